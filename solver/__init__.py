@@ -1,0 +1,52 @@
+"""Plate Analysis: the solver of plateviz, with no plotting and no user interface.
+
+From the pixel positions of stars on the exposures ("plates") of one satellite orbit and
+a reference catalogue it finds, in one Bayesian fit, every star's position, each
+exposure's pointing and focal length, the optical distortion and the detectors' places.
+
+This is the one place that turns on float64 in JAX: at a right ascension of 266 deg one
+float32 step is about 110 mas, four orders of magnitude above what is measured here.
+It does so without importing JAX, because readers of results (the web process among
+them) use this package too and must start without it: public names load on first use.
+
+`numpyro.plate` means a vectorised axis and collides with the paper's "plate"; here a
+plate is always called an exposure, and `plate_id` is only a column name.
+"""
+
+import importlib
+import os
+import sys
+
+os.environ["JAX_ENABLE_X64"] = "1"
+if "jax" in sys.modules:
+    sys.modules["jax"].config.update("jax_enable_x64", True)
+
+_PUBLIC = {
+    "FitResult": "solver.result",
+    "FitSettings": "solver.settings",
+    "InputError": "solver.errors",
+    "Instrument": "solver.instrument",
+    "OrbitData": "solver.orbit",
+    "PARAMETERS": "solver.parameters",
+    "SurveySettings": "solver.simulate.settings",
+    "fit_orbit": "solver.fit",
+    "inspect_files": "solver.io.inspect",
+    "read_orbit": "solver.io.read",
+    "read_result": "solver.io.result",
+    "simulate_survey": "solver.simulate.survey",
+    "write_result": "solver.io.result",
+}
+
+__all__ = sorted(_PUBLIC)
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name on first use, so that importing `solver` costs nothing."""
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'solver' has no attribute {name!r}")
+    return getattr(importlib.import_module(_PUBLIC[name]), name)
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return __all__

@@ -1,0 +1,17 @@
+"""The one exception that means "your input, not our code"."""
+
+
+class InputError(ValueError):
+    """Wrong input, described in one message for the person who can mend it.
+
+    The message names the file, the HDU or column, what was expected and what was found.
+    The command line prints it and exits with code 2.
+    """
+
+
+class CancelledError(RuntimeError):
+    """The person who asked for the work asked for it to stop; nothing was changed."""
+
+
+class FitError(RuntimeError):
+    """A fit that ended with nothing to show: the message says why."""

@@ -1,0 +1,170 @@
+"""Instrument: the nominal focal plane, built in for the mini-mock or read from TOML.
+
+Paper, section "Survey Design": focal length, four detectors of 1920 x 1920 pixels of
+10 um in a 2 x 2 grid with gaps of 3 mm. A detector's rotation is that of the model,
+Eq. (exp:model:nxny), which is minus the angle at which the detector is mounted.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from solver.errors import InputError
+
+
+@dataclass(frozen=True)
+class Detector:
+    """Nominal place of one detector.
+
+    Attributes
+    ----------
+    detector_id : as in the measurement table
+    x_um, y_um : centre on the focal plane, um
+    rotation_deg : rotation of Eq. (exp:model:nxny), deg
+    pitch_x_um, pitch_y_um : pixel pitch, um
+    n_x, n_y : number of pixels
+    """
+
+    detector_id: int
+    x_um: float
+    y_um: float
+    rotation_deg: float
+    pitch_x_um: float
+    pitch_y_um: float
+    n_x: int
+    n_y: int
+
+    def corners_um(self) -> np.ndarray:
+        """Return the corners on the distorted focal plane, um, shape (4, 2), in order."""
+        half = 0.5 * np.array([self.n_x * self.pitch_x_um, self.n_y * self.pitch_y_um])
+        pixels = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+        c, s = np.cos(np.radians(self.rotation_deg)), np.sin(np.radians(self.rotation_deg))
+        return pixels @ np.array([(c, -s), (s, c)]) + (self.x_um, self.y_um)
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """Nominal focal length, distortion scale and detectors of one instrument.
+
+    Attributes
+    ----------
+    name : for people
+    focal_length_um : nominal focal length, um
+    distortion_scale_um : 1/s of Eq. (model:Lx), the focal-plane radius mapped to 1, um
+    detectors : in the order of the detector axis
+    """
+
+    name: str
+    focal_length_um: float
+    distortion_scale_um: float
+    detectors: tuple[Detector, ...]
+
+    def index_of(self, detector_ids: np.ndarray) -> np.ndarray:
+        """Return the position of each id along the detector axis; -1 where unknown."""
+        known = {d.detector_id: i for i, d in enumerate(self.detectors)}
+        ids, inverse = np.unique(detector_ids, return_inverse=True)
+        return np.array([known.get(int(i), -1) for i in ids], dtype=np.int64)[inverse]
+
+
+def _mini_mock() -> Instrument:
+    # Places and rotations as in the published simulator: centres 11.1 mm from the axis.
+    places = ((-1, -1, 0.0), (1, -1, -90.0), (1, 1, 180.0), (-1, 1, 90.0))
+    return Instrument(
+        name="JASMINE mini-mock",
+        focal_length_um=4.86e6,
+        distortion_scale_um=21_000.0,
+        detectors=tuple(
+            Detector(i, 11_100.0 * x, 11_100.0 * y, rotation, 10.0, 10.0, 1920, 1920)
+            for i, (x, y, rotation) in enumerate(places)
+        ),
+    )
+
+
+MINI_MOCK = _mini_mock()
+
+_DETECTOR_KEYS = {
+    "id": "detector_id",
+    "x_um": "x_um",
+    "y_um": "y_um",
+    "rotation_deg": "rotation_deg",
+    "pitch_x_um": "pitch_x_um",
+    "pitch_y_um": "pitch_y_um",
+    "n_x": "n_x",
+    "n_y": "n_y",
+}
+
+
+def read_instrument(path: Path) -> Instrument:
+    """Read an instrument from a TOML file with the attributes of `Instrument`.
+
+    `[[detector]]` tables hold `id`, `x_um`, `y_um`, `rotation_deg`, `pitch_x_um`,
+    `pitch_y_um`, `n_x` and `n_y`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a key is missing or unknown, or a value is not usable.
+    """
+    try:
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: expected an instrument in TOML, found: {error}") from error
+    tables = content.pop("detector", [])
+    _expect_keys(path, "the file", content, {"name", "focal_length_um", "distortion_scale_um"})
+    if not isinstance(tables, list) or not tables:
+        raise InputError(f"{path}: expected at least one [[detector]] table, found none")
+    detectors = tuple(_detector(path, number, table) for number, table in enumerate(tables))
+    if len({d.detector_id for d in detectors}) < len(detectors):
+        raise InputError(f"{path}: expected each detector id once, found one repeated")
+    return Instrument(
+        str(content["name"]),
+        _positive(path, "focal_length_um", content["focal_length_um"]),
+        _positive(path, "distortion_scale_um", content["distortion_scale_um"]),
+        detectors,
+    )
+
+
+def write_instrument(instrument: Instrument) -> str:
+    """Return the TOML text that `read_instrument` reads back as `instrument`."""
+    lines = [
+        f'name = "{instrument.name}"',
+        f"focal_length_um = {instrument.focal_length_um!r}",
+        f"distortion_scale_um = {instrument.distortion_scale_um!r}",
+    ]
+    for detector in instrument.detectors:
+        lines += ["", "[[detector]]"]
+        lines += [f"{key} = {getattr(detector, name)!r}" for key, name in _DETECTOR_KEYS.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _detector(path: Path, number: int, table: dict) -> Detector:
+    where = f"detector number {number}"
+    _expect_keys(path, where, table, set(_DETECTOR_KEYS))
+    for key in ("pitch_x_um", "pitch_y_um", "n_x", "n_y"):
+        _positive(path, f"{key} of {where}", table[key])
+    integers = {"id", "n_x", "n_y"}
+    try:
+        values = {
+            name: (int if key in integers else float)(table[key])
+            for key, name in _DETECTOR_KEYS.items()
+        }
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: expected numbers in {where}, found: {error}") from error
+    return Detector(**values)
+
+
+def _expect_keys(path: Path, where: str, table: dict, expected: set[str]) -> None:
+    missing, unknown = sorted(expected - set(table)), sorted(set(table) - expected)
+    if missing or unknown:
+        raise InputError(
+            f"{path}: expected the keys {', '.join(sorted(expected))} in {where}; "
+            f"missing: {', '.join(missing) or 'none'}; unknown: {', '.join(unknown) or 'none'}"
+        )
+
+
+def _positive(path: Path, name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+        raise InputError(f"{path}: expected {name} to be a positive number, found {value!r}")
+    return float(value)

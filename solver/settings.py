@@ -1,0 +1,85 @@
+"""FitSettings: everything a person chooses about a fit, checked once, plain enough for JSON."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from solver.errors import InputError
+from solver.parameters import BY_NAME
+
+MAX_ORDER = 9
+ENGINES = ("gauss-newton",)
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """The choices of one fit.
+
+    Attributes
+    ----------
+    order : highest total degree of the Legendre distortion, 0 to 9
+    engine : one of `ENGINES`
+    prior_widths : group name -> standard deviation of its prior, in the group's
+        `width_unit`; for "sources" a factor on the catalogue's uncertainties;
+        `inf` for a flat prior. Groups not named keep the default of `parameters`.
+    aberration : whether stellar aberration is part of the forward model
+    max_iterations : limit of the engine
+    tolerance : the fit has converged when every step is below this times its uncertainty
+    """
+
+    order: int = 5
+    engine: str = "gauss-newton"
+    prior_widths: Mapping[str, float] = field(default_factory=dict)
+    aberration: bool = True
+    max_iterations: int = 20
+    tolerance: float = 1e-3
+
+    def __post_init__(self) -> None:
+        """Refuse what no fit can use; `InputError` names the setting."""
+        if not isinstance(self.order, int) or not 0 <= self.order <= MAX_ORDER:
+            raise InputError(
+                f"expected a distortion order from 0 to {MAX_ORDER}, found {self.order!r}"
+            )
+        if self.engine not in ENGINES:
+            raise InputError(
+                f"expected an engine out of {', '.join(ENGINES)}, found {self.engine!r}"
+            )
+        for name, width in self.prior_widths.items():
+            _check_width(name, width)
+        object.__setattr__(self, "prior_widths", dict(self.prior_widths))
+
+    def width(self, name: str) -> float:
+        """Return the prior width of group `name`, in its `width_unit`."""
+        return float(self.prior_widths.get(name, BY_NAME[name].width))
+
+    def with_(self, **changes: object) -> "FitSettings":
+        """Return a copy with some fields changed."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the settings as plain values; `from_dict` reads them back."""
+        return {
+            "order": self.order,
+            "engine": self.engine,
+            "aberration": self.aberration,
+            "max_iterations": self.max_iterations,
+            "tolerance": self.tolerance,
+            "prior_widths": dict(self.prior_widths),
+        }
+
+    @staticmethod
+    def from_dict(values: Mapping[str, object]) -> "FitSettings":
+        """Return the settings that `to_dict` wrote."""
+        return FitSettings(**values)  # type: ignore[arg-type]
+
+
+def _check_width(name: str, width: float) -> None:
+    if name not in BY_NAME:
+        raise InputError(f"expected a parameter group out of {', '.join(BY_NAME)}, found {name!r}")
+    if not width > 0 or math.isnan(width):
+        raise InputError(f"expected a positive prior width for {name}, found {width!r}")
+    if name == "sources" and math.isinf(width):
+        raise InputError(
+            "expected a finite factor on the catalogue's uncertainties for sources, found inf: "
+            "without the reference sources nothing fixes the solution on the sky"
+        )

@@ -1,0 +1,91 @@
+"""Catalogue sources at an epoch: directions and the covariance of their positions.
+
+Paper, Eqs. (exp:survey:alpha_p) to (exp:survey:sigma_delta_p), in vector form: uniform
+space motion from a Julian epoch in TCB and the parallax of the observer's barycentric
+position, without aberration. Errors are those of alpha* = alpha cos(dec) and delta.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from solver.projection import tangent_frame
+from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000, RAD_PER_DEG, RAD_PER_MAS
+
+_PARAMETERS = ("ra", "dec", "parallax", "pmra", "pmdec")
+
+
+class Places(NamedTuple):
+    """Sources at one epoch.
+
+    `frame` holds direction, east and north; `covariance` is that of (alpha*, delta), mas^2.
+    """
+
+    frame: Float[np.ndarray, "src 3 3"]
+    covariance: Float[np.ndarray, "src 2 2"]
+
+
+def propagate(
+    catalogue: pd.DataFrame, mjd_tcb: float, observer_position: Float[np.ndarray, " 3"]
+) -> Places:
+    """Return where the sources of a catalogue are seen from `observer_position`.
+
+    Parameters
+    ----------
+    catalogue : `schema.CATALOGUE`
+    mjd_tcb : epoch, MJD in TCB
+    observer_position : barycentric, au
+    """
+    years = _years_since_epoch(catalogue, mjd_tcb)
+    start = tangent_frame(catalogue["ra"].to_numpy(), catalogue["dec"].to_numpy())
+    direction, east, north = start[:, 0], start[:, 1], start[:, 2]
+    motion = (
+        RAD_PER_MAS
+        * years[:, None]
+        * (
+            catalogue["pmra"].to_numpy()[:, None] * east
+            + catalogue["pmdec"].to_numpy()[:, None] * north
+        )
+    )
+    parallax = RAD_PER_MAS * catalogue["parallax"].to_numpy()[:, None] * observer_position
+    frame = tangent_frame(*sky_position(direction + motion - parallax))
+    return Places(frame, _covariance(catalogue, years, start, observer_position))
+
+
+def sky_position(
+    direction: Float[np.ndarray, "n 3"],
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return right ascension in [0, 360) and declination, deg, of vectors of any length."""
+    x, y, z = direction.T
+    return (
+        np.mod(np.arctan2(y, x), 2 * np.pi) / RAD_PER_DEG,
+        np.arctan2(z, np.hypot(x, y)) / RAD_PER_DEG,
+    )
+
+
+def _years_since_epoch(catalogue: pd.DataFrame, mjd_tcb: float) -> Float[np.ndarray, " src"]:
+    julian_year = 2000.0 + (mjd_tcb - MJD_J2000) / DAYS_PER_JULIAN_YEAR
+    return julian_year - catalogue["ref_epoch"].to_numpy()
+
+
+def _covariance(
+    catalogue: pd.DataFrame,
+    years: Float[np.ndarray, " src"],
+    frame: Float[np.ndarray, "src 3 3"],
+    observer_position: Float[np.ndarray, " 3"],
+) -> Float[np.ndarray, "src 2 2"]:
+    """Propagate the 5 x 5 covariance of the catalogue to (alpha*, delta) at the epoch."""
+    sigma = np.stack([catalogue[f"{name}_error"].to_numpy() for name in _PARAMETERS], axis=-1)
+    correlation = np.tile(np.eye(5), (len(catalogue), 1, 1))
+    for i, first in enumerate(_PARAMETERS):
+        for j in range(i + 1, 5):
+            name = f"{first}_{_PARAMETERS[j]}_corr"
+            correlation[:, i, j] = correlation[:, j, i] = catalogue[name].to_numpy()
+    jacobian = np.zeros((len(catalogue), 2, 5))
+    jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
+    jacobian[:, :, 2] = -frame[:, 1:] @ observer_position
+    jacobian[:, 0, 3] = jacobian[:, 1, 4] = years
+    scaled = jacobian * sigma[:, None, :]
+    return scaled @ correlation @ scaled.transpose(0, 2, 1)

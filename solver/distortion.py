@@ -1,0 +1,45 @@
+"""Legendre distortion of any order: ideal to distorted focal plane.
+
+Paper, Eqs. (model:Lx, model:Ly, model:A0, model:B0, model:first). The first order is
+zero, since pointing, focal length and position angle carry it, and the constant term is
+fixed such that the optical centre is not displaced. Both hold for every order when each
+term is taken as L_k(x) L_l(y) - L_k(0) L_l(0), with total degree from 2 upwards.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+
+def terms(order: int) -> list[tuple[int, int]]:
+    """Return the degrees (k, l) of the terms up to `order`.
+
+    They are ordered by total degree, then by falling power of x, so that the terms of a
+    lower order come first.
+    """
+    return [(n - j, j) for n in range(2, order + 1) for j in range(n + 1)]
+
+
+def basis(x: Float[Array, " obs"], y: Float[Array, " obs"], order: int) -> Float[Array, "obs coef"]:
+    """Return the value of every distortion term.
+
+    Parameters
+    ----------
+    x, y : ideal focal-plane position times s, within [-1, 1] on the field
+    order : highest total degree
+    """
+    if order < 2:
+        return jnp.zeros((*x.shape, 0), x.dtype)
+    in_x, in_y = _legendre(x, order), _legendre(y, order)
+    at_zero = np.array([np.polynomial.legendre.legval(0.0, row) for row in np.eye(order + 1)])
+    return jnp.stack(
+        [in_x[k] * in_y[j] - at_zero[k] * at_zero[j] for k, j in terms(order)], axis=-1
+    )
+
+
+def _legendre(x: Float[Array, " obs"], order: int) -> list[Float[Array, " obs"]]:
+    """Return L_0 ... L_order by Bonnet's recursion."""
+    values = [jnp.ones_like(x), x]
+    for n in range(1, order):
+        values.append(((2 * n + 1) * x * values[n] - n * values[n - 1]) / (n + 1))
+    return values

@@ -1,0 +1,81 @@
+"""Sky to the ideal focal plane: directions, pointing axes, gnomonic projection.
+
+Paper, section "Observation model", Eqs. (method:projection) and (method:ideal), written
+with unit vectors: trigonometry belongs to sources and exposures, and what is left for
+each measurement is three dot products.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+
+def tangent_frame(
+    ra_deg: Float[np.ndarray, " n"], dec_deg: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 3 3"]:
+    """Return the local frames (direction, east, north) at sky positions.
+
+    Parameters
+    ----------
+    ra_deg, dec_deg : deg
+
+    Returns
+    -------
+    unit vectors along the second axis, in the order direction, east, north
+    """
+    a, d = np.radians(ra_deg), np.radians(dec_deg)
+    ca, sa, cd, sd, zero = np.cos(a), np.sin(a), np.cos(d), np.sin(d), np.zeros_like(a)
+    rows = [(cd * ca, cd * sa, sd), (-sa, ca, zero), (-sd * ca, -sd * sa, cd)]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def displace(
+    frame: Float[Array, "n 3 3"], east: Float[Array, " n"], north: Float[Array, " n"]
+) -> Float[Array, "n 3"]:
+    """Return unit vectors displaced in the tangent plane of their frames.
+
+    Parameters
+    ----------
+    frame : as from `tangent_frame`
+    east, north : rad
+    """
+    moved = frame[:, 0] + east[:, None] * frame[:, 1] + north[:, None] * frame[:, 2]
+    return moved / jnp.linalg.norm(moved, axis=-1, keepdims=True)
+
+
+def focal_axes(
+    centre: Float[Array, "exp 3"], position_angle: Float[Array, " exp"]
+) -> Float[Array, "exp 3 3"]:
+    """Return the axes of the focal plane on the sky: x, y and the optical axis.
+
+    Eq. (method:ideal) as vectors: with east E and north N at the pointing,
+    x = -cos(theta) E + sin(theta) N and y = sin(theta) E + cos(theta) N.
+
+    Parameters
+    ----------
+    centre : unit vectors of the pointings
+    position_angle : rad
+    """
+    # East is the pole crossed with the direction, and has no third component.
+    east = jnp.stack([-centre[:, 1], centre[:, 0], jnp.zeros_like(centre[:, 0])], axis=-1)
+    east = east / jnp.linalg.norm(east, axis=-1, keepdims=True)
+    north = jnp.cross(centre, east)
+    c, s = jnp.cos(position_angle)[:, None], jnp.sin(position_angle)[:, None]
+    return jnp.stack([-c * east + s * north, s * east + c * north, centre], axis=-2)
+
+
+def project(
+    components: Float[Array, "obs 3"], focal_length: Float[Array, " obs"]
+) -> Float[Array, "obs 2"]:
+    """Project directions onto the ideal focal plane, Eqs. (method:projection, method:ideal).
+
+    Parameters
+    ----------
+    components : along the axes of `focal_axes`; any common length
+    focal_length : um
+
+    Returns
+    -------
+    um, origin on the optical axis
+    """
+    return focal_length[:, None] * components[:, :2] / components[:, 2:]

@@ -1,0 +1,100 @@
+"""Figures that say whether a solution can be trusted: arrays in, numbers out.
+
+Paper, section "Results", Eq. (result:deviation); with expected values beside them,
+because a point estimate of a reference star does not scatter as its prior does.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from solver.gauss_newton import Mode
+from solver.leverage import Covariances
+from solver.priors import Priors
+from solver.schur import Reduced
+
+
+class NormalisedDeviation(NamedTuple):
+    """Root mean square of (estimate - prior) / prior sigma of the reference stars.
+
+    `expected` is its expectation, which is below one: the estimate is drawn towards the
+    prior, so that its variance about it is the prior's less the marginal one.
+    """
+
+    measured: Float[np.ndarray, " 2"]
+    expected: Float[np.ndarray, " 2"]
+
+
+def normalised_deviation(
+    sources: Float[np.ndarray, "src 2"],
+    prior_variance: Float[np.ndarray, "src 2"],
+    marginal_variance: Float[np.ndarray, "src 2"],
+    is_reference: Bool[np.ndarray, " src"],
+) -> NormalisedDeviation:
+    """Return Eq. (result:deviation) in alpha* and delta, with its expectation.
+
+    Parameters
+    ----------
+    sources : estimate minus prior, mas
+    prior_variance, marginal_variance : mas^2
+    """
+    squares = sources[is_reference] ** 2 / prior_variance[is_reference]
+    shares = 1.0 - marginal_variance[is_reference] / prior_variance[is_reference]
+    return NormalisedDeviation(np.sqrt(squares.mean(axis=0)), np.sqrt(shares.mean(axis=0)))
+
+
+def effective_parameters(
+    priors: Priors, curvature: Float[np.ndarray, " calib"], covariance: Covariances
+) -> float:
+    """Return the number of parameters that the data decide: n less the prior shares."""
+    of_sources = 2 * len(priors.precision) - np.einsum(
+        "sij,sji->", priors.precision, covariance.source
+    )
+    of_theta = len(curvature) - curvature @ np.diag(covariance.theta)
+    return float(of_sources + of_theta)
+
+
+def log_evidence(mode: Mode, priors: Priors, log_sigma_sum: float, n_coordinates: int) -> float:
+    """Return the logarithm of the evidence in Laplace's approximation.
+
+    Parameters
+    ----------
+    log_sigma_sum : sum of log sigma over all measured coordinates, pixels
+    n_coordinates : two for each measurement
+    """
+    if mode.reduced is None:
+        return float("nan")
+    n_parameters = len(mode.theta) + mode.sources.size
+    likelihood = -0.5 * n_coordinates * np.log(2.0 * np.pi) - log_sigma_sum
+    volume = 0.5 * n_parameters * np.log(2.0 * np.pi) - 0.5 * mode.reduced.log_determinant()
+    return float(likelihood + volume + priors.log_normalisation() - 0.5 * mode.trace[-1].objective)
+
+
+def mean_covariance(
+    reduced: Reduced, members: Bool[np.ndarray, " src"]
+) -> Float[np.ndarray, "2 2"]:
+    """Return the covariance of the mean position error of some sources, mas^2.
+
+    Their errors share the calibration, and with it the reference stars' errors, so this
+    does not fall with their number.
+    """
+    count = max(int(members.sum()), 1)
+    conditional = reduced.conditional_covariance()[members].sum(axis=0) / count**2
+    shared = reduced.response()[members].sum(axis=0) / count
+    return conditional + shared @ reduced.theta_covariance() @ shared.T
+
+
+def induced_shift(
+    reduced: Reduced,
+    priors: Priors,
+    reference_error: Float[np.ndarray, "src 2"],
+) -> Float[np.ndarray, "src 2"]:
+    """Return the shift of every source that errors of the reference positions cause, mas.
+
+    Parameters
+    ----------
+    reference_error : catalogue minus truth of reference stars, zero for the others, mas
+    """
+    pull = np.einsum("sij,sj->si", priors.precision, reference_error)
+    return reduced.solve(np.zeros(len(reduced.by_theta)), pull)[1]

@@ -1,0 +1,81 @@
+"""Layout: where each calibration parameter stands in the flat vector the engines solve for.
+
+Exposures come first, all groups of one exposure together, then the distortion's two
+directions, then the detectors, all groups of one detector together: the parameters that
+one measurement touches lie in three runs of columns.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from solver.parameters import CALIBRATION_GROUPS, Group, groups_on
+
+PER_EXPOSURE = groups_on("exp")
+PER_COEFFICIENT = groups_on("coef")
+PER_DETECTOR = groups_on("det")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Sizes of the calibration axes and the columns that follow from them."""
+
+    n_exp: int
+    n_coef: int
+    n_det: int
+
+    @property
+    def size(self) -> int:
+        """Number of calibration parameters."""
+        return self.first_detector + self.n_det * len(PER_DETECTOR)
+
+    @property
+    def first_coefficient(self) -> int:
+        """Column of the first distortion coefficient."""
+        return self.n_exp * len(PER_EXPOSURE)
+
+    @property
+    def first_detector(self) -> int:
+        """Column of the first detector parameter."""
+        return self.first_coefficient + self.n_coef * len(PER_COEFFICIENT)
+
+    def exposure(self, m: int) -> slice:
+        """Return the columns of exposure `m`."""
+        return slice(m * len(PER_EXPOSURE), (m + 1) * len(PER_EXPOSURE))
+
+    def coefficients(self) -> slice:
+        """Return the columns of the distortion, first all of A, then all of B."""
+        return slice(self.first_coefficient, self.first_detector)
+
+    def detector(self, n: int) -> slice:
+        """Return the columns of detector `n`."""
+        first = self.first_detector + n * len(PER_DETECTOR)
+        return slice(first, first + len(PER_DETECTOR))
+
+    def touched(self, m: int, n: int) -> tuple[slice, slice, slice]:
+        """Return the runs of columns that a measurement of exposure m, detector n touches."""
+        return self.exposure(m), self.coefficients(), self.detector(n)
+
+    def columns(self, group: Group) -> np.ndarray:
+        """Return the columns of one group, in the order of its axis."""
+        if group.axis == "coef":
+            first = self.first_coefficient + PER_COEFFICIENT.index(group) * self.n_coef
+            return np.arange(first, first + self.n_coef)
+        members, first, count = (
+            (PER_EXPOSURE, 0, self.n_exp)
+            if group.axis == "exp"
+            else (PER_DETECTOR, self.first_detector, self.n_det)
+        )
+        return first + members.index(group) + len(members) * np.arange(count)
+
+    def gather(self, values: dict[str, Float[np.ndarray, " n"]]) -> Float[np.ndarray, " calib"]:
+        """Return the flat vector of values given per group."""
+        flat = np.empty(self.size)
+        for group in CALIBRATION_GROUPS:
+            flat[self.columns(group)] = values[group.name]
+        return flat
+
+    def scatter(self, flat: Float[np.ndarray, " calib"]) -> dict[str, Float[np.ndarray, " n"]]:
+        """Return the values per group of a flat vector."""
+        return {group.name: flat[self.columns(group)] for group in CALIBRATION_GROUPS}

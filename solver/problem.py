@@ -1,0 +1,215 @@
+"""Problem: the tables of one orbit as arrays, in the order that the engines work in.
+
+Measurements are sorted by exposure, detector and source, so that those which share a
+run of calibration parameters lie together. Shapes are padded to few sizes, because each
+new one costs JAX a compilation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float, Int
+
+from solver.astrometry import propagate
+from solver.distortion import terms
+from solver.ephemeris import observer_at
+from solver.errors import InputError
+from solver.forward import Geometry, Index
+from solver.instrument import Instrument
+from solver.layout import Layout
+from solver.orbit import OrbitData
+from solver.parameters import CALIBRATION_GROUPS, PARAMETERS, SOURCES
+from solver.priors import Priors, group_widths
+from solver.projection import tangent_frame
+from solver.settings import MAX_ORDER, FitSettings
+
+_KEY = ["field_id", "plate_id"]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One orbit, ready to be solved.
+
+    Attributes
+    ----------
+    geometry : origins of all parameters, padded along src and exp
+    index : source, exposure and detector of each measurement
+    measured : pixels from the detector's centre
+    sigma : pixels
+    row : row of each measurement in the input table
+    sources : catalogue rows of the measured sources, in ascending source_id
+    exposures : environment rows, in order of (field_id, plate_id)
+    priors : in offsets from the origins
+    layout : columns of the calibration parameters
+    epoch : mean epoch, MJD in TCB
+    """
+
+    geometry: Geometry
+    index: Index
+    measured: Float[np.ndarray, "obs 2"]
+    sigma: Float[np.ndarray, "obs 2"]
+    row: Int[np.ndarray, " obs"]
+    sources: pd.DataFrame
+    exposures: pd.DataFrame
+    priors: Priors
+    layout: Layout
+    epoch: float
+
+    @property
+    def n_obs(self) -> int:
+        """Number of measurements, two coordinates each."""
+        return len(self.row)
+
+    @property
+    def n_src(self) -> int:
+        """Number of measured sources."""
+        return len(self.sources)
+
+    def offsets(
+        self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
+    ) -> dict[str, Float[np.ndarray, "..."]]:
+        """Return the parameters as `solver.forward.predict` takes them, padded."""
+        sizes = {"exp": len(self.geometry.pointing_frame), "src": len(self.geometry.source_frame)}
+        values = {**self.layout.scatter(theta), SOURCES.name: sources}
+        return {
+            group.name: pad(values[group.name], sizes.get(group.axis, 0)) for group in PARAMETERS
+        }
+
+
+def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings) -> Problem:
+    """Turn the tables of one orbit into a problem to solve.
+
+    Raises
+    ------
+    InputError
+        If a detector is not part of the instrument, or the measurements cannot hold the
+        distortion order asked for.
+    """
+    exposures = data.exposures.sort_values(_KEY, ignore_index=True)
+    measured_ids = np.unique(data.measurements["source_id"].to_numpy())
+    sources = data.catalogue.set_index("source_id").loc[measured_ids].reset_index()
+    index, row = _index(data.measurements, exposures, measured_ids, instrument)
+    layout = Layout(len(exposures), len(terms(settings.order)), len(instrument.detectors))
+    _check_freedom(len(row), len(sources), layout, settings.order)
+
+    epoch = float(exposures["obstime"].mean())
+    places = propagate(sources, epoch, observer_at(np.array([epoch])).position[0])
+    centres = calibration_centres(exposures, instrument, layout)
+    table = data.measurements.iloc[row]
+    return Problem(
+        geometry=_geometry(places.frame, exposures, centres, instrument, settings),
+        index=index,
+        measured=table[["nx", "ny"]].to_numpy(),
+        sigma=table[["sx", "sy"]].to_numpy(),
+        row=row,
+        sources=sources,
+        exposures=exposures,
+        priors=_priors(places.covariance, centres, settings, layout),
+        layout=layout,
+        epoch=epoch,
+    )
+
+
+def _index(
+    measurements: pd.DataFrame,
+    exposures: pd.DataFrame,
+    source_ids: Int[np.ndarray, " src"],
+    instrument: Instrument,
+) -> tuple[Index, Int[np.ndarray, " obs"]]:
+    """Return the indices of the measurements in working order, and their input rows."""
+    source = np.searchsorted(source_ids, measurements["source_id"].to_numpy())
+    keys = pd.MultiIndex.from_frame(exposures[_KEY])
+    exposure = keys.get_indexer(pd.MultiIndex.from_frame(measurements[_KEY]))
+    detector = instrument.index_of(measurements["detector_id"].to_numpy())
+    if (detector < 0).any():
+        unknown = sorted(set(measurements["detector_id"].to_numpy()[detector < 0].tolist()))
+        known = [d.detector_id for d in instrument.detectors]
+        raise InputError(
+            f"column detector_id of the measurements: expected detectors of the instrument "
+            f"{instrument.name!r} ({known}), found {unknown}"
+        )
+    row = np.lexsort((source, detector, exposure))
+    return Index(source[row], exposure[row], detector[row]), row
+
+
+def _check_freedom(n_obs: int, n_src: int, layout: Layout, order: int) -> None:
+    """Refuse a distortion order for which there are more parameters than data."""
+    others = 2 * n_src + layout.size - 2 * layout.n_coef
+    if 2 * n_obs > others + 2 * layout.n_coef:
+        return
+    possible = [n for n in range(MAX_ORDER + 1) if 2 * n_obs > others + 2 * len(terms(n))]
+    hint = f"the highest order they can hold is {max(possible)}" if possible else "no order fits"
+    raise InputError(
+        f"distortion order {order}: expected more than {others + 2 * layout.n_coef} coordinates "
+        f"measured for as many parameters, found {2 * n_obs} ({n_obs} measurements); {hint}"
+    )
+
+
+def calibration_centres(
+    exposures: pd.DataFrame, instrument: Instrument, layout: Layout
+) -> dict[str, Float[np.ndarray, " n"]]:
+    """Return the prior centres of every calibration group, in the group's unit."""
+    centres = {}
+    for group in CALIBRATION_GROUPS:
+        if group.origin == "environment":
+            values = exposures[group.column].to_numpy(dtype=np.float64)
+        elif group.origin == "instrument":
+            values = np.array([getattr(d, group.column) for d in instrument.detectors], float)
+        else:
+            values = np.zeros(len(layout.columns(group)))
+        centres[group.name] = values * group.per_value_unit
+    return centres
+
+
+def _geometry(
+    source_frame: Float[np.ndarray, "src 3 3"],
+    exposures: pd.DataFrame,
+    centres: dict[str, Float[np.ndarray, " n"]],
+    instrument: Instrument,
+    settings: FitSettings,
+) -> Geometry:
+    satellite = exposures[[f"satellite_v{axis}" for axis in "xyz"]].to_numpy()
+    observer = observer_at(exposures["obstime"].to_numpy(), satellite)
+    pointing = tangent_frame(exposures["ra_est"].to_numpy(), exposures["dec_est"].to_numpy())
+    sizes = {"exp": _rounded_up(len(exposures), 16)}
+    return Geometry(
+        source_frame=pad(source_frame, _rounded_up(len(source_frame), 1024)),
+        pointing_frame=pad(pointing, sizes["exp"]),
+        origin={
+            group.name: pad(centres[group.name], sizes.get(group.axis, 0))
+            for group in CALIBRATION_GROUPS
+            if not group.name.startswith("pointing")
+        },
+        velocity=pad(observer.velocity * settings.aberration, sizes["exp"]),
+        sun_distance=pad(observer.sun_distance, sizes["exp"]),
+        distortion_scale=np.array(instrument.distortion_scale_um),
+        order=settings.order,
+    )
+
+
+def _priors(
+    covariance: Float[np.ndarray, "src 2 2"],
+    centres: dict[str, Float[np.ndarray, " n"]],
+    settings: FitSettings,
+    layout: Layout,
+) -> Priors:
+    is_gamma = {
+        g.name: np.full(len(centres[g.name]), g.family == "gamma") for g in CALIBRATION_GROUPS
+    }
+    return Priors(
+        centre=layout.gather(centres),
+        width=layout.gather(group_widths(settings, centres)),
+        is_gamma=layout.gather(is_gamma).astype(bool),
+        precision=np.linalg.inv(covariance * settings.width(SOURCES.name) ** 2),
+    )
+
+
+def pad(values: Float[np.ndarray, "n ..."], length: int) -> Float[np.ndarray, "m ..."]:
+    """Return `values` lengthened to `length` by repeats of the last row."""
+    missing = max(length - len(values), 0)
+    return np.concatenate([values, np.repeat(values[-1:], missing, axis=0)])
+
+
+def _rounded_up(length: int, step: int) -> int:
+    return -(-length // step) * step

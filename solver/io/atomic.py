@@ -1,0 +1,89 @@
+"""Atomic file writing: a reader sees the old file or the new one, never a part of it."""
+
+import hashlib
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from solver.errors import InputError
+
+
+@contextmanager
+def write_atomically(path: Path) -> Iterator[Path]:
+    """Give a temporary path beside `path` that takes its place once it is whole.
+
+    Parameters
+    ----------
+    path : the file to write; one that exists is replaced
+
+    Yields
+    ------
+    An empty file in the same folder and with the same suffix. When the block ends it is
+    flushed to disk and renamed to `path`; when the block raises it is removed and `path`
+    is left as it was.
+
+    Raises
+    ------
+    InputError
+        Before the block runs if `path` cannot be written; after it if the disk refuses.
+    """
+    target = require_writable(path)
+    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(6)}{target.suffix}")
+    try:
+        temporary.touch(exist_ok=False)
+        yield temporary
+        _flush(temporary)
+        os.replace(temporary, target)
+        _flush(target.parent)
+    except OSError as error:
+        raise InputError(f"{path}: expected to write the file, found: {error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def require_writable(path: Path) -> Path:
+    """Return the place where `path` is to be written, links followed.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing or read-only, or `path` is something other than a file
+        that may be replaced.
+    """
+    target = Path(path).resolve()
+    folder = target.parent
+    if not folder.is_dir():
+        raise InputError(f"{path}: expected to write into a folder, found no folder {folder}")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: expected a folder that can be written, found {folder} read-only")
+    # A device such as /dev/null exists but must never be renamed over.
+    if target.exists() and not target.is_file():
+        raise InputError(f"{path}: expected a file to write, found something that is not a file")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise InputError(f"{path}: expected a file that can be replaced, found it read-only")
+    return target
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file as 64 hexadecimal digits.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    try:
+        with Path(path).open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: expected a readable file, found: {error}") from error
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

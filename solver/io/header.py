@@ -1,0 +1,99 @@
+"""FITS headers of a result: what made it, and the figures that its readers look for."""
+
+import json
+import math
+from importlib import metadata
+
+import numpy as np
+from astropy.io import fits
+
+from solver.result import FitResult
+
+ORIGIN = "plateviz"
+FORMAT = 1
+
+_VERSIONS = {"PLATEVIZ": "plateviz", "JAX": "jax", "NUMPY": "numpy", "ASTROPY": "astropy"}
+
+# Keyword, value, comment. Text of any length has no comment, for it may leave no room.
+Card = tuple[str, object, str]
+
+
+def primary_header(result: FitResult) -> fits.Header:
+    """Return the primary header: format, versions, settings, inputs and figures."""
+    inputs = list(result.provenance.items())
+    settings = result.settings
+    cards: list[Card] = [
+        ("ORIGIN", ORIGIN, "program that wrote this file"),
+        ("FORMAT", FORMAT, "version of this layout"),
+        *(
+            (keyword, _version(package), f"version of {package}")
+            for keyword, package in _VERSIONS.items()
+        ),
+        ("INPUT", inputs[0][0] if inputs else None, ""),
+        ("REFCAT", inputs[1][0] if len(inputs) > 1 else None, ""),
+    ]
+    for number, (name, digest) in enumerate(inputs, 1):
+        cards += [
+            (f"INFILE{number}", name, ""),
+            (f"INHASH{number}", digest, ""),
+        ]
+    cards += [
+        ("ENGINE", settings.engine, "engine of the fit"),
+        ("ORDER", settings.order, "order of the distortion"),
+        ("ABERR", settings.aberration, "aberration in the model"),
+        ("MAXITER", settings.max_iterations, "limit of iterations"),
+        ("TOLER", settings.tolerance, "steps over sigma at convergence"),
+        ("PRIORS", json.dumps(dict(settings.prior_widths)), ""),
+        ("NITER", int(result.trace["iteration"].max()) if len(result.trace) else 0, "iterations"),
+        *_figures(result),
+    ]
+    return _header(cards)
+
+
+def result_header(result: FitResult) -> fits.Header:
+    """Return the header of RESULT, with the keywords of the published files."""
+    references = result.sources[result.sources["is_reference"]]
+    loss = result.trace["objective"].iloc[-1] if len(result.trace) else math.nan
+    words = "std of offset over prior sigma, references"
+    return _header(
+        [
+            *_figures(result),
+            ("LOSS", loss, "final objective"),
+            ("SIGMA_RA", _scatter(references["offset_ra"], references["prior_sigma_ra"]), words),
+            ("SIGMA_DE", _scatter(references["offset_dec"], references["prior_sigma_dec"]), words),
+        ]
+    )
+
+
+def _figures(result: FitResult) -> list[Card]:
+    sigma_x, sigma_y = result.residuals["sx"].mean(), result.residuals["sy"].mean()
+    return [
+        ("OBSTIME", result.exposures["obstime"].mean(), "mean epoch, MJD (TCB)"),
+        ("SIGMA_X", sigma_x, "[pix] mean measurement uncertainty in x"),
+        ("SIGMA_Y", sigma_y, "[pix] mean measurement uncertainty in y"),
+        ("SIGMA", (sigma_x + sigma_y) / 2.0, "[pix] mean measurement uncertainty"),
+    ]
+
+
+def _scatter(offset: np.ndarray, sigma: np.ndarray) -> float:
+    return float(np.std(np.asarray(offset) / np.asarray(sigma))) if len(offset) else math.nan
+
+
+def _header(cards: list[Card]) -> fits.Header:
+    header = fits.Header()
+    for keyword, value, comment in cards:
+        plain = value.item() if isinstance(value, np.generic) else value
+        # A FITS header has no NaN; what is not known is left out.
+        if plain is None or (isinstance(plain, float) and not math.isfinite(plain)):
+            continue
+        if isinstance(plain, str):
+            plain = plain.encode("unicode_escape").decode("ascii")
+        header[keyword] = (plain, comment)
+    return header
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,239 @@
+"""Result files: the published result layout in FITS, written and read without loss."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from astropy.io import fits
+from astropy.table import Table as RawTable
+
+from solver import schema
+from solver.errors import InputError
+from solver.io import layout
+from solver.io.atomic import write_atomically
+from solver.io.failure import reading
+from solver.io.fits import FitsFile, read_fits
+from solver.io.header import FORMAT, ORIGIN, primary_header, result_header
+from solver.io.layout import Derived, Layout
+from solver.result import FitResult
+from solver.settings import FitSettings
+
+_SUMMARY = "SUMMARY"
+_SECTIONS = ("summary", "settings", "provenance")
+_KINDS = {"int64": "iu", "float64": "f", "bool": "b", "str": "SU"}
+
+
+def write_result(result: FitResult, path: Path) -> None:
+    """Write a fitted orbit in the published result layout, in one step.
+
+    Parameters
+    ----------
+    result : what to write; `read_result` reads back every table and value of it
+    path : the FITS file; one that exists is replaced once the new one is whole
+
+    Raises
+    ------
+    InputError
+        If `path` cannot be written.
+    """
+    with write_atomically(path) as temporary:
+        hdus = fits.HDUList(
+            [
+                fits.PrimaryHDU(header=primary_header(result)),
+                _table_hdu(
+                    layout.RESULT,
+                    result.sources,
+                    layout.source_sigmas(result.sources),
+                    result_header(result),
+                ),
+                _table_hdu(layout.SAMPLE, result.residuals),
+                _derived_hdu("TELESCOPE", layout.telescope(result)),
+                _derived_hdu("DETECTOR", layout.detector(result)),
+                _derived_hdu("DISTORTION", layout.distortion(result)),
+                _table_hdu(layout.TRACE, result.trace),
+                _table_hdu(layout.CALIBRATION, result.calibration),
+                _table_hdu(layout.EXPOSURES, result.exposures),
+                _derived_hdu(_SUMMARY, _summary_columns(result)),
+            ]
+        )
+        if result.true_places is not None:
+            hdus.append(_table_hdu(layout.TRUE_PLACES, result.true_places))
+        hdus.writeto(temporary, overwrite=True, checksum=True)
+
+
+def read_result(path: Path) -> FitResult:
+    """Read a fitted orbit that `write_result` wrote.
+
+    Raises
+    ------
+    InputError
+        If the file is not such a result, is damaged or incomplete, or has a newer format.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: expected a result file, found none")
+    return to_result(path, read_fits(path))
+
+
+def to_result(path: Path, file: FitsFile) -> FitResult:
+    """Return the fitted orbit that the contents of `path` are; raises as `read_result`."""
+    _check_format(path, file.primary)
+    sections = _read_summary(path, _table(path, file, _SUMMARY))
+    with reading(f"{path}, HDU {_SUMMARY}", "the settings of a fit"):
+        settings = FitSettings.from_dict(sections["settings"])
+    places = layout.TRUE_PLACES
+    return FitResult(
+        sources=_frame(path, file, layout.RESULT),
+        residuals=_frame(path, file, layout.SAMPLE),
+        calibration=_frame(path, file, layout.CALIBRATION),
+        exposures=_frame(path, file, layout.EXPOSURES),
+        trace=_frame(path, file, layout.TRACE),
+        summary=sections["summary"],
+        settings=settings,
+        provenance=sections["provenance"],
+        true_places=_frame(path, file, places) if places.hdu in file.tables else None,
+    )
+
+
+def is_result(primary: fits.Header) -> bool:
+    """Return whether a primary header is that of a result of ours, of any version."""
+    return primary.get("ORIGIN") == ORIGIN and isinstance(primary.get("FORMAT"), int)
+
+
+def _check_format(path: Path, primary: fits.Header) -> None:
+    if not is_result(primary):
+        raise InputError(
+            f"{path}: expected a result file, with ORIGIN = {ORIGIN!r} and FORMAT in the primary "
+            f"header, found ORIGIN = {primary.get('ORIGIN')!r}, FORMAT = {primary.get('FORMAT')!r}"
+        )
+    if primary["FORMAT"] > FORMAT:
+        raise InputError(
+            f"{path}: expected a result of format {FORMAT} or older, found format "
+            f"{primary['FORMAT']}: it was written by a newer version "
+            f"({primary.get('PLATEVIZ', 'unknown')})"
+        )
+
+
+def _table_hdu(
+    kept: Layout,
+    frame: pd.DataFrame,
+    extra: list[Derived] | None = None,
+    header: fits.Header | None = None,
+) -> fits.BinTableHDU:
+    columns = [
+        Derived(
+            kept.name(column),
+            "" if column.name in kept.unitless else column.unit,
+            f"[{column.unit}] {column.meaning}" if column.unit else column.meaning,
+            _stored(frame[column.name], column),
+        )
+        for column in kept.table
+    ]
+    columns += extra or []
+    order = {name: rank for rank, name in enumerate(layout.PUBLISHED_ORDER.get(kept.hdu, ()))}
+    columns.sort(key=lambda column: order.get(column.name, len(order)))
+    return _derived_hdu(kept.hdu, columns, header)
+
+
+def _derived_hdu(
+    name: str, columns: list[Derived], header: fits.Header | None = None
+) -> fits.BinTableHDU:
+    table = RawTable({column.name: column.values for column in columns})
+    for column in columns:
+        table[column.name].unit = column.unit or None
+    hdu = fits.table_to_hdu(table)
+    hdu.name = name
+    hdu.header.extend(header or ())
+    for number, column in enumerate(columns, 1):
+        hdu.header.set(f"TCOMM{number}", column.meaning, after=f"TTYPE{number}")
+    return hdu
+
+
+def _stored(values: pd.Series, column: schema.Column) -> np.ndarray:
+    if column.dtype == "str":
+        return _text_array([_escape(text) for text in values])
+    return values.to_numpy(dtype=column.dtype)
+
+
+def _text_array(texts: list[str]) -> np.ndarray:
+    return np.array(texts, dtype=np.str_)
+
+
+def _escape(text: str) -> str:
+    # FITS tables hold ASCII and drop spaces at the end.
+    plain = text.encode("unicode_escape").decode("ascii")
+    bare = plain.rstrip(" ")
+    return bare + r"\x20" * (len(plain) - len(bare))
+
+
+def _unescape(text: str) -> str:
+    return text.encode("ascii").decode("unicode_escape")
+
+
+def _summary_columns(result: FitResult) -> list[Derived]:
+    contents = (result.summary, result.settings.to_dict(), result.provenance)
+    rows = [
+        (section, _escape(str(key)), json.dumps(value, default=_plain))
+        for section, content in zip(_SECTIONS, contents, strict=True)
+        for key, value in content.items()
+    ]
+    columns = zip(*rows, strict=True)
+    return [
+        Derived(name, "", meaning, _text_array(list(texts)))
+        for (name, meaning), texts in zip(
+            (("section", "of what"), ("key", "name"), ("value", "value, as JSON")),
+            columns,
+            strict=True,
+        )
+    ]
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"expected plain numbers and words, got {type(value).__name__}")
+
+
+def _read_summary(path: Path, table: RawTable) -> Mapping[str, dict]:
+    sections: dict[str, dict] = {section: {} for section in _SECTIONS}
+    with reading(f"{path}, HDU {_SUMMARY}", "columns section, key, value with JSON values"):
+        for row in table:
+            value = json.loads(str(row["value"]))
+            sections[str(row["section"])][_unescape(str(row["key"]))] = value
+    return sections
+
+
+def _table(path: Path, file: FitsFile, name: str) -> RawTable:
+    if name not in file.tables:
+        raise InputError(
+            f"{path}: expected an HDU {name} in a result file, "
+            f"found {', '.join(file.tables) or 'no table'}"
+        )
+    return file.tables[name]
+
+
+def _frame(path: Path, file: FitsFile, kept: Layout) -> pd.DataFrame:
+    table = _table(path, file, kept.hdu)
+    missing = [kept.name(c) for c in kept.table if kept.name(c) not in table.colnames]
+    if missing:
+        raise InputError(
+            f"{path}, HDU {kept.hdu}: expected the columns of a result, "
+            f"found none called {', '.join(missing)}"
+        )
+    return pd.DataFrame(
+        {c.name: _restored(table[kept.name(c)], c, f"{path}, HDU {kept.hdu}") for c in kept.table}
+    )
+
+
+def _restored(values: np.ndarray, column: schema.Column, where: str) -> np.ndarray | pd.Series:
+    array = np.asarray(values)
+    if array.dtype.kind not in _KINDS[column.dtype] or array.ndim != 1:
+        raise InputError(
+            f"{where}, column for {column.name}: expected {column.dtype}, found {array.dtype}"
+        )
+    if column.dtype == "str":
+        with reading(f"{where}, column for {column.name}", "escaped text"):
+            return pd.Series([_unescape(text) for text in array], dtype="str")
+    return array.astype(column.dtype)

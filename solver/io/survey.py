@@ -1,0 +1,208 @@
+"""Survey directories: the tables of many orbits that share one reference catalogue.
+
+    survey.toml                        format, versions, instrument, settings; written last
+    reference.parquet                  `schema.CATALOGUE`
+    truth.parquet                      `schema.TRUTH`, where there is truth
+    exposures.parquet                  `schema.ENVIRONMENT` of all orbits
+    measurements/orbit=0000.parquet    `schema.MEASUREMENT` of one orbit
+
+A directory without `survey.toml` is not read: it is unfinished, or something else.
+"""
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from pyarrow import parquet
+
+from solver.errors import InputError
+from solver.io.atomic import sha256_of, write_atomically
+from solver.io.check import conform, refuse
+from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
+from solver.io.read import find_catalogue
+from solver.orbit import OrbitData
+from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
+
+FORMAT = 1
+HEADER = "survey.toml"
+REFERENCE = "reference.parquet"
+TRUTH_FILE = "truth.parquet"
+EXPOSURES = "exposures.parquet"
+MEASUREMENTS = "measurements"
+
+_ORBIT_FILE = re.compile(r"orbit=(\d{4,})\.parquet")
+
+
+def measurement_path(directory: Path, orbit_id: int) -> Path:
+    """Return where the measurements of an orbit are kept."""
+    return Path(directory) / MEASUREMENTS / f"orbit={orbit_id:04d}.parquet"
+
+
+def survey_orbits(directory: Path) -> list[int]:
+    """Return the ids of a survey's orbits, in order.
+
+    Raises
+    ------
+    InputError
+        If the directory is not a whole survey.
+    """
+    read_header(directory)
+    folder = Path(directory) / MEASUREMENTS
+    names = [path.name for path in folder.iterdir()] if folder.is_dir() else []
+    return sorted(int(found[1]) for name in names if (found := _ORBIT_FILE.fullmatch(name)))
+
+
+def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
+    """Read and check one orbit of a survey.
+
+    Returns
+    -------
+    The orbit's tables; of the catalogue and the truth only the measured sources; in the
+    provenance the hash of every file read, the measurements first.
+
+    Raises
+    ------
+    InputError
+        If the directory is not a whole survey, has no such orbit, or anything is wrong
+        with a table or with what the tables say of each other.
+    """
+    directory = Path(directory)
+    orbits = survey_orbits(directory)
+    if orbit_id not in orbits:
+        raise InputError(
+            f"{directory}: expected an orbit out of {_ranges(orbits)}, found {orbit_id}"
+        )
+    paths = [measurement_path(directory, orbit_id), directory / REFERENCE, directory / EXPOSURES]
+    measurements, catalogue, exposures = (
+        read_survey_table(path, schema)
+        for path, schema in zip(paths, (MEASUREMENT, CATALOGUE, ENVIRONMENT), strict=True)
+    )
+    _check_orbit(measurements, orbit_id, paths[0])
+    where, where_catalogue, where_exposures = map(str, paths)
+    found = exposure_problems(measurements, exposures, where, where_exposures)
+    found += catalogue_problems(measurements, catalogue, where, where_catalogue)
+    truth = None
+    if (path := directory / TRUTH_FILE).is_file():
+        truth = read_survey_table(path, TRUTH)
+        found += truth_problems(measurements, truth, where, str(path))
+        paths.append(path)
+    refuse(found)
+    key = list(ENVIRONMENT.key)
+    return OrbitData(
+        measurements=measurements,
+        exposures=exposures.merge(measurements[key].drop_duplicates(), on=key, validate="1:1"),
+        catalogue=_measured(catalogue, measurements),
+        truth=None if truth is None else _measured(truth, measurements),
+        provenance={str(path.relative_to(directory)): sha256_of(path) for path in paths},
+    )
+
+
+def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
+    """Return the content of a survey's header.
+
+    Parameters
+    ----------
+    name : of the file, for a survey that is not finished
+
+    Raises
+    ------
+    InputError
+        If there is none, it cannot be read, or its format is not one this program knows.
+    """
+    path = Path(directory) / name
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise InputError(
+            f"{directory}: expected a survey with a file {name}, found none"
+        ) from error
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: expected the header of a survey, found: {error}") from error
+    if content.get("format") != FORMAT:
+        raise InputError(
+            f"{path}: expected format = {FORMAT}, found {content.get('format', 'no format')!r}"
+        )
+    return content
+
+
+def write_header(directory: Path, content: Mapping[str, object], name: str = HEADER) -> None:
+    """Write a survey's header: text, numbers, lists, and mappings as tables of them.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    values = {"format": FORMAT, **content}
+    lines = [f"{k} = {_toml(v)}" for k, v in values.items() if not isinstance(v, Mapping)]
+    for key, table in values.items():
+        if isinstance(table, Mapping):
+            lines += ["", f"[{key}]", *(f"{k} = {_toml(v)}" for k, v in table.items())]
+    with write_atomically(Path(directory) / name) as path:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def read_survey_table(path: Path, schema: Table) -> pd.DataFrame:
+    """Read one table of a survey as `schema` asks.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or its table is not of the schema.
+    """
+    return conform(find_catalogue(path).table, schema, str(path))
+
+
+def write_survey_table(frame: pd.DataFrame, schema: Table, path: Path) -> None:
+    """Write the columns of `schema` as Parquet, each with its unit.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    content = pa.Table.from_pandas(frame[schema.names], preserve_index=False)
+    fields = [
+        content.schema.field(column.name).with_metadata({"unit": column.unit})
+        if column.unit
+        else content.schema.field(column.name)
+        for column in schema
+    ]
+    with write_atomically(path) as temporary:
+        parquet.write_table(content.cast(pa.schema(fields)), temporary, compression="zstd")
+
+
+def _measured(sources: pd.DataFrame, measurements: pd.DataFrame) -> pd.DataFrame:
+    measured = np.isin(sources["source_id"].to_numpy(), measurements["source_id"].unique())
+    return sources[measured].reset_index(drop=True)
+
+
+def _check_orbit(measurements: pd.DataFrame, orbit_id: int, path: Path) -> None:
+    found = measurements["orbit_id"].unique().tolist()
+    if found != [orbit_id]:
+        raise InputError(f"{path}, column orbit_id: expected {orbit_id} alone, found {found}")
+
+
+def _ranges(orbits: list[int]) -> str:
+    if not orbits:
+        return "none, for there are no measurements"
+    consecutive = orbits == list(range(orbits[0], orbits[-1] + 1))
+    return f"{orbits[0]} to {orbits[-1]}" if consecutive else ", ".join(map(str, orbits))
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, str) and "\n" in value:
+        text = value.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
+        return f'"""\n{text}"""'
+    # A text, number or truth value is written alike in JSON and in TOML, but for the one
+    # control character that JSON leaves as it is.
+    return json.dumps(value).replace("\x7f", "\\u007f")

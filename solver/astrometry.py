@@ -30,7 +30,7 @@ class Places(NamedTuple):
 def propagate(
     catalogue: pd.DataFrame, mjd_tcb: float, observer_position: Float[np.ndarray, " 3"]
 ) -> Places:
-    """Return where the sources of a catalogue are seen from `observer_position`.
+    """Return where the sources of a catalogue are seen from `observer_position`, and how surely.
 
     Parameters
     ----------
@@ -38,20 +38,28 @@ def propagate(
     mjd_tcb : epoch, MJD in TCB
     observer_position : barycentric, au
     """
+    return Places(
+        frames_at(catalogue, mjd_tcb, observer_position),
+        _covariance(catalogue, _years_since_epoch(catalogue, mjd_tcb), observer_position),
+    )
+
+
+def frames_at(
+    catalogue: pd.DataFrame, mjd_tcb: float, observer_position: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, "src 3 3"]:
+    """Return direction, east and north of sources at an epoch; arguments as `propagate`.
+
+    The columns of uncertainties are not used, so that a true catalogue will do.
+    """
     years = _years_since_epoch(catalogue, mjd_tcb)
     start = tangent_frame(catalogue["ra"].to_numpy(), catalogue["dec"].to_numpy())
-    direction, east, north = start[:, 0], start[:, 1], start[:, 2]
-    motion = (
-        RAD_PER_MAS
-        * years[:, None]
-        * (
-            catalogue["pmra"].to_numpy()[:, None] * east
-            + catalogue["pmdec"].to_numpy()[:, None] * north
-        )
+    velocity = (
+        catalogue["pmra"].to_numpy()[:, None] * start[:, 1]
+        + catalogue["pmdec"].to_numpy()[:, None] * start[:, 2]
     )
-    parallax = RAD_PER_MAS * catalogue["parallax"].to_numpy()[:, None] * observer_position
-    frame = tangent_frame(*sky_position(direction + motion - parallax))
-    return Places(frame, _covariance(catalogue, years, start, observer_position))
+    parallax = catalogue["parallax"].to_numpy()[:, None] * observer_position
+    moved = start[:, 0] + RAD_PER_MAS * (years[:, None] * velocity - parallax)
+    return tangent_frame(*sky_position(moved))
 
 
 def sky_position(
@@ -73,7 +81,6 @@ def _years_since_epoch(catalogue: pd.DataFrame, mjd_tcb: float) -> Float[np.ndar
 def _covariance(
     catalogue: pd.DataFrame,
     years: Float[np.ndarray, " src"],
-    frame: Float[np.ndarray, "src 3 3"],
     observer_position: Float[np.ndarray, " 3"],
 ) -> Float[np.ndarray, "src 2 2"]:
     """Propagate the 5 x 5 covariance of the catalogue to (alpha*, delta) at the epoch."""
@@ -83,6 +90,7 @@ def _covariance(
         for j in range(i + 1, 5):
             name = f"{first}_{_PARAMETERS[j]}_corr"
             correlation[:, i, j] = correlation[:, j, i] = catalogue[name].to_numpy()
+    frame = tangent_frame(catalogue["ra"].to_numpy(), catalogue["dec"].to_numpy())
     jacobian = np.zeros((len(catalogue), 2, 5))
     jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
     jacobian[:, :, 2] = -frame[:, 1:] @ observer_position

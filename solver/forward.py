@@ -70,23 +70,38 @@ class Prediction(NamedTuple):
     basis: Float[Array, "obs coef"]
 
 
-def predict(
-    offsets: Offsets,
-    geometry: Geometry,
-    index: Index,
-    displacement: Float[Array, "#obs 2"] | float = 0.0,
-) -> Prediction:
+def predict(offsets: Offsets, geometry: Geometry, index: Index) -> Prediction:
     """Predict the measurements of `index`.
 
     Parameters
     ----------
     offsets : group name -> offsets in the group's unit; "sources" is (src, 2), the others
         have one value per element of their axis
+    """
+    return image(ideal_position(offsets, geometry, index), offsets, geometry, index)
+
+
+def ideal_position(offsets: Offsets, geometry: Geometry, index: Index) -> Float[Array, "obs 2"]:
+    """Return positions on the undistorted focal plane, um."""
+    focal_length = geometry.value(offsets, "focal_length")[index.exposure]
+    return project(_apparent(offsets, geometry, index), focal_length)
+
+
+def image(
+    ideal: Float[Array, "obs 2"],
+    offsets: Offsets,
+    geometry: Geometry,
+    index: Index,
+    displacement: Float[Array, "#obs 2"] | float = 0.0,
+) -> Prediction:
+    """Predict measurements from undistorted positions.
+
+    Parameters
+    ----------
+    ideal : um
     displacement : um, added to the distorted position. The derivative with respect to it,
         times `basis`, is the derivative with respect to the distortion coefficients.
     """
-    focal_length = geometry.value(offsets, "focal_length")[index.exposure]
-    ideal = project(_apparent(offsets, geometry, index), focal_length)
     scaled = ideal / geometry.distortion_scale
     values = basis(scaled[:, 0], scaled[:, 1], geometry.order)
     focal = ideal + values @ _pair(offsets, geometry, "distortion") + displacement
@@ -115,7 +130,7 @@ def _apparent(offsets: Offsets, geometry: Geometry, index: Index) -> Float[Array
         RAD_PER_ARCSEC * offsets["pointing_dec"],
     )
     axes = focal_axes(centre, RAD_PER_ARCSEC * geometry.value(offsets, "position_angle"))
-    along_axes = jnp.einsum("eij,ej->ei", axes, geometry.velocity)
+    along_axes = jnp.sum(axes * geometry.velocity[:, None, :], axis=-1)
     m = index.exposure
     return aberrate(
         jnp.einsum("oij,oj->oi", axes[m], source),

@@ -5,6 +5,7 @@ Paper, section "Survey Design": focal length, four detectors of 1920 x 1920 pixe
 Eq. (exp:model:nxny), which is minus the angle at which the detector is mounted.
 """
 
+import json
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -108,8 +109,23 @@ def read_instrument(path: Path) -> Instrument:
         If the file cannot be read, a key is missing or unknown, or a value is not usable.
     """
     try:
-        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: expected an instrument in TOML, found: {error}") from error
+    return parse_instrument(text, path)
+
+
+def parse_instrument(text: str, path: Path) -> Instrument:
+    """Return the instrument that a TOML text describes; `path` is named in messages.
+
+    Raises
+    ------
+    InputError
+        As `read_instrument`.
+    """
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: expected an instrument in TOML, found: {error}") from error
     tables = content.pop("detector", [])
     _expect_keys(path, "the file", content, {"name", "focal_length_um", "distortion_scale_um"})
@@ -129,7 +145,8 @@ def read_instrument(path: Path) -> Instrument:
 def write_instrument(instrument: Instrument) -> str:
     """Return the TOML text that `read_instrument` reads back as `instrument`."""
     lines = [
-        f'name = "{instrument.name}"',
+        # A JSON string is a TOML string.
+        f"name = {json.dumps(instrument.name)}",
         f"focal_length_um = {instrument.focal_length_um!r}",
         f"distortion_scale_um = {instrument.distortion_scale_um!r}",
     ]

@@ -6,16 +6,16 @@ The distortion coefficients are shared by all measurements, but act only through
 displacement they add: its derivative and the basis stand for theirs.
 """
 
-from functools import partial
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from solver.forward import Geometry, Index, Offsets, Prediction, predict
+from solver.forward import Geometry, Index, Offsets, Prediction, ideal_position, image
 from solver.layout import PER_DETECTOR, PER_EXPOSURE
-from solver.parameters import SOURCES
+from solver.parameters import SOURCES, Group
 
 
 class Linearised(NamedTuple):
@@ -49,43 +49,47 @@ def linearise(
     measured : pixels
     weight : 1/sigma, pixel^-1; zero removes a coordinate
     """
-    prediction = predict(offsets, geometry, index)
-    by_group = partial(_derivative_by, offsets, geometry, index)
-    sources = offsets[SOURCES.name]
-    east, north = (
-        jnp.zeros_like(sources).at[:, 0].set(1.0),
-        jnp.zeros_like(sources).at[:, 1].set(1.0),
-    )
+    ideal = ideal_position(offsets, geometry, index)
+    prediction = image(ideal, offsets, geometry, index)
+    by_ideal = _derivative(lambda moved: image(moved, offsets, geometry, index).pixel, ideal)
 
-    def whitened(columns: list[Float[Array, "obs 2"]]) -> Float[Array, "obs 2 _"]:
+    def by_group(name: str, tangent: Float[Array, "..."]) -> Float[Array, "obs 2"]:
+        """Chain the derivative through the focal plane, where both stages are narrow."""
+
+        def with_values(values: Float[Array, "..."]) -> Offsets:
+            return {**offsets, name: values}
+
+        on_plane, on_detector = (
+            jax.jvp(stage, (offsets[name],), (tangent,))[1]
+            for stage in (
+                lambda values: ideal_position(with_values(values), geometry, index),
+                lambda values: image(ideal, with_values(values), geometry, index).pixel,
+            )
+        )
+        return jnp.einsum("oij,oj->oi", by_ideal, on_plane) + on_detector
+
+    def by_groups(groups: tuple[Group, ...]) -> Float[Array, "obs 2 _"]:
+        columns = [by_group(g.name, jnp.ones_like(offsets[g.name])) for g in groups]
         return jnp.stack(columns, axis=-1) * weight[:, :, None]
 
+    east = jnp.zeros_like(offsets[SOURCES.name]).at[:, 0].set(1.0)
+    by_source = [by_group(SOURCES.name, tangent) for tangent in (east, 1.0 - east)]
+    by_displacement = _derivative(
+        lambda moved: image(ideal, offsets, geometry, index, moved).pixel, jnp.zeros_like(ideal)
+    )
     return Linearised(
         residual=(measured - prediction.pixel) * weight,
-        source=whitened([by_group(SOURCES.name, east), by_group(SOURCES.name, north)]),
-        exposure=whitened([by_group(g.name, jnp.ones_like(offsets[g.name])) for g in PER_EXPOSURE]),
-        detector=whitened([by_group(g.name, jnp.ones_like(offsets[g.name])) for g in PER_DETECTOR]),
-        displacement=whitened(
-            [_derivative_by_displacement(offsets, geometry, index, axis) for axis in range(2)]
-        ),
+        source=jnp.stack(by_source, axis=-1) * weight[:, :, None],
+        exposure=by_groups(PER_EXPOSURE),
+        detector=by_groups(PER_DETECTOR),
+        displacement=by_displacement * weight[:, :, None],
         prediction=prediction,
     )
 
 
-def _derivative_by(
-    offsets: Offsets, geometry: Geometry, index: Index, name: str, tangent: Float[Array, "..."]
-) -> Float[Array, "obs 2"]:
-    def pixel(values: Float[Array, "..."]) -> Float[Array, "obs 2"]:
-        return predict({**offsets, name: values}, geometry, index).pixel
-
-    return jax.jvp(pixel, (offsets[name],), (tangent,))[1]
-
-
-def _derivative_by_displacement(
-    offsets: Offsets, geometry: Geometry, index: Index, axis: int
-) -> Float[Array, "obs 2"]:
-    def pixel(displacement: Float[Array, "1 2"]) -> Float[Array, "obs 2"]:
-        return predict(offsets, geometry, index, displacement).pixel
-
-    zero = jnp.zeros((1, 2))
-    return jax.jvp(pixel, (zero,), (zero.at[0, axis].set(1.0),))[1]
+def _derivative(
+    of: Callable[[Float[Array, "obs 2"]], Float[Array, "obs 2"]], at: Float[Array, "obs 2"]
+) -> Float[Array, "obs 2 2"]:
+    """Return the derivative of each row of a function by its own row of the argument."""
+    x = jnp.zeros_like(at).at[:, 0].set(1.0)
+    return jnp.stack([jax.jvp(of, (at,), (unit,))[1] for unit in (x, 1.0 - x)], axis=-1)

@@ -1,6 +1,7 @@
 """FitSettings: everything a person chooses about a fit, checked once, plain enough for JSON."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -83,3 +84,58 @@ def _check_width(name: str, width: float) -> None:
             "expected a finite factor on the catalogue's uncertainties for sources, found inf: "
             "without the reference sources nothing fixes the solution on the sky"
         )
+
+
+def parse_width(name: str, text: str) -> float:
+    """Return the prior width that a person wrote for group `name`, in its `width_unit`.
+
+    Parameters
+    ----------
+    text : a number, with a unit if the group has one ("0.5 deg", "2um", "0.01"), or "flat"
+
+    Raises
+    ------
+    InputError
+        If the group, the number or the unit is not usable.
+    """
+    if name not in BY_NAME:
+        raise InputError(f"expected a parameter group out of {', '.join(BY_NAME)}, found {name!r}")
+    unit = BY_NAME[name].width_unit
+    match = _WIDTH.fullmatch(text.strip())
+    if match is None:
+        raise InputError(
+            f"prior of {name}: expected a width such as {_example(name)} or flat, found {text!r}"
+        )
+    if match["flat"]:
+        width = math.inf
+    else:
+        width = float(match["number"]) * _factor(name, match["unit"], unit)
+    _check_width(name, width)
+    return width
+
+
+def format_width(name: str, width: float) -> str:
+    """Return a prior width as `parse_width` reads it."""
+    unit = BY_NAME[name].width_unit
+    return "flat" if math.isinf(width) else f"{width:.6g} {unit}".strip()
+
+
+_WIDTH = re.compile(
+    r"(?P<flat>flat|inf)|(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\W\d]\w*)?"
+)
+_IN_ARCSEC = {"deg": 3600.0, "arcmin": 60.0, "arcsec": 1.0, "mas": 1e-3, "uas": 1e-6}
+_IN_UM = {"mm": 1e3, "um": 1.0, "µm": 1.0, "micron": 1.0, "nm": 1e-3}
+
+
+def _factor(name: str, given: str | None, unit: str) -> float:
+    scale = next((s for s in (_IN_ARCSEC, _IN_UM) if unit in s), {})
+    if given is None:
+        return 1.0
+    if given not in scale:
+        expected = f"a unit out of {', '.join(scale)}" if scale else "a number without unit"
+        raise InputError(f"prior of {name}: expected {expected}, found {given!r}")
+    return scale[given] / scale[unit]
+
+
+def _example(name: str) -> str:
+    return f"{format_width(name, 1.0)!r}"

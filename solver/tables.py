@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from solver.astrometry import Places, propagate, sky_position
+from solver.astrometry import frames_at, sky_position
 from solver.diagnostics import induced_shift
 from solver.distortion import terms
 from solver.ephemeris import observer_at
@@ -138,10 +138,10 @@ def true_places(solution: Solution, truth: pd.DataFrame | None) -> pd.DataFrame 
     ids = problem.sources["source_id"].to_numpy()[known]
     observer = observer_at(np.array([problem.epoch])).position[0]
     rows = truth.set_index("source_id").loc[ids].reset_index()
-    places = propagate(rows, problem.epoch, observer)
-    ra, dec = sky_position(places.frame[:, 0])
+    direction = frames_at(rows, problem.epoch, observer)[:, 0]
+    ra, dec = sky_position(direction)
     error = np.zeros((problem.n_src, 2))
-    error[known] = _separation(source_frame(problem)[known], places)
+    error[known] = _separation(source_frame(problem)[known], direction)
     error[~problem.sources["is_reference"].to_numpy(bool)] = 0.0
     induced = induced_shift(solution.reduced, problem.priors, error)[known]
     columns = {
@@ -159,9 +159,11 @@ def source_frame(problem: Problem) -> Float[np.ndarray, "src 3 3"]:
     return np.asarray(problem.geometry.source_frame)[: problem.n_src]
 
 
-def _separation(frame: Float[np.ndarray, "src 3 3"], places: Places) -> Float[np.ndarray, "src 2"]:
+def _separation(
+    frame: Float[np.ndarray, "src 3 3"], direction: Float[np.ndarray, "src 3"]
+) -> Float[np.ndarray, "src 2"]:
     """Return prior minus true position in the frame of the prior, mas."""
-    return -np.einsum("sij,sj->si", frame[:, 1:], places.frame[:, 0]) / RAD_PER_MAS
+    return -np.einsum("sij,sj->si", frame[:, 1:], direction) / RAD_PER_MAS
 
 
 def _displaced(

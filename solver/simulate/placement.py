@@ -1,0 +1,32 @@
+"""Where the detectors really are: the instrument's nominal places, displaced once.
+
+Paper, section "Survey Design": the alignment of the detectors is constant during the
+mission and unknown to the fit.
+"""
+
+from dataclasses import replace
+
+from solver.instrument import Instrument
+from solver.simulate.settings import Stream, SurveySettings
+
+
+def place_detectors(instrument: Instrument, settings: SurveySettings) -> Instrument:
+    """Return the true instrument: detectors displaced, rotated and their pitch changed.
+
+    With the default settings, as in the paper, it is the nominal one.
+    """
+    rng = settings.rng(Stream.DETECTORS)
+    detectors = []
+    for detector in instrument.detectors:
+        x, y, rotation, pitch_x, pitch_y = rng.standard_normal(5).tolist()
+        detectors.append(
+            replace(
+                detector,
+                x_um=detector.x_um + settings.detector_offset_um * x,
+                y_um=detector.y_um + settings.detector_offset_um * y,
+                rotation_deg=detector.rotation_deg + settings.detector_rotation_deg * rotation,
+                pitch_x_um=detector.pitch_x_um * (1.0 + settings.pitch_relative * pitch_x),
+                pitch_y_um=detector.pitch_y_um * (1.0 + settings.pitch_relative * pitch_y),
+            )
+        )
+    return replace(instrument, detectors=tuple(detectors))

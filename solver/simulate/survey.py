@@ -1,0 +1,164 @@
+"""A simulated survey on disk: catalogue, exposures and the measurements of every orbit."""
+
+from collections.abc import Callable, Mapping
+from importlib import metadata
+from pathlib import Path
+
+import pandas as pd
+
+from solver.errors import InputError
+from solver.instrument import MINI_MOCK, Instrument, write_instrument
+from solver.io.atomic import sha256_of
+from solver.io.read import find_catalogue
+from solver.io.survey import (
+    EXPOSURES,
+    HEADER,
+    MEASUREMENTS,
+    REFERENCE,
+    TRUTH_FILE,
+    measurement_path,
+    read_header,
+    write_header,
+    write_survey_table,
+)
+from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
+from solver.simulate.catalogue import (
+    reference_catalogue,
+    truth_catalogue,
+    truth_from_gaia,
+)
+from solver.simulate.measure import measure_orbit
+from solver.simulate.schedule import environment, orbit_attitude
+from solver.simulate.settings import SurveySettings
+
+UNFINISHED = "unfinished.toml"
+
+_PACKAGES = ("plateviz", "jax", "numpy", "pyerfa")
+
+
+def simulate_survey(
+    directory: Path,
+    settings: SurveySettings | None = None,
+    instrument: Instrument = MINI_MOCK,
+    catalogue: Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Simulate a survey into `directory`, or finish one that was interrupted.
+
+    Each orbit is whole once its file exists, and is kept when the simulation is called
+    again with the same choices. The directory becomes a survey with its last file.
+
+    Parameters
+    ----------
+    directory : made if there is none
+    settings : the defaults are the paper's
+    instrument : nominal focal plane
+    catalogue : table of the Gaia archive to take as the truth; without it stars are drawn
+    progress : called with the number of finished orbits and that of all orbits; what it
+        raises stops the simulation
+
+    Raises
+    ------
+    InputError
+        If the directory holds anything but this survey unfinished, the catalogue cannot
+        be used, or an orbit sees no reference star.
+    """
+    directory, settings = Path(directory), settings or SurveySettings()
+    header = _header(settings, instrument, catalogue)
+    _claim(directory, header)
+    truth = _truth(settings, catalogue)
+    attitudes = [
+        orbit_attitude(orbit_id, settings, instrument.focal_length_um)
+        for orbit_id in range(settings.orbits)
+    ]
+    write_survey_table(truth, TRUTH, directory / TRUTH_FILE)
+    write_survey_table(reference_catalogue(truth, settings), CATALOGUE, directory / REFERENCE)
+    write_survey_table(
+        environment(pd.concat(attitudes, ignore_index=True)), ENVIRONMENT, directory / EXPOSURES
+    )
+    for orbit_id in range(settings.orbits):
+        path = measurement_path(directory, orbit_id)
+        if not path.exists():
+            measurements = measure_orbit(orbit_id, truth, settings, instrument).measurements
+            _check_seen(measurements, truth, orbit_id)
+            write_survey_table(measurements, MEASUREMENT, path)
+        if progress is not None:
+            progress(orbit_id + 1, settings.orbits)
+    write_header(directory, header, HEADER)
+    (directory / UNFINISHED).unlink(missing_ok=True)
+
+
+def _header(
+    settings: SurveySettings, instrument: Instrument, catalogue: Path | None
+) -> dict[str, object]:
+    versions = {package: _version(package) for package in _PACKAGES}
+    content = {"versions": versions, "settings": settings.to_dict()}
+    if catalogue is not None:
+        content["catalogue"] = {"name": Path(catalogue).name, "sha256": sha256_of(catalogue)}
+    return {**content, "instrument": write_instrument(instrument)}
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def _claim(directory: Path, header: Mapping[str, object]) -> None:
+    """Mark `directory` as this survey, unfinished; refuse it if it holds anything else."""
+    if directory.exists() and not directory.is_dir():
+        raise InputError(f"{directory}: expected a directory for the survey, found a file")
+    if (directory / HEADER).exists():
+        raise InputError(f"{directory}: expected no survey there yet, found a finished one")
+    if (directory / UNFINISHED).exists():
+        _check_same(directory, header)
+    elif directory.is_dir() and any(directory.iterdir()):
+        raise InputError(
+            f"{directory}: expected an empty directory or an unfinished survey, "
+            f"found {min(path.name for path in directory.iterdir())}"
+        )
+    try:
+        (directory / MEASUREMENTS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{directory}: expected to make the directory, found: {error}") from error
+    write_header(directory, header, UNFINISHED)
+
+
+def _check_same(directory: Path, header: Mapping[str, object]) -> None:
+    """Refuse an unfinished survey that was begun with other choices."""
+    begun = read_header(directory, UNFINISHED)
+    wanted, found = (
+        {
+            **_mapping(content.get("settings")),
+            "instrument": content.get("instrument"),
+            "catalogue": content.get("catalogue"),
+        }
+        for content in (header, begun)
+    )
+    different = [name for name in {**wanted, **found} if wanted.get(name) != found.get(name)]
+    if different:
+        raise InputError(
+            f"{directory / UNFINISHED}: expected the choices with which this survey was begun, "
+            f"found other {', '.join(different)}"
+        )
+
+
+def _mapping(value: object) -> Mapping[str, object]:
+    return value if isinstance(value, Mapping) else {}
+
+
+def _truth(settings: SurveySettings, catalogue: Path | None) -> pd.DataFrame:
+    if catalogue is None:
+        return truth_catalogue(settings)
+    located = find_catalogue(Path(catalogue))
+    return truth_from_gaia(located.table.to_pandas(), settings, located.where)
+
+
+def _check_seen(measurements: pd.DataFrame, truth: pd.DataFrame, orbit_id: int) -> None:
+    references = truth["source_id"][truth["is_reference"]]
+    if not measurements["source_id"].isin(references).any():
+        raise InputError(
+            f"orbit {orbit_id}: expected at least one reference star on the detectors, found "
+            f"none among {measurements['source_id'].nunique()} sources; more stars are needed"
+        )

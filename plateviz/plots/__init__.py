@@ -1,0 +1,34 @@
+"""Pictures: pure functions from the tables of `plateviz.tables` to HoloViews objects.
+
+Every `plot_<noun>(table, *, options)` returns an object for the Bokeh backend, an empty
+and titled one for an empty table. The dashboard, notebooks and reports use the same.
+"""
+
+from plateviz.plots.comparison import (
+    plot_comparison,
+    plot_comparison_histogram,
+    plot_comparison_map,
+)
+from plateviz.plots.convergence import plot_convergence
+from plateviz.plots.deviation import plot_deviation
+from plateviz.plots.distortion import plot_distortion
+from plateviz.plots.footprint import plot_footprint
+from plateviz.plots.pulls import plot_exposure_chi2, plot_pulls
+from plateviz.plots.residual_map import plot_residual_map
+from plateviz.plots.residual_scatter import plot_residual_scatter
+from plateviz.plots.uncertainty import plot_uncertainty
+
+__all__ = [
+    "plot_comparison",
+    "plot_comparison_histogram",
+    "plot_comparison_map",
+    "plot_convergence",
+    "plot_deviation",
+    "plot_distortion",
+    "plot_exposure_chi2",
+    "plot_footprint",
+    "plot_pulls",
+    "plot_residual_map",
+    "plot_residual_scatter",
+    "plot_uncertainty",
+]

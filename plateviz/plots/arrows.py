@@ -1,0 +1,156 @@
+"""Vectors drawn to a stated scale: shafts, heads, and a key arrow to read them by.
+
+`hv.VectorField` normalises lengths by default; segments have the length they are given.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import holoviews as hv
+import numpy as np
+import pandas as pd
+
+from plateviz.plots.style import TICK_SIZE, drawn, theme_of
+
+# The root-mean-square arrow is about this share of the frame's width.
+_RMS_SHARE = 0.04
+_HEAD_SHARE = 0.32
+_LARGEST_HEAD = 0.018
+_HEAD_ANGLE = math.radians(26.0)
+_KEY_STRIP = 0.11
+_STEPS = (1.0, 2.0, 5.0, 10.0)
+
+
+class Field(NamedTuple):
+    """The area that vectors are drawn on, in the units of the axes.
+
+    Attributes
+    ----------
+    x, y : limits of the data; the first may be the larger, for an axis that runs backwards
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    @property
+    def width(self) -> float:
+        """Width of the area, positive."""
+        return abs(self.x[1] - self.x[0])
+
+    @property
+    def ylim(self) -> tuple[float, float]:
+        """Limits of the y axis: those of the data and a strip below for the key."""
+        return self.y[0] - _KEY_STRIP * self.width, self.y[1]
+
+
+def round_125(value: float) -> float:
+    """Return the number 1, 2 or 5 times a power of ten nearest to `value` in the logarithm."""
+    if not (math.isfinite(value) and value > 0):
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    step = min(_STEPS, key=lambda s: abs(math.log(value / (s * power))))
+    # Through text, so that 5 * 10**-3 is the number that prints as 0.005.
+    return float(f"{step * power:.12g}")
+
+
+def rms_length(table: pd.DataFrame) -> float:
+    """Return the root-mean-square length of the vectors `u`, `v`; 0 for none."""
+    if table.empty:
+        return 0.0
+    return float(np.sqrt(np.mean(table["u"].to_numpy() ** 2 + table["v"].to_numpy() ** 2)))
+
+
+def automatic_scale(table: pd.DataFrame, field: Field) -> float:
+    """Return the round magnification that makes the rms arrow about 4 % of the width."""
+    rms = rms_length(table)
+    return round_125(_RMS_SHARE * field.width / rms) if rms > 0 else 1.0
+
+
+def arrows(
+    table: pd.DataFrame,
+    *,
+    scale: float,
+    field: Field,
+    colour: str,
+    hover: Sequence[tuple[str, str]],
+    extra: list[str],
+) -> list[hv.Element]:
+    """Return the vectors as shafts, heads and hoverable tails.
+
+    Parameters
+    ----------
+    table : tails `x`, `y` and vectors `u`, `v` in the units of the axes, columns `extra`
+    scale : drawn length over true length
+    field : the area drawn on; bounds the size of the heads
+    colour : of the arrows
+    hover : label and format of each line of the hover
+    extra : columns that the hover needs
+
+    Returns
+    -------
+    Segments of the shafts (a row per row of `table`), segments of the heads, points
+    """
+    ends = table.assign(
+        x_end=table["x"] + scale * table["u"], y_end=table["y"] + scale * table["v"]
+    )
+    shafts = hv.Segments(ends, ["x", "y", "x_end", "y_end"], extra, label="arrows")
+    tails = hv.Points(table, ["x", "y"], extra, label="tails")
+    return [
+        drawn(shafts, color=colour, line_width=1.2),
+        drawn(_heads(ends, field), color=colour, line_width=1.2),
+        drawn(
+            tails,
+            color=colour,
+            size=3.5,
+            alpha=0.6,
+            nonselection_alpha=0.15,
+            tools=["hover"],
+            hover_tooltips=list(hover),
+        ),
+    ]
+
+
+def key(length: float, text: str, *, scale: float, field: Field, theme: str) -> list[hv.Element]:
+    """Return a key arrow of true length `length`, with its meaning beside it.
+
+    Parameters
+    ----------
+    length : in the units of the axes, before magnification
+    text : the length in words
+    scale : drawn length over true length, that of the arrows it explains
+    field : the area drawn on; the key stands in the strip below it
+    theme : "light" or "dark"
+    """
+    colours = theme_of(theme)
+    direction = math.copysign(1.0, field.x[1] - field.x[0])
+    x = field.x[0] + direction * 0.03 * field.width
+    y = field.y[0] - 0.5 * _KEY_STRIP * field.width
+    arrow = pd.DataFrame(
+        {"x": [x], "y": [y], "x_end": [x + direction * scale * length], "y_end": [y]}
+    )
+    shaft = hv.Segments(arrow, ["x", "y", "x_end", "y_end"], label="key")
+    words = hv.Text(x + direction * (scale * length + 0.015 * field.width), y, text, halign="left")
+    return [
+        drawn(shaft, color=colours.text, line_width=2),
+        drawn(_heads(arrow, field), color=colours.text, line_width=2),
+        drawn(words, text_color=colours.text, text_font_size=TICK_SIZE),
+    ]
+
+
+def _heads(ends: pd.DataFrame, field: Field) -> hv.Segments:
+    dx = (ends["x_end"] - ends["x"]).to_numpy(dtype=float)
+    dy = (ends["y_end"] - ends["y"]).to_numpy(dtype=float)
+    length = np.minimum(_HEAD_SHARE * np.hypot(dx, dy), _LARGEST_HEAD * field.width)
+    angle = np.arctan2(dy, dx)[:, None] + np.pi + np.array([-_HEAD_ANGLE, _HEAD_ANGLE])
+    tip_x, tip_y = ends["x_end"].to_numpy(dtype=float), ends["y_end"].to_numpy(dtype=float)
+    return hv.Segments(
+        (
+            np.repeat(tip_x, 2),
+            np.repeat(tip_y, 2),
+            (tip_x[:, None] + length[:, None] * np.cos(angle)).ravel(),
+            (tip_y[:, None] + length[:, None] * np.sin(angle)).ravel(),
+        ),
+        ["x", "y", "x_end", "y_end"],
+        label="heads",
+    )

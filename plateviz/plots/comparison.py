@@ -1,0 +1,191 @@
+"""Two fits of the same sources: differences on the sky, and over their uncertainty."""
+
+import holoviews as hv
+import numpy as np
+import pandas as pd
+
+from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
+from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.points import steps
+from plateviz.plots.style import (
+    ARROW_LIMIT,
+    FRAME_WIDTH,
+    SERIES_COLOURS,
+    AxisLabels,
+    framed,
+    message,
+    side_by_side,
+    theme_of,
+)
+from plateviz.plots.units import angle_text
+from plateviz.tables.comparison import comparison, difference_histogram
+from plateviz.tables.residuals import binned_vectors
+
+_MAP = "Difference of positions, B minus A"
+_MAP_LABELS: AxisLabels = {"xlabel": "Δα cos δ (arcmin, East to the left)", "ylabel": "Δδ (arcmin)"}
+_HISTOGRAM = "Difference over uncertainty"
+_HISTOGRAM_LABELS: AxisLabels = {
+    "xlabel": "(B minus A) / marginal σ of A",
+    "ylabel": "sources per bin",
+}
+_MAS_PER_ARCMIN = 60_000.0
+_MARGIN = 1.14
+_LEAST_SHARE = 0.25
+_BINS = 24
+_NAMES = {"ra": "α cos δ", "dec": "δ"}
+_HOVER_VALUES = [
+    ("Δα cos δ", "@{difference_ra_mas}{0.00000} mas"),
+    ("Δδ", "@{difference_dec_mas}{0.00000} mas"),
+    ("over σ", "@{pull_ra}{0.000}, @{pull_dec}{0.000}"),
+    ("σ of B / σ of A", "@{sigma_ratio_ra}{0.000}, @{sigma_ratio_dec}{0.000}"),
+]
+_VALUES = [
+    "difference_ra_mas",
+    "difference_dec_mas",
+    "pull_ra",
+    "pull_dec",
+    "sigma_ratio_ra",
+    "sigma_ratio_dec",
+]
+
+
+def plot_comparison(
+    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
+) -> hv.Layout:
+    """Draw the differences on the sky and their histogram side by side.
+
+    Parameters
+    ----------
+    table : `tables.comparison`
+    theme : "light" or "dark"
+    width : of each frame, screen pixels
+    """
+    panels = [
+        plot_comparison_map(table, theme=theme, width=width),
+        plot_comparison_histogram(table, theme=theme, width=width),
+    ]
+    return side_by_side(panels, columns=2)
+
+
+def plot_comparison_map(
+    table: pd.DataFrame,
+    *,
+    arrow_scale: float | None = None,
+    theme: str = "light",
+    width: int = FRAME_WIDTH,
+) -> hv.Overlay:
+    """Draw the differences as arrows to a stated scale; means in bins above 2,000.
+
+    Parameters
+    ----------
+    table : `tables.comparison`
+    arrow_scale : drawn length over true length; None for a round number
+    theme : "light" or "dark"
+    width : of the frame, screen pixels
+    """
+    if table.empty:
+        return message(_MAP, "No source in both fits", theme=theme, width=width, **_MAP_LABELS)
+    half = _MARGIN * (float(np.abs(table[["x_arcmin", "y_arcmin"]].to_numpy()).max()) or 1.0)
+    field = Field((half, -half), (-half, half))
+    shown, what = _thinned(_vectors(table), half)
+    scale = arrow_scale or automatic_scale(shown, field)
+    mas = round_125(2.0 * rms_length(shown) * _MAS_PER_ARCMIN)
+    words = angle_text(mas)
+    single = [("source", "@{id}"), ("class", "@{source_class}")]
+    hover = single if "id" in shown else [("sources in the bin", "@{n}")]
+    return framed(
+        [
+            *arrows(
+                shown,
+                scale=scale,
+                field=field,
+                colour=theme_of(theme).mark,
+                hover=[*hover, *_HOVER_VALUES],
+                extra=[c for c in ("id", "source_class", "n") if c in shown] + _VALUES,
+            ),
+            *key(mas / _MAS_PER_ARCMIN, words, scale=scale, field=field, theme=theme),
+        ],
+        title=_MAP,
+        subtitle=f"{what}\nDrawn {scale:,g} times enlarged: an arrow of {words}",
+        theme=theme,
+        width=width,
+        xlim=field.x,
+        ylim=field.ylim,
+        **_MAP_LABELS,
+    )
+
+
+def plot_comparison_histogram(
+    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
+) -> hv.Overlay:
+    """Draw the histogram of the differences over the marginal uncertainty of A.
+
+    Parameters
+    ----------
+    table : `tables.comparison`
+    theme : "light" or "dark"
+    width : of the frame, screen pixels
+    """
+    if table.empty:
+        return message(
+            _HISTOGRAM, "No source in both fits", theme=theme, width=width, **_HISTOGRAM_LABELS
+        )
+    histogram = difference_histogram(table)
+    limit = float(histogram["right"].max())
+    ratios = table[["sigma_ratio_ra", "sigma_ratio_dec"]].median()
+    return framed(
+        [
+            steps(rows, _NAMES[str(coordinate)], SERIES_COLOURS[number])
+            for number, (coordinate, rows) in enumerate(histogram.groupby("coordinate", sort=False))
+        ],
+        title=_HISTOGRAM,
+        subtitle=f"{len(table):,} sources\nmedian σ of B over σ of A: "
+        f"{ratios.iloc[0]:.3f} (α), {ratios.iloc[1]:.3f} (δ)",
+        theme=theme,
+        width=width,
+        height=round(0.75 * width),
+        xlim=(-limit, limit),
+        ylim=(0.0, 1.1 * float(histogram["count"].max())),
+        legend_columns=2,
+        **_HISTOGRAM_LABELS,
+    )
+
+
+def _vectors(table: pd.DataFrame) -> pd.DataFrame:
+    return table.assign(
+        x=table["x_arcmin"],
+        y=table["y_arcmin"],
+        u=table["difference_ra_mas"] / _MAS_PER_ARCMIN,
+        v=table["difference_dec_mas"] / _MAS_PER_ARCMIN,
+    )
+
+
+def _thinned(vectors: pd.DataFrame, half: float) -> tuple[pd.DataFrame, str]:
+    if len(vectors) <= ARROW_LIMIT:
+        return vectors, f"{len(vectors):,} sources, an arrow each"
+    means = binned_vectors(
+        vectors, x_range=(-half, half), y_range=(-half, half), bins=_BINS, least_share=_LEAST_SHARE
+    )
+    return means, (
+        f"{len(vectors):,} sources: mean difference in {len(means):,} bins of a "
+        f"{_BINS} × {_BINS} grid"
+    )
+
+
+def _draw(chosen: Chosen, theme: str) -> hv.Layout | hv.Overlay:
+    if chosen.other is None:
+        return message(_MAP, "Fit again with other choices to compare two solutions.", theme=theme)
+    return plot_comparison(comparison(chosen.other, chosen.result), theme=theme)
+
+
+DIAGNOSTICS = (
+    Diagnostic(
+        "comparison",
+        "Comparison of two solutions",
+        "The solution on the screen (B) minus the one before it (A): positions on the sky, and "
+        "the differences over the uncertainty. Good: what you changed does not matter.",
+        85,
+        _draw,
+        is_wide=True,
+    ),
+)

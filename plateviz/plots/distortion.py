@@ -1,0 +1,97 @@
+"""The fitted optical distortion as vectors on the focal plane."""
+
+from collections.abc import Sequence
+
+import holoviews as hv
+import numpy as np
+import pandas as pd
+
+from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
+from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.style import FRAME_WIDTH, AxisLabels, drawn, framed, message, theme_of
+from plateviz.plots.units import angle_text
+from plateviz.tables.calibration import distortion
+from solver.instrument import Detector
+
+_TITLE = "Fitted distortion, distorted minus ideal place"
+_LABELS: AxisLabels = {"xlabel": "focal-plane x (mm)", "ylabel": "focal-plane y (mm)"}
+_HOVER = [
+    ("at", "@{x}{0.00}, @{y}{0.00} mm"),
+    ("x", "@{dx_um}{0.000} µm = @{dx_mas}{0.00} mas"),
+    ("y", "@{dy_um}{0.000} µm = @{dy_mas}{0.00} mas"),
+]
+_MARGIN = 1.18
+
+
+def plot_distortion(
+    table: pd.DataFrame,
+    *,
+    detectors: Sequence[Detector] = (),
+    arrow_scale: float | None = None,
+    theme: str = "light",
+    width: int = FRAME_WIDTH,
+) -> hv.Overlay:
+    """Draw the displacement by the distortion to a stated scale.
+
+    Parameters
+    ----------
+    table : `tables.distortion`
+    detectors : outlined where given
+    arrow_scale : drawn length over true length; None for a round number that makes the
+        rms arrow about 4 % of the width
+    theme : "light" or "dark"
+    width : of the frame, screen pixels
+    """
+    if table.empty:
+        return message(_TITLE, "No distortion fitted", theme=theme, width=width, **_LABELS)
+    half = _MARGIN * float(np.abs(table[["x", "y"]].to_numpy()).max())
+    field = Field((-half, half), (-half, half))
+    scale = arrow_scale or automatic_scale(table, field)
+    rms_um = 1000.0 * rms_length(table)
+    length_um = round_125(2.0 * rms_um) if rms_um > 0 else 1.0
+    mas = length_um / 1000.0 * float(table["mas_per_unit"].iloc[0])
+    words = f"{length_um:g} µm = {angle_text(mas)}"
+    return framed(
+        [
+            _outlines(detectors, theme),
+            *arrows(
+                table,
+                scale=scale,
+                field=field,
+                colour=theme_of(theme).mark,
+                hover=_HOVER,
+                extra=["dx_um", "dy_um", "dx_mas", "dy_mas"],
+            ),
+            *key(length_um / 1000.0, words, scale=scale, field=field, theme=theme),
+        ],
+        title=_TITLE,
+        subtitle=f"Zero at the optical centre; rms {rms_um:.3g} µm.\n"
+        f"Drawn {scale:,g} times enlarged: an arrow of {words}",
+        theme=theme,
+        width=width,
+        xlim=field.x,
+        ylim=field.ylim,
+        **_LABELS,
+    )
+
+
+def _outlines(detectors: Sequence[Detector], theme: str) -> hv.Path:
+    paths = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detectors]
+    colour = theme_of(theme).muted
+    return drawn(hv.Path(paths, ["x", "y"]), color=colour, line_width=1)
+
+
+def _draw(chosen: Chosen, theme: str) -> hv.Overlay:
+    table = distortion(chosen.result, chosen.instrument)
+    return plot_distortion(table, detectors=chosen.instrument.detectors, theme=theme)
+
+
+DIAGNOSTICS = (
+    Diagnostic(
+        "distortion",
+        "Distortion",
+        "Displacement on the focal plane by the fitted Legendre terms, zero at the optical centre.",
+        80,
+        _draw,
+    ),
+)

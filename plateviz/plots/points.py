@@ -1,0 +1,101 @@
+"""Points by class of source, points in numbers that only a raster can show, histograms."""
+
+from collections.abc import Sequence
+
+import holoviews as hv
+import numpy as np
+import pandas as pd
+from bokeh.palettes import interp_palette
+from holoviews import dim
+
+from plateviz.plots.style import (
+    CLASS_COLOURS,
+    CLASS_MARKERS,
+    CLASS_SIZES,
+    drawn,
+    theme_of,
+)
+
+Tooltips = Sequence[tuple[str, str]]
+
+
+def class_points(
+    table: pd.DataFrame, x: hv.Dimension, y: hv.Dimension, *, hover: Tooltips, extra: list[str]
+) -> hv.Points:
+    """Return one element with a point per row, coloured and shaped by `source_class`.
+
+    One element rather than one per class keeps the index of a selected point equal to
+    the row of the table.
+
+    Parameters
+    ----------
+    table : with `id` (text), `source_class` and the columns of `x`, `y` and `extra`
+    x, y : dimensions to draw
+    hover : label and format of each line of the hover
+    extra : further columns that the hover needs
+    """
+    points = hv.Points(table, [x, y], ["source_class", "id", *extra])
+    kind = dim("source_class")
+    return drawn(
+        points,
+        color="source_class",
+        cmap=dict(CLASS_COLOURS),
+        marker=kind.categorize(dict(CLASS_MARKERS), default="circle"),
+        size=kind.categorize(dict(CLASS_SIZES), default=4.0),
+        line_width=1.4,
+        alpha=0.85,
+        nonselection_alpha=0.15,
+        tools=["hover"],
+        hover_tooltips=list(hover),
+    )
+
+
+def raster(
+    points: hv.Points,
+    *,
+    xlim: tuple[float, float],
+    ylim: tuple[float, float],
+    width: int,
+    height: int,
+    theme: str,
+    dynamic: bool,
+) -> hv.Element | hv.DynamicMap:
+    """Return the number of points per cell as an image.
+
+    Parameters
+    ----------
+    points : to be counted
+    xlim, ylim : the range counted when `dynamic` is False
+    width, height : of the frame in screen pixels
+    theme : "light" or "dark"
+    dynamic : True for a live plot that is counted anew at each zoom
+    """
+    # Datashader and Numba take seconds and 150 MB to load; few plots have that many rows.
+    from holoviews.operation.datashader import rasterize
+
+    image = rasterize(
+        points,
+        aggregator="count",
+        x_range=xlim,
+        y_range=ylim,
+        width=width // 2,
+        height=height // 2,
+        dynamic=dynamic,
+    )
+    return drawn(
+        image,
+        cmap=list(interp_palette(theme_of(theme).ramp, 256)),
+        cnorm="log",
+        clipping_colors={"NaN": "transparent"},
+        colorbar=True,
+        clabel="measurements per cell",
+        colorbar_opts={"width": 10},
+    )
+
+
+def steps(bins: pd.DataFrame, name: str, colour: str) -> hv.Curve:
+    """Return a histogram, `left`, `right` and `count` of each bin, as an outline."""
+    edges = np.append(bins["left"].to_numpy(), bins["right"].to_numpy()[-1])
+    counts = np.append(bins["count"].to_numpy(), bins["count"].to_numpy()[-1])
+    curve = hv.Curve((edges, counts), "edge", "count", label=name)
+    return drawn(curve, interpolation="steps-post", color=colour, line_width=1.8)

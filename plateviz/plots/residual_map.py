@@ -1,0 +1,176 @@
+"""Residual vectors on a detector or the whole focal plane (paper, "residual:detector")."""
+
+import holoviews as hv
+import numpy as np
+import pandas as pd
+
+from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
+from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.style import (
+    ARROW_LIMIT,
+    FRAME_WIDTH,
+    AxisLabels,
+    drawn,
+    framed,
+    message,
+    theme_of,
+)
+from plateviz.plots.units import angle_text
+from plateviz.tables.residuals import binned_vectors, residual_map
+from solver.instrument import Detector, Instrument
+
+_BINS_ON_DETECTOR, _BINS_ON_FOCAL_PLANE = 16, 24
+_LEAST_SHARE = 0.25
+_MARGIN = 1.08
+_VALUES = ["residual_x_mpix", "residual_y_mpix", "residual_x_mas", "residual_y_mas"]
+_HOVER_VALUES = [
+    ("residual x", "@{residual_x_mpix}{0.00} mpix = @{residual_x_mas}{0.000} mas"),
+    ("residual y", "@{residual_y_mpix}{0.00} mpix = @{residual_y_mas}{0.000} mas"),
+]
+
+
+def plot_residual_map(
+    table: pd.DataFrame,
+    detector: Detector | Instrument,
+    *,
+    arrow_scale: float | None = None,
+    theme: str = "light",
+    width: int = FRAME_WIDTH,
+) -> hv.Overlay:
+    """Draw residual vectors to a stated scale; mean vectors in bins above 2,000.
+
+    Parameters
+    ----------
+    table : `tables.residual_map`, of one detector in pix or of all in mm
+    detector : the detector that the table is of, or the instrument for all detectors
+    arrow_scale : drawn length over true length; None for a round number that makes the
+        rms arrow about 4 % of the width
+    theme : "light" or "dark"
+    width : of the frame, screen pixels
+    """
+    unit = "mm" if isinstance(detector, Instrument) else "pix"
+    labels: AxisLabels = {
+        "xlabel": _axis_label(detector, "x"),
+        "ylabel": _axis_label(detector, "y"),
+    }
+    if table.empty:
+        return message(_title(detector), "No measurements", theme=theme, width=width, **labels)
+    field = _field(detector)
+    shown, binning = _thinned(table, detector, field)
+    scale = arrow_scale or automatic_scale(shown, field)
+    length, words = _key(shown, unit)
+    return framed(
+        [
+            _outlines(detector, theme),
+            *arrows(
+                shown,
+                scale=scale,
+                field=field,
+                colour=theme_of(theme).mark,
+                hover=_hover(shown),
+                extra=[c for c in ("id", "exposure", "detector_id", "n") if c in shown] + _VALUES,
+            ),
+            *key(length, words, scale=scale, field=field, theme=theme),
+        ],
+        title=_title(detector),
+        subtitle=f"{_shown_exposures(table)}. {binning}\n"
+        f"Drawn {scale:,g} times enlarged: an arrow of {words}",
+        theme=theme,
+        width=width,
+        xlim=field.x,
+        ylim=field.ylim,
+        **labels,
+    )
+
+
+def _title(detector: Detector | Instrument) -> str:
+    if isinstance(detector, Instrument):
+        return "Residuals on the focal plane, measured minus predicted"
+    return f"Residuals on detector {detector.detector_id}, measured minus predicted"
+
+
+def _axis_label(detector: Detector | Instrument, axis: str) -> str:
+    if isinstance(detector, Instrument):
+        return f"focal-plane {axis} (mm)"
+    return f"detector {axis} (pix)"
+
+
+def _field(detector: Detector | Instrument) -> Field:
+    if isinstance(detector, Instrument):
+        half = max(np.abs(d.corners_um()).max() for d in detector.detectors) / 1000.0
+        x = y = half
+    else:
+        x, y = 0.5 * detector.n_x, 0.5 * detector.n_y
+    return Field((-_MARGIN * x, _MARGIN * x), (-_MARGIN * y, _MARGIN * y))
+
+
+def _outlines(detector: Detector | Instrument, theme: str) -> hv.Path:
+    if isinstance(detector, Instrument):
+        paths = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detector.detectors]
+    else:
+        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
+        paths = [0.5 * corners * (detector.n_x, detector.n_y)]
+    colour = theme_of(theme).line
+    return drawn(hv.Path(paths, ["x", "y"]), color=colour, line_width=1)
+
+
+def _thinned(
+    table: pd.DataFrame, detector: Detector | Instrument, field: Field
+) -> tuple[pd.DataFrame, str]:
+    """Return what is drawn, the vectors or their means in bins, and words on which."""
+    if len(table) <= ARROW_LIMIT:
+        return table, f"{len(table):,} measurements, an arrow each"
+    bins = _BINS_ON_FOCAL_PLANE if isinstance(detector, Instrument) else _BINS_ON_DETECTOR
+    x, y = field.x[1] / _MARGIN, field.y[1] / _MARGIN
+    means = binned_vectors(
+        table, x_range=(-x, x), y_range=(-y, y), bins=bins, least_share=_LEAST_SHARE
+    )
+    return means, (
+        f"{len(table):,} measurements: mean residual in {len(means):,} bins of a "
+        f"{bins} × {bins} grid, {means['n'].mean():.0f} in each on average"
+    )
+
+
+def _key(shown: pd.DataFrame, unit: str) -> tuple[float, str]:
+    """Return the length of the key arrow in axis units, and that length in words."""
+    mas_per_unit = float(shown["mas_per_unit"].mean())
+    length = round_125(2.0 * rms_length(shown)) if rms_length(shown) > 0 else 1.0
+    words = f"{length:g} pix" if unit == "pix" else f"{1000.0 * length:g} µm"
+    return length, f"{words} = {angle_text(length * mas_per_unit)}"
+
+
+def _hover(shown: pd.DataFrame) -> list[tuple[str, str]]:
+    if "id" in shown:
+        return [("source", "@{id}"), ("exposure", "@{exposure}"), *_HOVER_VALUES]
+    return [("measurements in the bin", "@{n}"), *_HOVER_VALUES]
+
+
+def _shown_exposures(table: pd.DataFrame) -> str:
+    names = table["exposure"].unique()
+    return str(names[0]).capitalize() if len(names) == 1 else f"{len(names)} exposures"
+
+
+def _draw(chosen: Chosen, theme: str) -> hv.Overlay:
+    table = residual_map(
+        chosen.result,
+        chosen.instrument,
+        exposures=chosen.exposures,
+        detector_id=chosen.detector,
+    )
+    detectors = {d.detector_id: d for d in chosen.instrument.detectors}
+    shown = chosen.instrument if chosen.detector is None else detectors[chosen.detector]
+    return plot_residual_map(table, shown, theme=theme)
+
+
+DIAGNOSTICS = (
+    Diagnostic(
+        "residual-map",
+        "Residual map",
+        "Measured minus predicted position on the detector, for the exposures and the detector "
+        "chosen. Good: directions without pattern. Neighbours that point the same way are "
+        "distortion that the order does not reach.",
+        20,
+        _draw,
+        follows_selection=True,
+    ),
+)

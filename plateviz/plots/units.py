@@ -1,0 +1,24 @@
+"""Numbers in words: an angle in the unit that fits, a factor with its thousands."""
+
+import math
+
+from solver.units import UAS_PER_MAS
+
+_UAS_BELOW_MAS = 0.5
+
+
+def angle_unit(size_mas: float) -> tuple[str, float]:
+    """Return the unit, µas or mas, that suits `size_mas`, and what to multiply mas by."""
+    small = math.isfinite(size_mas) and size_mas < _UAS_BELOW_MAS
+    return ("µas", UAS_PER_MAS) if small else ("mas", 1.0)
+
+
+def angle_text(value_mas: float) -> str:
+    """Return an angle to two or three digits with its unit: "4.2 mas", "85 µas"."""
+    unit, factor = angle_unit(abs(value_mas))
+    return f"{_digits(value_mas * factor)} {unit}"
+
+
+def _digits(value: float) -> str:
+    decimals = max(0, 1 - math.floor(math.log10(abs(value)))) if value else 0
+    return f"{value:,.{min(decimals, 6)}f}"

@@ -1,0 +1,57 @@
+"""A FitResult (and the truth, where there is one) as tidy tables, one function per plot.
+
+Every number that a plot, a view or a report shows is computed here. The truth is a
+frame with `source_id`, `ra` and `dec` (deg, direction at the mean epoch of the orbit,
+without aberration), or None; what needs a truth is an empty table without one.
+"""
+
+from plateviz.tables.calibration import calibration_tables, distortion
+from plateviz.tables.comparison import comparison, difference_histogram
+from plateviz.tables.convergence import convergence
+from plateviz.tables.footprint import footprint_fields, footprint_sources
+from plateviz.tables.pulls import exposure_chi2, pull_histogram
+from plateviz.tables.residuals import (
+    ScatterStatistics,
+    binned_vectors,
+    residual_map,
+    residual_scatter,
+    scatter_statistics,
+)
+from plateviz.tables.sources import (
+    ARTIFICIAL,
+    CLASSES,
+    NON_REFERENCE,
+    REFERENCE,
+    deviation,
+    deviation_statistics,
+    uncertainty,
+    uncertainty_by_count,
+)
+from plateviz.tables.summary import SummaryItem, summary_strip
+
+__all__ = [
+    "ARTIFICIAL",
+    "CLASSES",
+    "NON_REFERENCE",
+    "REFERENCE",
+    "ScatterStatistics",
+    "SummaryItem",
+    "binned_vectors",
+    "calibration_tables",
+    "comparison",
+    "convergence",
+    "deviation",
+    "deviation_statistics",
+    "difference_histogram",
+    "distortion",
+    "exposure_chi2",
+    "footprint_fields",
+    "footprint_sources",
+    "pull_histogram",
+    "residual_map",
+    "residual_scatter",
+    "scatter_statistics",
+    "summary_strip",
+    "uncertainty",
+    "uncertainty_by_count",
+]

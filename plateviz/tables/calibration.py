@@ -1,0 +1,125 @@
+"""Tables of the calibration: the distortion as a field of vectors, the fitted values."""
+
+import numpy as np
+import pandas as pd
+from numpy.polynomial import legendre
+
+from solver.instrument import Instrument
+from solver.parameters import Axis, groups_on
+from solver.result import FitResult
+from solver.units import RAD_PER_MAS
+
+_UM_PER_MM = 1000.0
+_TITLES: tuple[tuple[str, Axis], ...] = (
+    ("Exposures", "exp"),
+    ("Detectors", "det"),
+    ("Distortion", "coef"),
+)
+
+
+def distortion(result: FitResult, instrument: Instrument, *, grid: int = 17) -> pd.DataFrame:
+    """Return the fitted distortion on a square grid that covers the detectors.
+
+    Eq. (model:Lx) and Eq. (model:Ly), with the value at the optical centre subtracted:
+    the displacement there is zero for every order, as Eq. (model:A0) has it for order 5.
+
+    Parameters
+    ----------
+    result : the fit
+    instrument : of the fit; gives the scale s of the polynomials and the grid's extent
+    grid : number of points along each axis; odd, so that the optical centre is one
+
+    Returns
+    -------
+    Tail `x`, `y` and displacement `u`, `v` in mm, `mas_per_unit` (mas per mm), and the
+    displacement as `dx_um`, `dy_um`, `dx_mas`, `dy_mas`
+    """
+    half = max(np.abs(d.corners_um()).max() for d in instrument.detectors)
+    x, y = (a.ravel() for a in np.meshgrid(*[np.linspace(-half, half, grid)] * 2))
+    scaled = x / instrument.distortion_scale_um, y / instrument.distortion_scale_um
+    fitted = result.values_on("coef")
+    dx = displacement_um(fitted["distortion_x"].to_numpy(), *scaled)
+    dy = displacement_um(fitted["distortion_y"].to_numpy(), *scaled)
+    focal_um = float(result.values_on("exp")["focal_length"].mean())
+    mas_per_um = 1.0 / focal_um / RAD_PER_MAS
+    return pd.DataFrame(
+        {
+            "x": x / _UM_PER_MM,
+            "y": y / _UM_PER_MM,
+            "u": dx / _UM_PER_MM,
+            "v": dy / _UM_PER_MM,
+            "mas_per_unit": mas_per_um * _UM_PER_MM,
+            "dx_um": dx,
+            "dy_um": dy,
+            "dx_mas": dx * mas_per_um,
+            "dy_mas": dy * mas_per_um,
+        }
+    )
+
+
+def displacement_um(coefficients: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the Legendre sum less its value at the origin.
+
+    Parameters
+    ----------
+    coefficients : um, ordered by total degree, then by falling power of x, from degree 2
+    x, y : scaled focal-plane coordinates, shape (n,)
+
+    Returns
+    -------
+    um, shape (n,)
+
+    Raises
+    ------
+    ValueError
+        If the number of coefficients is not that of a complete order.
+    """
+    matrix = _coefficient_matrix(coefficients)
+    return legendre.legval2d(x, y, matrix) - legendre.legval2d(0.0, 0.0, matrix)
+
+
+def calibration_tables(result: FitResult) -> dict[str, pd.DataFrame]:
+    """Return the fitted calibration for display, a table per axis.
+
+    Returns
+    -------
+    "Exposures", "Detectors" and "Distortion" -> a row per exposure, detector or
+    coefficient pair, named by the column `element`; for each group its value, marginal
+    sigma and the share of the answer that is prior. The unit stands in brackets in the
+    column's name.
+    """
+    return {title: _display_table(result, axis) for title, axis in _TITLES}
+
+
+def _display_table(result: FitResult, axis: Axis) -> pd.DataFrame:
+    groups = groups_on(axis)
+    columns: dict[str, pd.Series] = {}
+    wide = {
+        name: result.values_on(axis, name) for name in ("value", "sigma_marginal", "prior_share")
+    }
+    for group in groups:
+        unit, value_unit = (u.replace("um", "µm") for u in (group.unit, group.value_unit))
+        columns[f"{group.label} [{value_unit}]"] = wide["value"][group.name]
+        columns[f"σ {group.label}, marginal [{unit}]"] = wide["sigma_marginal"][group.name]
+        columns[f"{group.label}, prior share"] = wide["prior_share"][group.name]
+    rows = result.calibration[result.calibration["group"].isin([g.name for g in groups])]
+    labels = rows.groupby("element")["label"].agg(lambda names: " ".join(dict.fromkeys(names)))
+    table = pd.DataFrame(columns)
+    table.insert(0, "element", labels.reindex(table.index))
+    return table.reset_index(drop=True)
+
+
+def _coefficient_matrix(coefficients: np.ndarray) -> np.ndarray:
+    order = 1
+    while (order + 1) * (order + 2) // 2 - 3 < len(coefficients):
+        order += 1
+    if (order + 1) * (order + 2) // 2 - 3 != len(coefficients):
+        raise ValueError(
+            f"coefficients: expected those of a complete order (3, 7, 12, 18, ...), "
+            f"got {len(coefficients)}"
+        )
+    matrix = np.zeros((order + 1, order + 1))
+    degrees = [(d - power, power) for d in range(2, order + 1) for power in range(d + 1)]
+    for (power_x, power_y), value in zip(degrees, coefficients, strict=True):
+        matrix[power_x, power_y] = value
+    return matrix

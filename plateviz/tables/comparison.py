@@ -1,0 +1,79 @@
+"""Table of the differences between two fits of the same sources."""
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.labels import id_strings
+from plateviz.tables.sky import mean_direction, offsets_arcmin, offsets_mas
+from plateviz.tables.sources import ordered_by_class
+from solver.result import FitResult
+
+
+def comparison(result_a: FitResult, result_b: FitResult) -> pd.DataFrame:
+    """Return position B minus position A of every source in both, and the sigmas' ratio.
+
+    Parameters
+    ----------
+    result_a : the fit on screen
+    result_b : the fit compared with it
+
+    Returns
+    -------
+    `source_id`, `id`, `source_class`, `n_obs` (of A), `x_arcmin` (ra cos(dec)),
+    `y_arcmin`, `difference_ra_mas` (ra cos(dec)), `difference_dec_mas`, `pull_ra`,
+    `pull_dec` (difference over the marginal sigma of A; not unit normal, since both fits
+    share their data), `sigma_ratio_ra`, `sigma_ratio_dec` (marginal, B over A)
+    """
+    columns = ["source_id", "ra", "dec", "sigma_ra_marginal", "sigma_dec_marginal"]
+    table = ordered_by_class(result_a.sources).merge(
+        result_b.sources[columns], on="source_id", suffixes=("", "_b"), validate="one_to_one"
+    )
+    d_ra, d_dec = offsets_mas(table["ra_b"], table["dec_b"], table["ra"], table["dec"])
+    centre = mean_direction(table["ra"].to_numpy(), table["dec"].to_numpy())
+    x, y = offsets_arcmin(table["ra"], table["dec"], *centre)
+    return pd.DataFrame(
+        {
+            "source_id": table["source_id"],
+            "id": id_strings(table["source_id"]),
+            "source_class": table["source_class"],
+            "n_obs": table["n_obs"],
+            "x_arcmin": x,
+            "y_arcmin": y,
+            "difference_ra_mas": d_ra,
+            "difference_dec_mas": d_dec,
+            "pull_ra": d_ra / table["sigma_ra_marginal"],
+            "pull_dec": d_dec / table["sigma_dec_marginal"],
+            "sigma_ratio_ra": table["sigma_ra_marginal_b"] / table["sigma_ra_marginal"],
+            "sigma_ratio_dec": table["sigma_dec_marginal_b"] / table["sigma_dec_marginal"],
+        }
+    )
+
+
+def difference_histogram(table: pd.DataFrame, *, bins: int = 41) -> pd.DataFrame:
+    """Return the histogram of the differences of `comparison` over their uncertainty.
+
+    Parameters
+    ----------
+    table : of `comparison`, not empty
+    bins : number of bins; odd, so that one is centred on zero
+
+    Returns
+    -------
+    A row per coordinate ("ra", "dec") and bin: `coordinate`, `left`, `right`, `count`;
+    the bins span every difference
+    """
+    pulls = table[["pull_ra", "pull_dec"]].to_numpy(dtype=float)
+    limit = 1.05 * float(np.abs(pulls).max()) or 1.0
+    edges = np.linspace(-limit, limit, bins + 1)
+    frames = [
+        pd.DataFrame(
+            {
+                "coordinate": coordinate,
+                "left": edges[:-1],
+                "right": edges[1:],
+                "count": np.histogram(table[f"pull_{coordinate}"], edges)[0],
+            }
+        )
+        for coordinate in ("ra", "dec")
+    ]
+    return pd.concat(frames, ignore_index=True)

@@ -1,0 +1,85 @@
+"""Tables of the footprint: sources and outlines of the fields on the sky."""
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.labels import id_strings
+from plateviz.tables.sky import mean_direction, offsets_arcmin, sky_of_focal_plane
+from plateviz.tables.sources import ordered_by_class
+from solver.instrument import Instrument
+from solver.result import FitResult
+
+
+def footprint_sources(result: FitResult) -> pd.DataFrame:
+    """Return the sources as offsets from the centre of the orbit's field.
+
+    Returns
+    -------
+    `source_id`, `id` (text), `source_class`, `n_obs`, `ra`, `dec` (deg), `x_arcmin`
+    (ra cos(dec), East positive) and `y_arcmin`; reference stars last, so that they are
+    drawn on top
+    """
+    table = ordered_by_class(result.sources)
+    x, y = offsets_arcmin(table["ra"], table["dec"], *_centre(result))
+    columns = ["source_id", "source_class", "n_obs", "ra", "dec"]
+    return table[columns].assign(id=id_strings(table["source_id"]), x_arcmin=x, y_arcmin=y)
+
+
+def footprint_fields(result: FitResult, instrument: Instrument) -> pd.DataFrame:
+    """Return the outline of each detector on the first exposure of each field.
+
+    The nominal corners are taken through the fitted pointing, position angle and focal
+    length; distortion (below a pixel) is left out. The pointing is that of the observed,
+    aberrated sky, so an outline may lie up to 0.35 arcmin off the sources.
+
+    Parameters
+    ----------
+    result : the fit
+    instrument : of the fit; gives the detectors' nominal corners
+
+    Returns
+    -------
+    `field_id`, `plate_id`, `detector_id`, `corner` (0 to 4, closed), `ra`, `dec` (deg),
+    `x_arcmin` (ra cos(dec)), `y_arcmin`, as in `footprint_sources`
+    """
+    centre = _centre(result)
+    optics = result.values_on("exp")
+    exposures = result.exposures.reset_index(drop=True)
+    first = exposures.sort_values(["field_id", "plate_id"]).drop_duplicates("field_id")
+    corners = np.concatenate([d.corners_um()[[0, 1, 2, 3, 0]] for d in instrument.detectors])
+    frames = [_outline(corners, optics.loc[index], instrument) for index in first.index]
+    if not frames:
+        return pd.DataFrame(columns=_FIELD_COLUMNS)
+    table = pd.concat(frames, keys=first["field_id"], names=["field_id"]).reset_index(level=0)
+    table["plate_id"] = table["field_id"].map(first.set_index("field_id")["plate_id"])
+    table["x_arcmin"], table["y_arcmin"] = offsets_arcmin(table["ra"], table["dec"], *centre)
+    return table[_FIELD_COLUMNS].reset_index(drop=True)
+
+
+_FIELD_COLUMNS = [
+    "field_id",
+    "plate_id",
+    "detector_id",
+    "corner",
+    "ra",
+    "dec",
+    "x_arcmin",
+    "y_arcmin",
+]
+
+
+def _outline(corners: np.ndarray, pointing: pd.Series, instrument: Instrument) -> pd.DataFrame:
+    ra, dec = sky_of_focal_plane(corners, pointing)
+    ids = [d.detector_id for d in instrument.detectors]
+    return pd.DataFrame(
+        {
+            "detector_id": np.repeat(ids, 5),
+            "corner": np.tile(np.arange(5), len(ids)),
+            "ra": ra,
+            "dec": dec,
+        }
+    )
+
+
+def _centre(result: FitResult) -> tuple[float, float]:
+    return mean_direction(result.sources["ra"].to_numpy(), result.sources["dec"].to_numpy())

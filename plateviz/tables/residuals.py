@@ -1,0 +1,186 @@
+"""Tables of residuals on the detectors: vectors, scatter, and their means in bins."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.labels import exposure_labels, id_strings
+from solver.instrument import Instrument
+from solver.result import FitResult
+from solver.units import RAD_PER_MAS
+
+ExposureKey = tuple[int, int]
+_MPIX_PER_PIX = 1000.0
+_UM_PER_MM = 1000.0
+
+
+def residual_map(
+    result: FitResult,
+    instrument: Instrument,
+    *,
+    exposures: Iterable[ExposureKey] | None = None,
+    detector_id: int | None = None,
+) -> pd.DataFrame:
+    """Return the residual vectors of chosen exposures, on one detector or on all.
+
+    Parameters
+    ----------
+    result : the fit
+    instrument : of the fit; gives the order of the detectors
+    exposures : (field_id, plate_id) of each exposure wanted; None for all
+    detector_id : the detector, or None for all detectors on the focal plane
+
+    Returns
+    -------
+    `source_id`, `id`, `exposure`, `detector_id`, the tail `x`, `y` and the vector `u`, `v`
+    (pix on one detector, mm on the focal plane: the residual turned by the detector's
+    fitted rotation), `mas_per_unit` (mas on the sky per unit of u and v), and the residual
+    on the detector in `residual_x_mpix`, `residual_y_mpix`, `residual_x_mas`,
+    `residual_y_mas`
+    """
+    rows = _chosen(result.residuals, exposures, detector_id)
+    fitted = result.values_on("det").loc[instrument.index_of(rows["detector_id"].to_numpy())]
+    focal_um = _focal_length_um(result, rows)
+    d_x_um = (rows["residual_x"] * fitted["pitch_x"].to_numpy()).to_numpy()
+    d_y_um = (rows["residual_y"] * fitted["pitch_y"].to_numpy()).to_numpy()
+    mas_per_um = 1.0 / focal_um / RAD_PER_MAS
+    if detector_id is None:
+        # The inverse of the rotation of Eq. (exp:model:nxny).
+        angle = np.radians(fitted["detector_rotation"].to_numpy())
+        u = (np.cos(angle) * d_x_um + np.sin(angle) * d_y_um) / _UM_PER_MM
+        v = (np.cos(angle) * d_y_um - np.sin(angle) * d_x_um) / _UM_PER_MM
+        x, y = rows["focal_x"] / _UM_PER_MM, rows["focal_y"] / _UM_PER_MM
+        mas_per_unit = mas_per_um * _UM_PER_MM
+    else:
+        x, y, u, v = (rows[name] for name in ("nx", "ny", "residual_x", "residual_y"))
+        mas_per_unit = mas_per_um * fitted["pitch_x"].to_numpy()
+    return pd.DataFrame(
+        {
+            "source_id": rows["source_id"],
+            "id": id_strings(rows["source_id"]),
+            "exposure": exposure_labels(rows),
+            "detector_id": rows["detector_id"],
+            "x": x,
+            "y": y,
+            "u": u,
+            "v": v,
+            "mas_per_unit": mas_per_unit,
+            "residual_x_mpix": rows["residual_x"] * _MPIX_PER_PIX,
+            "residual_y_mpix": rows["residual_y"] * _MPIX_PER_PIX,
+            "residual_x_mas": d_x_um * mas_per_um,
+            "residual_y_mas": d_y_um * mas_per_um,
+        }
+    ).reset_index(drop=True)
+
+
+def residual_scatter(
+    result: FitResult, *, exposures: Iterable[ExposureKey] | None = None
+) -> pd.DataFrame:
+    """Return residual x against y of chosen exposures, with the scatter expected of them.
+
+    Parameters
+    ----------
+    result : the fit
+    exposures : (field_id, plate_id) of each exposure wanted; None for all
+
+    Returns
+    -------
+    `source_id`, `id`, `exposure`, `detector_id`, `residual_x_mpix`, `residual_y_mpix`,
+    and `expected_x_mpix`, `expected_y_mpix`: the measurement uncertainty less what the
+    fit absorbs (half the leverage in each axis)
+    """
+    rows = _chosen(result.residuals, exposures, None)
+    kept = np.sqrt(np.clip(1.0 - 0.5 * rows["leverage"], 0.0, None))
+    return pd.DataFrame(
+        {
+            "source_id": rows["source_id"],
+            "id": id_strings(rows["source_id"]),
+            "exposure": exposure_labels(rows),
+            "detector_id": rows["detector_id"],
+            "residual_x_mpix": rows["residual_x"] * _MPIX_PER_PIX,
+            "residual_y_mpix": rows["residual_y"] * _MPIX_PER_PIX,
+            "expected_x_mpix": rows["sx"] * kept * _MPIX_PER_PIX,
+            "expected_y_mpix": rows["sy"] * kept * _MPIX_PER_PIX,
+        }
+    ).reset_index(drop=True)
+
+
+class ScatterStatistics(NamedTuple):
+    """What sums up a table of `residual_scatter`; rms about zero, in mpix."""
+
+    n: int
+    n_exposures: int
+    rms_x: float
+    rms_y: float
+    expected_x: float
+    expected_y: float
+
+
+def scatter_statistics(table: pd.DataFrame) -> ScatterStatistics:
+    """Return the numbers that sum up a table of `residual_scatter`, not empty."""
+    names = ("residual_x_mpix", "residual_y_mpix", "expected_x_mpix", "expected_y_mpix")
+    rms = (float(np.sqrt(np.mean(table[name].to_numpy(dtype=float) ** 2))) for name in names)
+    return ScatterStatistics(len(table), table["exposure"].nunique(), *rms)
+
+
+def binned_vectors(
+    table: pd.DataFrame,
+    *,
+    x_range: tuple[float, float],
+    y_range: tuple[float, float],
+    bins: int,
+    least_share: float = 0.0,
+) -> pd.DataFrame:
+    """Return the mean vector in each bin of a regular grid; empty bins have no row.
+
+    A bin cut by a detector's edge holds few vectors, and their mean is long by chance
+    alone: `least_share` leaves such bins out.
+
+    Parameters
+    ----------
+    table : tails `x`, `y`, vectors `u`, `v`; other numeric columns are averaged too
+    x_range, y_range : the limits of the grid; what lies outside counts in the edge bins
+    bins : number of bins along each axis
+    least_share : bins with less than this share of the mean number per bin have no row
+
+    Returns
+    -------
+    The numeric columns of `table` averaged, the place included, and the number of
+    vectors `n`
+    """
+    column = _bin_index(table["x"], x_range, bins)
+    row = _bin_index(table["y"], y_range, bins)
+    numeric = table.select_dtypes("number").drop(
+        columns=["source_id", "detector_id"], errors="ignore"
+    )
+    groups = numeric.groupby([row, column])
+    means = groups.mean()
+    means["n"] = groups.size()
+    return means[means["n"] >= least_share * means["n"].mean()].reset_index(drop=True)
+
+
+def _bin_index(values: pd.Series, limits: tuple[float, float], bins: int) -> np.ndarray:
+    scaled = (values.to_numpy(dtype=float) - limits[0]) / (limits[1] - limits[0]) * bins
+    return np.clip(np.floor(scaled), 0, bins - 1).astype(np.int64)
+
+
+def _chosen(
+    residuals: pd.DataFrame, exposures: Iterable[ExposureKey] | None, detector_id: int | None
+) -> pd.DataFrame:
+    keep = np.ones(len(residuals), dtype=bool)
+    if exposures is not None:
+        keys = pd.MultiIndex.from_tuples(list(exposures), names=["field_id", "plate_id"])
+        rows = pd.MultiIndex.from_frame(residuals[["field_id", "plate_id"]])
+        keep &= rows.isin(keys)
+    if detector_id is not None:
+        keep &= (residuals["detector_id"] == detector_id).to_numpy()
+    return residuals[keep]
+
+
+def _focal_length_um(result: FitResult, rows: pd.DataFrame) -> np.ndarray:
+    keys = ["field_id", "plate_id"]
+    fitted = result.values_on("exp")["focal_length"].to_numpy()
+    by_exposure = pd.Series(fitted, index=pd.MultiIndex.from_frame(result.exposures[keys]))
+    return by_exposure.reindex(pd.MultiIndex.from_frame(rows[keys])).to_numpy()

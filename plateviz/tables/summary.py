@@ -1,0 +1,159 @@
+"""The strip of numbers that says whether a fit can be trusted."""
+
+import math
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
+
+import pandas as pd
+
+from plateviz.tables.sources import deviation, deviation_statistics
+from solver.result import FitResult
+
+State = Literal["good", "warn", "bad", "neutral"]
+_SIGMAS = 3.0
+_MATERIAL = 0.2
+
+
+class SummaryItem(NamedTuple):
+    """One number: its name, its value in words, what it means, and how it is."""
+
+    label: str
+    value: str
+    hint: str
+    state: State
+
+
+def summary_strip(result: FitResult, truth: pd.DataFrame | None = None) -> list[SummaryItem]:
+    """Return the numbers to judge a fit by, the verdicts first.
+
+    A number is "good" within three times its expected scatter of its expected value,
+    "warn" beyond, and "bad" if it also lies more than 20 % off: with many measurements
+    the smallest flaw is significant, but only a large one spoils the uncertainties.
+
+    Parameters
+    ----------
+    result : the fit
+    truth : `source_id`, `ra`, `dec` (deg, at the mean epoch), or None
+
+    Returns
+    -------
+    Items with label, value, hint and state; those on the truth only where there is one
+    """
+    return [
+        _converged(result),
+        _chi2(result),
+        _normalised_deviation(result, "ra", "α"),
+        _normalised_deviation(result, "dec", "δ"),
+        *_from_truth(result, truth),
+        *_counts(result),
+        _iterations(result),
+        _seconds(result),
+    ]
+
+
+def _number(result: FitResult, key: str) -> float:
+    return float(result.summary[key])  # type: ignore[arg-type]
+
+
+def _verdict(value: float, expected: float, scatter: float) -> State:
+    if not (math.isfinite(value) and math.isfinite(expected) and scatter >= 0):
+        return "neutral"
+    departure = abs(value - expected)
+    if departure <= _SIGMAS * scatter:
+        return "good"
+    return "bad" if departure > _MATERIAL * abs(expected) else "warn"
+
+
+def _rule(expected: float, scatter: float, because: str) -> str:
+    return (
+        f"Expected {expected:.3f} ± {scatter:.3f} ({because}). "
+        f"Good within {_SIGMAS:.0f} times that scatter; bad if beyond and more than "
+        f"{100 * _MATERIAL:.0f} % off."
+    )
+
+
+def _converged(result: FitResult) -> SummaryItem:
+    converged = bool(result.summary["converged"])
+    return SummaryItem(
+        "Converged",
+        "yes" if converged else "no",
+        str(result.summary["reason"]),
+        "good" if converged else "bad",
+    )
+
+
+def _chi2(result: FitResult) -> SummaryItem:
+    dof = _number(result, "dof")
+    value = _number(result, "chi2_per_dof")
+    scatter = math.sqrt(2.0 / dof) if dof > 0 else float("nan")
+    parameters = _number(result, "effective_parameters")
+    because = f"√(2/dof); dof = {dof:,.0f} after {parameters:,.0f} effective parameters"
+    return SummaryItem(
+        "χ² per degree of freedom",
+        f"{value:.3f}",
+        _rule(1.0, scatter, because),
+        _verdict(value, 1.0, scatter),
+    )
+
+
+def _normalised_deviation(result: FitResult, coordinate: str, symbol: str) -> SummaryItem:
+    value = _number(result, f"normalised_deviation_{coordinate}")
+    expected = _number(result, f"expected_normalised_deviation_{coordinate}")
+    count = int(_number(result, "n_reference"))
+    scatter = expected / math.sqrt(2.0 * count) if count else float("nan")
+    because = f"expected value over √(2 n), {count} reference stars"
+    return SummaryItem(
+        f"Reference stars, {symbol}",
+        f"{value:.3f} (expected {expected:.3f})",
+        "Rms of estimate minus catalogue over the catalogue's sigma. "
+        + _rule(expected, scatter, because),
+        _verdict(value, expected, scatter),
+    )
+
+
+def _from_truth(result: FitResult, truth: pd.DataFrame | None) -> list[SummaryItem]:
+    return [
+        SummaryItem(
+            f"Deviation from truth, {row.source_class}",
+            f"{math.hypot(row.rms_ra, row.rms_dec) / math.sqrt(2.0):.3f} mas",
+            f"Rms per coordinate of {row.n} sources with a simulated truth. Over the marginal "
+            f"sigma: {row.pull_rms_ra:.2f} in α, {row.pull_rms_dec:.2f} in δ, expected 1. Sources "
+            "share the calibration's error, so no scatter is expected of one orbit alone.",
+            "neutral",
+        )
+        for row in deviation_statistics(deviation(result, truth)).itertuples()
+    ]
+
+
+def _counts(result: FitResult) -> list[SummaryItem]:
+    names = {
+        "n_measurements": ("Measurements", "positions of a source on an exposure"),
+        "n_sources": ("Sources", "solved for"),
+        "n_reference": ("Reference stars", "sources with a precise catalogue position"),
+        "n_exposures": ("Exposures", "images of the orbit, all detectors at once"),
+    }
+    items = [
+        SummaryItem(label, f"{_number(result, key):,.0f}", hint, "neutral")
+        for key, (label, hint) in names.items()
+    ]
+    if _number(result, "n_reference") == 0:
+        hint = "Without reference stars nothing ties the solution to the sky."
+        items[2] = SummaryItem("Reference stars", "0", hint, "bad")
+    return items
+
+
+def _iterations(result: FitResult) -> SummaryItem:
+    engine, order = result.summary["engine"], result.summary["order"]
+    return SummaryItem(
+        "Iterations",
+        f"{_number(result, 'iterations'):.0f}",
+        f"Engine {engine}, distortion order {order}, at most {result.settings.max_iterations}",
+        "neutral",
+    )
+
+
+def _seconds(result: FitResult) -> SummaryItem:
+    seconds: Mapping[str, float] = result.summary["seconds"]  # type: ignore[assignment]
+    parts = {name: float(value) for name, value in seconds.items()}
+    hint = ", ".join(f"{name} {value:.2f} s" for name, value in parts.items())
+    return SummaryItem("Time", f"{sum(parts.values()):.1f} s", hint, "neutral")

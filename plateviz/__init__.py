@@ -1,0 +1,1 @@
+"""plateviz: run Plate Analysis on an orbit, and see whether to trust the solution."""

@@ -1,0 +1,95 @@
+"""The dashboard: one page, made anew for every browser session over a shared workbench."""
+
+import panel as pn
+import panel_material_ui as pmui
+import param
+from bokeh.themes import Theme
+
+from plateviz.gallery import diagnostics
+from plateviz.session import Session
+from plateviz.state import Selection
+from plateviz.views.calibration import CalibrationView
+from plateviz.views.figure import FigureGrid
+from plateviz.views.refit import RefitView
+from plateviz.views.selection import SelectionView
+from plateviz.views.summary import SummaryView
+from plateviz.workbench import Workbench
+
+_TICK_MILLISECONDS = 100
+_STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
+
+
+def build_app(workbench: Workbench) -> pmui.Page:
+    """Return the page of one session over `workbench`."""
+    session = Session(workbench)
+    figures = FigureGrid(session, diagnostics())
+    page = pmui.Page(
+        title=f"plateviz · {workbench.title}",
+        sidebar=[
+            _heading("Shown"),
+            SelectionView(session),
+            _heading("Refit"),
+            RefitView(session),
+        ],
+        main=[
+            pn.Column(
+                SummaryView(session),
+                figures,
+                _heading("Calibration"),
+                CalibrationView(session),
+                sizing_mode="stretch_width",
+                margin=(4, 16, 24, 16),
+            )
+        ],
+        sidebar_width=300,
+        theme_config={"typography": {"fontSize": 13}},
+    )
+    # Figures come styled, in both themes; a theme that names these models keeps the page's
+    # own style off them.
+    if pn.state.curdoc is not None:
+        pn.state.curdoc.theme = Theme(json={"attrs": {name: {} for name in _STYLED}})
+    # The page's busy light changes with every event, and each change of the page makes Panel
+    # walk all models of all figures: half a second every time. The refit panel says it instead.
+    with param.edit_constant(page):
+        page.busy = False
+    page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
+    _set_theme(session, page.dark_theme)
+    _keep_in_address(session.selection)
+    _keep_up(session, figures)
+    session.show_orbit(session.selection.orbit)
+    return page
+
+
+def _keep_up(session: Session, figures: FigureGrid) -> None:
+    """Ask for news of the job and draw what is due, for as long as there is any.
+
+    The page asks, it is not told: a job belongs to the server and outlives the page.
+    """
+
+    def tick() -> None:
+        session.poll()
+        figures.draw_due()
+        if session.job is None and not figures.is_due:
+            callback.stop()
+
+    def wake(*_: object) -> None:
+        if not callback.running:
+            callback.start()
+
+    callback = pn.state.add_periodic_callback(tick, period=_TICK_MILLISECONDS, start=False)
+    session.param.watch(wake, ["stage", "shown", "other", "theme"])
+    session.selection.param.watch(wake, ["field", "plates", "detector"])
+
+
+def _heading(text: str) -> pmui.Typography:
+    return pmui.Typography(text, variant="subtitle1", margin=(10, 10, 4, 10))
+
+
+def _set_theme(session: Session, is_dark: bool) -> None:
+    session.theme = "dark" if is_dark else "light"
+
+
+def _keep_in_address(selection: Selection) -> None:
+    """Keep the selection in the address, so that it can be sent to somebody."""
+    if pn.state.location is not None:
+        pn.state.location.sync(selection, ["field", "plates", "detector"])

@@ -1,0 +1,141 @@
+"""What the command line prints: progress on standard error, results on standard output."""
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from plateviz.job import Job, JobStatus
+
+_ERRORS = Console(stderr=True)
+
+
+class Reporter:
+    """A line of progress that work in this process or another one keeps up to date."""
+
+    def __init__(self, progress: Progress, title: str) -> None:
+        """Add the line."""
+        self._progress = progress
+        self._task = progress.add_task(title, total=None)
+
+    def step(self, done: int, total: int) -> None:
+        """Say how much is done."""
+        self._progress.update(self._task, completed=done, total=total)
+
+    def say(self, words: str) -> None:
+        """Say what is being done."""
+        self._progress.update(self._task, description=words)
+
+    def follow(self, job: Job) -> JobStatus:
+        """Report a job until it is over."""
+        seen = 0
+        while not job.status.is_over:
+            job.wait_for_news(seen, timeout=1.0)
+            reports = job.progress
+            for report in reports[seen:]:
+                self.say(str(report.get("stage", "")))
+                if "total" in report:
+                    self.step(int(str(report["done"])), int(str(report["total"])))
+            seen = len(reports)
+        return job.status
+
+
+@contextmanager
+def reporting(title: str) -> Iterator[Reporter]:
+    """Give a line of progress on standard error; it is gone when the work is done."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=30),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=_ERRORS, transient=True) as progress:
+        yield Reporter(progress, title)
+
+
+def print_json(value: object) -> None:
+    """Print one JSON value."""
+    typer.echo(json.dumps(value, indent=1, allow_nan=False, default=str))
+
+
+def print_fit(summary: Mapping[str, Any], output: Path) -> None:
+    """Print the summary of a fit for people."""
+    verdict = "converged" if summary["converged"] else "NOT CONVERGED"
+    rows = [
+        ("orbit", f"{summary['orbit']}, mean epoch MJD {summary['epoch_mjd']:.5f} (TCB)"),
+        (
+            "data",
+            f"{summary['n_measurements']} measurements of {summary['n_sources']} sources "
+            f"({summary['n_reference']} reference) on {summary['n_exposures']} exposures",
+        ),
+        ("fit", f"{verdict} after {summary['iterations']} iterations: {summary['reason']}"),
+        ("chi2 per degree of freedom", _chi2(summary)),
+        ("residual rms", _milli_pixels(summary)),
+        ("normalised deviation", _deviations(summary)),
+        ("common error", _pair(summary, "mean_error_{}", "mas, of the mean of all other sources")),
+        *_truth_rows(summary.get("truth", {})),
+        ("time", ", ".join(f"{k} {v:.2f} s" for k, v in summary["seconds"].items())),
+        ("written", str(output)),
+    ]
+    width = max(len(name) for name, _ in rows)
+    for name, words in rows:
+        typer.echo(f"{name:<{width}}  {words}")
+
+
+def print_inspection(reports: list[dict[str, Any]]) -> None:
+    """Print what `solver.inspect_files` found, for people."""
+    for report in reports:
+        typer.echo(f"{report['file']}: {report['kind']}")
+        for table in report["tables"]:
+            typer.echo(f"  {table['name']}: {table['rows']} rows")
+            for column in table["columns"]:
+                typer.echo(f"    {_column(column)}")
+        for problem in report["problems"]:
+            typer.echo(f"  WRONG: {problem}")
+
+
+def _column(column: Mapping[str, Any]) -> str:
+    return str(column)
+
+
+def _chi2(summary: Mapping[str, Any]) -> str:
+    expected = (2.0 / summary["dof"]) ** 0.5
+    return (
+        f"{summary['chi2_per_dof']:.4f} (expected 1 ± {expected:.4f}; "
+        f"{summary['effective_parameters']:.0f} effective of {summary['n_parameters']} parameters)"
+    )
+
+
+def _milli_pixels(summary: Mapping[str, Any]) -> str:
+    x, y = (1e3 * summary[f"residual_rms_{axis}"] for axis in "xy")
+    return f"{x:.2f}, {y:.2f} mpix in x, y"
+
+
+def _deviations(summary: Mapping[str, Any]) -> str:
+    measured, expected = (
+        ", ".join(f"{summary[f'{kind}normalised_deviation_{axis}']:.3f}" for axis in ("ra", "dec"))
+        for kind in ("", "expected_")
+    )
+    return f"{measured} in RA, Dec of the reference sources (expected {expected})"
+
+
+def _pair(figures: Mapping[str, Any], pattern: str, words: str) -> str:
+    ra, dec = (figures[pattern.format(axis)] for axis in ("ra", "dec"))
+    return f"{ra:.3f}, {dec:.3f} {words}"
+
+
+def _truth_rows(truth: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
+    return [
+        (
+            f"{name} against truth",
+            f"{figures['n']} sources: mean {_pair(figures, 'mean_{}', 'mas')} "
+            f"(of which {_pair(figures, 'induced_{}', '')}from the references), "
+            f"rms {_pair(figures, 'rms_{}', 'mas')}, pull sd {_pair(figures, 'pull_sd_{}', '')}",
+        )
+        for name, figures in truth.items()
+    ]

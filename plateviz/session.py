@@ -1,0 +1,154 @@
+"""Session: one person's solutions on one screen. No Panel here: views watch, this decides.
+
+The old solution stays until the new one is whole; then both can be compared.
+"""
+
+from enum import Enum
+from typing import NamedTuple
+
+import param
+
+from plateviz.job import Job, JobStatus
+from plateviz.state import FitChoices, Selection, describe
+from plateviz.workbench import Workbench
+from solver.errors import InputError
+from solver.result import FitResult
+from solver.settings import FitSettings
+
+
+class Stage(Enum):
+    """What the screen can show."""
+
+    LOADING = "the first solution is being made"
+    READY = "the solution is what was asked for"
+    STALE = "another solution is being made"
+    FAILED = "the last request could not be met"
+
+
+class Solution(NamedTuple):
+    """One solution of the session and what it was asked for."""
+
+    orbit: int | None
+    settings: FitSettings
+    result: FitResult
+
+    @property
+    def label(self) -> str:
+        """The solution in a few words."""
+        return describe(self.settings)
+
+
+class Session(param.Parameterized):
+    """State of one browser session.
+
+    `shown` is the solution on the screen, `other` the one it is compared with; either
+    may be None. `stage` and `message` say how things stand.
+    """
+
+    shown = param.ClassSelector(class_=Solution, default=None, allow_None=True)
+    other = param.ClassSelector(class_=Solution, default=None, allow_None=True)
+    solutions = param.List(default=[], item_type=Solution)
+    stage = param.ClassSelector(class_=Stage, default=Stage.LOADING)
+    message = param.String(default="")
+    theme = param.Selector(default="light", objects=["light", "dark"])
+
+    def __init__(self, workbench: Workbench) -> None:
+        """Begin with the first orbit and the paper's settings."""
+        super().__init__()
+        self.workbench = workbench
+        self.selection = Selection()
+        self.choices = FitChoices()
+        self.selection.param["orbit"].objects = workbench.orbits
+        self.selection.orbit = workbench.orbits[0]
+        self._job: Job | None = None
+        self._asked: FitSettings = FitSettings()
+
+    @property
+    def job(self) -> Job | None:
+        """The job that is under way, if any."""
+        return self._job
+
+    def show_orbit(self, orbit: int | None) -> None:
+        """Turn to an orbit, with the settings of the solution on the screen."""
+        self.selection.orbit = orbit
+        settings = self.shown.settings if self.shown else self._asked
+        self.param.update(solutions=[], other=None)
+        self._ask(settings)
+
+    def refit(self) -> None:
+        """Ask for the orbit with the choices made; what cannot be used is said at once."""
+        try:
+            settings = self.choices.settings()
+        except InputError as error:
+            self.param.update(stage=Stage.FAILED, message=str(error))
+            return
+        self._ask(settings)
+
+    def cancel(self) -> None:
+        """Stop the job that is under way."""
+        if self._job is not None:
+            self.workbench.cancel(self._job)
+
+    def poll(self) -> None:
+        """Take in what has become of the job; called every so often while there is one."""
+        if self._job is None:
+            return
+        status = self._job.status
+        if status is JobStatus.DONE:
+            self._job = None
+            self._show(self._asked)
+        elif status.is_over:
+            reason = self._job.message or "The fit was cancelled; the last solution stays."
+            self._job = None
+            self.param.update(stage=Stage.FAILED, message=reason)
+        else:
+            self.message = _words(self._job)
+
+    def compare_with(self, other: Solution | None) -> None:
+        """Compare the solution on the screen with another one, or with none."""
+        self.other = other
+
+    def bring_up(self, solution: Solution) -> None:
+        """Show a solution that was made before; the one on the screen becomes the other."""
+        if solution is not self.shown:
+            self.param.update(shown=solution, other=self.shown)
+            self.choices.take(solution.settings)
+
+    def _ask(self, settings: FitSettings) -> None:
+        if self._job is not None:
+            self.workbench.cancel(self._job)
+        self._asked = settings
+        self._job = self.workbench.request(self.selection.orbit, settings)
+        stage = Stage.STALE if self.shown else Stage.LOADING
+        self.param.update(stage=stage, message=_words(self._job))
+        self.poll()
+
+    def _show(self, settings: FitSettings) -> None:
+        orbit = self.selection.orbit
+        result = self.workbench.result(orbit, settings)
+        if result is None:
+            self.param.update(stage=Stage.FAILED, message="The result of the fit is gone.")
+            return
+        numbers = [d.detector_id for d in self.workbench.instrument.detectors]
+        self.selection.fit_to(result, numbers)
+        solution = Solution(orbit, settings, result)
+        before = self.shown if self.shown and self.shown.orbit == orbit else None
+        kept = [s for s in self.solutions if s.settings != settings]
+        self.param.update(
+            solutions=[*kept, solution],
+            other=before if before and before.settings != settings else None,
+            shown=solution,
+            stage=Stage.READY,
+            message="",
+        )
+
+
+def _words(job: Job) -> str:
+    """Say how far a job is."""
+    if job.status is JobStatus.QUEUED:
+        return "waiting for the solver"
+    last = job.progress[-1] if job.progress else {}
+    words = str(last.get("stage", "starting"))
+    if last.get("largest_step") == last.get("largest_step") and "largest_step" in last:
+        words += f", largest step {last['largest_step']:.2g} sigma"
+    return f"{words} ({job.seconds:.0f} s)"

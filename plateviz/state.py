@@ -1,0 +1,102 @@
+"""What the user of one browser session has chosen; bounds are enforced here, on the server."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import param
+
+from solver.parameters import PARAMETERS
+from solver.result import FitResult
+from solver.settings import MAX_ORDER, FitSettings, format_width, parse_width
+
+ALL = "all"
+
+
+class Selection(param.Parameterized):
+    """The exposures and the detector that every view of the session shows."""
+
+    orbit = param.Selector(doc="orbit on the screen")
+    field = param.Selector(default=ALL, objects=[ALL], doc="field of the exposures, or all")
+    plates = param.Range(default=(0, 0), bounds=(0, 0), step=1, doc="first and last exposure")
+    detector = param.Selector(
+        default=ALL, objects=[ALL], doc="detector of the residual map, or all"
+    )
+
+    def fit_to(self, result: FitResult, detectors: list[int]) -> None:
+        """Offer what a solution holds; choices that it does not hold are given up."""
+        exposures = result.exposures
+        fields = [ALL, *(str(f) for f in sorted(exposures["field_id"].unique().tolist()))]
+        plates = (int(exposures["plate_id"].min()), int(exposures["plate_id"].max()))
+        numbers = [ALL, *(str(d) for d in detectors)]
+        first = self.param["field"].objects == [ALL]
+        self.param["field"].objects = fields
+        self.param["detector"].objects = numbers
+        self.param["plates"].bounds = plates
+        lowest, highest = (min(max(p, plates[0]), plates[1]) for p in self.plates)
+        self.param.update(
+            field=fields[1] if first else self.field if self.field in fields else ALL,
+            detector=numbers[1] if first else self.detector if self.detector in numbers else ALL,
+            plates=(lowest, highest),
+        )
+
+    @property
+    def detector_id(self) -> int | None:
+        """The chosen detector, None for all."""
+        return None if self.detector == ALL else int(self.detector)
+
+    def exposures_of(self, result: FitResult) -> list[tuple[int, int]]:
+        """Return (field_id, plate_id) of the chosen exposures that the solution holds."""
+        table = result.exposures
+        chosen = table["plate_id"].between(*self.plates)
+        if self.field != ALL:
+            chosen &= table["field_id"] == int(self.field)
+        pairs = table.loc[chosen, ["field_id", "plate_id"]]
+        return [(int(f), int(p)) for f, p in pairs.itertuples(index=False)]
+
+
+class FitChoices(param.Parameterized):
+    """What a refit is to use; prior widths are kept as the words that people write."""
+
+    order = param.Integer(default=5, bounds=(0, MAX_ORDER), doc="order of the distortion")
+    aberration = param.Boolean(default=True, doc="stellar aberration in the model")
+    widths = param.Dict(default={}, doc="group name -> prior width as text")
+
+    def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
+        """Start from the paper's priors."""
+        super().__init__(**values)
+        self.widths = default_widths()
+
+    def settings(self) -> FitSettings:
+        """Return the choices as settings; InputError says which of them cannot be used."""
+        defaults = default_widths()
+        changed = {
+            name: parse_width(name, text)
+            for name, text in self.widths.items()
+            if text.strip() != defaults[name]
+        }
+        return FitSettings(order=self.order, aberration=self.aberration, prior_widths=changed)
+
+    def take(self, settings: FitSettings) -> None:
+        """Show the choices that `settings` were made from."""
+        widths = {g.name: format_width(g.name, settings.width(g.name)) for g in PARAMETERS}
+        self.param.update(order=settings.order, aberration=settings.aberration, widths=widths)
+
+
+def default_widths() -> dict[str, str]:
+    """Return the paper's prior widths as people write them."""
+    defaults = FitSettings()
+    return {g.name: format_width(g.name, defaults.width(g.name)) for g in PARAMETERS}
+
+
+def describe(settings: FitSettings) -> str:
+    """Return the choices of a fit in a few words, the paper's priors going without saying."""
+    words = [f"order {settings.order}"]
+    words += [f"{name} {format_width(name, w)}" for name, w in _changed(settings).items()]
+    if not settings.aberration:
+        words.append("no aberration")
+    return ", ".join(words)
+
+
+def _changed(settings: FitSettings) -> Mapping[str, float]:
+    defaults = FitSettings()
+    return {n: w for n, w in settings.prior_widths.items() if w != defaults.width(n)}

@@ -1,0 +1,1 @@
+"""Views: they connect the session to the pictures, and compute nothing themselves."""

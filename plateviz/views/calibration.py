@@ -1,0 +1,42 @@
+"""CalibrationView: the fitted calibration as tables, a tab for each axis."""
+
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.session import Session
+from plateviz.tables import calibration_tables
+
+
+class CalibrationView(pn.viewable.Viewer):
+    """Tables of exposures, detectors and distortion of the solution on the screen."""
+
+    def __init__(self, session: Session, **params: object) -> None:
+        """Follow `session`."""
+        super().__init__(**params)
+        self._session = session
+        self._tabs = pmui.Tabs(sizing_mode="stretch_width")
+        session.param.watch(self._fill, "shown")
+        self._fill()
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the tabs."""
+        return self._tabs
+
+    def _fill(self, *_: object) -> None:
+        shown = self._session.shown
+        tables = calibration_tables(shown.result) if shown else {}
+        self._tabs[:] = [
+            (
+                title,
+                pn.widgets.Tabulator(
+                    table,
+                    disabled=True,
+                    show_index=False,
+                    pagination="remote",
+                    page_size=12,
+                    layout="fit_data_fill",
+                    sizing_mode="stretch_width",
+                ),
+            )
+            for title, table in tables.items()
+        ]

@@ -1,0 +1,120 @@
+"""RefitView: fit the orbit again with another order or other priors, watch it, stop it."""
+
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.session import Session, Solution, Stage
+from plateviz.state import default_widths
+from solver.parameters import PARAMETERS, Group
+
+
+class RefitView(pn.viewable.Viewer):
+    """Controls of a refit, its progress, and the choice among the solutions made."""
+
+    def __init__(self, session: Session, **params: object) -> None:
+        """Follow `session`."""
+        super().__init__(**params)
+        self._session = session
+        choices = session.choices
+        order = pmui.IntSlider.from_param(
+            choices.param.order, label="Distortion order", sizing_mode="stretch_width"
+        )
+        aberration = pmui.Switch.from_param(choices.param.aberration, label="Stellar aberration")
+        self._widths = {group.name: self._width_input(group) for group in PARAMETERS}
+        self._reset = pmui.Button(label="The paper's priors", variant="text", size="small")
+        self._fit = pmui.Button(label="Fit", color="primary", sizing_mode="stretch_width")
+        self._stop = pmui.Button(
+            label="Cancel", color="warning", variant="outlined", sizing_mode="stretch_width"
+        )
+        self._bar = pmui.LinearProgress(variant="indeterminate", sizing_mode="stretch_width")
+        self._news = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
+        self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
+        priors = pmui.Card(
+            *self._widths.values(),
+            self._reset,
+            title="Prior widths",
+            collapsed=True,
+            sizing_mode="stretch_width",
+            margin=(8, 10),
+            elevation=0,
+            variant="outlined",
+        )
+        self._column = pmui.Column(
+            order,
+            aberration,
+            priors,
+            pmui.Row(self._fit, self._stop, sizing_mode="stretch_width", margin=0),
+            self._bar,
+            self._news,
+            self._solutions,
+            sizing_mode="stretch_width",
+            margin=0,
+        )
+        self._connect()
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the controls."""
+        return self._column
+
+    def _connect(self) -> None:
+        session = self._session
+        self._fit.on_click(lambda _: session.refit())
+        self._stop.on_click(lambda _: session.cancel())
+        self._reset.on_click(lambda _: setattr(session.choices, "widths", default_widths()))
+        self._solutions.param.watch(self._bring_up, "value")
+        session.choices.param.watch(self._show_widths, "widths")
+        session.param.watch(self._show_stage, ["stage", "message"])
+        session.param.watch(self._show_solutions, ["solutions", "shown"])
+        self._show_stage()
+        self._show_solutions()
+
+    def _width_input(self, group: Group) -> pmui.TextInput:
+        entry = pmui.TextInput(
+            label=f"{group.label} ({group.symbol})",
+            value=self._session.choices.widths[group.name],
+            description=_explanation(group),
+            size="small",
+            sizing_mode="stretch_width",
+        )
+
+        def take(event: object) -> None:
+            widths = self._session.choices.widths
+            self._session.choices.widths = {**widths, group.name: event.new}  # type: ignore[attr-defined]
+
+        entry.param.watch(take, "value")
+        return entry
+
+    def _show_widths(self, *_: object) -> None:
+        for name, text in self._session.choices.widths.items():
+            self._widths[name].value = text
+
+    def _show_stage(self, *_: object) -> None:
+        stage, message = self._session.stage, self._session.message
+        at_work = stage in (Stage.LOADING, Stage.STALE)
+        self._bar.visible = at_work
+        self._stop.disabled = not at_work
+        self._news.param.update(
+            object=message,
+            visible=bool(message),
+            severity="error" if stage is Stage.FAILED else "info",
+        )
+
+    def _show_solutions(self, *_: object) -> None:
+        solutions = {solution.label: solution for solution in self._session.solutions}
+        self._solutions.param.update(
+            options=solutions, value=self._session.shown, visible=len(solutions) > 1
+        )
+
+    def _bring_up(self, event: object) -> None:
+        chosen = event.new  # type: ignore[attr-defined]
+        if isinstance(chosen, Solution):
+            self._session.bring_up(chosen)
+
+
+def _explanation(group: Group) -> str:
+    """Say what the number in a prior's box means."""
+    if group.axis == "src":
+        return "Factor on the catalogue's own uncertainties."
+    if group.relative:
+        return "Standard deviation as a fraction of the nominal value, or flat."
+    return f"Standard deviation in {group.unit} (other units may be written), or flat."

@@ -1,0 +1,81 @@
+"""Workbench: one source of orbits, one worker, and every solution made so far.
+
+It belongs to the server and is shared by all its sessions; solutions are files in a
+scratch folder, found again by what was asked for.
+"""
+
+import hashlib
+import json
+import shutil
+import tempfile
+import threading
+from functools import lru_cache
+from pathlib import Path
+
+from plateviz.job import Job, JobStatus
+from plateviz.source import Source, source_to_dict
+from plateviz.store import is_complete, read_run
+from plateviz.worker import Worker
+from solver.instrument import Instrument
+from solver.result import FitResult
+from solver.settings import FitSettings
+
+
+class Workbench:
+    """Fits orbits of one source on request and keeps their results."""
+
+    def __init__(self, source: Source, worker: Worker) -> None:
+        """Serve `source` with `worker`, which is closed with the workbench."""
+        self.source = source
+        self.orbits = source.orbits()
+        self.instrument: Instrument = source.read_instrument()
+        self._worker = worker
+        self._lock = threading.Lock()
+        self._jobs: dict[Path, Job] = {}
+        self._scratch = Path(tempfile.mkdtemp(prefix="plateviz-"))
+        self._read = lru_cache(maxsize=16)(read_run)
+
+    @property
+    def title(self) -> str:
+        """What people call the source."""
+        return self.source.title
+
+    def request(self, orbit: int | None, settings: FitSettings) -> Job:
+        """Ask for an orbit fitted with `settings`; the same question gives the same job."""
+        directory = self._directory(orbit, settings)
+        with self._lock:
+            job = self._jobs.get(directory)
+            if job is None or job.status in (JobStatus.FAILED, JobStatus.CANCELLED):
+                job = self._worker.submit(Job(self._request(orbit, settings, directory)))
+                self._jobs[directory] = job
+            return job
+
+    def cancel(self, job: Job) -> None:
+        """Stop a job that is waiting or running."""
+        self._worker.cancel(job)
+
+    def result(self, orbit: int | None, settings: FitSettings) -> FitResult | None:
+        """Return a solution that was asked for before and is whole, else None."""
+        directory = self._directory(orbit, settings)
+        return self._read(directory) if is_complete(directory) else None
+
+    def close(self) -> None:
+        """Stop the worker and remove the scratch folder."""
+        self._worker.close()
+        shutil.rmtree(self._scratch, ignore_errors=True)
+
+    def _request(
+        self, orbit: int | None, settings: FitSettings, directory: Path
+    ) -> dict[str, object]:
+        return {
+            "do": "fit",
+            "source": source_to_dict(self.source),
+            "orbit": orbit,
+            "settings": settings.to_dict(),
+            "directory": str(directory),
+        }
+
+    def _directory(self, orbit: int | None, settings: FitSettings) -> Path:
+        question = json.dumps([orbit, settings.to_dict()], sort_keys=True)
+        name = hashlib.sha256(question.encode()).hexdigest()[:16]
+        return self._scratch / f"orbit={'file' if orbit is None else f'{orbit:04d}'}-{name}"

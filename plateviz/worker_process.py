@@ -1,0 +1,138 @@
+"""The solver process: reads requests from standard input, writes events to standard output.
+
+One JSON object a line, both ways. It is the only process of a served plateviz that
+imports JAX, it stays warm between fits, and it ends with its standard input. A fault of
+ours ends it too, with a traceback on standard error: `plateviz.worker` reports that and
+starts another.
+
+Requests: {"do": "fit", "job", "source", "orbit", "settings", "directory"},
+{"do": "simulate", "job", "directory", "settings"}, {"do": "cancel", "job"}.
+Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
+"""
+
+import json
+import os
+import queue
+import sys
+import threading
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import TextIO
+
+from plateviz.source import source_from_dict
+from plateviz.store import write_run
+from solver.errors import CancelledError, FitError, InputError
+from solver.fit import fit_orbit
+from solver.gauss_newton import Iteration
+from solver.instrument import Instrument
+from solver.orbit import OrbitData
+from solver.settings import FitSettings
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
+
+Request = dict
+Send = Callable[[dict], None]
+
+
+class _Cancellations:
+    """Which jobs somebody has asked to stop."""
+
+    def __init__(self) -> None:
+        self._jobs: set[str] = set()
+
+    def add(self, job: str) -> None:
+        self._jobs.add(job)
+
+    def check(self, job: str) -> None:
+        if job in self._jobs:
+            raise CancelledError(job)
+
+
+def main() -> None:
+    """Serve requests until standard input ends."""
+    send = _sender()
+    requests: queue.Queue[Request | None] = queue.Queue()
+    cancellations = _Cancellations()
+    reader = threading.Thread(target=_read, args=(sys.stdin, requests, cancellations), daemon=True)
+    reader.start()
+    send({"event": "ready"})
+    while (request := requests.get()) is not None:
+        _serve(request, send, cancellations)
+
+
+def _sender() -> Send:
+    """Keep the real standard output for events; what libraries print goes to standard error."""
+    channel = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8", buffering=1)
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    lock = threading.Lock()
+
+    def send(event: dict) -> None:
+        with lock:
+            channel.write(json.dumps(event) + "\n")
+
+    return send
+
+
+def _read(
+    lines: TextIO, requests: "queue.Queue[Request | None]", cancellations: _Cancellations
+) -> None:
+    for line in lines:
+        request = json.loads(line)
+        if request["do"] == "cancel":
+            cancellations.add(request["job"])
+        else:
+            requests.put(request)
+    # Nobody is left to read a result: stop at once, even in the middle of a fit.
+    os._exit(0)
+
+
+def _serve(request: Request, send: Send, cancellations: _Cancellations) -> None:
+    job = request["job"]
+    work = {"fit": _fit, "simulate": _simulate}[request["do"]]
+
+    def progress(**values: object) -> None:
+        cancellations.check(job)
+        send({"event": "progress", "job": job, **values})
+
+    try:
+        cancellations.check(job)
+        work(request, progress)
+        send({"event": "done", "job": job})
+    except CancelledError:
+        send({"event": "cancelled", "job": job})
+    except (InputError, FitError) as error:
+        send({"event": "failed", "job": job, "message": str(error)})
+
+
+def _fit(request: Request, progress: Callable[..., None]) -> None:
+    progress(stage="reading the orbit")
+    data, instrument = _orbit(json.dumps(request["source"], sort_keys=True), request["orbit"])
+    settings = FitSettings.from_dict(request["settings"])
+
+    def on_iteration(iteration: Iteration) -> None:
+        progress(stage=f"iteration {iteration.iteration}", **iteration._asdict())
+
+    progress(stage="linearising")
+    result = fit_orbit(data, instrument, settings, on_iteration)
+    progress(stage="writing the result")
+    write_run(Path(request["directory"]), result)
+
+
+def _simulate(request: Request, progress: Callable[..., None]) -> None:
+    settings = SurveySettings.from_dict(request["settings"])
+    simulate_survey(
+        Path(request["directory"]),
+        settings,
+        progress=lambda done, total: progress(stage="simulating", done=done, total=total),
+    )
+
+
+@lru_cache(maxsize=4)
+def _orbit(source: str, orbit: int | None) -> tuple[OrbitData, Instrument]:
+    origin = source_from_dict(json.loads(source))
+    return origin.read(orbit), origin.read_instrument()
+
+
+if __name__ == "__main__":
+    main()

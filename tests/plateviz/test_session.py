@@ -1,0 +1,189 @@
+"""The session's rules, with a workbench whose jobs end when the test says so."""
+
+import pytest
+
+from plateviz.job import Job
+from plateviz.session import Session, Stage
+from plateviz.state import ALL, FitChoices, Selection, default_widths, describe
+from solver.errors import InputError
+from solver.instrument import MINI_MOCK
+from solver.settings import FitSettings
+
+
+class Bench:
+    """A workbench without a solver: what it is asked for is kept, and given when told."""
+
+    orbits = (0, 1)
+    instrument = MINI_MOCK
+    title = "bench"
+
+    def __init__(self, result):
+        self._result = result
+        self.asked, self.cancelled = [], []
+
+    def request(self, orbit, settings):
+        self.asked.append((orbit, settings, Job({"do": "fit"})))
+        return self.asked[-1][2]
+
+    def cancel(self, job):
+        self.cancelled.append(job)
+        job.cancel()
+
+    def result(self, orbit, settings):
+        return self._result
+
+
+@pytest.fixture
+def session(fit_result):
+    made = Session(Bench(fit_result))
+    made.show_orbit(0)
+    return made
+
+
+def finish(session):
+    session.job.take({"event": "done"})
+    session.poll()
+
+
+def test_the_first_orbit_is_asked_for_with_the_papers_settings(session):
+    assert session.stage is Stage.LOADING
+    assert session.workbench.asked[0][:2] == (0, FitSettings())
+    finish(session)
+    assert session.stage is Stage.READY
+    assert session.shown.settings == FitSettings()
+    assert session.other is None
+
+
+def test_the_old_solution_stays_until_the_new_one_is_whole(session):
+    finish(session)
+    before = session.shown
+    session.choices.order = 3
+    session.refit()
+    assert session.stage is Stage.STALE
+    assert session.shown is before
+    session.poll()
+    assert session.shown is before
+    finish(session)
+    assert session.shown.settings.order == 3
+    assert session.other is before
+    assert len(session.solutions) == 2
+
+
+def test_a_cancelled_refit_leaves_the_old_solution(session):
+    finish(session)
+    before = session.shown
+    session.choices.order = 3
+    session.refit()
+    session.cancel()
+    session.poll()
+    assert session.shown is before
+    assert session.stage is Stage.FAILED
+    assert "cancelled" in session.message
+    assert session.job is None
+
+
+def test_a_failed_refit_says_why_and_leaves_the_old_solution(session):
+    finish(session)
+    before = session.shown
+    session.refit()
+    session.job.take({"event": "failed", "message": "no reference star"})
+    session.poll()
+    assert session.shown is before
+    assert session.message == "no reference star"
+
+
+def test_a_prior_that_cannot_be_used_asks_for_nothing(session):
+    finish(session)
+    session.choices.widths = {**session.choices.widths, "distortion_x": "wide"}
+    session.refit()
+    assert session.stage is Stage.FAILED
+    assert "distortion_x" in session.message
+    assert len(session.workbench.asked) == 1
+
+
+def test_a_new_request_cancels_the_one_under_way(session):
+    first = session.job
+    session.refit()
+    assert session.workbench.cancelled == [first]
+
+
+def test_progress_is_said_in_words(session):
+    report = {"event": "progress", "stage": "iteration 2", "largest_step": 7.14}
+    session.job.take(report)
+    session.poll()
+    assert session.message.startswith("iteration 2, largest step 7.1 sigma")
+    session.job.take({**report, "stage": "iteration 0", "largest_step": float("nan")})
+    session.poll()
+    assert session.message.startswith("iteration 0 (")
+
+
+def test_bringing_up_an_older_solution_compares_with_the_newer(session):
+    finish(session)
+    session.choices.order = 3
+    session.refit()
+    finish(session)
+    newer, older = session.shown, session.other
+    session.bring_up(older)
+    assert (session.shown, session.other) == (older, newer)
+    assert session.choices.order == 5
+
+
+def test_another_orbit_forgets_the_solutions_of_the_last(session):
+    finish(session)
+    session.show_orbit(1)
+    assert session.solutions == []
+    assert session.workbench.asked[-1][:2] == (1, FitSettings())
+    finish(session)
+    assert session.other is None
+
+
+def test_the_selection_offers_what_the_solution_holds(fit_result):
+    selection = Selection()
+    selection.fit_to(fit_result, [0, 1, 2, 3])
+    assert selection.field == "0"
+    assert selection.exposures_of(fit_result) == [(0, 0)]
+    selection.field = ALL
+    selection.plates = (0, 1)
+    assert len(selection.exposures_of(fit_result)) == 8
+    assert selection.detector_id == 0
+    selection.detector = ALL
+    assert selection.detector_id is None
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("plates", (0, 99)), ("detector", "17"), ("field", "9")]
+)
+def test_the_selection_refuses_what_is_not_there(fit_result, name, value):
+    selection = Selection()
+    selection.fit_to(fit_result, [0, 1, 2, 3])
+    with pytest.raises(ValueError, match=name):
+        setattr(selection, name, value)
+
+
+@pytest.mark.parametrize("order", [-1, 10, 3.5])
+def test_the_order_is_bounded_on_the_server(order):
+    with pytest.raises(ValueError, match="order"):
+        FitChoices(order=order)
+
+
+def test_choices_become_settings_that_name_only_what_was_changed():
+    choices = FitChoices()
+    assert choices.settings() == FitSettings()
+    choices.widths = {**default_widths(), "pointing_ra": "1 arcmin", "pitch_x": "flat"}
+    assert choices.settings().prior_widths == {"pointing_ra": 60.0, "pitch_x": float("inf")}
+    again = FitChoices()
+    again.take(choices.settings())
+    assert again.settings() == choices.settings()
+
+
+def test_choices_that_cannot_be_used_say_which():
+    choices = FitChoices()
+    choices.widths = {**default_widths(), "detector_x": "-3"}
+    with pytest.raises(InputError, match="detector_x"):
+        choices.settings()
+
+
+def test_solutions_are_described_by_what_departs_from_the_paper():
+    assert describe(FitSettings()) == "order 5"
+    changed = FitSettings(order=3, aberration=False, prior_widths={"distortion_x": 0.5})
+    assert describe(changed) == "order 3, distortion_x 0.5 um, no aberration"

@@ -1,0 +1,122 @@
+"""The real solver process behind the workbench: fits, cancels, dies, and comes back."""
+
+import pytest
+
+from plateviz.job import Job, JobStatus
+from plateviz.source import OrbitFiles, SurveyFolder, source_from_dict, source_to_dict
+from plateviz.worker import Worker
+from plateviz.workbench import Workbench
+from solver.errors import InputError
+from solver.settings import FitSettings
+
+LONG = 120
+
+
+@pytest.fixture(scope="module")
+def workbench(small_survey):
+    bench = Workbench(SurveyFolder(str(small_survey)), Worker())
+    yield bench
+    bench.close()
+
+
+def test_an_orbit_is_fitted_and_kept(workbench):
+    job = workbench.request(0, FitSettings())
+    assert job.wait(LONG) is JobStatus.DONE, job.message
+    result = workbench.result(0, FitSettings())
+    assert result.summary["converged"]
+    assert result.true_places is not None
+    stages = [report["stage"] for report in job.progress]
+    assert stages[0] == "reading the orbit"
+    assert "iteration 1" in stages
+
+
+def test_the_same_question_is_asked_once(workbench):
+    first = workbench.request(0, FitSettings())
+    assert workbench.request(0, FitSettings()) is first
+    assert workbench.request(1, FitSettings()) is not first
+
+
+def test_other_settings_give_another_solution(workbench):
+    settings = FitSettings(order=3, prior_widths={"distortion_x": 10.0})
+    assert workbench.result(0, settings) is None
+    assert workbench.request(0, settings).wait(LONG) is JobStatus.DONE
+    other = workbench.result(0, settings)
+    assert other.settings == settings
+    assert other.summary["chi2"] > workbench.result(0, FitSettings()).summary["chi2"]
+
+
+def test_what_is_wrong_with_the_input_is_reported(tmp_path, sample_orbit_dir):
+    files = OrbitFiles(str(sample_orbit_dir / "sample_obs.fits"), str(tmp_path / "none.fits"))
+    bench = Workbench(files, Worker())
+    try:
+        job = bench.request(None, FitSettings())
+        assert job.wait(LONG) is JobStatus.FAILED
+        assert "none.fits" in job.message
+    finally:
+        bench.close()
+
+
+def test_a_cancelled_fit_ends_and_can_be_asked_for_again(workbench):
+    settings = FitSettings(order=7)
+    job = workbench.request(1, settings)
+    job.wait_for_news(0, timeout=LONG)
+    workbench.cancel(job)
+    assert job.wait(LONG) is JobStatus.CANCELLED
+    assert workbench.result(1, settings) is None
+    again = workbench.request(1, settings)
+    assert again is not job
+    assert again.wait(LONG) is JobStatus.DONE
+
+
+def test_a_waiting_job_is_cancelled_without_being_begun(workbench):
+    first = workbench.request(0, FitSettings(order=4))
+    waiting = workbench.request(0, FitSettings(order=2))
+    workbench.cancel(waiting)
+    assert waiting.status is JobStatus.CANCELLED
+    assert waiting.progress == []
+    assert first.wait(LONG) is JobStatus.DONE
+
+
+def test_a_process_that_dies_is_reported_and_replaced(workbench):
+    job = workbench.request(1, FitSettings(order=6))
+    job.wait_for_news(0, timeout=LONG)
+    workbench._worker._process.kill()
+    assert job.wait(LONG) is JobStatus.FAILED
+    assert "the solver process ended" in job.message
+    assert workbench.request(1, FitSettings(order=6)).wait(LONG) is JobStatus.DONE
+
+
+def test_closing_cancels_and_removes_everything(small_survey):
+    bench = Workbench(SurveyFolder(str(small_survey)), Worker())
+    job = bench.request(0, FitSettings())
+    scratch = bench._scratch
+    bench.close()
+    assert job.status is JobStatus.CANCELLED
+    assert not scratch.exists()
+
+
+def test_a_fault_of_ours_does_not_hang_the_queue(small_survey):
+    worker = Worker()
+    try:
+        broken = worker.submit(Job({"do": "nothing of the kind"}))
+        assert broken.wait(LONG) is JobStatus.FAILED
+        assert "KeyError" in broken.message
+    finally:
+        worker.close()
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        OrbitFiles("obs.fits", "ref.fits", orbit=3, instrument="camera.toml"),
+        SurveyFolder("somewhere"),
+    ],
+    ids=["files", "survey"],
+)
+def test_sources_are_plain_values_and_back(source):
+    assert source_from_dict(source_to_dict(source)) == source
+
+
+def test_a_folder_that_is_no_survey_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"survey\.toml"):
+        SurveyFolder(str(tmp_path)).orbits()

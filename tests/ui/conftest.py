@@ -1,0 +1,91 @@
+"""A served dashboard and a real Chromium; skipped, with the reason, where there is none."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+_FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+]
+# Chromium's software renderer remarks on its own speed; that is no fault of the page.
+_HARMLESS = re.compile(r"GL Driver Message|GPU stall")
+
+
+@pytest.fixture(scope="session")
+def chromium_path():
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        reason = "there is no Chromium on this machine (Debian: apt-get install chromium)"
+        if os.environ.get("PLATEVIZ_REQUIRE_BROWSER"):
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return path
+
+
+@pytest.fixture(scope="session")
+def browser(chromium_path):
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=chromium_path, args=_FLAGS)
+        yield launched
+        launched.close()
+
+
+@contextmanager
+def serving(*arguments, env=None):
+    """Run a command of plateviz that serves; gives the address it announces."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "plateviz.cli", *arguments, "--no-open"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**os.environ, **(env or {}), "PYTHONUNBUFFERED": "1"},
+    )
+    said = []
+    try:
+        for line in process.stdout:
+            said.append(line)
+            if found := re.search(r"http://\S+", line):
+                yield found[0]
+                break
+        else:
+            pytest.fail(f"the server ended: {''.join(said)}")
+    finally:
+        process.terminate()
+        process.wait(30)
+        process.stdout.close()
+
+
+@pytest.fixture
+def open_page(browser):
+    """Open a page of a size and colour scheme; what it complains of fails the test."""
+    complaints, contexts = [], []
+
+    def complain(message):
+        if message.type in ("error", "warning") and not _HARMLESS.search(message.text):
+            complaints.append(f"{message.type}: {message.text}")
+
+    def open_at(address, width=1500, height=1000):
+        context = browser.new_context(viewport={"width": width, "height": height})
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(90_000)
+        page.on("console", complain)
+        page.on("pageerror", lambda error: complaints.append(f"page error: {error}"))
+        page.on("requestfailed", lambda request: complaints.append(f"not loaded: {request.url}"))
+        page.goto(address)
+        return page
+
+    yield open_at
+    for context in contexts:
+        context.close()
+    assert complaints == []

@@ -1,0 +1,116 @@
+"""The dashboard as a person meets it: `plateviz demo` in a real Chromium."""
+
+import pytest
+from playwright.sync_api import expect
+
+from plateviz.gallery import diagnostics
+from tests.ui.conftest import serving
+
+pytestmark = [pytest.mark.ui, pytest.mark.slow]
+
+# Rows of the longest data source of each figure on the page, by the figure's title.
+ROWS = """() => Object.fromEntries(
+  Bokeh.documents.flatMap(d => [...d._all_models.values()])
+    .filter(m => m.type === 'Figure')
+    .map(f => [f.above.concat(f.title ? [f.title] : []).map(t => t.text ?? '').join(' | '),
+               Math.max(0, ...f.renderers.map(r => r.data_source?.get_length() ?? 0))]))"""
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory, chromium_path):
+    cache = tmp_path_factory.mktemp("cache")
+    with serving("demo", "--port", "0", env={"XDG_CACHE_HOME": str(cache)}) as address:
+        yield address
+
+
+@pytest.fixture
+def page(demo, open_page):
+    page = open_page(demo)
+    for diagnostic in diagnostics():
+        page.locator(f".figure-{diagnostic.name} canvas").first.wait_for(state="attached")
+    return page
+
+
+def value(page, name):
+    cell = page.locator(".cell").filter(has_text=name).first
+    return cell.locator(".value").inner_text()
+
+
+def set_order(page, order):
+    slider = page.get_by_role("slider", name="Distortion order")
+    current = int(slider.get_attribute("aria-valuenow"))
+    for _ in range(abs(order - current)):
+        slider.press("ArrowRight" if order > current else "ArrowLeft")
+    expect(slider).to_have_attribute("aria-valuenow", str(order))
+
+
+def residual_arrows(page):
+    return page.evaluate(
+        """() => Bokeh.documents.flatMap(d => [...d._all_models.values()])
+          .filter(m => m.type === 'Figure' && JSON.stringify(
+             m.above.concat([m.title]).map(t => t?.text ?? '')).includes('Residuals on detector'))
+          .flatMap(f => f.renderers.filter(r => r.glyph?.type === 'Segment'))
+          .map(r => JSON.stringify(Array.from(r.data_source.data['x1'] ?? []))).join()"""
+    )
+
+
+def test_every_figure_is_drawn_with_data(page):
+    rows = page.evaluate(ROWS)
+    assert len(rows) >= len(diagnostics())
+    empty = [title for title, n in rows.items() if n == 0 and "Comparison" not in title]
+    assert [t for t in empty if "Difference of positions" not in t] == []
+
+
+def test_the_summary_says_whether_to_trust_the_solution(page):
+    assert value(page, "Converged") == "yes"
+    assert 0.9 < float(value(page, "χ² per degree of freedom").split()[0]) < 1.1
+
+
+def test_another_order_changes_the_summary_and_the_residual_map(page):
+    chi2, arrows = value(page, "χ² per degree of freedom"), residual_arrows(page)
+    assert len(arrows) > 100
+    set_order(page, 3)
+    page.get_by_role("button", name="Fit", exact=True).click()
+    expect(page.locator(".solution")).to_have_count(2)
+    expect(page.locator(".solution").first).to_contain_text("order 3")
+    assert value(page, "χ² per degree of freedom") != chi2
+    page.wait_for_function("() => true")
+    assert residual_arrows(page) != arrows
+    assert page.locator(".figure-comparison canvas").count() > 0
+
+
+def test_a_refit_can_be_cancelled_and_the_old_solution_stays(page):
+    before = value(page, "χ² per degree of freedom")
+    set_order(page, 8)
+    page.get_by_role("button", name="Fit", exact=True).click()
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.get_by_text("The fit was cancelled; the last solution stays.")).to_be_visible()
+    assert value(page, "χ² per degree of freedom") == before
+    expect(page.locator(".solution")).to_have_count(1)
+
+
+def test_a_prior_that_makes_no_sense_is_refused_in_words(page):
+    page.get_by_text("Prior widths").click()
+    entry = page.get_by_label("distortion A (A_kl)")
+    entry.fill("1 deg")
+    entry.press("Enter")
+    page.get_by_role("button", name="Fit", exact=True).click()
+    expect(page.get_by_text("prior of distortion_x: expected a unit out of")).to_be_visible()
+
+
+def test_the_selection_is_in_the_address_and_comes_back(page, open_page):
+    page.get_by_label("Detector").first.click()
+    page.get_by_role("option", name="2").click()
+    page.wait_for_url("**detector=*2*")
+    again = open_page(page.url)
+    again.locator(".figure-residual-map canvas").first.wait_for(state="attached")
+    expect(again.get_by_label("Detector").first).to_have_text("2")
+
+
+def test_the_dark_theme_reaches_the_figures(page):
+    backgrounds = """() => [...new Set(Bokeh.documents.flatMap(d => [...d._all_models.values()])
+        .filter(m => m.type === 'Figure').map(m => m.background_fill_color))]"""
+    light = page.evaluate(backgrounds)
+    page.get_by_label("Toggle theme").click()
+    page.wait_for_function(f"() => ({backgrounds})()[0] !== '{light[0]}'")
+    assert len(page.evaluate(backgrounds)) == 1

@@ -16,6 +16,22 @@ plate is always called an exposure, and `plate_id` is only a column name.
 import importlib
 import os
 import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from solver.errors import InputError as InputError
+    from solver.fit import fit_orbit as fit_orbit
+    from solver.instrument import Instrument as Instrument
+    from solver.io.inspect import inspect_files as inspect_files
+    from solver.io.read import read_orbit as read_orbit
+    from solver.io.result import read_result as read_result
+    from solver.io.result import write_result as write_result
+    from solver.orbit import OrbitData as OrbitData
+    from solver.parameters import PARAMETERS as PARAMETERS
+    from solver.result import FitResult as FitResult
+    from solver.settings import FitSettings as FitSettings
+    from solver.simulate.settings import SurveySettings as SurveySettings
+    from solver.simulate.survey import simulate_survey as simulate_survey
 
 os.environ["JAX_ENABLE_X64"] = "1"
 if "jax" in sys.modules:
@@ -37,10 +53,24 @@ _PUBLIC = {
     "write_result": "solver.io.result",
 }
 
-__all__ = sorted(_PUBLIC)
+__all__ = [
+    "PARAMETERS",
+    "FitResult",
+    "FitSettings",
+    "InputError",
+    "Instrument",
+    "OrbitData",
+    "SurveySettings",
+    "fit_orbit",
+    "inspect_files",
+    "read_orbit",
+    "read_result",
+    "simulate_survey",
+    "write_result",
+]
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:  # noqa: ANN401 any public name
     """Load a public name on first use, so that importing `solver` costs nothing."""
     if name not in _PUBLIC:
         raise AttributeError(f"module 'solver' has no attribute {name!r}")

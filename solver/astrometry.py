@@ -67,10 +67,9 @@ def sky_position(
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Return right ascension in [0, 360) and declination, deg, of vectors of any length."""
     x, y, z = direction.T
-    return (
-        np.mod(np.arctan2(y, x), 2 * np.pi) / RAD_PER_DEG,
-        np.arctan2(z, np.hypot(x, y)) / RAD_PER_DEG,
-    )
+    ra = np.mod(np.arctan2(y, x) / RAD_PER_DEG, 360.0)
+    # A hair below zero is rounded up to the full turn.
+    return np.where(ra < 360.0, ra, 0.0), np.arctan2(z, np.hypot(x, y)) / RAD_PER_DEG
 
 
 def _years_since_epoch(catalogue: pd.DataFrame, mjd_tcb: float) -> Float[np.ndarray, " src"]:

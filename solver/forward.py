@@ -6,7 +6,7 @@ and a term here. Simulator, engines and diagnostics all call `predict`.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -18,7 +18,9 @@ from solver.distortion import basis
 from solver.projection import displace, focal_axes, project
 from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
 
-Offsets = Mapping[str, Array]
+# A NumPy or a JAX array: tables come as the one, what is computed from them is the other.
+AnyArray = Any
+Offsets = Mapping[str, AnyArray]
 
 
 class Geometry(eqx.Module):
@@ -36,12 +38,12 @@ class Geometry(eqx.Module):
     order : highest degree of the distortion
     """
 
-    source_frame: Float[Array, "src 3 3"]
-    pointing_frame: Float[Array, "exp 3 3"]
-    origin: dict[str, Float[Array, " _"]]
-    velocity: Float[Array, "exp 3"]
-    sun_distance: Float[Array, " exp"]
-    distortion_scale: Float[Array, ""]
+    source_frame: Float[AnyArray, "src 3 3"]
+    pointing_frame: Float[AnyArray, "exp 3 3"]
+    origin: dict[str, Float[AnyArray, " _"]]
+    velocity: Float[AnyArray, "exp 3"]
+    sun_distance: Float[AnyArray, " exp"]
+    distortion_scale: Float[AnyArray, ""]
     order: int = eqx.field(static=True)
 
     def value(self, offsets: Offsets, name: str) -> Float[Array, " _"]:
@@ -52,9 +54,9 @@ class Geometry(eqx.Module):
 class Index(NamedTuple):
     """Which source, exposure and detector each measurement belongs to."""
 
-    source: Int[Array, " obs"]
-    exposure: Int[Array, " obs"]
-    detector: Int[Array, " obs"]
+    source: Int[AnyArray, " obs"]
+    exposure: Int[AnyArray, " obs"]
+    detector: Int[AnyArray, " obs"]
 
 
 class Prediction(NamedTuple):
@@ -64,10 +66,10 @@ class Prediction(NamedTuple):
     from the detector's centre; `basis` holds the value of each distortion term.
     """
 
-    ideal: Float[Array, "obs 2"]
-    focal: Float[Array, "obs 2"]
-    pixel: Float[Array, "obs 2"]
-    basis: Float[Array, "obs coef"]
+    ideal: Float[AnyArray, "obs 2"]
+    focal: Float[AnyArray, "obs 2"]
+    pixel: Float[AnyArray, "obs 2"]
+    basis: Float[AnyArray, "obs coef"]
 
 
 def predict(offsets: Offsets, geometry: Geometry, index: Index) -> Prediction:

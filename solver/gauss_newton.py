@@ -1,7 +1,7 @@
 """The gauss-newton engine: the exact posterior mode in a few steps.
 
 Each iteration linearises the model exactly, eliminates the sources and takes the full
-step; damping comes in only if the posterior's chi2 rises. The fit has converged when
+step, or half of it, or a quarter, if the posterior's chi2 would rise. The fit has converged when
 every step is below the tolerance times the uncertainty of its parameter, which is what
 "nothing changes any more" means to somebody who reads the result.
 """
@@ -20,8 +20,7 @@ from solver.result import FitStatus
 from solver.schur import Reduced, reduce
 from solver.settings import FitSettings
 
-_FIRST_DAMPING = 1e-3
-_LARGEST_DAMPING = 1e9
+_SMALLEST_SHARE = 1e-6
 # Rounding moves chi2 by about this fraction; a rise below it is none.
 _ROUNDING = 1e-9
 
@@ -42,7 +41,7 @@ class Mode(NamedTuple):
     """Where the engine ended.
 
     `theta` and `sources` are offsets from the origins; `reduced` is the posterior
-    factorised, without damping, at the last linearisation point, which lies within one
+    factorised at the last linearisation point, which lies within one
     converged step.
     """
 
@@ -87,7 +86,7 @@ def find_mode(
     if not np.isfinite(point.objective):
         return Mode(point.theta, point.sources, None, FitStatus.NOT_FINITE, trace)
     while True:
-        reduced = _reduce(problem, point)
+        reduced = reduce(point.equations, problem.priors, point.theta, point.sources)
         if reduced is None:
             return Mode(point.theta, point.sources, None, FitStatus.SINGULAR, trace)
         step = reduced.step()
@@ -113,26 +112,22 @@ def _evaluate(
     return _Point(theta, sources, equations, objective)
 
 
-def _reduce(problem: Problem, point: _Point, damping: float = 0.0) -> Reduced | None:
-    return reduce(point.equations, problem.priors, point.theta, point.sources, damping)
-
-
 def _descend(
     problem: Problem,
     point: _Point,
     step: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
 ) -> tuple[_Point | None, float]:
-    """Take the step, damped as far as it takes for the objective not to rise."""
-    damping = 0.0
-    while True:
-        moved = _evaluate(problem, point.theta + step[0], point.sources + step[1])
+    """Take the step, or as much of it as it takes for the objective not to rise.
+
+    The step points downhill, so that a short enough part of it always does.
+    """
+    share = 1.0
+    while share > _SMALLEST_SHARE:
+        moved = _evaluate(problem, point.theta + share * step[0], point.sources + share * step[1])
         if moved.objective <= point.objective * (1.0 + _ROUNDING):
-            return moved, damping
-        damping = 10.0 * damping or _FIRST_DAMPING
-        damped = _reduce(problem, point, damping)
-        if damped is None or damping > _LARGEST_DAMPING:
-            return None, damping
-        step = damped.step()
+            return moved, 1.0 - share
+        share *= 0.5
+    return None, 1.0 - share
 
 
 def _largest(

@@ -6,9 +6,11 @@ Eq. (exp:model:nxny), which is minus the angle at which the detector is mounted.
 """
 
 import json
+import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -129,7 +131,7 @@ def parse_instrument(text: str, path: Path) -> Instrument:
         raise InputError(f"{path}: expected an instrument in TOML, found: {error}") from error
     tables = content.pop("detector", [])
     _expect_keys(path, "the file", content, {"name", "focal_length_um", "distortion_scale_um"})
-    if not isinstance(tables, list) or not tables:
+    if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
         raise InputError(f"{path}: expected at least one [[detector]] table, found none")
     detectors = tuple(_detector(path, number, table) for number, table in enumerate(tables))
     if len({d.detector_id for d in detectors}) < len(detectors):
@@ -161,14 +163,15 @@ def _detector(path: Path, number: int, table: dict) -> Detector:
     _expect_keys(path, where, table, set(_DETECTOR_KEYS))
     for key in ("pitch_x_um", "pitch_y_um", "n_x", "n_y"):
         _positive(path, f"{key} of {where}", table[key])
-    integers = {"id", "n_x", "n_y"}
-    try:
-        values = {
-            name: (int if key in integers else float)(table[key])
-            for key, name in _DETECTOR_KEYS.items()
-        }
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{path}: expected numbers in {where}, found: {error}") from error
+    values: dict[str, Any] = {}
+    for key, name in _DETECTOR_KEYS.items():
+        is_count = key in {"id", "n_x", "n_y"}
+        if not _is_finite(table[key]) or (is_count and not isinstance(table[key], int)):
+            kind = "a whole number" if is_count else "a number"
+            raise InputError(
+                f"{path}: expected {key} of {where} to be {kind}, found {table[key]!r}"
+            )
+        values[name] = table[key] if is_count else float(table[key])
     return Detector(**values)
 
 
@@ -182,6 +185,10 @@ def _expect_keys(path: Path, where: str, table: dict, expected: set[str]) -> Non
 
 
 def _positive(path: Path, name: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0:
+    if not isinstance(value, int | float) or not _is_finite(value) or not value > 0:
         raise InputError(f"{path}: expected {name} to be a positive number, found {value!r}")
     return float(value)
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -8,7 +8,7 @@ one measurement touches lie in three runs of columns.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Shaped
 
 from solver.parameters import CALIBRATION_GROUPS, Group, groups_on
 
@@ -69,13 +69,13 @@ class Layout:
         )
         return first + members.index(group) + len(members) * np.arange(count)
 
-    def gather(self, values: dict[str, Float[np.ndarray, " n"]]) -> Float[np.ndarray, " calib"]:
+    def gather(self, values: dict[str, Shaped[np.ndarray, " _"]]) -> Shaped[np.ndarray, " calib"]:
         """Return the flat vector of values given per group."""
         flat = np.empty(self.size)
         for group in CALIBRATION_GROUPS:
             flat[self.columns(group)] = values[group.name]
         return flat
 
-    def scatter(self, flat: Float[np.ndarray, " calib"]) -> dict[str, Float[np.ndarray, " n"]]:
+    def scatter(self, flat: Shaped[np.ndarray, " calib"]) -> dict[str, Shaped[np.ndarray, " _"]]:
         """Return the values per group of a flat vector."""
         return {group.name: flat[self.columns(group)] for group in CALIBRATION_GROUPS}

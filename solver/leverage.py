@@ -96,9 +96,10 @@ def _standardised(
     rest = np.eye(2) - leverage
     determinant = rest[:, 0, 0] * rest[:, 1, 1] - rest[:, 0, 1] * rest[:, 1, 0]
     # Below this the measurement alone decides its prediction, and rounding its residual.
-    usable = determinant > 1e-12
+    usable = (determinant > 1e-12) & (np.trace(rest, axis1=1, axis2=2) > 0.0)
     root = np.sqrt(np.where(usable, determinant, 1.0))
-    scale = np.sqrt(np.trace(rest, axis1=1, axis2=2) + 2.0 * root)
+    trace = np.where(usable, np.trace(rest, axis1=1, axis2=2), 1.0)
+    scale = np.sqrt(trace + 2.0 * root)
     square_root = (rest + root[:, None, None] * np.eye(2)) / scale[:, None, None]
     square_root[~usable] = np.eye(2)
     solved = np.linalg.solve(square_root, residual[:, :, None])[:, :, 0]

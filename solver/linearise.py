@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from solver.forward import Geometry, Index, Offsets, Prediction, ideal_position, image
+from solver.forward import AnyArray, Geometry, Index, Offsets, Prediction, ideal_position, image
 from solver.layout import PER_DETECTOR, PER_EXPOSURE
 from solver.parameters import SOURCES, Group
 
@@ -26,11 +26,11 @@ class Linearised(NamedTuple):
     (per group unit), and by a displacement on the focal plane (um^-1).
     """
 
-    residual: Float[Array, "obs 2"]
-    source: Float[Array, "obs 2 2"]
-    exposure: Float[Array, "obs 2 per_exp"]
-    detector: Float[Array, "obs 2 per_det"]
-    displacement: Float[Array, "obs 2 2"]
+    residual: Float[AnyArray, "obs 2"]
+    source: Float[AnyArray, "obs 2 2"]
+    exposure: Float[AnyArray, "obs 2 per_exp"]
+    detector: Float[AnyArray, "obs 2 per_det"]
+    displacement: Float[AnyArray, "obs 2 2"]
     prediction: Prediction
 
 
@@ -39,8 +39,8 @@ def linearise(
     offsets: Offsets,
     geometry: Geometry,
     index: Index,
-    measured: Float[Array, "obs 2"],
-    weight: Float[Array, "obs 2"],
+    measured: Float[AnyArray, "obs 2"],
+    weight: Float[AnyArray, "obs 2"],
 ) -> Linearised:
     """Linearise the model at `offsets`.
 

@@ -66,7 +66,7 @@ class Priors(NamedTuple):
         self, theta: Float[np.ndarray, " calib"]
     ) -> tuple[Float[np.ndarray, " gamma"], Float[np.ndarray, " gamma"]]:
         centre = self.centre[self.is_gamma]
-        # A value at or below zero has no density; the engine's damping turns back there.
+        # A value at or below zero has no density; the engine takes a shorter step then.
         value = np.maximum(centre + theta[self.is_gamma], np.finfo(float).tiny)
         return centre / self._gamma_scale(), value
 
@@ -78,8 +78,8 @@ class Priors(NamedTuple):
 
 
 def group_widths(
-    settings: FitSettings, centres: dict[str, Float[np.ndarray, " n"]]
-) -> dict[str, Float[np.ndarray, " n"]]:
+    settings: FitSettings, centres: dict[str, Float[np.ndarray, " _"]]
+) -> dict[str, Float[np.ndarray, " _"]]:
     """Return the prior widths of every calibration group, in the group's unit.
 
     Parameters

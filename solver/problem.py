@@ -148,7 +148,7 @@ def _check_freedom(n_obs: int, n_src: int, layout: Layout, order: int) -> None:
 
 def calibration_centres(
     exposures: pd.DataFrame, instrument: Instrument, layout: Layout
-) -> dict[str, Float[np.ndarray, " n"]]:
+) -> dict[str, Float[np.ndarray, " _"]]:
     """Return the prior centres of every calibration group, in the group's unit."""
     centres = {}
     for group in CALIBRATION_GROUPS:
@@ -165,7 +165,7 @@ def calibration_centres(
 def _geometry(
     source_frame: Float[np.ndarray, "src 3 3"],
     exposures: pd.DataFrame,
-    centres: dict[str, Float[np.ndarray, " n"]],
+    centres: dict[str, Float[np.ndarray, " _"]],
     instrument: Instrument,
     settings: FitSettings,
 ) -> Geometry:
@@ -190,7 +190,7 @@ def _geometry(
 
 def _priors(
     covariance: Float[np.ndarray, "src 2 2"],
-    centres: dict[str, Float[np.ndarray, " n"]],
+    centres: dict[str, Float[np.ndarray, " _"]],
     settings: FitSettings,
     layout: Layout,
 ) -> Priors:

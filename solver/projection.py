@@ -30,7 +30,9 @@ def tangent_frame(
 
 
 def displace(
-    frame: Float[Array, "n 3 3"], east: Float[Array, " n"], north: Float[Array, " n"]
+    frame: Float[Array | np.ndarray, "n 3 3"],
+    east: Float[Array | np.ndarray, " n"],
+    north: Float[Array | np.ndarray, " n"],
 ) -> Float[Array, "n 3"]:
     """Return unit vectors displaced in the tangent plane of their frames.
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
 import pandas as pd
 
@@ -15,7 +16,7 @@ class FitStatus(Enum):
 
     CONVERGED = "every step of the last iteration is below the tolerance times its uncertainty"
     MAX_ITERATIONS = "the limit of iterations was reached before the steps became small"
-    STUCK = "no damping made chi2 fall any further, and the steps are not small"
+    STUCK = "no part of the step made chi2 fall any further, and the steps are not small"
     SINGULAR = "the data and the priors together leave a direction of the solution open"
     NOT_FINITE = "the residuals are not finite: a start value is far from the truth"
 
@@ -42,7 +43,7 @@ class FitResult:
     calibration: pd.DataFrame
     exposures: pd.DataFrame
     trace: pd.DataFrame
-    summary: Mapping[str, object]
+    summary: Mapping[str, Any]
     settings: FitSettings
     provenance: Mapping[str, str] = field(default_factory=dict)
     true_places: pd.DataFrame | None = None

@@ -262,7 +262,7 @@ TRACE = Table(
         Column("chi2", "float64", "", "chi2 of the data"),
         Column("largest_step", "float64", "", "largest step over its uncertainty", may_be_nan=True),
         Column("largest_parameter", "str", "", "the parameter of that step"),
-        Column("damping", "float64", "", "damping factor, 0 if none was needed"),
+        Column("damping", "float64", "", "share of the step that was not taken, mostly 0"),
         Column("seconds", "float64", "s", "time since the start of the fit"),
     ),
 )

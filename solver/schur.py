@@ -99,25 +99,27 @@ def reduce(
     priors: Priors,
     theta: Float[np.ndarray, " calib"],
     sources: Float[np.ndarray, "src 2"],
-    damping: float = 0.0,
 ) -> Reduced | None:
     """Add the priors at (theta, sources), eliminate the sources and factorise.
 
     Returns
     -------
-    None if the system is singular: the data and the priors leave a direction open.
+    None if the system is singular: the data and the priors leave a direction open, or hold
+    it so weakly that rounding hides it.
     """
     diagonal = np.diag(equations.theta) + priors.curvature(theta)
     hessian = equations.theta.copy()
-    np.fill_diagonal(hessian, diagonal * (1.0 + damping))
+    np.fill_diagonal(hessian, diagonal)
     source = equations.source + priors.precision
-    source[:, [0, 1], [0, 1]] *= 1.0 + damping
     try:
         source_factor = np.linalg.cholesky(source)
         whitened = _lower_solve(source_factor, equations.cross)
         rows = whitened.reshape(-1, len(hessian))
         factor = sl.cholesky(hessian - rows.T @ rows, check_finite=True)
     except (np.linalg.LinAlgError, ValueError):
+        return None
+    # A pivot is what is left of the diagonal once all else is accounted for.
+    if (np.diag(factor) ** 2 < len(hessian) * np.finfo(float).eps * diagonal).any():
         return None
     return Reduced(
         by_theta=equations.by_theta - priors.gradient(theta),

@@ -37,7 +37,7 @@ class FitSettings:
 
     def __post_init__(self) -> None:
         """Refuse what no fit can use; `InputError` names the setting."""
-        if not isinstance(self.order, int) or not 0 <= self.order <= MAX_ORDER:
+        if not _is_whole(self.order) or not 0 <= self.order <= MAX_ORDER:
             raise InputError(
                 f"expected a distortion order from 0 to {MAX_ORDER}, found {self.order!r}"
             )
@@ -45,6 +45,12 @@ class FitSettings:
             raise InputError(
                 f"expected an engine out of {', '.join(ENGINES)}, found {self.engine!r}"
             )
+        if not _is_whole(self.max_iterations) or self.max_iterations < 1:
+            raise InputError(
+                f"expected max_iterations to be 1 or more, found {self.max_iterations!r}"
+            )
+        if not self.tolerance > 0.0:
+            raise InputError(f"expected a positive tolerance, found {self.tolerance!r}")
         for name, width in self.prior_widths.items():
             _check_width(name, width)
         object.__setattr__(self, "prior_widths", dict(self.prior_widths))
@@ -72,6 +78,10 @@ class FitSettings:
     def from_dict(values: Mapping[str, object]) -> "FitSettings":
         """Return the settings that `to_dict` wrote."""
         return FitSettings(**values)  # type: ignore[arg-type]
+
+
+def _is_whole(number: object) -> bool:
+    return isinstance(number, int) and not isinstance(number, bool)
 
 
 def _check_width(name: str, width: float) -> None:

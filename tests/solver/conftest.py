@@ -1,0 +1,238 @@
+"""A small orbit and its solution, and the same posterior as one dense matrix."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import jax
+import numpy as np
+import pytest
+import scipy.linalg as sl
+
+from solver.fit import fit_orbit
+from solver.forward import predict
+from solver.gauss_newton import find_mode
+from solver.io.read import read_orbit
+from solver.leverage import covariances, residuals
+from solver.normal import accumulate
+from solver.parameters import CALIBRATION_GROUPS, SOURCES
+from solver.problem import build_problem
+from solver.schur import reduce
+from solver.settings import FitSettings
+from solver.tables import Solution
+from tests.solver.small_orbit import make_orbit, true_offsets
+
+# One length for all, since each costs a compilation; a small orbit fills it almost twice.
+CHUNK = 192
+
+
+@pytest.fixture(autouse=True)
+def _small_chunks(monkeypatch):
+    """Linearise a small orbit a little at a time, in more than one chunk."""
+    monkeypatch.setattr("solver.normal.CHUNK", CHUNK)
+
+
+@pytest.fixture(scope="session")
+def small_orbit():
+    """Two fields of four exposures on four detectors, with the paper's aberration."""
+    return make_orbit()
+
+
+# With the default priors the common shift, roll and scale of the detectors are so weakly
+# held that a dense inverse has but seven digits to compare with.
+HELD = {
+    "detector_x": 10.0,
+    "detector_y": 10.0,
+    "detector_rotation": 60.0,
+    "pitch_x": 1e-3,
+    "pitch_y": 1e-3,
+}
+
+
+@pytest.fixture(scope="session")
+def problem(small_orbit):
+    """The small orbit, its detectors held more tightly than by default."""
+    settings = FitSettings(prior_widths=HELD)
+    return build_problem(small_orbit.data, small_orbit.instrument, settings)
+
+
+def solve(orbit, settings=None):
+    """Return the `Solution` of a small orbit."""
+    settings = settings or FitSettings()
+    problem = build_problem(orbit.data, orbit.instrument, settings)
+    mode = find_mode(problem, settings)
+    covariance = covariances(mode.reduced)
+    at_mode = residuals(problem, mode.theta, mode.sources, covariance)
+    return Solution(problem, mode, mode.reduced, covariance, at_mode)
+
+
+@pytest.fixture(scope="session")
+def solution(small_orbit):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("solver.normal.CHUNK", CHUNK)
+        return solve(small_orbit)
+
+
+@pytest.fixture(scope="session")
+def result(small_orbit):
+    """The result of the small orbit."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("solver.normal.CHUNK", CHUNK)
+        return fit_orbit(small_orbit.data, small_orbit.instrument)
+
+
+@pytest.fixture(scope="session")
+def mocks():
+    """Truth and solution of orbits whose every parameter is drawn from its prior."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("solver.normal.CHUNK", CHUNK)
+        orbits = [make_orbit(seed=seed, scatter=1.0) for seed in range(100, 124)]
+        return [(orbit, solve(orbit)) for orbit in orbits]
+
+
+@pytest.fixture(scope="session")
+def sample_orbit(sample_orbit_dir):
+    """The tables of the sample orbit."""
+    return read_orbit(
+        sample_orbit_dir / "sample_obs.fits",
+        sample_orbit_dir / "sample_ref.fits",
+        sample_orbit_dir / "sample_truth.fits",
+    )
+
+
+class Dense(NamedTuple):
+    """Whole whitened Jacobian, Hessian with priors and its inverse, calibration first.
+
+    `jacobian` has a row for each coordinate, in working order; `gradient` is minus that of
+    half the penalised chi2.
+    """
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    prior: np.ndarray
+    hessian: np.ndarray
+    gradient: np.ndarray
+    covariance: np.ndarray
+    n_calib: int
+
+
+@jax.jit
+def _pixels(offsets, geometry, index):
+    return predict(offsets, geometry, index).pixel
+
+
+@jax.jit
+def _dense_jacobian(offsets, geometry, index):
+    return jax.jacfwd(lambda values: _pixels(values, geometry, index))(offsets)
+
+
+def dense_jacobian(problem, theta, sources):
+    """Return the derivatives of all pixels by all parameters, shape (2 obs, parameters)."""
+    offsets = {**problem.layout.scatter(theta), SOURCES.name: sources}
+    blocks = _dense_jacobian(offsets, unpadded(problem), problem.index)
+    n_rows = 2 * problem.n_obs
+    jacobian = np.zeros((n_rows, problem.layout.size + sources.size))
+    for group in CALIBRATION_GROUPS:
+        block = np.asarray(blocks[group.name])
+        jacobian[:, problem.layout.columns(group)] = block.reshape(n_rows, -1)
+    jacobian[:, problem.layout.size :] = np.asarray(blocks[SOURCES.name]).reshape(n_rows, -1)
+    return jacobian
+
+
+def unpadded(problem):
+    """Return the geometry with as many sources and exposures as there are."""
+    geometry, n_exp = problem.geometry, problem.layout.n_exp
+    return replace(
+        geometry,
+        source_frame=geometry.source_frame[: problem.n_src],
+        pointing_frame=geometry.pointing_frame[:n_exp],
+        origin={
+            group.name: geometry.origin[group.name][:n_exp]
+            if group.axis == "exp"
+            else geometry.origin[group.name]
+            for group in CALIBRATION_GROUPS
+            if group.name in geometry.origin
+        },
+        velocity=geometry.velocity[:n_exp],
+        sun_distance=geometry.sun_distance[:n_exp],
+    )
+
+
+def matrix_root(matrix):
+    """Return R with R'R = `matrix`, which may be singular."""
+    values, vectors = np.linalg.eigh(matrix)
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+
+
+def inverse_of_normal(jacobian):
+    """Return (J'J)^-1 by a QR decomposition of J, with half the condition of J'J."""
+    scale = 1.0 / np.linalg.norm(jacobian, axis=0)
+    triangle = np.linalg.qr(jacobian * scale, mode="r")
+    root = sl.solve_triangular(triangle, np.eye(len(scale))) * scale[:, None]
+    return root @ root.T
+
+
+@pytest.fixture(scope="session")
+def make_dense():
+    """Return the function that builds the dense posterior of a problem at a point."""
+
+    def make(problem, theta, sources):
+        weight = 1.0 / problem.sigma.ravel()
+        jacobian = dense_jacobian(problem, theta, sources) * weight[:, None]
+        predicted = _pixels(problem.offsets(theta, sources), problem.geometry, problem.index)
+        residual = (problem.measured - np.asarray(predicted)).ravel() * weight
+        n_calib = problem.layout.size
+        prior = np.zeros((jacobian.shape[1],) * 2)
+        prior[:n_calib, :n_calib] = np.diag(problem.priors.curvature(theta))
+        for i, precision in enumerate(problem.priors.precision):
+            here = slice(n_calib + 2 * i, n_calib + 2 * i + 2)
+            prior[here, here] = precision
+        hessian = jacobian.T @ jacobian + prior
+        gradient = jacobian.T @ residual
+        gradient[:n_calib] -= problem.priors.gradient(theta)
+        gradient[n_calib:] -= prior[n_calib:, n_calib:] @ sources.ravel()
+        covariance = inverse_of_normal(np.vstack([jacobian, matrix_root(prior)]))
+        return Dense(residual, jacobian, prior, hessian, gradient, covariance, n_calib)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def expansion_point(small_orbit, problem):
+    """The truth: about one sigma away from the mode, and nowhere at an origin."""
+    return true_offsets(small_orbit, problem)
+
+
+@pytest.fixture(scope="session")
+def dense(problem, expansion_point, make_dense):
+    """The dense posterior of the small orbit at `expansion_point`."""
+    return make_dense(problem, *expansion_point)
+
+
+@pytest.fixture
+def equations(problem, expansion_point):
+    return accumulate(problem, *expansion_point)
+
+
+@pytest.fixture
+def reduced(problem, equations, expansion_point):
+    return reduce(equations, problem.priors, *expansion_point)
+
+
+@pytest.fixture
+def fit():
+    """Return the function that fits a small orbit with some settings."""
+
+    def run(orbit, **settings):
+        return fit_orbit(orbit.data, orbit.instrument, FitSettings(**settings))
+
+    return run
+
+
+@pytest.fixture
+def with_tables():
+    """Return the function that replaces tables of a small orbit."""
+
+    def change(orbit, **tables):
+        return orbit._replace(data=replace(orbit.data, **tables))
+
+    return change

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from solver.layout import Layout
+from solver.parameters import CALIBRATION_GROUPS
+
+LAYOUT = Layout(n_exp=3, n_coef=5, n_det=2)
+
+
+def test_every_column_belongs_to_one_group():
+    columns = np.concatenate([LAYOUT.columns(g) for g in CALIBRATION_GROUPS])
+    assert sorted(columns) == list(range(LAYOUT.size))
+
+
+def test_size_is_four_per_exposure_two_per_term_and_five_per_detector():
+    assert LAYOUT.size == 4 * 3 + 2 * 5 + 5 * 2
+
+
+def test_scatter_undoes_gather():
+    flat = np.random.default_rng(0).normal(size=LAYOUT.size)
+    np.testing.assert_array_equal(LAYOUT.gather(LAYOUT.scatter(flat)), flat)
+
+
+def test_groups_follow_their_axis():
+    values = {g.name: np.arange(len(LAYOUT.columns(g))) + 0.0 for g in CALIBRATION_GROUPS}
+    scattered = LAYOUT.scatter(LAYOUT.gather(values))
+    for name, expected in values.items():
+        np.testing.assert_array_equal(scattered[name], expected)
+
+
+@pytest.mark.parametrize(("m", "n"), [(0, 0), (2, 1), (1, 0)])
+def test_measurement_touches_its_exposure_all_terms_and_its_detector(m, n):
+    element = {"exp": m, "det": n}
+    expected = [
+        column
+        for g in CALIBRATION_GROUPS
+        for i, column in enumerate(LAYOUT.columns(g))
+        if element.get(g.axis, i) == i
+    ]
+    assert sorted(np.r_[LAYOUT.touched(m, n)]) == sorted(expected)
+
+
+def test_order_without_terms_has_no_columns_for_them():
+    layout = Layout(2, 0, 1)
+    assert layout.first_coefficient == layout.first_detector
+    assert len(np.r_[layout.touched(1, 0)]) == 9

@@ -1,0 +1,127 @@
+"""The sample orbit: made by a program that shares no code with the project."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from astropy.table import Table
+
+from solver.fit import fit_orbit
+from solver.settings import FitSettings
+
+MIN_OBS = 10
+CLASSES = ["non-reference", "artificial"]
+AXES = ["ra", "dec"]
+
+
+@pytest.fixture(scope="module")
+def sample_result(sample_orbit):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("solver.normal.CHUNK", 65_536)
+        return fit_orbit(sample_orbit)
+
+
+@pytest.fixture(scope="module")
+def deviations(sample_result):
+    """Estimate minus truth, mas, of sources with ten measurements or more."""
+    joined = sample_result.sources.merge(
+        sample_result.true_places, on="source_id", suffixes=("", "_true")
+    )
+    joined = joined[joined["n_obs"] >= MIN_OBS]
+    cos_dec = np.cos(np.radians(joined["dec"]))
+    joined["deviation_ra"] = 3.6e6 * cos_dec * (joined["ra"] - joined["ra_true"])
+    joined["deviation_dec"] = 3.6e6 * (joined["dec"] - joined["dec_true"])
+    joined["class"] = np.select(
+        [joined["is_reference"], joined["is_artificial"]], ["reference", "artificial"], CLASSES[0]
+    )
+    return joined
+
+
+def test_fit_converges_within_six_iterations(sample_result):
+    assert sample_result.summary["converged"]
+    assert sample_result.summary["iterations"] <= 6
+
+
+def test_chi2_is_that_of_the_degrees_of_freedom(sample_result):
+    dof = sample_result.summary["dof"]
+    error = np.sqrt(2.0 / dof)
+    assert sample_result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=4.0 * error)
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_standardised_residuals_scatter_by_one(sample_result, axis):
+    values = sample_result.residuals[f"standardised_{axis}"]
+    assert values.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * len(values)))
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("kind", CLASSES)
+def test_pulls_scatter_by_one(deviations, kind, axis):
+    rows = deviations[deviations["class"] == kind]
+    pulls = rows[f"deviation_{axis}"] / rows[f"sigma_{axis}_marginal"]
+    assert 0.92 < pulls.std(ddof=0) < 1.10
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("kind", CLASSES)
+def test_mean_deviation_is_what_the_reference_stars_errors_induce(deviations, kind, axis):
+    """But for what the noise leaves: of each source and of the calibration they share."""
+    rows = deviations[deviations["class"] == kind]
+    left = rows[f"deviation_{axis}"].mean() - rows[f"induced_{axis}"].mean()
+    own = np.sqrt((rows[f"sigma_{axis}_conditional"] ** 2).sum()) / len(rows)
+    assert abs(left) < 4.0 * own * calibration_share(deviations, axis)
+
+
+def calibration_share(deviations, axis):
+    """Return how much more a source's error is than its own measurements leave."""
+    free = deviations[deviations["class"] != "reference"]
+    return float((free[f"sigma_{axis}_marginal"] / free[f"sigma_{axis}_conditional"]).mean())
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_summary_gives_the_same_figures(sample_result, deviations, axis):
+    for kind in CLASSES:
+        rows, figures = (
+            deviations[deviations["class"] == kind],
+            sample_result.summary["truth"][kind],
+        )
+        assert figures["n"] == len(rows)
+        assert figures[f"mean_{axis}"] == pytest.approx(rows[f"deviation_{axis}"].mean(), abs=1e-6)
+        assert figures[f"induced_{axis}"] == pytest.approx(rows[f"induced_{axis}"].mean())
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_true_places_are_those_of_the_truth_file(sample_orbit_dir, sample_result, axis):
+    table = Table.read(sample_orbit_dir / "sample_truth.fits").to_pandas()
+    expected = table.set_index("source_id").loc[sample_result.true_places["source_id"]]
+    difference = sample_result.true_places[axis].to_numpy() - expected[f"{axis}_epoch"].to_numpy()
+    assert np.abs(difference).max() * 3.6e9 < 0.1
+
+
+def test_true_distortion_is_within_its_uncertainty(sample_result):
+    """Eq. (exp:distortion)."""
+    rows = sample_result.calibration
+    rows = rows[rows["group"].str.startswith("distortion")].set_index("label")
+    truth = pd.Series(0.0, index=rows.index)
+    named = {"A(1,1)": 0.2, "A(3,0)": 3.0, "A(5,0)": 0.3}
+    named |= {"B(1,1)": 0.3, "B(0,3)": -3.0, "B(0,5)": 0.5}
+    truth.update(pd.Series(named))
+    pulls = (rows["value"] - truth) / rows["sigma_marginal"]
+    assert pulls.abs().max() < 4.0
+    assert (rows["sigma_marginal"] < 0.1).all()
+
+
+def test_aberration_left_out_hides_in_the_quadratic_distortion(sample_orbit, sample_result):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("solver.normal.CHUNK", 65_536)
+        without = fit_orbit(sample_orbit, settings=FitSettings(aberration=False))
+    moved = without.values_on("coef").to_numpy() - sample_result.values_on("coef").to_numpy()
+    quadratic, others = np.abs(moved[:3]), np.abs(moved[3:])
+    # The scale changes by 1e-4, and with it a true cubic term of 3 um by less than 1 nm.
+    assert 3e-3 < quadratic.max() < 1e-2
+    assert others.max() < 1e-3
+    assert without.summary["chi2"] == pytest.approx(sample_result.summary["chi2"], rel=1e-5)
+
+
+def test_true_flags_are_read(sample_result):
+    assert sample_result.summary["n_reference"] == 58
+    assert sample_result.sources["is_artificial"].any()

@@ -1,0 +1,136 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.schur import reduce
+
+# The agreement that the elimination is held to, relative to the uncertainties.
+AGREEMENT = 1e-8
+
+
+@pytest.fixture(scope="session")
+def sigma(dense):
+    return np.sqrt(np.diag(dense.covariance))
+
+
+def blocks_of(covariance, n_calib):
+    """Return the covariances of the calibration, between, and of each source."""
+    n_src = (len(covariance) - n_calib) // 2
+    of_sources = covariance[n_calib:, n_calib:].reshape(n_src, 2, n_src, 2)
+    return (
+        covariance[:n_calib, :n_calib],
+        covariance[n_calib:, :n_calib].reshape(n_src, 2, n_calib),
+        of_sources[np.arange(n_src), :, np.arange(n_src), :],
+    )
+
+
+def flat(theta, sources):
+    return np.concatenate([theta, sources.ravel()])
+
+
+def test_step_is_the_dense_newton_step(reduced, dense, sigma):
+    expected = dense.covariance @ dense.gradient
+    np.testing.assert_allclose(
+        flat(*reduced.step()) / sigma,
+        expected / sigma,
+        atol=AGREEMENT * abs(expected / sigma).max(),
+    )
+
+
+def test_gradient_includes_the_priors(reduced, dense):
+    scale = np.sqrt(np.diag(dense.hessian))
+    found = flat(reduced.by_theta, reduced.by_source) / scale
+    expected = dense.gradient / scale
+    np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
+
+
+def test_calibration_covariance_is_the_dense_one(reduced, dense, sigma):
+    expected = blocks_of(dense.covariance, dense.n_calib)[0]
+    scale = np.outer(sigma[: dense.n_calib], sigma[: dense.n_calib])
+    found = reduced.theta_covariance()
+    np.testing.assert_allclose(found / scale, expected / scale, atol=AGREEMENT)
+
+
+def test_marginal_covariance_is_the_dense_one(reduced, dense):
+    expected = blocks_of(dense.covariance, dense.n_calib)[2]
+    found = reduced.marginal_covariance(reduced.spread())
+    np.testing.assert_allclose(found, expected, rtol=AGREEMENT)
+
+
+def test_conditional_covariance_is_the_inverse_of_the_sources_block(reduced, dense):
+    expected = np.linalg.inv(blocks_of(dense.hessian, dense.n_calib)[2])
+    np.testing.assert_allclose(reduced.conditional_covariance(), expected, rtol=AGREEMENT)
+
+
+def test_conditional_covariance_is_below_the_marginal_one(reduced):
+    difference = reduced.marginal_covariance(reduced.spread()) - reduced.conditional_covariance()
+    assert np.linalg.eigvalsh(difference).min() > 0.0
+
+
+def test_cross_covariance_is_the_dense_one(reduced, dense, sigma):
+    expected = blocks_of(dense.covariance, dense.n_calib)[1]
+    scale = sigma[dense.n_calib :].reshape(-1, 2)[:, :, None] * sigma[: dense.n_calib]
+    found = reduced.cross_covariance(reduced.spread())
+    np.testing.assert_allclose(found / scale, expected / scale, atol=AGREEMENT)
+
+
+def test_response_is_minus_the_shift_of_sources_per_unit_of_the_calibration(reduced, dense):
+    n = dense.n_calib
+    expected = np.linalg.solve(dense.hessian[n:, n:], dense.hessian[n:, :n])
+    found = reduced.response().reshape(expected.shape)
+    np.testing.assert_allclose(found, expected, atol=AGREEMENT * np.abs(expected).max())
+
+
+def test_log_determinant_is_the_dense_one(reduced, dense):
+    scale = np.sqrt(np.diag(dense.hessian))
+    scaled = np.linalg.slogdet(dense.hessian / np.outer(scale, scale))[1]
+    expected = scaled + 2.0 * np.log(scale).sum()
+    assert reduced.log_determinant() == pytest.approx(expected, abs=1e-7)
+
+
+def test_solve_takes_any_right_hand_side(reduced, dense, sigma):
+    rng = np.random.default_rng(0)
+    right = rng.normal(size=len(sigma)) / sigma
+    expected = dense.covariance @ right
+    n = dense.n_calib
+    found = flat(*reduced.solve(right[:n], right[n:].reshape(-1, 2)))
+    np.testing.assert_allclose(found / sigma, expected / sigma, atol=1e-7)
+
+
+def test_blocks_of_the_data_are_not_changed(equations, problem, expansion_point):
+    """They outlive a change of the priors."""
+    before = {k: np.copy(getattr(equations, k)) for k in ("theta", "source", "cross")}
+    reduce(equations, problem.priors, *expansion_point)
+    for name, values in before.items():
+        np.testing.assert_array_equal(getattr(equations, name), values)
+
+
+def test_open_direction_makes_no_solution(equations, problem, expansion_point):
+    """A parameter with neither data nor prior."""
+    theta = equations.theta.copy()
+    theta[0], theta[:, 0] = 0.0, 0.0
+    cross = equations.cross.copy()
+    cross[:, :, 0] = 0.0
+    width = problem.priors.width.copy()
+    width[0] = np.inf
+    priors = problem.priors._replace(width=width)
+    open_ = replace(equations, theta=theta, cross=cross)
+    assert reduce(open_, priors, *expansion_point) is None
+
+
+def test_combination_that_only_priors_hold_makes_no_solution_without_them(
+    equations, problem, expansion_point
+):
+    """A common shift of the detectors is one of the pointings: with both flat, it is open."""
+    flat_prior = problem.priors._replace(
+        width=np.full(problem.layout.size, np.inf),
+        is_gamma=np.zeros(problem.layout.size, dtype=bool),
+    )
+    assert reduce(equations, flat_prior, *expansion_point) is None
+
+
+def test_values_that_are_not_finite_make_no_solution(equations, problem, expansion_point):
+    theta = equations.theta.copy()
+    theta[2, 2] = np.nan
+    assert reduce(replace(equations, theta=theta), problem.priors, *expansion_point) is None

@@ -1,0 +1,120 @@
+import json
+
+import numpy as np
+import pytest
+
+from solver.errors import InputError
+from solver.parameters import BY_NAME, PARAMETERS
+from solver.settings import FitSettings, format_width, parse_width
+
+
+def test_defaults_are_the_papers():
+    settings = FitSettings()
+    assert settings.order == 5
+    assert settings.aberration
+    assert {g.name: settings.width(g.name) for g in PARAMETERS} == {
+        g.name: g.width for g in PARAMETERS
+    }
+
+
+@pytest.mark.parametrize("order", [-1, 10, 5.0, "5", None, True], ids=repr)
+def test_order_that_is_none_is_refused(order):
+    with pytest.raises(InputError, match="distortion order from 0 to 9"):
+        FitSettings(order=order)
+
+
+def test_unknown_engine_is_refused():
+    with pytest.raises(InputError, match="gauss-newton.*'magic'"):
+        FitSettings(engine="magic")
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, float("nan")], ids=str)
+def test_width_that_is_not_positive_is_refused(width):
+    with pytest.raises(InputError, match="positive prior width for detector_x"):
+        FitSettings(prior_widths={"detector_x": width})
+
+
+def test_unknown_group_is_refused_with_the_known_ones():
+    with pytest.raises(InputError, match="pointing_ra.*'detector_z'"):
+        FitSettings(prior_widths={"detector_z": 1.0})
+
+
+def test_flat_prior_is_allowed_on_the_calibration_and_not_on_the_sources():
+    assert np.isinf(FitSettings(prior_widths={"pitch_x": np.inf}).width("pitch_x"))
+    with pytest.raises(InputError, match="finite factor.*sources"):
+        FitSettings(prior_widths={"sources": np.inf})
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan")], ids=str)
+def test_tolerance_that_no_step_can_meet_is_refused(tolerance):
+    with pytest.raises(InputError, match="tolerance"):
+        FitSettings(tolerance=tolerance)
+
+
+@pytest.mark.parametrize("limit", [0, -1, 2.5], ids=str)
+def test_limit_of_iterations_that_is_none_is_refused(limit):
+    with pytest.raises(InputError, match="max_iterations"):
+        FitSettings(max_iterations=limit)
+
+
+def test_settings_survive_json():
+    settings = FitSettings(order=3, aberration=False, prior_widths={"pitch_x": 0.1}, tolerance=0.01)
+    assert FitSettings.from_dict(json.loads(json.dumps(settings.to_dict()))) == settings
+
+
+def test_copy_with_changes_is_checked_too():
+    settings = FitSettings(order=3)
+    assert settings.with_(order=4) == FitSettings(order=4)
+    with pytest.raises(InputError, match="order"):
+        settings.with_(order=99)
+
+
+def test_widths_given_are_not_shared():
+    widths = {"pitch_x": 0.1}
+    settings = FitSettings(prior_widths=widths)
+    widths["pitch_x"] = -5.0
+    assert settings.width("pitch_x") == 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "width"),
+    [
+        ("pointing_ra", "0.5 deg", 1800.0),
+        ("pointing_ra", "2arcmin", 120.0),
+        ("detector_x", "3", 3.0),
+        ("detector_x", "0.1 mm", 100.0),
+        ("distortion_x", "500nm", 0.5),
+        ("distortion_x", "2 µm", 2.0),
+        ("pitch_x", "1e-3", 1e-3),
+        ("sources", "2.5", 2.5),
+        ("focal_length", "flat", np.inf),
+        ("position_angle", "inf", np.inf),
+    ],
+)
+def test_written_width_is_read(name, text, width):
+    assert parse_width(name, text) == pytest.approx(width)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "complaint"),
+    [
+        ("pointing_ra", "5 um", "arcsec"),
+        ("detector_x", "5 mas", "mm"),
+        ("pitch_x", "1 um", "without unit"),
+        ("detector_x", "wide", "'wide'"),
+        ("detector_x", "-3 um", "'-3 um'"),
+        ("detector_x", "0", "positive"),
+        ("detector_x", "", "''"),
+        ("sources", "flat", "sources"),
+        ("nothing", "1", "'nothing'"),
+    ],
+)
+def test_written_width_that_is_none_is_refused(name, text, complaint):
+    with pytest.raises(InputError, match=complaint):
+        parse_width(name, text)
+
+
+@pytest.mark.parametrize("name", [n for n in BY_NAME if n != "sources"])
+@pytest.mark.parametrize("width", [0.25, 3600.0, np.inf], ids=str)
+def test_formatted_width_is_read_back(name, width):
+    assert parse_width(name, format_width(name, width)) == width

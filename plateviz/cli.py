@@ -8,6 +8,7 @@ command that needs it, so that `--help` and mistakes answer at once.
 import sys
 import time
 import webbrowser
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,6 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+_GROUPS = ", ".join(group.name for group in PARAMETERS)
 _PORT = typer.Option(help="TCP port to serve on; 0 takes a free one.", min=0, max=65535)
 _ADDRESS = typer.Option(help="Interface to serve on. Only this machine can reach the default.")
 _OPEN = typer.Option("--open/--no-open", help="Open the page in your browser.")
@@ -58,19 +60,19 @@ def demo(
     from plateviz.worker import Worker
 
     port = check_address(address, port)
-    worker, directory = Worker(), demo_directory()
-    try:
-        with reporting("starting the solver") as reporter:
-            survey = simulation(directory)
-            if survey is not None:
-                reporter.follow(worker.submit(survey))
-                require_done(survey)
-            workbench, first = open_survey(directory, worker)
-            reporter.follow(first)
-            require_done(first)
-    except BaseException:
-        worker.close()
-        raise
+    directory = demo_directory()
+    with ExitStack() as stack, reporting("starting the solver") as reporter:
+        worker = Worker()
+        stack.callback(worker.close)
+        survey = simulation(directory)
+        if survey is not None:
+            reporter.follow(worker.submit(survey))
+            require_done(survey)
+        workbench, first = open_survey(directory, worker)
+        reporter.follow(first)
+        require_done(first)
+        # From here the server closes it, with the workbench.
+        stack.pop_all()
     _serve(workbench, port, address, open_browser)
 
 
@@ -141,7 +143,7 @@ def fit(
         list[str] | None,
         typer.Option(
             help="Prior width of a parameter group, such as distortion_x=0.5um or "
-            f"position_angle=flat; may be repeated. Groups: {', '.join(g.name for g in PARAMETERS)}.",
+            f"position_angle=flat; may be repeated. Groups: {_GROUPS}.",
             metavar="GROUP=VALUE",
         ),
     ] = None,
@@ -201,8 +203,8 @@ def serve(
     """Show a survey, or the orbit in some files, in the dashboard."""
     from plateviz.server import check_address
     from plateviz.source import OrbitFiles, SurveyFolder
-    from plateviz.worker import Worker
     from plateviz.workbench import Workbench
+    from plateviz.worker import Worker
 
     port = check_address(address, port)
     if reference is None:

@@ -5,8 +5,8 @@ from pathlib import Path
 from plateviz.cache import cache_directory
 from plateviz.job import Job, JobStatus
 from plateviz.source import SurveyFolder
-from plateviz.worker import Worker
 from plateviz.workbench import Workbench
+from plateviz.worker import Worker
 from solver.errors import InputError
 from solver.io.survey import HEADER
 from solver.settings import FitSettings

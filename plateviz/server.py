@@ -3,6 +3,7 @@
 import contextlib
 import socket
 from collections.abc import Callable
+from typing import Any
 
 import panel as pn
 
@@ -11,9 +12,7 @@ from plateviz.workbench import Workbench
 from solver.errors import InputError
 
 
-def serve(
-    workbench: Workbench, *, port: int, address: str, ready: Callable[[str], None]
-) -> None:
+def serve(workbench: Workbench, *, port: int, address: str, ready: Callable[[str], None]) -> None:
     """Serve the dashboard until it is interrupted; the workbench is closed at the end.
 
     Parameters
@@ -25,7 +24,8 @@ def serve(
     """
     pn.extension("tabulator")
     hosts = sorted({address, "localhost", "127.0.0.1"})
-    server = pn.serve(
+    # A thread is what it gives only where it is asked to make one.
+    server: Any = pn.serve(
         lambda: build_app(workbench),
         port=port,
         address=address,

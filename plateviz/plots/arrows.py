@@ -11,7 +11,8 @@ import holoviews as hv
 import numpy as np
 import pandas as pd
 
-from plateviz.plots.style import TICK_SIZE, drawn, theme_of
+from plateviz.plots.style import TICK_SIZE, drawn
+from plateviz.plots.theme import theme_of
 
 # The root-mean-square arrow is about this share of the frame's width.
 _RMS_SHARE = 0.04

@@ -15,8 +15,8 @@ from plateviz.plots.style import (
     framed,
     message,
     side_by_side,
-    theme_of,
 )
+from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_text
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.residuals import binned_vectors

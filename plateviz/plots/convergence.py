@@ -4,7 +4,8 @@ import holoviews as hv
 import pandas as pd
 
 from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.style import PANEL_WIDTH, drawn, framed, message, side_by_side, theme_of
+from plateviz.plots.style import PANEL_WIDTH, drawn, framed, message, side_by_side
+from plateviz.plots.theme import theme_of
 from plateviz.tables.convergence import convergence
 
 _TITLE = "Convergence"

@@ -8,7 +8,8 @@ import pandas as pd
 
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import class_points
-from plateviz.plots.style import PANEL_WIDTH, drawn, framed, message, side_by_side, theme_of
+from plateviz.plots.style import PANEL_WIDTH, drawn, framed, message, side_by_side
+from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_unit
 from plateviz.tables.sources import CLASSES, deviation, deviation_statistics
 
@@ -78,7 +79,7 @@ def _panel(rows: pd.DataFrame, statistics: pd.Series, theme: str, width: int) ->
             class_points(scaled, x, y, hover=_HOVER, extra=_EXTRA),
             drawn(_ellipse(statistics, factor), color=line, line_width=1.8),
         ],
-        title=f"{_TITLE}: {rows['source_class'].iloc[0]} sources",
+        title=f"{rows['source_class'].iloc[0].capitalize()} sources",
         subtitle=_words(statistics, unit, factor, hidden),
         theme=theme,
         width=width,

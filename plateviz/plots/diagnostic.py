@@ -56,4 +56,3 @@ class Diagnostic:
     draw: Callable[[Chosen, str], hv.core.Dimensioned]
     follows_selection: bool = False
     is_wide: bool = False
-

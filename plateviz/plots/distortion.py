@@ -8,7 +8,8 @@ import pandas as pd
 
 from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
 from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.style import FRAME_WIDTH, AxisLabels, drawn, framed, message, theme_of
+from plateviz.plots.style import FRAME_WIDTH, AxisLabels, drawn, framed, message
+from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_text
 from plateviz.tables.calibration import distortion
 from solver.instrument import Detector

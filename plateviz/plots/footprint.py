@@ -8,7 +8,8 @@ import pandas as pd
 
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import class_points
-from plateviz.plots.style import FRAME_WIDTH, LABEL_SIZE, drawn, framed, message, theme_of
+from plateviz.plots.style import FRAME_WIDTH, LABEL_SIZE, drawn, framed, message
+from plateviz.plots.theme import theme_of
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 
 _TITLE = "Footprint of the orbit"

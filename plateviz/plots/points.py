@@ -13,8 +13,8 @@ from plateviz.plots.style import (
     CLASS_MARKERS,
     CLASS_SIZES,
     drawn,
-    theme_of,
 )
+from plateviz.plots.theme import theme_of
 
 Tooltips = Sequence[tuple[str, str]]
 

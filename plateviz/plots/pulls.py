@@ -13,8 +13,8 @@ from plateviz.plots.style import (
     drawn,
     framed,
     message,
-    theme_of,
 )
+from plateviz.plots.theme import theme_of
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
 
 _PULLS = "Standardised residuals"

@@ -13,8 +13,8 @@ from plateviz.plots.style import (
     drawn,
     framed,
     message,
-    theme_of,
 )
+from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_text
 from plateviz.tables.residuals import binned_vectors, residual_map
 from solver.instrument import Detector, Instrument

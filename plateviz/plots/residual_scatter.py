@@ -14,8 +14,8 @@ from plateviz.plots.style import (
     drawn,
     framed,
     message,
-    theme_of,
 )
+from plateviz.plots.theme import theme_of
 from plateviz.tables.residuals import ScatterStatistics, residual_scatter, scatter_statistics
 from plateviz.tables.sources import REFERENCE
 

@@ -4,16 +4,15 @@ import functools
 import operator
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TypedDict
+from typing import TypedDict, TypeVar
 
 import holoviews as hv
 import holoviews.plotting.bokeh  # noqa: F401  registers the options of the backend
-from bokeh.model import Model
 from bokeh.models import BoxZoomTool, ColorBar, HoverTool, Title
 from bokeh.plotting import figure as Figure  # noqa: N812  a class by another name
 
+from plateviz.plots.theme import Theme, theme_of
 from plateviz.tables.sources import ARTIFICIAL, NON_REFERENCE, REFERENCE
 
 Limits = tuple[float, float]
@@ -25,6 +24,8 @@ class AxisLabels(TypedDict):
     xlabel: str
     ylabel: str
 
+
+_Model = TypeVar("_Model")
 
 BACKEND = "bokeh"
 ROW_LIMIT = 20_000
@@ -54,64 +55,6 @@ CLASS_SIZES: Mapping[str, float] = MappingProxyType(
     {NON_REFERENCE: 4.0, ARTIFICIAL: 6.5, REFERENCE: 7.0}
 )
 SERIES_COLOURS = ("#4291d2", "#e4602a", "#12a37b", "#b98a00", "#b565a7", "#7a8793")
-
-
-@dataclass(frozen=True)
-class Theme:
-    """Colours that depend on the background.
-
-    Attributes
-    ----------
-    background, text, muted, grid : of the page, the words, the lesser words, the grid
-    line : guide lines, outlines, expected curves
-    mark : the data where classes do not matter
-    ramp : colours of rising counts
-    """
-
-    background: str
-    text: str
-    muted: str
-    grid: str
-    line: str
-    mark: str
-    ramp: tuple[str, ...]
-
-
-THEMES: Mapping[str, Theme] = MappingProxyType(
-    {
-        "light": Theme(
-            "#ffffff",
-            "#1f2933",
-            "#52606d",
-            "#e4e8ec",
-            "#3e4c59",
-            "#2b78b8",
-            ("#d3e5f4", "#9cc6e6", "#5ea2d5", "#2b78b8", "#15507f", "#0a2f4f"),
-        ),
-        "dark": Theme(
-            "#121212",
-            "#e6eaee",
-            "#a5b0bb",
-            "#2b323a",
-            "#c2cbd3",
-            "#62aee6",
-            ("#1c3f5e", "#24608f", "#3a87c8", "#6db3e8", "#a9d6f5", "#e5f4fd"),
-        ),
-    }
-)
-
-
-def theme_of(name: str) -> Theme:
-    """Return the colours of theme `name`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such theme.
-    """
-    if name not in THEMES:
-        raise ValueError(f"theme: expected one of {', '.join(THEMES)}, got {name!r}")
-    return THEMES[name]
 
 
 def framed(
@@ -241,7 +184,7 @@ def _styling(theme: Theme, subtitle: str, width: int, equal: bool) -> Callable:
     return apply
 
 
-def _of_type(models: Iterable[Model], kind: type[Model]) -> list[Model]:
+def _of_type(models: Iterable[object], kind: type[_Model]) -> list[_Model]:
     # Bokeh's own `select` walks every model of the document, which takes half of the drawing.
     return [model for model in models if isinstance(model, kind)]
 

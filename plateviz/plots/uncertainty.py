@@ -18,8 +18,8 @@ from plateviz.plots.style import (
     framed,
     message,
     side_by_side,
-    theme_of,
 )
+from plateviz.plots.theme import theme_of
 from plateviz.tables.sources import CLASSES, KINDS, uncertainty, uncertainty_by_count
 
 Coordinate = Literal["ra", "dec", "both"]

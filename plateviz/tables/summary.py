@@ -4,9 +4,6 @@ import math
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
-import pandas as pd
-
-from plateviz.tables.sources import deviation, deviation_statistics
 from solver.result import FitResult
 
 State = Literal["good", "warn", "bad", "neutral"]
@@ -23,7 +20,7 @@ class SummaryItem(NamedTuple):
     state: State
 
 
-def summary_strip(result: FitResult, truth: pd.DataFrame | None = None) -> list[SummaryItem]:
+def summary_strip(result: FitResult) -> list[SummaryItem]:
     """Return the numbers to judge a fit by, the verdicts first.
 
     A number is "good" within three times its expected scatter of its expected value,
@@ -33,7 +30,6 @@ def summary_strip(result: FitResult, truth: pd.DataFrame | None = None) -> list[
     Parameters
     ----------
     result : the fit
-    truth : `source_id`, `ra`, `dec` (deg, at the mean epoch), or None
 
     Returns
     -------
@@ -44,7 +40,7 @@ def summary_strip(result: FitResult, truth: pd.DataFrame | None = None) -> list[
         _chi2(result),
         _normalised_deviation(result, "ra", "α"),
         _normalised_deviation(result, "dec", "δ"),
-        *_from_truth(result, truth),
+        *_from_truth(result),
         *_counts(result),
         _iterations(result),
         _seconds(result),
@@ -111,18 +107,27 @@ def _normalised_deviation(result: FitResult, coordinate: str, symbol: str) -> Su
     )
 
 
-def _from_truth(result: FitResult, truth: pd.DataFrame | None) -> list[SummaryItem]:
+def _from_truth(result: FitResult) -> list[SummaryItem]:
+    truth: Mapping[str, Mapping[str, float]] = result.summary.get("truth", {})
     return [
         SummaryItem(
-            f"Deviation from truth, {row.source_class}",
-            f"{math.hypot(row.rms_ra, row.rms_dec) / math.sqrt(2.0):.3f} mas",
-            f"Rms per coordinate of {row.n} sources with a simulated truth. Over the marginal "
-            f"sigma: {row.pull_rms_ra:.2f} in α, {row.pull_rms_dec:.2f} in δ, expected 1. Sources "
-            "share the calibration's error, so no scatter is expected of one orbit alone.",
+            f"Pulls against truth, {name}",
+            f"{figures['pull_sd_ra']:.2f}, {figures['pull_sd_dec']:.2f} "
+            f"({_rms(figures):.2f} mas rms)",
+            f"Standard deviation of deviation over marginal sigma in α, δ of {figures['n']} "
+            "sources with 10 or more measurements and a simulated truth; expected 1. Sources "
+            "share the calibration's error, so no scatter is expected of one orbit alone. "
+            f"Mean deviation {figures['mean_ra']:.3f}, {figures['mean_dec']:.3f} mas, of which "
+            f"{figures['induced_ra']:.3f}, {figures['induced_dec']:.3f} mas come from the "
+            "reference stars' errors.",
             "neutral",
         )
-        for row in deviation_statistics(deviation(result, truth)).itertuples()
+        for name, figures in truth.items()
     ]
+
+
+def _rms(figures: Mapping[str, float]) -> float:
+    return math.hypot(figures["rms_ra"], figures["rms_dec"]) / math.sqrt(2.0)
 
 
 def _counts(result: FitResult) -> list[SummaryItem]:

@@ -1,5 +1,7 @@
 """RefitView: fit the orbit again with another order or other priors, watch it, stop it."""
 
+from typing import Any
+
 import panel as pn
 import panel_material_ui as pmui
 
@@ -29,9 +31,9 @@ class RefitView(pn.viewable.Viewer):
         self._bar = pmui.LinearProgress(variant="indeterminate", sizing_mode="stretch_width")
         self._news = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
+        entries: list[Any] = [*self._widths.values(), self._reset]
         priors = pmui.Card(
-            *self._widths.values(),
-            self._reset,
+            *entries,
             title="Prior widths",
             collapsed=True,
             sizing_mode="stretch_width",

@@ -39,11 +39,9 @@ class SummaryView(pn.viewable.Viewer):
 
 
 def _row(solution: Solution, role: str) -> str:
-    items = summary_strip(solution.result, solution.result.true_places)
-    return (
-        f"<p class='solution'><span class='muted'>{role}:</span> <b>{escape(solution.label)}</b></p>"
-        f"<div class='strip'>{''.join(_cell(item) for item in items)}</div>"
-    )
+    cells = "".join(_cell(item) for item in summary_strip(solution.result))
+    label = f"<span class='muted'>{role}:</span> <b>{escape(solution.label)}</b>"
+    return f"<p class='solution'>{label}</p><div class='strip'>{cells}</div>"
 
 
 def _cell(item: SummaryItem) -> str:

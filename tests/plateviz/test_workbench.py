@@ -4,8 +4,8 @@ import pytest
 
 from plateviz.job import Job, JobStatus
 from plateviz.source import OrbitFiles, SurveyFolder, source_from_dict, source_to_dict
-from plateviz.worker import Worker
 from plateviz.workbench import Workbench
+from plateviz.worker import Worker
 from solver.errors import InputError
 from solver.settings import FitSettings
 

@@ -9,7 +9,8 @@ import pytest
 from bokeh.models import ColumnDataSource, GlyphRenderer, HoverTool, Plot, Title
 
 from plateviz import plots, tables
-from plateviz.plots.style import CLASS_COLOURS, THEMES, theme_of
+from plateviz.plots.style import CLASS_COLOURS
+from plateviz.plots.theme import THEMES, theme_of
 
 _LABELLED_UNIT = re.compile(
     r"\(.+\)|per bin|χ² / dof|expected scatter|iteration|in order|N$|σ of A$"

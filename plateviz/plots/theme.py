@@ -1,0 +1,63 @@
+"""The colours that depend on whether a page is light or dark."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colours that depend on the background.
+
+    Attributes
+    ----------
+    background, text, muted, grid : of the page, the words, the lesser words, the grid
+    line : guide lines, outlines, expected curves
+    mark : the data where classes do not matter
+    ramp : colours of rising counts
+    """
+
+    background: str
+    text: str
+    muted: str
+    grid: str
+    line: str
+    mark: str
+    ramp: tuple[str, ...]
+
+
+THEMES: Mapping[str, Theme] = MappingProxyType(
+    {
+        "light": Theme(
+            "#ffffff",
+            "#1f2933",
+            "#52606d",
+            "#e4e8ec",
+            "#3e4c59",
+            "#2b78b8",
+            ("#d3e5f4", "#9cc6e6", "#5ea2d5", "#2b78b8", "#15507f", "#0a2f4f"),
+        ),
+        "dark": Theme(
+            "#121212",
+            "#e6eaee",
+            "#a5b0bb",
+            "#2b323a",
+            "#c2cbd3",
+            "#62aee6",
+            ("#1c3f5e", "#24608f", "#3a87c8", "#6db3e8", "#a9d6f5", "#e5f4fd"),
+        ),
+    }
+)
+
+
+def theme_of(name: str) -> Theme:
+    """Return the colours of theme `name`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such theme.
+    """
+    if name not in THEMES:
+        raise ValueError(f"theme: expected one of {', '.join(THEMES)}, got {name!r}")
+    return THEMES[name]

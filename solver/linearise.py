@@ -18,6 +18,19 @@ from solver.layout import PER_DETECTOR, PER_EXPOSURE
 from solver.parameters import SOURCES, Group
 
 
+class Products(NamedTuple):
+    """The derivatives by the source, transposed, times the other parts of `Linearised`.
+
+    They are made here because they are many and tiny: two rows each.
+    """
+
+    residual: Float[AnyArray, "obs 2"]
+    source: Float[AnyArray, "obs 2 2"]
+    exposure: Float[AnyArray, "obs 2 per_exp"]
+    detector: Float[AnyArray, "obs 2 per_det"]
+    displacement: Float[AnyArray, "obs 2 2"]
+
+
 class Linearised(NamedTuple):
     """One chunk of measurements, linearised; all but `prediction` divided by sigma.
 
@@ -32,6 +45,7 @@ class Linearised(NamedTuple):
     detector: Float[AnyArray, "obs 2 per_det"]
     displacement: Float[AnyArray, "obs 2 2"]
     prediction: Prediction
+    products: Products
 
 
 @jax.jit
@@ -77,14 +91,19 @@ def linearise(
     by_displacement = _derivative(
         lambda moved: image(ideal, offsets, geometry, index, moved).pixel, jnp.zeros_like(ideal)
     )
-    return Linearised(
-        residual=(measured - prediction.pixel) * weight,
-        source=jnp.stack(by_source, axis=-1) * weight[:, :, None],
-        exposure=by_groups(PER_EXPOSURE),
-        detector=by_groups(PER_DETECTOR),
-        displacement=by_displacement * weight[:, :, None],
-        prediction=prediction,
+    residual = (measured - prediction.pixel) * weight
+    source = jnp.stack(by_source, axis=-1) * weight[:, :, None]
+    exposure, detector = by_groups(PER_EXPOSURE), by_groups(PER_DETECTOR)
+    displacement = by_displacement * weight[:, :, None]
+
+    def times_source(right: Float[Array, "obs 2 k"]) -> Float[Array, "obs 2 k"]:
+        return jnp.sum(source[:, :, :, None] * right[:, :, None, :], axis=1)
+
+    products = Products(
+        times_source(residual[:, :, None])[:, :, 0],
+        *(times_source(part) for part in (source, exposure, detector, displacement)),
     )
+    return Linearised(residual, source, exposure, detector, displacement, prediction, products)
 
 
 def _derivative(

@@ -17,13 +17,13 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from solver.forward import Index, Offsets
-from solver.layout import Layout
+from solver.layout import PER_DETECTOR, PER_EXPOSURE, Layout
 from solver.linearise import Linearised, linearise
 from solver.problem import Problem
 
 # Long enough to keep the vector units busy, short enough to bound memory; one size means
 # one compilation, whatever the number of measurements.
-CHUNK = 65_536
+CHUNK = 16_384
 
 
 @dataclass(frozen=True)
@@ -116,16 +116,20 @@ def accumulate(
     hessian, gradient = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
     cross, on_sources = np.zeros((n_src, 2, layout.size)), np.zeros((n_src, 2))
     source, chi2 = np.zeros((n_src, 2, 2)), 0.0
+    by_exposure = np.empty((problem.n_obs, 2, len(PER_EXPOSURE)))
+    by_detector = np.empty((problem.n_obs, 2, len(PER_DETECTOR)))
     for rows, chunk in chunks(problem, theta, sources):
         chi2 += float(np.vdot(chunk.residual, chunk.residual))
         _add_sources(problem.index.source[rows], chunk, source, on_sources)
         _add_cross_coefficients(problem.index.source[rows], chunk, layout, cross)
+        by_exposure[rows], by_detector[rows] = chunk.products.exposure, chunk.products.detector
         for segment in segments(problem, rows, chunk):
             flat = segment.jacobian.reshape(-1, segment.jacobian.shape[-1])
             columns = np.r_[segment.columns]
             hessian[np.ix_(columns, columns)] += flat.T @ flat
             gradient[columns] += chunk.residual[segment.rows].ravel() @ flat
-            _add_cross_blocks(segment, chunk, layout, cross)
+    _add_cross_exposures(problem, by_exposure, cross)
+    _add_cross_detectors(problem.index, by_detector, layout, cross)
     return NormalEquations(chi2, gradient, on_sources, hessian, source, cross)
 
 
@@ -148,14 +152,11 @@ def _add_sources(
     hessian: Float[np.ndarray, "src 2 2"],
     gradient: Float[np.ndarray, "src 2"],
 ) -> None:
-    products = np.swapaxes(chunk.source, 1, 2) @ np.concatenate(
-        [chunk.source, chunk.residual[:, :, None]], axis=-1
-    )
-    n_src = len(hessian)
+    n_src, products = len(hessian), chunk.products
     for a in range(2):
         for b in range(2):
-            hessian[:, a, b] += np.bincount(index, products[:, a, b], n_src)
-        gradient[:, a] += np.bincount(index, products[:, a, 2], n_src)
+            hessian[:, a, b] += np.bincount(index, products.source[:, a, b], n_src)
+        gradient[:, a] += np.bincount(index, products.residual[:, a], n_src)
 
 
 def _add_cross_coefficients(
@@ -169,25 +170,43 @@ def _add_cross_coefficients(
     They are sums over the measurements of a source of a 2 x 2 matrix times the basis: a
     sparse matrix that gathers them, times the dense basis.
     """
-    by_displacement = np.swapaxes(chunk.source, 1, 2) @ chunk.displacement
     first, count = layout.first_coefficient, layout.n_coef
     for a in range(2):
         for axis in range(2):
             gather = sp.csr_matrix(
-                (by_displacement[:, a, axis], (index, np.arange(len(index)))),
+                (chunk.products.displacement[:, a, axis], (index, np.arange(len(index)))),
                 shape=(len(cross), len(index)),
             )
             columns = slice(first + axis * count, first + (axis + 1) * count)
             cross[:, a, columns] += gather @ chunk.prediction.basis
 
 
-def _add_cross_blocks(
-    segment: Segment, chunk: Linearised, layout: Layout, cross: Float[np.ndarray, "src 2 calib"]
+def _add_cross_exposures(
+    problem: Problem,
+    products: Float[np.ndarray, "obs 2 per_exp"],
+    cross: Float[np.ndarray, "src 2 calib"],
 ) -> None:
-    """Add the blocks between sources, exposure and detector; a source occurs once here."""
-    by_source = np.swapaxes(chunk.source[segment.rows], 1, 2)
-    for columns, jacobian in (
-        (layout.exposure(segment.exposure), chunk.exposure),
-        (layout.detector(segment.detector), chunk.detector),
-    ):
-        cross[segment.source, :, columns] += by_source @ jacobian[segment.rows]
+    """Add the blocks between sources and exposures, one for each measurement.
+
+    Source after source, so that what is written lies together.
+    """
+    order = np.argsort(problem.index.source, kind="stable")
+    size, width = problem.layout.size, products.shape[-1]
+    first = 2 * size * problem.index.source[order] + width * problem.index.exposure[order]
+    places = first[:, None, None] + size * np.arange(2)[:, None] + np.arange(width)
+    np.add.at(cross.reshape(-1), places.ravel(), products[order].ravel())
+
+
+def _add_cross_detectors(
+    index: Index,
+    products: Float[np.ndarray, "obs 2 per_det"],
+    layout: Layout,
+    cross: Float[np.ndarray, "src 2 calib"],
+) -> None:
+    """Add the blocks between sources and detectors, summed over the exposures."""
+    pair = index.source * layout.n_det + index.detector
+    for a in range(2):
+        for k in range(products.shape[-1]):
+            sums = np.bincount(pair, products[:, a, k], len(cross) * layout.n_det)
+            columns = slice(layout.first_detector + k, layout.size, products.shape[-1])
+            cross[:, a, columns] += sums.reshape(len(cross), layout.n_det)

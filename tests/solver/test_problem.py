@@ -69,7 +69,7 @@ def test_width_given_in_settings_reaches_the_priors(small_orbit):
 
 
 def test_only_focal_lengths_have_gamma_priors(problem):
-    flags = problem.layout.scatter(problem.priors.is_gamma)
+    flags = problem.layout.scatter(problem.priors.is_gamma.astype(float))
     assert [name for name, values in flags.items() if values.any()] == ["focal_length"]
     assert BY_NAME["focal_length"].family == "gamma"
 

@@ -6,6 +6,7 @@ import pytest
 from astropy.table import Table
 
 from solver.fit import fit_orbit
+from solver.normal import CHUNK
 from solver.settings import FitSettings
 
 MIN_OBS = 10
@@ -16,7 +17,7 @@ AXES = ["ra", "dec"]
 @pytest.fixture(scope="module")
 def sample_result(sample_orbit):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.normal.CHUNK", 65_536)
+        patch.setattr("solver.normal.CHUNK", CHUNK)
         return fit_orbit(sample_orbit)
 
 
@@ -112,7 +113,7 @@ def test_true_distortion_is_within_its_uncertainty(sample_result):
 
 def test_aberration_left_out_hides_in_the_quadratic_distortion(sample_orbit, sample_result):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.normal.CHUNK", 65_536)
+        patch.setattr("solver.normal.CHUNK", CHUNK)
         without = fit_orbit(sample_orbit, settings=FitSettings(aberration=False))
     moved = without.values_on("coef").to_numpy() - sample_result.values_on("coef").to_numpy()
     quadratic, others = np.abs(moved[:3]), np.abs(moved[3:])

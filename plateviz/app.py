@@ -7,7 +7,6 @@ from bokeh.themes import Theme
 
 from plateviz.gallery import diagnostics
 from plateviz.session import Session
-from plateviz.state import Selection
 from plateviz.views.calibration import CalibrationView
 from plateviz.views.figure import FigureGrid
 from plateviz.views.refit import RefitView
@@ -54,7 +53,6 @@ def build_app(workbench: Workbench) -> pmui.Page:
         page.busy = False
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     _set_theme(session, page.dark_theme)
-    _keep_in_address(session.selection)
     _keep_up(session, figures)
     session.show_orbit(session.selection.orbit)
     return page
@@ -87,9 +85,3 @@ def _heading(text: str) -> pmui.Typography:
 
 def _set_theme(session: Session, is_dark: bool) -> None:
     session.theme = "dark" if is_dark else "light"
-
-
-def _keep_in_address(selection: Selection) -> None:
-    """Keep the selection in the address, so that it can be sent to somebody."""
-    if pn.state.location is not None:
-        pn.state.location.sync(selection, ["field", "plates", "detector"])

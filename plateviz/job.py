@@ -72,8 +72,10 @@ class Job:
 
     def fail(self, message: str) -> None:
         """Mark the job as failed."""
-        self._message = message
-        self._advance(JobStatus.FAILED)
+        with self._changed:
+            if not self._status.is_over:
+                self._message = message
+            self._advance(JobStatus.FAILED)
 
     def cancel(self) -> None:
         """Mark the job as cancelled."""

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from solver.linearise import Linearised
-from solver.normal import Segment, chunks, segments
+from solver.normal import Segment, chunks, one_blas_thread, segments
 from solver.problem import Problem
 from solver.schur import Reduced
 
@@ -60,8 +60,9 @@ def residuals(
     parts = []
     for rows, chunk in chunks(problem, theta, sources):
         leverage = np.empty((len(chunk.residual), 2, 2))
-        for segment in segments(problem, rows, chunk):
-            leverage[segment.rows] = _leverage(segment, chunk, covariance)
+        with one_blas_thread():
+            for segment in segments(problem, rows, chunk):
+                leverage[segment.rows] = _leverage(segment, chunk, covariance)
         parts.append(
             Residuals(
                 chunk.residual,

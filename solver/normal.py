@@ -8,13 +8,16 @@ outlive a change of the priors.
 """
 
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import jax
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
+from threadpoolctl import ThreadpoolController
 
 from solver.forward import Index, Offsets
 from solver.layout import PER_DETECTOR, PER_EXPOSURE, Layout
@@ -81,6 +84,20 @@ def chunks(
         yield rows, _to_numpy(current, rows.stop - first)
 
 
+def one_blas_thread() -> AbstractContextManager[object]:
+    """Keep BLAS to one thread while many small products are made.
+
+    Its threads wait in a busy loop between products; beside JAX or a browser, on few
+    cores, that was measured to make a pass up to twenty times slower.
+    """
+    return _thread_pools().limit(limits=1, user_api="blas")
+
+
+@cache
+def _thread_pools() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
 def _start_chunk(problem: Problem, offsets: Offsets, first: int) -> Linearised:
     # The last row is repeated up to a full chunk, with no weight.
     take = np.minimum(np.arange(first, first + CHUNK), problem.n_obs - 1)
@@ -118,16 +135,17 @@ def accumulate(
     source, chi2 = np.zeros((n_src, 2, 2)), 0.0
     by_exposure = np.empty((problem.n_obs, 2, len(PER_EXPOSURE)))
     by_detector = np.empty((problem.n_obs, 2, len(PER_DETECTOR)))
-    for rows, chunk in chunks(problem, theta, sources):
-        chi2 += float(np.vdot(chunk.residual, chunk.residual))
-        _add_sources(problem.index.source[rows], chunk, source, on_sources)
-        _add_cross_coefficients(problem.index.source[rows], chunk, layout, cross)
-        by_exposure[rows], by_detector[rows] = chunk.products.exposure, chunk.products.detector
-        for segment in segments(problem, rows, chunk):
-            flat = segment.jacobian.reshape(-1, segment.jacobian.shape[-1])
-            columns = np.r_[segment.columns]
-            hessian[np.ix_(columns, columns)] += flat.T @ flat
-            gradient[columns] += chunk.residual[segment.rows].ravel() @ flat
+    with one_blas_thread():
+        for rows, chunk in chunks(problem, theta, sources):
+            chi2 += float(np.vdot(chunk.residual, chunk.residual))
+            _add_sources(problem.index.source[rows], chunk, source, on_sources)
+            _add_cross_coefficients(problem.index.source[rows], chunk, layout, cross)
+            by_exposure[rows], by_detector[rows] = chunk.products.exposure, chunk.products.detector
+            for segment in segments(problem, rows, chunk):
+                flat = segment.jacobian.reshape(-1, segment.jacobian.shape[-1])
+                columns = np.r_[segment.columns]
+                hessian[np.ix_(columns, columns)] += flat.T @ flat
+                gradient[columns] += chunk.residual[segment.rows].ravel() @ flat
     _add_cross_exposures(problem, by_exposure, cross)
     _add_cross_detectors(problem.index, by_detector, layout, cross)
     return NormalEquations(chi2, gradient, on_sources, hessian, source, cross)

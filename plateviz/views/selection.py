@@ -13,11 +13,14 @@ class SelectionView(pn.viewable.Viewer):
         """Follow `session`."""
         super().__init__(**params)
         selection = session.selection
-        wide = {"sizing_mode": "stretch_width", "size": "small"}
+        wide = {"sizing_mode": "stretch_width", "size": "small", "description": ""}
         field = pmui.Select.from_param(selection.param.field, label="Field", **wide)
         detector = pmui.Select.from_param(selection.param.detector, label="Detector", **wide)
         plates = pmui.IntRangeSlider.from_param(
-            selection.param.plates, label="Exposures of the field", sizing_mode="stretch_width"
+            selection.param.plates,
+            label="Exposures of the field",
+            description="",
+            sizing_mode="stretch_width",
         )
         self._column = pmui.Column(field, plates, detector, sizing_mode="stretch_width", margin=0)
         if len(session.workbench.orbits) > 1:

@@ -32,6 +32,13 @@ def test_what_is_over_stays_over(event, status):
     assert job.message == ("because" if event == "failed" else "")
 
 
+def test_a_cancelled_job_does_not_take_the_blame_of_its_process():
+    job = Job({"do": "fit"})
+    job.cancel()
+    job.fail("the solver process ended")
+    assert (job.status, job.message) == (JobStatus.CANCELLED, "")
+
+
 def test_the_clock_stops_with_the_job():
     job = Job({"do": "fit"})
     job.take({"event": "done"})

@@ -6,6 +6,7 @@ from playwright.sync_api import expect
 from plateviz.gallery import diagnostics
 from tests.ui.conftest import serving
 
+expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
 
 # Rows of the longest data source of each figure on the page, by the figure's title.
@@ -50,8 +51,18 @@ def residual_arrows(page):
           .filter(m => m.type === 'Figure' && JSON.stringify(
              m.above.concat([m.title]).map(t => t?.text ?? '')).includes('Residuals on detector'))
           .flatMap(f => f.renderers.filter(r => r.glyph?.type === 'Segment'))
-          .map(r => JSON.stringify(Array.from(r.data_source.data['x1'] ?? []))).join()"""
+          .map(r => JSON.stringify(Object.values(r.data_source.data).map(c => Array.from(c))))
+          .join()"""
     )
+
+
+def until(page, condition):
+    """Wait for what only the models of the page can tell; figures are drawn in batches."""
+    for _ in range(300):
+        if condition():
+            return
+        page.wait_for_timeout(100)
+    pytest.fail("it did not come about in 30 s")
 
 
 def test_every_figure_is_drawn_with_data(page):
@@ -74,8 +85,7 @@ def test_another_order_changes_the_summary_and_the_residual_map(page):
     expect(page.locator(".solution")).to_have_count(2)
     expect(page.locator(".solution").first).to_contain_text("order 3")
     assert value(page, "χ² per degree of freedom") != chi2
-    page.wait_for_function("() => true")
-    assert residual_arrows(page) != arrows
+    until(page, lambda: residual_arrows(page) != arrows)
     assert page.locator(".figure-comparison canvas").count() > 0
 
 
@@ -90,21 +100,12 @@ def test_a_refit_can_be_cancelled_and_the_old_solution_stays(page):
 
 
 def test_a_prior_that_makes_no_sense_is_refused_in_words(page):
-    page.get_by_text("Prior widths").click()
-    entry = page.get_by_label("distortion A (A_kl)")
+    page.get_by_role("button", name="show more").click()
+    entry = page.get_by_role("textbox", name="distortion A")
     entry.fill("1 deg")
     entry.press("Enter")
     page.get_by_role("button", name="Fit", exact=True).click()
     expect(page.get_by_text("prior of distortion_x: expected a unit out of")).to_be_visible()
-
-
-def test_the_selection_is_in_the_address_and_comes_back(page, open_page):
-    page.get_by_label("Detector").first.click()
-    page.get_by_role("option", name="2").click()
-    page.wait_for_url("**detector=*2*")
-    again = open_page(page.url)
-    again.locator(".figure-residual-map canvas").first.wait_for(state="attached")
-    expect(again.get_by_label("Detector").first).to_have_text("2")
 
 
 def test_the_dark_theme_reaches_the_figures(page):

@@ -100,7 +100,10 @@ def print_inspection(reports: list[dict[str, Any]]) -> None:
 
 
 def _column(column: Mapping[str, Any]) -> str:
-    return str(column)
+    meaning = column.get("canonical") or "not read"
+    values = f"{column['min']} to {column['max']}" if column.get("min") is not None else ""
+    unit = f" {column['unit']}" if column.get("unit") else ""
+    return f"{column['name']:<18} {column['type']:<8} {values}{unit}  ({meaning})"
 
 
 def _chi2(summary: Mapping[str, Any]) -> str:

@@ -104,10 +104,6 @@ class Session(param.Parameterized):
         else:
             self.message = _words(self._job)
 
-    def compare_with(self, other: Solution | None) -> None:
-        """Compare the solution on the screen with another one, or with none."""
-        self.other = other
-
     def bring_up(self, solution: Solution) -> None:
         """Show a solution that was made before; the one on the screen becomes the other."""
         if solution is not self.shown:

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from solver.simulate.settings import SurveySettings as SurveySettings
     from solver.simulate.survey import simulate_survey as simulate_survey
 
+# OpenBLAS reads this when it is loaded: its idle threads are to sleep after some microseconds,
+# not to spin for as long as a product takes, beside JAX and a second OpenBLAS in SciPy.
+os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "14")
 os.environ["JAX_ENABLE_X64"] = "1"
 if "jax" in sys.modules:
     sys.modules["jax"].config.update("jax_enable_x64", True)

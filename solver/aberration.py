@@ -7,22 +7,24 @@ corners of the field; so it is applied here, per exposure.
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+Components = tuple[Float[Array, "*#obs"], Float[Array, "*#obs"], Float[Array, "*#obs"]]
+
 # Schwarzschild radius of the Sun, au: the gravitational term of Klioner (2003).
 SUN_SCHWARZSCHILD_AU = 1.97412574336e-8
 
 
 def aberrate(
-    components: Float[Array, "obs 3"],
-    velocity: Float[Array, "obs 3"],
-    speed_along: Float[Array, " obs"],
-    lorentz: Float[Array, " obs"],
-    sun_distance: Float[Array, " obs"],
-) -> Float[Array, "obs 3"]:
+    components: Components,
+    velocity: Components,
+    speed_along: Float[Array, "*#obs"],
+    lorentz: Float[Array, "*#obs"],
+    sun_distance: Float[Array, "*#obs"],
+) -> Components:
     """Return apparent directions, not normalised, along the same axes.
 
     Parameters
     ----------
-    components : unit vectors towards the sources
+    components : of unit vectors towards the sources
     velocity : of the observer, in c, along the same axes
     speed_along : dot product of source direction and velocity, in c
     lorentz : sqrt(1 - v^2)
@@ -30,8 +32,9 @@ def aberrate(
     """
     potential = SUN_SCHWARZSCHILD_AU / sun_distance
     on_source = lorentz - potential * speed_along
-    on_velocity = 1.0 + speed_along / (1.0 + lorentz) + potential
-    return on_source[:, None] * components + on_velocity[:, None] * velocity
+    on_velocity = 1.0 / (1.0 + lorentz) * speed_along + (1.0 + potential)
+    x, y, z = (on_source * u + on_velocity * v for u, v in zip(components, velocity, strict=True))
+    return x, y, z
 
 
 def lorentz_factor(velocity: Float[Array, "exp 3"]) -> Float[Array, " exp"]:

@@ -5,24 +5,25 @@ from jaxtyping import Array, Float
 
 
 def to_pixel(
-    focal: Float[Array, "obs 2"],
-    centre: Float[Array, "obs 2"],
-    rotation: Float[Array, " obs"],
-    pitch: Float[Array, "obs 2"],
-) -> Float[Array, "obs 2"]:
+    focal: tuple[Float[Array, "*obs"], Float[Array, "*obs"]],
+    centre: tuple[Float[Array, "*#obs"], Float[Array, "*#obs"]],
+    rotation: Float[Array, "*#obs"],
+    pitch: tuple[Float[Array, "*#obs"], Float[Array, "*#obs"]],
+) -> tuple[Float[Array, "*obs"], Float[Array, "*obs"]]:
     """Return detector coordinates of positions on the distorted focal plane.
 
     Parameters
     ----------
-    focal : um
+    focal : x and y, um
     centre : place of the detector's centre, um
     rotation : rad
     pitch : pixel pitch along the detector's axes, um
 
     Returns
     -------
-    pixels from the detector's centre
+    x and y, pixels from the detector's centre
     """
-    x, y = (focal - centre).T
+    x, y = focal[0] - centre[0], focal[1] - centre[1]
     c, s = jnp.cos(rotation), jnp.sin(rotation)
-    return jnp.stack([c * x - s * y, s * x + c * y], axis=-1) / pitch
+    # The factors belong to the detector; only the products to each measurement.
+    return (c / pitch[0]) * x - (s / pitch[0]) * y, (s / pitch[1]) * x + (c / pitch[1]) * y

@@ -81,8 +81,8 @@ def mean_covariance(
     """
     count = max(int(members.sum()), 1)
     conditional = reduced.conditional_covariance()[members].sum(axis=0) / count**2
-    shared = reduced.response()[members].sum(axis=0) / count
-    return conditional + shared @ reduced.theta_covariance() @ shared.T
+    shared = reduced.response()[:, :, members].sum(axis=-1) / count
+    return conditional + shared.T @ reduced.theta_covariance() @ shared
 
 
 def induced_shift(
@@ -97,4 +97,4 @@ def induced_shift(
     reference_error : catalogue minus truth of reference stars, zero for the others, mas
     """
     pull = np.einsum("sij,sj->si", priors.precision, reference_error)
-    return reduced.solve(np.zeros(len(reduced.by_theta)), pull)[1]
+    return reduced.solve(np.zeros(len(reduced.theta)), pull)[1]

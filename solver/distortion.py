@@ -20,26 +20,25 @@ def terms(order: int) -> list[tuple[int, int]]:
     return [(n - j, j) for n in range(2, order + 1) for j in range(n + 1)]
 
 
-def basis(x: Float[Array, " obs"], y: Float[Array, " obs"], order: int) -> Float[Array, "obs coef"]:
-    """Return the value of every distortion term.
+def basis(
+    x: Float[Array, "*obs"], y: Float[Array, "*obs"], order: int
+) -> list[Float[Array, "*obs"]]:
+    """Return the value of every distortion term, in the order of `terms`.
 
     Parameters
     ----------
     x, y : ideal focal-plane position times s, within [-1, 1] on the field
     order : highest total degree
     """
-    if order < 2:
-        return jnp.zeros((*x.shape, 0), x.dtype)
     in_x, in_y = _legendre(x, order), _legendre(y, order)
-    at_zero = np.array([np.polynomial.legendre.legval(0.0, row) for row in np.eye(order + 1)])
-    return jnp.stack(
-        [in_x[k] * in_y[j] - at_zero[k] * at_zero[j] for k, j in terms(order)], axis=-1
-    )
+    at_zero = [np.polynomial.legendre.legval(0.0, row).item() for row in np.eye(order + 1)]
+    return [in_x[k] * in_y[j] - at_zero[k] * at_zero[j] for k, j in terms(order)]
 
 
-def _legendre(x: Float[Array, " obs"], order: int) -> list[Float[Array, " obs"]]:
+def _legendre(x: Float[Array, "*obs"], order: int) -> list[Float[Array, "*obs"]]:
     """Return L_0 ... L_order by Bonnet's recursion."""
     values = [jnp.ones_like(x), x]
     for n in range(1, order):
-        values.append(((2 * n + 1) * x * values[n] - n * values[n - 1]) / (n + 1))
+        higher, lower = (2 * n + 1) / (n + 1), n / (n + 1)
+        values.append(higher * x * values[n] - lower * values[n - 1])
     return values

@@ -1,26 +1,40 @@
 """The gauss-newton engine: the exact posterior mode in a few steps.
 
-Each iteration linearises the model exactly, eliminates the sources and takes the full
-step, or half of it, or a quarter, if the posterior's chi2 would rise. The fit has converged when
-every step is below the tolerance times the uncertainty of its parameter, which is what
-"nothing changes any more" means to somebody who reads the result.
+Each iteration solves the linearised model with the sources eliminated and takes the full
+step, or half of it, or a quarter, if the posterior's chi2 would rise. The gradient is exact
+at every point; the Jacobians are those of the last point that was further than
+`_KEEP_BELOW` from the next. The fit has converged when every step is below the tolerance
+times the uncertainty of its parameter, which is what "nothing changes any more" means to
+somebody who reads the result.
 """
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from solver.normal import NormalEquations, accumulate
+from solver.objective import Gradient, gradient
 from solver.parameters import CALIBRATION_GROUPS
-from solver.problem import Problem
+from solver.problem import Problem, thinned
 from solver.result import FitStatus
 from solver.schur import Reduced, reduce
 from solver.settings import FitSettings
 
 _SMALLEST_SHARE = 1e-6
+# A step of so few sigmas leaves the Jacobians good enough for the next one. It is no more
+# because what pointings and detectors have in common is held by the priors alone: in that
+# direction the smallest change of the Jacobians is amplified by its uncertainty.
+_KEEP_BELOW = 1.0
+# Steps that do not shrink by this much are not those of a nearly linear model.
+_KEEP_SHRINKING = 0.1
+# Fits of more sources than this start from a fit of about so many of them, done to within
+# some sigmas of its own, which is as good as a step of the whole at a fraction of its cost.
+_ROUGH_SOURCES = 1000
+_ROUGH_TOLERANCE = 1e4
 # Rounding moves chi2 by about this fraction; a rise below it is none.
 _ROUNDING = 1e-9
 
@@ -41,8 +55,8 @@ class Mode(NamedTuple):
     """Where the engine ended.
 
     `theta` and `sources` are offsets from the origins; `reduced` is the posterior
-    factorised at the last linearisation point, which lies within one
-    converged step.
+    factorised at the last linearisation point, from which the mode is less than
+    `_KEEP_BELOW` sigmas away.
     """
 
     theta: Float[np.ndarray, " calib"]
@@ -55,8 +69,20 @@ class Mode(NamedTuple):
 class _Point(NamedTuple):
     theta: Float[np.ndarray, " calib"]
     sources: Float[np.ndarray, "src 2"]
-    equations: NormalEquations
+    gradient: Gradient
     objective: float
+    equations: NormalEquations | None
+
+
+class _Scale(NamedTuple):
+    """Uncertainties in which steps are measured.
+
+    Marginal ones for the calibration; for the sources the conditional ones, which are
+    smaller by a few per cent and cost nothing.
+    """
+
+    theta: Float[np.ndarray, " calib"]
+    sources: Float[np.ndarray, "src 2"]
 
 
 def find_mode(
@@ -70,52 +96,95 @@ def find_mode(
     ----------
     progress : called after every iteration; what it raises stops the fit
     """
-    start = time.perf_counter()
+    begin = time.perf_counter()
+    keep = _rough_selection(problem)
+    theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
+    if not keep.all():
+        rough = replace(settings, tolerance=max(settings.tolerance, _ROUGH_TOLERANCE))
+        mode = _iterate(thinned(problem, keep), rough, theta, sources[keep], lambda _: None, begin)
+        if mode.status is FitStatus.CONVERGED:
+            theta, sources[keep] = mode.theta, mode.sources
+    return _iterate(problem, settings, theta, sources, progress, begin)
+
+
+def _rough_selection(problem: Problem) -> Bool[np.ndarray, " src"]:
+    """Return the sources to start with: the reference stars and a share of the others."""
+    every = max(problem.n_src // _ROUGH_SOURCES, 1)
+    return (np.arange(problem.n_src) % every == 0) | problem.sources["is_reference"].to_numpy(bool)
+
+
+def _iterate(
+    problem: Problem,
+    settings: FitSettings,
+    theta: Float[np.ndarray, " calib"],
+    sources: Float[np.ndarray, "src 2"],
+    progress: Callable[[Iteration], None],
+    begin: float,
+) -> Mode:
     trace: list[Iteration] = []
 
     def report(point: _Point, largest: float, parameter: str, damping: float) -> None:
-        elapsed = time.perf_counter() - start
-        chi2 = point.equations.chi2
+        elapsed = time.perf_counter() - begin
+        chi2 = point.gradient.chi2
         trace.append(
             Iteration(len(trace), point.objective, chi2, largest, parameter, damping, elapsed)
         )
         progress(trace[-1])
 
-    point = _evaluate(problem, np.zeros(problem.layout.size), np.zeros((problem.n_src, 2)))
+    point = _evaluate(problem, theta, sources)
     report(point, float("nan"), "", 0.0)
     if not np.isfinite(point.objective):
         return Mode(point.theta, point.sources, None, FitStatus.NOT_FINITE, trace)
+    reduced, scale, before = None, None, np.inf
     while True:
-        reduced = reduce(point.equations, problem.priors, point.theta, point.sources)
-        if reduced is None:
+        if point.equations is not None:
+            reduced = reduce(point.equations, problem.priors)
+            scale = None if reduced is None else _scale(reduced)
+        if reduced is None or scale is None:
             return Mode(point.theta, point.sources, None, FitStatus.SINGULAR, trace)
-        step = reduced.step()
-        largest, parameter = _largest(problem, step, reduced)
+        step = reduced.solve(*_downhill(problem, point))
+        largest, parameter = _largest(problem, step, scale)
         if largest < settings.tolerance:
             point = point._replace(theta=point.theta + step[0], sources=point.sources + step[1])
             report(point, largest, parameter, 0.0)
             return Mode(point.theta, point.sources, reduced, FitStatus.CONVERGED, trace)
         if len(trace) > settings.max_iterations:
             return Mode(point.theta, point.sources, reduced, FitStatus.MAX_ITERATIONS, trace)
-        moved, damping = _descend(problem, point, step)
+        keep = largest < min(_KEEP_BELOW, _KEEP_SHRINKING * before)
+        moved, damping = _descend(problem, point, step, keep)
         if moved is None:
             return Mode(point.theta, point.sources, reduced, FitStatus.STUCK, trace)
-        point = moved
+        point, before = moved, largest
         report(point, largest, parameter, damping)
 
 
 def _evaluate(
-    problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
+    problem: Problem,
+    theta: Float[np.ndarray, " calib"],
+    sources: Float[np.ndarray, "src 2"],
+    keep: bool = False,
 ) -> _Point:
-    equations = accumulate(problem, theta, sources)
-    objective = equations.chi2 + problem.priors.penalty(theta, sources)
-    return _Point(theta, sources, equations, objective)
+    """Evaluate the posterior at a point, without its Jacobians if those before are kept."""
+    equations = None if keep else accumulate(problem, theta, sources)
+    at = gradient(problem, theta, sources) if equations is None else equations.gradient
+    objective = at.chi2 + problem.priors.penalty(theta, sources)
+    return _Point(theta, sources, at, objective, equations)
+
+
+def _downhill(
+    problem: Problem, point: _Point
+) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
+    """Return minus the gradient of half the posterior's chi2."""
+    priors, at = problem.priors, point.gradient
+    by_theta = at.by_theta - priors.gradient(point.theta)
+    return by_theta, at.by_source - priors.source_gradient(point.sources)
 
 
 def _descend(
     problem: Problem,
     point: _Point,
     step: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
+    keep: bool,
 ) -> tuple[_Point | None, float]:
     """Take the step, or as much of it as it takes for the objective not to rise.
 
@@ -123,26 +192,26 @@ def _descend(
     """
     share = 1.0
     while share > _SMALLEST_SHARE:
-        moved = _evaluate(problem, point.theta + share * step[0], point.sources + share * step[1])
+        theta, sources = point.theta + share * step[0], point.sources + share * step[1]
+        moved = _evaluate(problem, theta, sources, keep)
         if moved.objective <= point.objective * (1.0 + _ROUNDING):
             return moved, 1.0 - share
         share *= 0.5
     return None, 1.0 - share
 
 
+def _scale(reduced: Reduced) -> _Scale:
+    variances = np.diagonal(reduced.conditional_covariance(), axis1=1, axis2=2)
+    return _Scale(np.sqrt(np.diag(reduced.theta_covariance())), np.sqrt(variances))
+
+
 def _largest(
     problem: Problem,
     step: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
-    reduced: Reduced,
+    scale: _Scale,
 ) -> tuple[float, str]:
-    """Return the largest step over its uncertainty, and the parameter's name.
-
-    Marginal uncertainties for the calibration; for the sources the conditional ones,
-    which are smaller by a few per cent and cost nothing.
-    """
-    of_theta = np.abs(step[0]) / np.sqrt(np.diag(reduced.theta_covariance()))
-    variances = np.diagonal(reduced.conditional_covariance(), axis1=1, axis2=2)
-    of_sources = np.abs(step[1]) / np.sqrt(variances)
+    """Return the largest step over its uncertainty, and the parameter's name."""
+    of_theta, of_sources = np.abs(step[0]) / scale.theta, np.abs(step[1]) / scale.sources
     if of_theta.max() > of_sources.max():
         column = int(of_theta.argmax())
         return float(of_theta[column]), _name_of(problem, column)

@@ -8,13 +8,15 @@ one measurement touches lie in three runs of columns.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Shaped
+from jaxtyping import Int, Shaped
 
 from solver.parameters import CALIBRATION_GROUPS, Group, groups_on
 
 PER_EXPOSURE = groups_on("exp")
 PER_COEFFICIENT = groups_on("coef")
 PER_DETECTOR = groups_on("det")
+# The groups of which a measurement touches one element each.
+LOCAL_GROUPS = PER_EXPOSURE + PER_DETECTOR
 
 
 @dataclass(frozen=True)
@@ -40,22 +42,21 @@ class Layout:
         """Column of the first detector parameter."""
         return self.first_coefficient + self.n_coef * len(PER_COEFFICIENT)
 
-    def exposure(self, m: int) -> slice:
-        """Return the columns of exposure `m`."""
-        return slice(m * len(PER_EXPOSURE), (m + 1) * len(PER_EXPOSURE))
-
     def coefficients(self) -> slice:
         """Return the columns of the distortion, first all of A, then all of B."""
         return slice(self.first_coefficient, self.first_detector)
 
-    def detector(self, n: int) -> slice:
-        """Return the columns of detector `n`."""
-        first = self.first_detector + n * len(PER_DETECTOR)
-        return slice(first, first + len(PER_DETECTOR))
-
-    def touched(self, m: int, n: int) -> tuple[slice, slice, slice]:
-        """Return the runs of columns that a measurement of exposure m, detector n touches."""
-        return self.exposure(m), self.coefficients(), self.detector(n)
+    def touched(
+        self, exposure: Int[np.ndarray, "*n"], detector: Int[np.ndarray, "*n"]
+    ) -> Int[np.ndarray, "*n local"]:
+        """Return the columns of `LOCAL_GROUPS` for exposures and detectors, side by side."""
+        return np.stack(
+            [
+                self.columns(group)[exposure if group.axis == "exp" else detector]
+                for group in LOCAL_GROUPS
+            ],
+            axis=-1,
+        )
 
     def columns(self, group: Group) -> np.ndarray:
         """Return the columns of one group, in the order of its axis."""

@@ -3,6 +3,10 @@
 With the whitened Jacobian J_k of measurement k and the marginal covariance C of all
 parameters, H_k = J_k C J_k' (2 x 2). The expected chi2 of the measurement is
 2 - tr H_k, and (I - H_k)^(-1/2) r_k has unit covariance if model and sigmas are right.
+
+A measurement depends on few parameters, and on the distortion's many coefficients only
+through the displacement that they add at its place; so C is first brought down to the
+covariance of the source, the touched parameters and that displacement.
 """
 
 from typing import NamedTuple
@@ -10,8 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from solver.forward import Index, Pair
+from solver.layout import Layout
 from solver.linearise import Linearised
-from solver.normal import Segment, chunks, one_blas_thread, segments
+from solver.normal import chunks, one_blas_thread
 from solver.problem import Problem
 from solver.schur import Reduced
 
@@ -33,17 +39,22 @@ class Residuals(NamedTuple):
 
 
 class Covariances(NamedTuple):
-    """Marginal covariances of sources, calibration, and between the two."""
+    """Marginal covariances of sources, calibration, and between the two.
 
+    `at` is where the model was linearised, calibration and sources.
+    """
+
+    at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
     source: Float[np.ndarray, "src 2 2"]
     theta: Float[np.ndarray, "calib calib"]
-    cross: Float[np.ndarray, "src 2 calib"]
+    cross: Float[np.ndarray, "calib 2 src"]
 
 
 def covariances(reduced: Reduced) -> Covariances:
     """Return all marginal covariances of a factorised posterior."""
     spread = reduced.spread()
     return Covariances(
+        reduced.at,
         reduced.marginal_covariance(spread),
         reduced.theta_covariance(),
         reduced.cross_covariance(spread),
@@ -57,37 +68,122 @@ def residuals(
     covariance: Covariances,
 ) -> Residuals:
     """Return the residuals at a point, with their leverage."""
+    tiles = problem.tiles
     parts = []
-    for rows, chunk in chunks(problem, theta, sources):
-        leverage = np.empty((len(chunk.residual), 2, 2))
-        with one_blas_thread():
-            for segment in segments(problem, rows, chunk):
-                leverage[segment.rows] = _leverage(segment, chunk, covariance)
-        parts.append(
-            Residuals(
-                chunk.residual,
-                _standardised(chunk.residual, leverage),
-                np.trace(leverage, axis1=1, axis2=2),
-                chunk.prediction.pixel,
-                chunk.prediction.ideal,
-                chunk.prediction.focal,
-            )
-        )
-    return Residuals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    with one_blas_thread():
+        # Large variances cancel in what the priors alone hold, and do so only with the very
+        # Jacobians from which the covariances were made.
+        jacobians = chunks(problem, *covariance.at)
+        for i, chunk in enumerate(chunks(problem, theta, sources)):
+            index = Index(*(part[i] for part in tiles.index))
+            leverage = _leverage(index, next(jacobians), problem.layout, covariance)
+            at = chunk.prediction
+            parts.append([leverage, *map(_pairs, (chunk.residual, at.pixel, at.ideal, at.focal))])
+    leverage, residual, pixel, ideal, focal = (
+        np.concatenate(columns)[tiles.place] for columns in zip(*parts, strict=True)
+    )
+    trace = np.trace(leverage, axis1=1, axis2=2)
+    return Residuals(residual, _standardised(residual, leverage), trace, pixel, ideal, focal)
+
+
+def _pairs(pair: Pair) -> Float[np.ndarray, "slots 2"]:
+    return np.stack([values.ravel() for values in pair], axis=-1)
 
 
 def _leverage(
-    segment: Segment, chunk: Linearised, covariance: Covariances
-) -> Float[np.ndarray, "seg 2 2"]:
-    """Return J C J' from its source, calibration and mixed parts."""
-    jacobian, columns = segment.jacobian, np.r_[segment.columns]
-    by_source = chunk.source[segment.rows]
-    of_theta = jacobian @ covariance.theta[np.ix_(columns, columns)]
-    cross = [covariance.cross[segment.source, :, run] for run in segment.columns]
-    mixed = by_source @ np.concatenate(cross, axis=-1)
-    half = (0.5 * of_theta + mixed) @ np.swapaxes(jacobian, 1, 2)
-    of_source = by_source @ covariance.source[segment.source] @ np.swapaxes(by_source, 1, 2)
-    return of_source + half + np.swapaxes(half, 1, 2)
+    index: Index, chunk: Linearised, layout: Layout, covariance: Covariances
+) -> Float[np.ndarray, "slots 2 2"]:
+    """Return J C J' of every slot of a chunk."""
+    source, local, displacement = map(_rows, (chunk.source, chunk.local, chunk.displacement))
+    of_local, with_displacement, of_displacement = _calibration_covariance(
+        index, chunk.prediction.basis, layout, covariance.theta
+    )
+    source_local, source_displacement = _source_covariance(
+        index, chunk.prediction.basis, layout, covariance.cross
+    )
+    spread = (of_local @ local.reshape(*local.shape[:2], -1)).reshape(local.shape)
+    leverage = np.einsum("tips,tiqs->tspq", local, spread)
+    for rows, between, columns in (
+        (source, covariance.source[index.source].transpose(0, 2, 3, 1), source),
+        (displacement, of_displacement, displacement),
+    ):
+        leverage += _between(rows, between, columns)
+    for rows, between, columns in (
+        (local, source_local, source),
+        (displacement, source_displacement, source),
+        (local, with_displacement, displacement),
+    ):
+        half = _between(rows, between, columns)
+        leverage += half + half.swapaxes(2, 3)
+    return leverage.reshape(-1, 2, 2)
+
+
+def _rows(part: list[Pair]) -> Float[np.ndarray, "tile row 2 slot"]:
+    return np.stack([np.stack(pair, axis=1) for pair in part], axis=1)
+
+
+def _between(
+    rows: Float[np.ndarray, "tile i 2 slot"],
+    covariance: Float[np.ndarray, "tile i j slot"],
+    columns: Float[np.ndarray, "tile j 2 slot"],
+) -> Float[np.ndarray, "tile slot 2 2"]:
+    spread = np.einsum("tijs,tjqs->tiqs", covariance, columns)
+    return np.einsum("tips,tiqs->tspq", rows, spread)
+
+
+def _calibration_covariance(
+    index: Index,
+    basis: list[Float[np.ndarray, "tile slot"]],
+    layout: Layout,
+    theta: Float[np.ndarray, "calib calib"],
+) -> tuple[
+    Float[np.ndarray, "tile local local"],
+    Float[np.ndarray, "tile local 2 slot"],
+    Float[np.ndarray, "tile 2 2 slot"],
+]:
+    """Return the covariances of the touched parameters and of the displacement.
+
+    In the order: among the former, between the two, of the latter.
+    """
+    own, shared = layout.touched(index.exposure[:, 0], index.detector[:, 0]), layout.coefficients()
+    n_tiles, n_slots = index.source.shape
+    terms = _terms(basis, index.source.shape)
+    n_rows = 2 * own.shape[-1]
+    between = theta[own][:, :, shared].reshape(n_tiles, n_rows, layout.n_coef)
+    mixed = (between @ terms).reshape(n_tiles, own.shape[-1], 2, n_slots)
+    blocks = theta[shared, shared].reshape(2, layout.n_coef, 2, layout.n_coef)
+    of_displacement = np.empty((n_tiles, 2, 2, n_slots))
+    for i in range(2):
+        for j in range(2):
+            spread = blocks[i, :, j] @ terms
+            of_displacement[:, i, j] = np.einsum("tcs,tcs->ts", terms, spread)
+    return theta[own[:, :, None], own[:, None, :]], mixed, of_displacement
+
+
+def _source_covariance(
+    index: Index,
+    basis: list[Float[np.ndarray, "tile slot"]],
+    layout: Layout,
+    cross: Float[np.ndarray, "calib 2 src"],
+) -> tuple[Float[np.ndarray, "tile local 2 slot"], Float[np.ndarray, "tile 2 2 slot"]]:
+    """Return the covariances of touched parameters and displacement with the source."""
+    own = layout.touched(index.exposure[:, 0], index.detector[:, 0])
+    source = index.source[:, None, :]
+    of_local = np.stack([cross[own[:, :, None], a, source] for a in range(2)], axis=2)
+    terms = _terms(basis, index.source.shape)
+    of_terms = cross[layout.coefficients()].reshape(2, layout.n_coef, *cross.shape[1:])
+    of_displacement = np.empty((len(own), 2, 2, terms.shape[-1]))
+    for i in range(2):
+        for a in range(2):
+            here = of_terms[i, :, a].T[index.source]
+            of_displacement[:, i, a] = np.einsum("tsc,tcs->ts", here, terms)
+    return of_local, of_displacement
+
+
+def _terms(
+    basis: list[Float[np.ndarray, "tile slot"]], shape: tuple[int, int]
+) -> Float[np.ndarray, "tile coef slot"]:
+    return np.stack(basis, axis=1) if basis else np.empty((shape[0], 0, shape[1]))
 
 
 def _standardised(

@@ -13,37 +13,46 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from solver.forward import AnyArray, Geometry, Index, Offsets, Prediction, ideal_position, image
-from solver.layout import PER_DETECTOR, PER_EXPOSURE
-from solver.parameters import SOURCES, Group
+from solver.forward import (
+    AnyArray,
+    Geometry,
+    Index,
+    Offsets,
+    Pair,
+    Prediction,
+    ideal_position,
+    image,
+)
+from solver.layout import LOCAL_GROUPS
+from solver.parameters import SOURCES
 
 
 class Products(NamedTuple):
-    """The derivatives by the source, transposed, times the other parts of `Linearised`.
+    """Sums over a measurement's two coordinates of products of the parts of `Linearised`.
 
-    They are made here because they are many and tiny: two rows each.
+    They are made here because they are many and tiny. The last entries of those with
+    `local` are the products with the residual.
     """
 
-    residual: Float[AnyArray, "obs 2"]
-    source: Float[AnyArray, "obs 2 2"]
-    exposure: Float[AnyArray, "obs 2 per_exp"]
-    detector: Float[AnyArray, "obs 2 per_det"]
-    displacement: Float[AnyArray, "obs 2 2"]
+    source_source: list[list[Float[AnyArray, "tile slot"]]]
+    local_source: list[list[Float[AnyArray, "tile slot"]]]
+    local_displacement: list[list[Float[AnyArray, "tile slot"]]]
+    displacement_source: list[list[Float[AnyArray, "tile slot"]]]
+    displacement_displacement: list[list[Float[AnyArray, "tile slot"]]]
 
 
 class Linearised(NamedTuple):
-    """One chunk of measurements, linearised; all but `prediction` divided by sigma.
+    """A run of tiles, linearised; all but `prediction` divided by sigma, x and y apart.
 
     `residual` is measured minus predicted. The others are derivatives of the prediction:
-    by the source's two offsets (mas^-1), by the groups on the exposure and on the detector
-    (per group unit), and by a displacement on the focal plane (um^-1).
+    by the source's two offsets (mas^-1), by the groups of `LOCAL_GROUPS` (per group unit),
+    and by a displacement on the focal plane (um^-1).
     """
 
-    residual: Float[AnyArray, "obs 2"]
-    source: Float[AnyArray, "obs 2 2"]
-    exposure: Float[AnyArray, "obs 2 per_exp"]
-    detector: Float[AnyArray, "obs 2 per_det"]
-    displacement: Float[AnyArray, "obs 2 2"]
+    residual: Pair
+    source: list[Pair]
+    local: list[Pair]
+    displacement: list[Pair]
     prediction: Prediction
     products: Products
 
@@ -53,8 +62,8 @@ def linearise(
     offsets: Offsets,
     geometry: Geometry,
     index: Index,
-    measured: Float[AnyArray, "obs 2"],
-    weight: Float[AnyArray, "obs 2"],
+    measured: Float[AnyArray, "2 tile slot"],
+    weight: Float[AnyArray, "2 tile slot"],
 ) -> Linearised:
     """Linearise the model at `offsets`.
 
@@ -65,50 +74,54 @@ def linearise(
     """
     ideal = ideal_position(offsets, geometry, index)
     prediction = image(ideal, offsets, geometry, index)
-    by_ideal = _derivative(lambda moved: image(moved, offsets, geometry, index).pixel, ideal)
+    by_ideal = _by_axes(lambda moved: image(moved, offsets, geometry, index).pixel, ideal)
 
-    def by_group(name: str, tangent: Float[Array, "..."]) -> Float[Array, "obs 2"]:
+    def by_group(name: str, tangent: Float[Array, "..."]) -> Pair:
         """Chain the derivative through the focal plane, where both stages are narrow."""
 
         def with_values(values: Float[Array, "..."]) -> Offsets:
             return {**offsets, name: values}
 
         on_plane, on_detector = (
-            jax.jvp(stage, (offsets[name],), (tangent,))[1]
+            jax.jvp(stage, (jnp.asarray(offsets[name]),), (tangent,))[1]
             for stage in (
                 lambda values: ideal_position(with_values(values), geometry, index),
                 lambda values: image(ideal, with_values(values), geometry, index).pixel,
             )
         )
-        return jnp.einsum("oij,oj->oi", by_ideal, on_plane) + on_detector
+        along_x, along_y = by_ideal
+        return whiten(
+            *(along_x[i] * on_plane[0] + along_y[i] * on_plane[1] + on_detector[i] for i in (0, 1))
+        )
 
-    def by_groups(groups: tuple[Group, ...]) -> Float[Array, "obs 2 _"]:
-        columns = [by_group(g.name, jnp.ones_like(offsets[g.name])) for g in groups]
-        return jnp.stack(columns, axis=-1) * weight[:, :, None]
+    def whiten(x: Float[Array, "*#obs"], y: Float[Array, "*#obs"]) -> Pair:
+        return weight[0] * x, weight[1] * y
 
+    def displaced(moved: Pair) -> Pair:
+        return image(ideal, offsets, geometry, index, moved).pixel
+
+    x, y = prediction.pixel
+    residual = whiten(measured[0] - x, measured[1] - y)
     east = jnp.zeros_like(offsets[SOURCES.name]).at[:, 0].set(1.0)
-    by_source = [by_group(SOURCES.name, tangent) for tangent in (east, 1.0 - east)]
-    by_displacement = _derivative(
-        lambda moved: image(ideal, offsets, geometry, index, moved).pixel, jnp.zeros_like(ideal)
-    )
-    residual = (measured - prediction.pixel) * weight
-    source = jnp.stack(by_source, axis=-1) * weight[:, :, None]
-    exposure, detector = by_groups(PER_EXPOSURE), by_groups(PER_DETECTOR)
-    displacement = by_displacement * weight[:, :, None]
-
-    def times_source(right: Float[Array, "obs 2 k"]) -> Float[Array, "obs 2 k"]:
-        return jnp.sum(source[:, :, :, None] * right[:, :, None, :], axis=1)
-
+    source = [by_group(SOURCES.name, tangent) for tangent in (east, 1.0 - east)]
+    local = [by_group(g.name, jnp.ones_like(offsets[g.name])) for g in LOCAL_GROUPS]
+    displacement = [whiten(*by) for by in _by_axes(displaced, jax.tree.map(jnp.zeros_like, ideal))]
+    with_residual = [*local, residual]
     products = Products(
-        times_source(residual[:, :, None])[:, :, 0],
-        *(times_source(part) for part in (source, exposure, detector, displacement)),
+        _dots(source, source),
+        _dots(with_residual, source),
+        _dots(with_residual, displacement),
+        _dots(displacement, source),
+        _dots(displacement, displacement),
     )
-    return Linearised(residual, source, exposure, detector, displacement, prediction, products)
+    return Linearised(residual, source, local, displacement, prediction, products)
 
 
-def _derivative(
-    of: Callable[[Float[Array, "obs 2"]], Float[Array, "obs 2"]], at: Float[Array, "obs 2"]
-) -> Float[Array, "obs 2 2"]:
-    """Return the derivative of each row of a function by its own row of the argument."""
-    x = jnp.zeros_like(at).at[:, 0].set(1.0)
-    return jnp.stack([jax.jvp(of, (at,), (unit,))[1] for unit in (x, 1.0 - x)], axis=-1)
+def _by_axes(of: Callable[[Pair], Pair], at: Pair) -> list[Pair]:
+    """Return the derivatives of a function by the two components of its argument."""
+    one, zero = jnp.ones_like(at[0]), jnp.zeros_like(at[0])
+    return [jax.jvp(of, (at,), (unit,))[1] for unit in ((one, zero), (zero, one))]
+
+
+def _dots(first: list[Pair], second: list[Pair]) -> list[list[Float[Array, "tile slot"]]]:
+    return [[a[0] * b[0] + a[1] * b[1] for b in second] for a in first]

@@ -1,17 +1,16 @@
 """Normal equations of one orbit, accumulated from the data alone.
 
 With calibration theta and sources s, half the data's chi2 has the Hessian blocks
-U (theta, theta), W (source, theta) and V (source, source). V is block-diagonal, 2 x 2
+U (theta, theta), W (theta, source) and V (source, source). V is block-diagonal, 2 x 2
 for each source, since a measurement belongs to one source: this is what makes the
 sources cheap to eliminate (`solver.schur`). Priors are added there, so that these blocks
 outlive a change of the priors.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -19,14 +18,13 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from threadpoolctl import ThreadpoolController
 
-from solver.forward import Index, Offsets
-from solver.layout import PER_DETECTOR, PER_EXPOSURE, Layout
+from solver.forward import AnyArray, Index
+from solver.layout import LOCAL_GROUPS, PER_DETECTOR, PER_EXPOSURE, Layout
 from solver.linearise import Linearised, linearise
+from solver.objective import Gradient
 from solver.problem import Problem
 
-# Long enough to keep the vector units busy, short enough to bound memory; one size means
-# one compilation, whatever the number of measurements.
-CHUNK = 16_384
+N_LOCAL = len(LOCAL_GROUPS)
 
 
 @dataclass(frozen=True)
@@ -35,53 +33,54 @@ class NormalEquations:
 
     Attributes
     ----------
-    chi2 : of the data, at the linearisation point
-    by_theta : minus the gradient by the calibration
-    by_source : minus the gradient by the sources
+    at : where the model was linearised, calibration and sources
+    gradient : g, with chi2_0
     theta : U
     source : V
     cross : W
     """
 
-    chi2: float
-    by_theta: Float[np.ndarray, " calib"]
-    by_source: Float[np.ndarray, "src 2"]
+    at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
+    gradient: Gradient
     theta: Float[np.ndarray, "calib calib"]
     source: Float[np.ndarray, "src 2 2"]
-    cross: Float[np.ndarray, "src 2 calib"]
+    cross: Float[np.ndarray, "calib 2 src"]
 
 
-class Segment(NamedTuple):
-    """Measurements of one exposure on one detector, within one chunk.
+@dataclass(frozen=True)
+class _TileSums:
+    """What is summed within each tile, before it is known where it belongs.
 
-    `rows` are positions in the chunk, `source` the source of each, `columns` are
-    the runs of calibration parameters that they touch, `jacobian` the derivatives by those.
+    `local` holds the products of the derivatives by `LOCAL_GROUPS` and, last, the
+    residual; `mixed` those with the distortion's two directions. `basis` and `shared`
+    belong to each slot: the distortion terms, and the products of a displacement with the
+    source.
     """
 
-    rows: slice
-    exposure: int
-    detector: int
-    source: Int[np.ndarray, " seg"]
-    columns: tuple[slice, ...]
-    jacobian: Float[np.ndarray, "seg 2 local"]
+    local: Float[np.ndarray, "chunk tile local local"]
+    mixed: Float[np.ndarray, "chunk tile local two_coef"]
+    basis: Float[np.ndarray, "chunk tile slot coef"]
+    shared: Float[np.ndarray, "2 2 chunk tile slot"]
 
 
 def chunks(
     problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
-) -> Iterator[tuple[slice, Linearised]]:
-    """Linearise the measurements a chunk at a time; yields their range and the chunk.
+) -> Iterator[Linearised]:
+    """Linearise the measurements a chunk of tiles at a time.
 
     The next chunk is under way in JAX while the caller works on this one.
     """
-    offsets = problem.offsets(theta, sources)
-    starts = range(0, problem.n_obs, CHUNK)
-    ahead = _start_chunk(problem, offsets, 0)
-    for first in starts:
+    offsets, n_chunks = problem.offsets(theta, sources), len(problem.tiles.measured)
+
+    def start(i: int) -> Linearised:
+        return linearise(offsets, problem.geometry, *problem.tiles.chunk(i))
+
+    ahead = start(0)
+    for i in range(n_chunks):
         current = ahead
-        if first + CHUNK < problem.n_obs:
-            ahead = _start_chunk(problem, offsets, first + CHUNK)
-        rows = slice(first, min(first + CHUNK, problem.n_obs))
-        yield rows, _to_numpy(current, rows.stop - first)
+        if i + 1 < n_chunks:
+            ahead = start(i + 1)
+        yield jax.tree.map(np.asarray, current)
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
@@ -98,133 +97,144 @@ def _thread_pools() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def _start_chunk(problem: Problem, offsets: Offsets, first: int) -> Linearised:
-    # The last row is repeated up to a full chunk, with no weight.
-    take = np.minimum(np.arange(first, first + CHUNK), problem.n_obs - 1)
-    weight = 1.0 / problem.sigma[take]
-    weight[problem.n_obs - first :] = 0.0
-    index = Index(*(column[take] for column in problem.index))
-    return linearise(offsets, problem.geometry, index, problem.measured[take], weight)
-
-
-def segments(problem: Problem, rows: slice, chunk: Linearised) -> Iterator[Segment]:
-    """Yield the segments of a chunk with their Jacobians by the calibration."""
-    layout = problem.layout
-    source, exposure, detector = (column[rows] for column in problem.index)
-    changes = np.flatnonzero(np.diff(exposure) | np.diff(detector)) + 1
-    for first, last in zip([0, *changes], [*changes, len(exposure)], strict=True):
-        here = slice(first, last)
-        m, n = int(exposure[first]), int(detector[first])
-        yield Segment(
-            here,
-            m,
-            n,
-            source[here],
-            layout.touched(m, n),
-            _calibration_jacobian(chunk, here),
-        )
-
-
 def accumulate(
     problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
 ) -> NormalEquations:
     """Accumulate the normal equations of the data at one point."""
-    layout, n_src = problem.layout, problem.n_src
-    hessian, gradient = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
-    cross, on_sources = np.zeros((n_src, 2, layout.size)), np.zeros((n_src, 2))
-    source, chi2 = np.zeros((n_src, 2, 2)), 0.0
-    by_exposure = np.empty((problem.n_obs, 2, len(PER_EXPOSURE)))
-    by_detector = np.empty((problem.n_obs, 2, len(PER_DETECTOR)))
+    layout, n_src, index = problem.layout, problem.n_src, problem.tiles.index
+    cross = np.zeros((layout.size, 2, n_src))
+    source, by_source = np.zeros((2, 2, n_src)), np.zeros((2, n_src))
+    coefficients = np.zeros((2, layout.n_coef, 2, layout.n_coef))
+    sums = _empty_sums(index.source.shape, layout.n_coef)
     with one_blas_thread():
-        for rows, chunk in chunks(problem, theta, sources):
-            chi2 += float(np.vdot(chunk.residual, chunk.residual))
-            _add_sources(problem.index.source[rows], chunk, source, on_sources)
-            _add_cross_coefficients(problem.index.source[rows], chunk, layout, cross)
-            by_exposure[rows], by_detector[rows] = chunk.products.exposure, chunk.products.detector
-            for segment in segments(problem, rows, chunk):
-                flat = segment.jacobian.reshape(-1, segment.jacobian.shape[-1])
-                columns = np.r_[segment.columns]
-                hessian[np.ix_(columns, columns)] += flat.T @ flat
-                gradient[columns] += chunk.residual[segment.rows].ravel() @ flat
-    _add_cross_exposures(problem, by_exposure, cross)
-    _add_cross_detectors(problem.index, by_detector, layout, cross)
-    return NormalEquations(chi2, gradient, on_sources, hessian, source, cross)
+        for i, chunk in enumerate(chunks(problem, theta, sources)):
+            here = Index(*(part[i] for part in index))
+            _sum_tiles(chunk, i, sums)
+            _add_coefficients(chunk, sums.basis[i], coefficients)
+            _add_sources(here.source, chunk, source, by_source)
+            _add_cross_local(here, chunk, layout, cross)
+        hessian, by_theta, chi2 = _assemble(index, layout, sums, coefficients)
+    _add_cross_coefficients(problem, sums, cross)
+    gradient = Gradient(chi2, by_theta, by_source.T.copy())
+    at, of_sources = (theta, sources), source.transpose(2, 0, 1).copy()
+    return NormalEquations(at, gradient, hessian, of_sources, cross)
 
 
-def _to_numpy(chunk: Linearised, length: int) -> Linearised:
-    return jax.tree.map(lambda values: np.asarray(values)[:length], chunk)
+def flatten(nested: Iterable[Iterable[AnyArray]]) -> list[AnyArray]:
+    """Return the arrays of a list of rows, row after row."""
+    return [values for row in nested for values in row]
 
 
-def _calibration_jacobian(chunk: Linearised, here: slice) -> Float[np.ndarray, "seg 2 local"]:
-    """Join the derivatives by exposure, distortion and detector of one segment."""
-    by_coefficient = [
-        chunk.displacement[here, :, axis, None] * chunk.prediction.basis[here, None, :]
-        for axis in range(2)
-    ]
-    return np.concatenate([chunk.exposure[here], *by_coefficient, chunk.detector[here]], axis=-1)
+def _empty_sums(shape: tuple[int, ...], n_coef: int) -> _TileSums:
+    tiles, rows = shape[:2], N_LOCAL + 1
+    return _TileSums(
+        np.empty((*tiles, rows, rows)),
+        np.empty((*tiles, rows, 2 * n_coef)),
+        np.empty((*shape, n_coef)),
+        np.empty((2, 2, *shape)),
+    )
+
+
+def _sum_tiles(chunk: Linearised, i: int, sums: _TileSums) -> None:
+    """Fill the sums of the tiles of chunk `i`, and what is kept of each slot."""
+    products, basis = chunk.products, sums.basis[i]
+    for term, values in enumerate(chunk.prediction.basis):
+        basis[:, :, term] = values
+    for axis in range(2):
+        for a in range(2):
+            sums.shared[axis, a, i] = products.displacement_source[axis][a]
+    rows = np.stack(flatten([*chunk.local, chunk.residual]), axis=1)
+    rows = rows.reshape(len(rows), N_LOCAL + 1, -1)
+    np.matmul(rows, rows.swapaxes(1, 2), out=sums.local[i])
+    mixed = np.stack(flatten(products.local_displacement), axis=1) @ basis
+    sums.mixed[i] = mixed.reshape(sums.mixed[i].shape)
+
+
+def _add_coefficients(
+    chunk: Linearised,
+    basis: Float[np.ndarray, "tile slot coef"],
+    hessian: Float[np.ndarray, "2 coef 2 coef"],
+) -> None:
+    n_tiles, n_slots, n_coef = basis.shape
+    terms = basis.reshape(n_tiles * n_slots, n_coef)
+    for i, j in ((0, 0), (0, 1), (1, 1)):
+        weight = chunk.products.displacement_displacement[i][j].reshape(-1, 1)
+        hessian[i, :, j] += (weight * terms).T @ terms
+    hessian[1, :, 0] = hessian[0, :, 1].T
 
 
 def _add_sources(
-    index: Int[np.ndarray, " obs"],
+    index: Int[np.ndarray, "tile slot"],
     chunk: Linearised,
-    hessian: Float[np.ndarray, "src 2 2"],
-    gradient: Float[np.ndarray, "src 2"],
+    hessian: Float[np.ndarray, "2 2 src"],
+    gradient: Float[np.ndarray, "2 src"],
 ) -> None:
-    n_src, products = len(hessian), chunk.products
+    products, n_src, flat = chunk.products, gradient.shape[-1], index.ravel()
     for a in range(2):
-        for b in range(2):
-            hessian[:, a, b] += np.bincount(index, products.source[:, a, b], n_src)
-        gradient[:, a] += np.bincount(index, products.residual[:, a], n_src)
+        gradient[a] += np.bincount(flat, products.local_source[-1][a].ravel(), n_src)
+        for b in range(a + 1):
+            hessian[a, b] += np.bincount(flat, products.source_source[a][b].ravel(), n_src)
+    hessian[0, 1] = hessian[1, 0]
+
+
+def _add_cross_local(
+    index: Index, chunk: Linearised, layout: Layout, cross: Float[np.ndarray, "calib 2 src"]
+) -> None:
+    """Add the blocks between the sources and what each of their measurements touches."""
+    n_src = cross.shape[-1]
+    for number, groups in ((index.exposure, PER_EXPOSURE), (index.detector, PER_DETECTOR)):
+        first, count = number.min(), np.ptp(number) + 1
+        pair = ((number - first) * n_src + index.source).ravel()
+        for group in groups:
+            columns = layout.columns(group)[first : first + count]
+            products = chunk.products.local_source[LOCAL_GROUPS.index(group)]
+            for a in range(2):
+                sums = np.bincount(pair, products[a].ravel(), count * n_src)
+                cross[columns, a] += sums.reshape(count, n_src)
 
 
 def _add_cross_coefficients(
-    index: Int[np.ndarray, " obs"],
-    chunk: Linearised,
-    layout: Layout,
-    cross: Float[np.ndarray, "src 2 calib"],
+    problem: Problem, sums: _TileSums, cross: Float[np.ndarray, "calib 2 src"]
 ) -> None:
-    """Add the blocks between sources and distortion, shared by all of a source's rows.
+    """Add the blocks between sources and distortion, shared by all measurements.
 
     They are sums over the measurements of a source of a 2 x 2 matrix times the basis: a
     sparse matrix that gathers them, times the dense basis.
     """
-    first, count = layout.first_coefficient, layout.n_coef
-    for a in range(2):
-        for axis in range(2):
-            gather = sp.csr_matrix(
-                (chunk.products.displacement[:, a, axis], (index, np.arange(len(index)))),
-                shape=(len(cross), len(index)),
-            )
-            columns = slice(first + axis * count, first + (axis + 1) * count)
-            cross[:, a, columns] += gather @ chunk.prediction.basis
+    n_src, n_coef = problem.n_src, problem.layout.n_coef
+    order, first = problem.slots_by_source
+    basis = sums.basis.reshape(len(order), n_coef)
+    target = cross[problem.layout.coefficients()].reshape(2, n_coef, 2, n_src)
+    for axis in range(2):
+        for a in range(2):
+            weight = sums.shared[axis, a].reshape(-1)[order]
+            gather = sp.csr_array((weight, order, first), shape=(n_src, len(basis)))
+            target[axis, :, a] = (gather @ basis).T
 
 
-def _add_cross_exposures(
-    problem: Problem,
-    products: Float[np.ndarray, "obs 2 per_exp"],
-    cross: Float[np.ndarray, "src 2 calib"],
-) -> None:
-    """Add the blocks between sources and exposures, one for each measurement.
-
-    Source after source, so that what is written lies together.
-    """
-    order = np.argsort(problem.index.source, kind="stable")
-    size, width = problem.layout.size, products.shape[-1]
-    first = 2 * size * problem.index.source[order] + width * problem.index.exposure[order]
-    places = first[:, None, None] + size * np.arange(2)[:, None] + np.arange(width)
-    np.add.at(cross.reshape(-1), places.ravel(), products[order].ravel())
-
-
-def _add_cross_detectors(
+def _assemble(
     index: Index,
-    products: Float[np.ndarray, "obs 2 per_det"],
     layout: Layout,
-    cross: Float[np.ndarray, "src 2 calib"],
-) -> None:
-    """Add the blocks between sources and detectors, summed over the exposures."""
-    pair = index.source * layout.n_det + index.detector
-    for a in range(2):
-        for k in range(products.shape[-1]):
-            sums = np.bincount(pair, products[:, a, k], len(cross) * layout.n_det)
-            columns = slice(layout.first_detector + k, layout.size, products.shape[-1])
-            cross[:, a, columns] += sums.reshape(len(cross), layout.n_det)
+    sums: _TileSums,
+    coefficients: Float[np.ndarray, "2 coef 2 coef"],
+) -> tuple[Float[np.ndarray, "calib calib"], Float[np.ndarray, " calib"], float]:
+    """Return Hessian, gradient and chi2 of the calibration."""
+    size, shared, own = layout.size, layout.coefficients(), slice(N_LOCAL)
+    columns = layout.touched(index.exposure[..., 0], index.detector[..., 0])
+    row = size * columns[..., :, None]
+    hessian = _sum_at(row + columns[..., None, :], sums.local[..., own, own], size * size)
+    hessian += _sum_at(row + np.arange(size)[shared], sums.mixed[..., own, :], size * size)
+    hessian = hessian.reshape(size, size)
+    hessian[shared, :] = hessian[:, shared].T
+    hessian[shared, shared] = coefficients.reshape(2 * layout.n_coef, 2 * layout.n_coef)
+    gradient = _sum_at(columns, sums.local[..., -1, own], size)
+    gradient[shared] = sums.mixed[..., -1, :].sum(axis=(0, 1))
+    return hessian, gradient, float(sums.local[..., -1, -1].sum())
+
+
+def _sum_at(
+    places: Int[np.ndarray, "..."], values: Float[np.ndarray, "..."], length: int
+) -> Float[np.ndarray, " _"]:
+    """Return the sums of the values that fall on each place."""
+    # Of nothing at all NumPy counts integers.
+    return np.bincount(places.ravel(), values.ravel(), length).astype(np.float64, copy=False)

@@ -52,6 +52,10 @@ class Priors(NamedTuple):
         slope[self.is_gamma] = 1.0 / self._gamma_scale() - (shape - 1.0) / value
         return slope
 
+    def source_gradient(self, sources: Float[np.ndarray, "src 2"]) -> Float[np.ndarray, "src 2"]:
+        """Return the derivative of half the penalty by the sources."""
+        return np.einsum("sij,sj->si", self.precision, sources)
+
     def curvature(self, theta: Float[np.ndarray, " calib"]) -> Float[np.ndarray, " calib"]:
         """Return the second derivative of half the penalty by the calibration."""
         curvature = self.width**-2.0

@@ -5,11 +5,13 @@ run of calibration parameters lie together. Shapes are padded to few sizes, beca
 new one costs JAX a compilation.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from solver.astrometry import propagate
 from solver.distortion import terms
@@ -23,6 +25,7 @@ from solver.parameters import CALIBRATION_GROUPS, PARAMETERS, SOURCES
 from solver.priors import Priors, group_widths
 from solver.projection import tangent_frame
 from solver.settings import MAX_ORDER, FitSettings
+from solver.tiles import Tiles, lay_tiles
 
 _KEY = ["field_id", "plate_id"]
 
@@ -66,6 +69,16 @@ class Problem:
         """Number of measured sources."""
         return len(self.sources)
 
+    @cached_property
+    def tiles(self) -> Tiles:
+        """The measurements in tiles."""
+        return lay_tiles(self.index, self.measured, self.sigma)
+
+    @cached_property
+    def slots_by_source(self) -> tuple[Int[np.ndarray, " slots"], Int[np.ndarray, " bounds"]]:
+        """The tiles' slots in order of their source, and where each source begins."""
+        return self.tiles.by_source(self.n_src)
+
     def offsets(
         self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
     ) -> dict[str, Float[np.ndarray, "..."]]:
@@ -75,6 +88,39 @@ class Problem:
         return {
             group.name: pad(values[group.name], sizes.get(group.axis, 0)) for group in PARAMETERS
         }
+
+    def gathered(
+        self, offsets: Mapping[str, Float[np.ndarray, "..."]]
+    ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
+        """Return calibration and sources of what `offsets` gives: its inverse."""
+        sizes = {"exp": self.layout.n_exp}
+        values = {g.name: offsets[g.name][: sizes.get(g.axis)] for g in CALIBRATION_GROUPS}
+        return self.layout.gather(values), offsets[SOURCES.name][: self.n_src]
+
+
+def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
+    """Return the problem with the measurements of some sources alone.
+
+    Its arrays in JAX have the shapes of the whole problem's, so that nothing is compiled anew.
+    """
+    rows = keep[problem.index.source]
+    number = np.cumsum(keep) - 1
+    frames = problem.geometry.source_frame
+    kept_first = np.argsort(~np.pad(keep, (0, len(frames) - len(keep))), kind="stable")
+    return replace(
+        problem,
+        geometry=replace(problem.geometry, source_frame=frames[kept_first]),
+        index=Index(
+            number[problem.index.source[rows]],
+            problem.index.exposure[rows],
+            problem.index.detector[rows],
+        ),
+        measured=problem.measured[rows],
+        sigma=problem.sigma[rows],
+        row=problem.row[rows],
+        sources=problem.sources[keep].reset_index(drop=True),
+        priors=problem.priors._replace(precision=problem.priors.precision[keep]),
+    )
 
 
 def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings) -> Problem:

@@ -67,17 +67,20 @@ def focal_axes(
 
 
 def project(
-    components: Float[Array, "obs 3"], focal_length: Float[Array, " obs"]
-) -> Float[Array, "obs 2"]:
+    components: tuple[Float[Array, "*obs"], Float[Array, "*obs"], Float[Array, "*obs"]],
+    focal_length: Float[Array, "*#obs"],
+) -> tuple[Float[Array, "*obs"], Float[Array, "*obs"]]:
     """Project directions onto the ideal focal plane, Eqs. (method:projection, method:ideal).
 
     Parameters
     ----------
-    components : along the axes of `focal_axes`; any common length
+    components : x, y and z along the axes of `focal_axes`; any common length
     focal_length : um
 
     Returns
     -------
-    um, origin on the optical axis
+    x and y, um, origin on the optical axis
     """
-    return focal_length[:, None] * components[:, :2] / components[:, 2:]
+    x, y, z = components
+    scale = focal_length / z
+    return scale * x, scale * y

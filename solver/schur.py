@@ -1,8 +1,8 @@
 """Elimination of the sources: the reduced system, its step and its covariances.
 
-With priors added, V_i = L_i L_i' and Z = L^-1 W, the calibration alone obeys
-S = U - Z'Z (the Schur complement); its inverse is the marginal covariance of the
-calibration, and that of source i is V_i^-1 + V_i^-1 W_i S^-1 W_i' V_i^-1.
+With priors added, V_i = L_i L_i' and Z = W L'^-1, the calibration alone obeys
+S = U - Z Z' (the Schur complement); its inverse is the marginal covariance of the
+calibration, and that of source i is V_i^-1 + V_i^-1 W_i' S^-1 W_i V_i^-1.
 """
 
 from dataclasses import dataclass
@@ -21,72 +21,72 @@ class Reduced:
 
     Attributes
     ----------
-    by_theta, by_source : minus the gradient of half the posterior's chi2
+    at : where the model was linearised, calibration and sources
     theta : U with priors
     source_factor : lower Cholesky factor of V with priors
     whitened : Z
     factor : upper Cholesky factor R of S = R'R
     """
 
-    by_theta: Float[np.ndarray, " calib"]
-    by_source: Float[np.ndarray, "src 2"]
+    at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
     theta: Float[np.ndarray, "calib calib"]
     source_factor: Float[np.ndarray, "src 2 2"]
-    whitened: Float[np.ndarray, "src 2 calib"]
+    whitened: Float[np.ndarray, "calib 2 src"]
     factor: Float[np.ndarray, "calib calib"]
-
-    def step(self) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
-        """Return the Newton step of the calibration and of the sources."""
-        return self.solve(self.by_theta, self.by_source)
 
     def solve(
         self, by_theta: Float[np.ndarray, " calib"], by_source: Float[np.ndarray, "src 2"]
     ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
         """Solve the whole system for one right-hand side."""
-        whitened = _lower_solve(self.source_factor, by_source[..., None])[..., 0]
-        reduced = by_theta - np.einsum("sak,sa->k", self.whitened, whitened)
-        theta = sl.cho_solve((self.factor, False), reduced)
-        remainder = whitened - self.whitened @ theta
-        return theta, _upper_solve(self.source_factor, remainder[..., None])[..., 0]
+        whitened = _lower_solve(self.source_factor, by_source.T)
+        rows = self.whitened.reshape(len(by_theta), -1)
+        theta = sl.cho_solve((self.factor, False), by_theta - rows @ whitened.ravel())
+        remainder = whitened - (theta @ rows).reshape(whitened.shape)
+        return theta, _upper_solve(self.source_factor, remainder).T.copy()
 
     def conditional_covariance(self) -> Float[np.ndarray, "src 2 2"]:
         """Return the covariance of each source with the calibration held fixed, mas^2."""
-        inverse = _lower_solve(
-            self.source_factor, np.broadcast_to(np.eye(2), self.source_factor.shape)
-        )
-        return np.swapaxes(inverse, 1, 2) @ inverse
+        unit = np.broadcast_to(np.eye(2)[:, :, None], (2, 2, len(self.source_factor)))
+        inverse = _lower_solve(self.source_factor, unit)
+        return np.einsum("ias,ibs->sab", inverse.swapaxes(0, 1), inverse.swapaxes(0, 1))
 
-    def response(self) -> Float[np.ndarray, "src 2 calib"]:
-        """Return V^-1 W, minus the shift of each source per unit of the calibration."""
+    def response(self) -> Float[np.ndarray, "calib 2 src"]:
+        """Return W V^-1, minus the shift of each source per unit of the calibration."""
         return _upper_solve(self.source_factor, self.whitened)
 
-    def spread(self) -> Float[np.ndarray, "src 2 calib"]:
-        """Return T = Z R^-1; I + T_i T_i' is the whitened marginal covariance of source i."""
-        rows = self.whitened.reshape(-1, len(self.factor))
-        # Solved in place of its transpose: BLAS then works on the rows as they lie in memory.
-        solved = sl.blas.dtrsm(1.0, self.factor, rows.T, trans_a=1, side=0)
-        return np.ascontiguousarray(solved.T).reshape(self.whitened.shape)
+    def spread(self) -> Float[np.ndarray, "calib 2 src"]:
+        """Return T = R'^-1 Z; I + T_i' T_i is the whitened marginal covariance of source i."""
+        return self._solved(self.whitened, trans=True)
 
     def marginal_covariance(
-        self, spread: Float[np.ndarray, "src 2 calib"]
+        self, spread: Float[np.ndarray, "calib 2 src"]
     ) -> Float[np.ndarray, "src 2 2"]:
         """Return the covariance of each source with the calibration integrated out, mas^2."""
-        inner = np.eye(2) + spread @ np.swapaxes(spread, 1, 2)
+        inner = np.empty((2, 2, spread.shape[-1]))
+        for a in range(2):
+            for b in range(2):
+                inner[a, b] = np.einsum("ks,ks->s", spread[:, a], spread[:, b]) + (a == b)
         half = _upper_solve(self.source_factor, inner)
-        return _upper_solve(self.source_factor, np.swapaxes(half, 1, 2))
+        return _upper_solve(self.source_factor, half.swapaxes(0, 1)).transpose(2, 1, 0).copy()
 
     def theta_covariance(self) -> Float[np.ndarray, "calib calib"]:
         """Return the marginal covariance of the calibration."""
         return sl.cho_solve((self.factor, False), np.eye(len(self.factor)))
 
     def cross_covariance(
-        self, spread: Float[np.ndarray, "src 2 calib"]
-    ) -> Float[np.ndarray, "src 2 calib"]:
-        """Return the covariance of each source with the calibration, -V^-1 W S^-1."""
-        rows = spread.reshape(-1, len(self.factor))
-        solved = sl.blas.dtrsm(-1.0, self.factor, rows.T, trans_a=0, side=0)
-        solved = np.ascontiguousarray(solved.T).reshape(spread.shape)
-        return _upper_solve(self.source_factor, solved)
+        self, spread: Float[np.ndarray, "calib 2 src"]
+    ) -> Float[np.ndarray, "calib 2 src"]:
+        """Return the covariance of the calibration with each source, -S^-1 W V^-1."""
+        return _upper_solve(self.source_factor, self._solved(spread, trans=False, scale=-1.0))
+
+    def _solved(
+        self, right: Float[np.ndarray, "calib 2 src"], trans: bool, scale: float = 1.0
+    ) -> Float[np.ndarray, "calib 2 src"]:
+        """Return scale R^-1 (or R'^-1) times the rows."""
+        rows = right.reshape(len(self.factor), -1)
+        # Solved from the right, in place of its transpose: so BLAS has them in its own order.
+        solved = sl.blas.dtrsm(scale, self.factor, rows.T, trans_a=not trans, side=1)
+        return solved.T.reshape(right.shape)
 
     def log_determinant(self) -> float:
         """Return the logarithm of the determinant of the whole Hessian."""
@@ -94,62 +94,53 @@ class Reduced:
         return float(2.0 * (of_sources + np.log(np.diag(self.factor)).sum()))
 
 
-def reduce(
-    equations: NormalEquations,
-    priors: Priors,
-    theta: Float[np.ndarray, " calib"],
-    sources: Float[np.ndarray, "src 2"],
-) -> Reduced | None:
-    """Add the priors at (theta, sources), eliminate the sources and factorise.
+def reduce(equations: NormalEquations, priors: Priors) -> Reduced | None:
+    """Add the priors, eliminate the sources and factorise.
 
     Returns
     -------
     None if the system is singular: the data and the priors leave a direction open, or hold
     it so weakly that rounding hides it.
     """
-    diagonal = np.diag(equations.theta) + priors.curvature(theta)
+    diagonal = np.diag(equations.theta) + priors.curvature(equations.at[0])
     hessian = equations.theta.copy()
     np.fill_diagonal(hessian, diagonal)
     source = equations.source + priors.precision
     try:
         source_factor = np.linalg.cholesky(source)
         whitened = _lower_solve(source_factor, equations.cross)
-        rows = whitened.reshape(-1, len(hessian))
-        factor = sl.cholesky(hessian - rows.T @ rows, check_finite=True)
-    except (np.linalg.LinAlgError, ValueError):
+        rows = whitened.reshape(len(hessian), -1)
+        # NumPy's, like the product before it: SciPy has a BLAS of its own, whose threads would
+        # wait for those of NumPy's, which go on spinning for a while.
+        factor = np.linalg.cholesky(hessian - rows @ rows.T).T
+    except np.linalg.LinAlgError:
         return None
     # A pivot is what is left of the diagonal once all else is accounted for.
-    if (np.diag(factor) ** 2 < len(hessian) * np.finfo(float).eps * diagonal).any():
+    smallest = len(hessian) * np.finfo(float).eps * diagonal
+    if not (np.diag(factor) ** 2 >= smallest).all():
         return None
-    return Reduced(
-        by_theta=equations.by_theta - priors.gradient(theta),
-        by_source=equations.by_source - np.einsum("sij,sj->si", priors.precision, sources),
-        theta=hessian,
-        source_factor=source_factor,
-        whitened=whitened,
-        factor=factor,
-    )
+    return Reduced(equations.at, hessian, source_factor, whitened, factor)
 
 
 def _lower_solve(
-    factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "src 2 k"]
-) -> Float[np.ndarray, "src 2 k"]:
+    factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "*k 2 src"]
+) -> Float[np.ndarray, "*k 2 src"]:
     """Solve L x = right for 2 x 2 lower triangles."""
-    solved = np.empty_like(right, order="C")
-    np.divide(right[:, 0], factor[:, 0, 0, None], out=solved[:, 0])
-    np.multiply(solved[:, 0], -factor[:, 1, 0, None], out=solved[:, 1])
-    solved[:, 1] += right[:, 1]
-    solved[:, 1] /= factor[:, 1, 1, None]
+    solved = np.empty(right.shape)
+    np.divide(right[..., 0, :], factor[:, 0, 0], out=solved[..., 0, :])
+    np.multiply(solved[..., 0, :], -factor[:, 1, 0], out=solved[..., 1, :])
+    solved[..., 1, :] += right[..., 1, :]
+    solved[..., 1, :] /= factor[:, 1, 1]
     return solved
 
 
 def _upper_solve(
-    factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "src 2 k"]
-) -> Float[np.ndarray, "src 2 k"]:
+    factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "*k 2 src"]
+) -> Float[np.ndarray, "*k 2 src"]:
     """Solve L' x = right for 2 x 2 lower triangles L."""
-    solved = np.empty_like(right, order="C")
-    np.divide(right[:, 1], factor[:, 1, 1, None], out=solved[:, 1])
-    np.multiply(solved[:, 1], -factor[:, 1, 0, None], out=solved[:, 0])
-    solved[:, 0] += right[:, 0]
-    solved[:, 0] /= factor[:, 0, 0, None]
+    solved = np.empty(right.shape)
+    np.divide(right[..., 1, :], factor[:, 1, 1], out=solved[..., 1, :])
+    np.multiply(solved[..., 1, :], -factor[:, 1, 0], out=solved[..., 0, :])
+    solved[..., 0, :] += right[..., 0, :]
+    solved[..., 0, :] /= factor[:, 0, 0]
     return solved

@@ -255,7 +255,7 @@ def _pixels(
 
     def on(detector: Int[Array, ""]) -> Float[Array, "cand 2"]:
         index = Index(source, exposure, jnp.full_like(source, detector))
-        return predict(offsets, geometry, index).pixel
+        return jnp.stack(predict(offsets, geometry, index).pixel, axis=-1)
 
     # Mapped over the detectors alone, so that the way to the focal plane is computed once.
     return jax.vmap(on)(jnp.arange(len(geometry.origin["detector_x"])))

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.linalg as sl
@@ -21,14 +22,14 @@ from solver.settings import FitSettings
 from solver.tables import Solution
 from tests.solver.small_orbit import make_orbit, true_offsets
 
-# One length for all, since each costs a compilation; a small orbit fills it almost twice.
-CHUNK = 192
+# Tiles; one length for all, since each costs a compilation. A small orbit fills it twice.
+CHUNK = 16
 
 
 @pytest.fixture(autouse=True)
 def _small_chunks(monkeypatch):
     """Linearise a small orbit a little at a time, in more than one chunk."""
-    monkeypatch.setattr("solver.normal.CHUNK", CHUNK)
+    monkeypatch.setattr("solver.tiles.CHUNK", CHUNK)
 
 
 @pytest.fixture(scope="session")
@@ -71,7 +72,7 @@ def solve(orbit, settings=None):
 @pytest.fixture(scope="session")
 def solution(small_orbit):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.normal.CHUNK", CHUNK)
+        patch.setattr("solver.tiles.CHUNK", CHUNK)
         return solve(small_orbit)
 
 
@@ -79,7 +80,7 @@ def solution(small_orbit):
 def result(small_orbit):
     """The result of the small orbit."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.normal.CHUNK", CHUNK)
+        patch.setattr("solver.tiles.CHUNK", CHUNK)
         return fit_orbit(small_orbit.data, small_orbit.instrument)
 
 
@@ -87,7 +88,7 @@ def result(small_orbit):
 def mocks():
     """Truth and solution of orbits whose every parameter is drawn from its prior."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.normal.CHUNK", CHUNK)
+        patch.setattr("solver.tiles.CHUNK", CHUNK)
         orbits = [make_orbit(seed=seed, scatter=1.0) for seed in range(100, 116)]
         return [(orbit, solve(orbit)) for orbit in orbits]
 
@@ -120,7 +121,7 @@ class Dense(NamedTuple):
 
 @jax.jit
 def _pixels(offsets, geometry, index):
-    return predict(offsets, geometry, index).pixel
+    return jnp.stack(predict(offsets, geometry, index).pixel, axis=-1)
 
 
 @jax.jit
@@ -218,7 +219,7 @@ def equations(problem, expansion_point):
 
 @pytest.fixture
 def reduced(problem, equations, expansion_point):
-    return reduce(equations, problem.priors, *expansion_point)
+    return reduce(equations, problem.priors)
 
 
 @pytest.fixture

@@ -15,13 +15,13 @@ def apparent(direction, velocity, sun_distance):
     along = np.sum(direction * velocity, axis=-1)
     lorentz = lorentz_factor(jnp.asarray(velocity))
     moved = aberrate(
-        jnp.asarray(direction),
-        jnp.asarray(velocity),
+        tuple(jnp.asarray(direction.T)),
+        tuple(jnp.asarray(velocity.T)),
         jnp.asarray(along),
         lorentz,
         jnp.array([sun_distance]),
     )
-    moved = np.asarray(moved)[0]
+    moved = np.concatenate(moved)
     return moved / np.linalg.norm(moved)
 
 

@@ -16,29 +16,27 @@ lengths = st.floats(-2e4, 2e4)
 def test_pixels_are_those_of_the_papers_matrix(x, y, centre_x, centre_y, angle, pitch):
     expected = detector_pixels(x, y, centre_x, centre_y, angle, pitch, 1.1 * pitch)
     ours = to_pixel(
-        jnp.array([[x, y]]),
-        jnp.array([[centre_x, centre_y]]),
+        (jnp.array([x]), jnp.array([y])),
+        (jnp.array([centre_x]), jnp.array([centre_y])),
         jnp.array([angle]),
-        jnp.array([[pitch, 1.1 * pitch]]),
+        (jnp.array([pitch]), jnp.array([1.1 * pitch])),
     )
-    np.testing.assert_allclose(np.asarray(ours)[0], expected, atol=1e-9)
+    np.testing.assert_allclose(np.concatenate(ours), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("detector", MINI_MOCK.detectors, ids=lambda d: str(d.detector_id))
 def test_corners_of_a_detector_are_its_outermost_pixels(detector):
-    n = np.ones(4)
-    pixels = to_pixel(
-        jnp.asarray(detector.corners_um()),
-        jnp.asarray(np.outer(n, (detector.x_um, detector.y_um))),
-        jnp.asarray(n * np.radians(detector.rotation_deg)),
-        jnp.asarray(np.outer(n, (detector.pitch_x_um, detector.pitch_y_um))),
-    )
+    place = (detector.x_um, detector.y_um), (detector.pitch_x_um, detector.pitch_y_um)
+    centre, pitch = (tuple(jnp.array([value]) for value in pair) for pair in place)
+    rotation = jnp.array([np.radians(detector.rotation_deg)])
+    corners = tuple(jnp.asarray(detector.corners_um().T))
+    pixels = np.stack(to_pixel(corners, centre, rotation, pitch), axis=-1)
     half = np.array([detector.n_x, detector.n_y]) / 2.0
     expected = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     np.testing.assert_allclose(pixels, expected, atol=1e-9)
 
 
 def test_centre_of_the_detector_is_pixel_zero():
-    place = jnp.array([[11_100.0, -11_100.0]])
-    pixels = to_pixel(place, place, jnp.array([0.3]), jnp.array([[10.0, 10.0]]))
+    place = (jnp.array([11_100.0]), jnp.array([-11_100.0]))
+    pixels = to_pixel(place, place, jnp.array([0.3]), (jnp.array([10.0]), jnp.array([10.0])))
     np.testing.assert_array_equal(pixels, 0.0)

@@ -11,7 +11,7 @@ from solver.diagnostics import (
     normalised_deviation,
 )
 from solver.leverage import covariances
-from solver.normal import accumulate
+from solver.objective import gradient
 from solver.settings import FitSettings
 from tests.solver.conftest import solve
 from tests.solver.small_orbit import make_orbit, true_offsets
@@ -114,7 +114,7 @@ def test_evidence_is_the_density_of_the_data_in_the_linearised_model(make_dense)
 
 
 def penalised_chi2(problem, theta, sources):
-    return accumulate(problem, theta, sources).chi2 + problem.priors.penalty(theta, sources)
+    return gradient(problem, theta, sources).chi2 + problem.priors.penalty(theta, sources)
 
 
 def test_penalised_chi2_at_the_mode_is_that_of_the_coordinates_over_mocks(mocks):

@@ -1,12 +1,11 @@
 from dataclasses import replace
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solver.forward import Index, ideal_position, image, predict
+from solver.forward import Index, Prediction, ideal_position, image, predict
 from solver.parameters import CALIBRATION_GROUPS, PARAMETERS
 from solver.problem import build_problem
 from solver.settings import FitSettings
@@ -24,7 +23,7 @@ def predicted(problem, theta, sources):
     take = np.minimum(np.arange(512), problem.n_obs - 1)
     index = Index(*(column[take] for column in problem.index))
     at = _predict(problem.offsets(theta, sources), problem.geometry, index)
-    return jax.tree.map(lambda values: np.asarray(values)[: problem.n_obs], at)
+    return Prediction(*(np.stack(part, axis=-1)[: problem.n_obs] for part in at))
 
 
 @pytest.mark.parametrize(
@@ -58,13 +57,12 @@ def test_prediction_gives_the_positions_between_sky_and_pixel(problem, expansion
 
 
 def test_displacement_is_added_on_the_focal_plane(problem, expansion_point):
-    shift = jnp.array([[2.0, -3.0]])
     arguments = (problem.offsets(*expansion_point), problem.geometry, problem.index)
     ideal = jax.jit(ideal_position)(*arguments)
-    still, moved = (jax.jit(image)(ideal, *arguments, by) for by in (0.0 * shift, shift))
-    difference = moved.focal - still.focal
-    np.testing.assert_allclose(difference, np.tile(shift, (problem.n_obs, 1)), atol=1e-8)
-    np.testing.assert_array_equal(moved.ideal, still.ideal)
+    still, moved = (jax.jit(image)(ideal, *arguments, by) for by in ((0.0, 0.0), (2.0, -3.0)))
+    for axis, shift in enumerate((2.0, -3.0)):
+        np.testing.assert_allclose(moved.focal[axis] - still.focal[axis], shift, atol=1e-8)
+        np.testing.assert_array_equal(moved.ideal[axis], still.ideal[axis])
 
 
 def test_order_padded_with_zeros_predicts_the_same(small_orbit, problem, expansion_point):

@@ -7,7 +7,7 @@ import pytest
 from solver.errors import CancelledError
 from solver.gauss_newton import find_mode
 from solver.instrument import MINI_MOCK
-from solver.normal import accumulate
+from solver.objective import gradient
 from solver.problem import build_problem
 from solver.result import FitStatus
 from solver.settings import FitSettings
@@ -30,7 +30,7 @@ def test_any_direction_away_from_the_mode_raises_the_penalised_chi2(solution):
     rng = np.random.default_rng(3)
 
     def objective(theta, sources):
-        return accumulate(problem, theta, sources).chi2 + problem.priors.penalty(theta, sources)
+        return gradient(problem, theta, sources).chi2 + problem.priors.penalty(theta, sources)
 
     sigma = np.sqrt(np.diag(solution.covariance.theta))
     lowest = objective(mode.theta, mode.sources)

@@ -3,19 +3,36 @@ import numpy as np
 import pytest
 
 from solver.forward import predict
-from solver.layout import PER_DETECTOR, PER_EXPOSURE
+from solver.layout import LOCAL_GROUPS
 from solver.linearise import linearise
 from tests.solver.small_orbit import observer_of, predict_pixels, true_offsets
 
 _predict = jax.jit(predict)
 
 
+def in_working_order(problem, weight, at):
+    """Linearise all chunks; return what belongs to each measurement, in working order."""
+    tiles, offsets = problem.tiles, problem.offsets(*at)
+    chunks = []
+    for i in range(len(tiles.measured)):
+        index, measured, _ = tiles.chunk(i)
+        chunks.append(linearise(offsets, problem.geometry, index, measured, weight[i]))
+    joined = jax.tree.map(lambda *parts: np.concatenate([np.ravel(p) for p in parts]), *chunks)
+    return jax.tree.map(lambda values: values[tiles.place], joined)
+
+
+def pixels(problem, offsets):
+    return np.stack(_predict(offsets, problem.geometry, problem.index).pixel, axis=-1)
+
+
 @pytest.fixture
 def linearised(problem, expansion_point):
-    offsets = problem.offsets(*expansion_point)
-    return linearise(
-        offsets, problem.geometry, problem.index, problem.measured, 1.0 / problem.sigma
-    )
+    return in_working_order(problem, problem.tiles.weight, expansion_point)
+
+
+def of_pixels(problem, pair):
+    """Return a pair of whitened derivatives as those of the pixels, one column each."""
+    return np.stack(pair, axis=-1) * problem.sigma
 
 
 def finite_difference(problem, point, group, element, step):
@@ -26,35 +43,25 @@ def finite_difference(problem, point, group, element, step):
         values = offsets[group].copy()
         values[(..., element) if group == "sources" else ...] += sign * step
         offsets[group] = values
-        moved.append(np.asarray(_predict(offsets, problem.geometry, problem.index).pixel))
+        moved.append(pixels(problem, offsets))
     return (moved[1] - moved[0]) / (2 * step)
 
 
 @pytest.mark.parametrize("axis", [0, 1], ids=["east", "north"])
 def test_derivatives_by_sources_are_finite_differences(problem, expansion_point, linearised, axis):
     expected = finite_difference(problem, expansion_point, "sources", axis, 100.0)
-    found = np.asarray(linearised.source)[:, :, axis] * problem.sigma
+    found = of_pixels(problem, linearised.source[axis])
     np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("name", [g.name for g in PER_EXPOSURE])
-def test_derivatives_by_exposures_are_finite_differences(
+@pytest.mark.parametrize("name", [g.name for g in LOCAL_GROUPS])
+def test_derivatives_by_local_groups_are_finite_differences(
     problem, expansion_point, linearised, name
 ):
-    column = [g.name for g in PER_EXPOSURE].index(name)
-    expected = finite_difference(problem, expansion_point, name, 0, 1.0)
-    found = np.asarray(linearised.exposure)[:, :, column] * problem.sigma
-    np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("name", [g.name for g in PER_DETECTOR])
-def test_derivatives_by_detectors_are_finite_differences(
-    problem, expansion_point, linearised, name
-):
-    column = [g.name for g in PER_DETECTOR].index(name)
+    column = [g.name for g in LOCAL_GROUPS].index(name)
     step = 1e-3 if name.startswith("pitch") else 1.0
     expected = finite_difference(problem, expansion_point, name, 0, step)
-    found = np.asarray(linearised.detector)[:, :, column] * problem.sigma
+    found = of_pixels(problem, linearised.local[column])
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
@@ -63,15 +70,15 @@ def test_displacement_times_basis_is_the_derivative_by_the_coefficients(
     problem, expansion_point, linearised, axis
 ):
     group = f"distortion_{'xy'[axis]}"
-    found = np.asarray(linearised.displacement)[:, :, axis] * problem.sigma
+    found = of_pixels(problem, linearised.displacement[axis])
     for term in range(problem.layout.n_coef):
         moved = []
         for step in (-1.0, 1.0):
             offsets = problem.offsets(*expansion_point)
             offsets[group] = offsets[group] + step * np.eye(problem.layout.n_coef)[term]
-            moved.append(np.asarray(_predict(offsets, problem.geometry, problem.index).pixel))
+            moved.append(pixels(problem, offsets))
         expected = 0.5 * (moved[1] - moved[0])
-        basis = np.asarray(linearised.prediction.basis)[:, term, None]
+        basis = linearised.prediction.basis[term][:, None]
         np.testing.assert_allclose(found * basis, expected, atol=1e-9)
 
 
@@ -79,22 +86,31 @@ def test_all_derivatives_are_those_of_the_whole_model(problem, linearised, dense
     """Against the Jacobian of `predict` by all parameters at once."""
     layout, jacobian = problem.layout, dense.jacobian.reshape(problem.n_obs, 2, -1)
     source, exposure, detector = problem.index
-    rows = np.arange(problem.n_obs)
-    for part, first, count, element in (
-        (linearised.source, layout.size, 2, source),
-        (linearised.exposure, 0, 4, exposure),
-        (linearised.detector, layout.first_detector, 5, detector),
+    columns = layout.touched(exposure, detector).T
+    expected_columns = [*zip(linearised.local, columns, strict=True)]
+    expected_columns += [(linearised.source[a], layout.size + 2 * source + a) for a in range(2)]
+    for pair, column in expected_columns:
+        expected = jacobian[np.arange(problem.n_obs), :, column]
+        found = np.stack(pair, axis=-1)
+        np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+
+
+def test_products_are_sums_over_the_two_coordinates(linearised):
+    products, residual = linearised.products, linearised.residual
+    with_residual = [*linearised.local, residual]
+    for found, first, second in (
+        (products.source_source, linearised.source, linearised.source),
+        (products.local_source, with_residual, linearised.source),
+        (products.local_displacement, with_residual, linearised.displacement),
+        (products.displacement_source, linearised.displacement, linearised.source),
+        (products.displacement_displacement, linearised.displacement, linearised.displacement),
     ):
-        for i in range(count):
-            expected = jacobian[rows, :, first + count * element + i]
-            np.testing.assert_allclose(
-                np.asarray(part)[:, :, i], expected, atol=1e-11 * np.abs(expected).max()
-            )
+        expected = np.einsum("ipo,jpo->ijo", np.array(first), np.array(second))
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
 def test_residual_is_measured_minus_predicted_over_sigma(small_orbit, problem):
-    offsets = problem.offsets(*true_offsets(small_orbit, problem))
-    at = linearise(offsets, problem.geometry, problem.index, problem.measured, 1.0 / problem.sigma)
+    at = in_working_order(problem, problem.tiles.weight, true_offsets(small_orbit, problem))
     truth = predict_pixels(
         small_orbit.truth,
         small_orbit.source,
@@ -104,14 +120,15 @@ def test_residual_is_measured_minus_predicted_over_sigma(small_orbit, problem):
         small_orbit.instrument.distortion_scale_um,
     )[problem.row]
     expected = (problem.measured - truth) / problem.sigma
-    np.testing.assert_allclose(at.residual, expected, atol=1e-5)
+    np.testing.assert_allclose(np.stack(at.residual, axis=-1), expected, atol=1e-5)
 
 
 def test_zero_weight_removes_a_coordinate(problem, expansion_point):
-    weight = 1.0 / problem.sigma
-    weight[3, 1] = 0.0
-    offsets = problem.offsets(*expansion_point)
-    at = linearise(offsets, problem.geometry, problem.index, problem.measured, weight)
-    for values in (at.residual, at.source, at.exposure, at.detector, at.displacement):
-        np.testing.assert_array_equal(np.asarray(values)[3, 1], 0.0)
-        assert np.abs(np.asarray(values)[3, 0]).max() > 0.0
+    weight = problem.tiles.weight.copy()
+    chunk, tile, slot = np.unravel_index(problem.tiles.place[3], problem.tiles.index.source.shape)
+    weight[chunk, 1, tile, slot] = 0.0
+    at = in_working_order(problem, weight, expansion_point)
+    for _, y in (at.residual, *at.source, *at.local, *at.displacement):
+        assert y[3] == 0.0
+    for x, _ in (at.residual, *at.source):
+        assert abs(x[3]) > 0.0

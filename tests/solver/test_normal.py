@@ -1,7 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from solver.normal import accumulate, chunks, segments
+from solver.normal import accumulate, chunks
+from solver.objective import gradient
 
 
 def close(found, expected, rtol=1e-9):
@@ -18,21 +21,23 @@ def blocks(dense, problem):
     of_sources = hessian[n:, n:].reshape(n_src, 2, n_src, 2)
     return {
         "theta": hessian[:n, :n],
-        "cross": hessian[n:, :n].reshape(n_src, 2, n),
+        "cross": hessian[:n, n:].reshape(n, n_src, 2).swapaxes(1, 2),
         "source": of_sources[np.arange(n_src), :, np.arange(n_src), :],
         "by_theta": gradient[:n],
         "by_source": gradient[n:].reshape(n_src, 2),
     }
 
 
+def part_of(equations, name):
+    return getattr(equations if hasattr(equations, name) else equations.gradient, name)
+
+
 @pytest.mark.parametrize("name", ["theta", "source", "cross", "by_theta", "by_source"])
 def test_block_is_that_of_the_dense_jacobian(equations, blocks, dense, name):
     scale = np.sqrt(np.diag(dense.hessian))[: dense.n_calib]
-    found, expected = getattr(equations, name), blocks[name]
-    if name == "theta":
-        found, expected = found / np.outer(scale, scale), expected / np.outer(scale, scale)
-    elif name in ("cross", "by_theta"):
-        found, expected = found / scale, expected / scale
+    found, expected = part_of(equations, name), blocks[name]
+    unit = {"theta": np.outer(scale, scale), "cross": scale[:, None, None], "by_theta": scale}
+    found, expected = found / unit.get(name, 1.0), expected / unit.get(name, 1.0)
     # A residual is rounded to 1e-8 of its sigma.
     close(found, expected, rtol=1e-7 if name.startswith("by_") else 1e-9)
 
@@ -46,31 +51,25 @@ def test_sources_are_not_coupled(dense, problem):
 
 
 def test_chi2_is_that_of_the_residuals(equations, dense):
-    assert equations.chi2 == pytest.approx(dense.residual @ dense.residual, rel=1e-8)
+    assert equations.gradient.chi2 == pytest.approx(dense.residual @ dense.residual, rel=1e-8)
 
 
 def test_length_of_chunks_changes_nothing(problem, equations, expansion_point, monkeypatch):
-    monkeypatch.setattr("solver.normal.CHUNK", 500)
-    other = accumulate(problem, *expansion_point)
+    monkeypatch.setattr("solver.tiles.CHUNK", 20)
+    other = accumulate(replace(problem), *expansion_point)
     for name in ("chi2", "by_theta", "by_source", "theta", "source", "cross"):
-        close(getattr(other, name), getattr(equations, name), rtol=1e-7)
+        close(part_of(other, name), part_of(equations, name), rtol=1e-7)
 
 
-def test_chunks_cover_every_measurement_once(problem, expansion_point):
-    covered = []
-    for rows, chunk in chunks(problem, *expansion_point):
-        assert len(chunk.residual) == rows.stop - rows.start
-        covered += range(rows.start, rows.stop)
-    assert covered == list(range(problem.n_obs))
+def test_chunks_are_those_of_the_tiles(problem, expansion_point):
+    found = list(chunks(problem, *expansion_point))
+    assert len(found) == len(problem.tiles.measured) > 1
+    for chunk, weight in zip(found, problem.tiles.weight, strict=True):
+        assert chunk.residual[0].shape == weight[0].shape
+        assert (chunk.residual[0][weight[0] == 0.0] == 0.0).all()
 
 
-def test_segments_hold_one_exposure_and_one_detector_each(problem, expansion_point):
-    for rows, chunk in chunks(problem, *expansion_point):
-        covered = []
-        for segment in segments(problem, rows, chunk):
-            here = slice(rows.start + segment.rows.start, rows.start + segment.rows.stop)
-            assert set(problem.index.exposure[here]) == {segment.exposure}
-            assert set(problem.index.detector[here]) == {segment.detector}
-            assert len(set(segment.source)) == len(segment.source)
-            covered += range(here.start, here.stop)
-        assert covered == list(range(rows.start, rows.stop))
+def test_gradient_alone_is_that_of_the_normal_equations(problem, equations, expansion_point):
+    alone = gradient(problem, *expansion_point)
+    for found, expected in zip(alone, equations.gradient, strict=True):
+        close(found, expected, rtol=1e-9)

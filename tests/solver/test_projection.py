@@ -18,7 +18,7 @@ def project_one(source, pointing, angle_deg):
     axes = focal_axes(jnp.asarray(frame[:, 0]), jnp.array([np.radians(angle_deg)]))
     direction = tangent_frame(np.array([source[0]]), np.array([source[1]]))[:, 0]
     components = jnp.einsum("oij,oj->oi", axes, jnp.asarray(direction))
-    return np.asarray(project(components, jnp.array([FOCAL_LENGTH])))[0]
+    return np.concatenate(project(tuple(components.T), jnp.array([FOCAL_LENGTH])))
 
 
 def astropy_plane(source, pointing, angle_deg):

@@ -6,8 +6,8 @@ import pytest
 from astropy.table import Table
 
 from solver.fit import fit_orbit
-from solver.normal import CHUNK
 from solver.settings import FitSettings
+from solver.tiles import CHUNK
 
 MIN_OBS = 10
 CLASSES = ["non-reference", "artificial"]
@@ -17,7 +17,7 @@ AXES = ["ra", "dec"]
 @pytest.fixture(scope="module")
 def sample_result(sample_orbit):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.normal.CHUNK", CHUNK)
+        patch.setattr("solver.tiles.CHUNK", CHUNK)
         return fit_orbit(sample_orbit)
 
 
@@ -113,7 +113,7 @@ def test_true_distortion_is_within_its_uncertainty(sample_result):
 
 def test_aberration_left_out_hides_in_the_quadratic_distortion(sample_orbit, sample_result):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.normal.CHUNK", CHUNK)
+        patch.setattr("solver.tiles.CHUNK", CHUNK)
         without = fit_orbit(sample_orbit, settings=FitSettings(aberration=False))
     moved = without.values_on("coef").to_numpy() - sample_result.values_on("coef").to_numpy()
     quadratic, others = np.abs(moved[:3]), np.abs(moved[3:])

@@ -20,7 +20,7 @@ def blocks_of(covariance, n_calib):
     of_sources = covariance[n_calib:, n_calib:].reshape(n_src, 2, n_src, 2)
     return (
         covariance[:n_calib, :n_calib],
-        covariance[n_calib:, :n_calib].reshape(n_src, 2, n_calib),
+        covariance[:n_calib, n_calib:].reshape(n_calib, n_src, 2).swapaxes(1, 2),
         of_sources[np.arange(n_src), :, np.arange(n_src), :],
     )
 
@@ -30,19 +30,12 @@ def flat(theta, sources):
 
 
 def test_step_is_the_dense_newton_step(reduced, dense, sigma):
+    n = dense.n_calib
+    step = reduced.solve(dense.gradient[:n], dense.gradient[n:].reshape(-1, 2))
     expected = dense.covariance @ dense.gradient
     np.testing.assert_allclose(
-        flat(*reduced.step()) / sigma,
-        expected / sigma,
-        atol=AGREEMENT * abs(expected / sigma).max(),
+        flat(*step) / sigma, expected / sigma, atol=AGREEMENT * abs(expected / sigma).max()
     )
-
-
-def test_gradient_includes_the_priors(reduced, dense):
-    scale = np.sqrt(np.diag(dense.hessian))
-    found = flat(reduced.by_theta, reduced.by_source) / scale
-    expected = dense.gradient / scale
-    np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
 
 
 def test_calibration_covariance_is_the_dense_one(reduced, dense, sigma):
@@ -70,15 +63,16 @@ def test_conditional_covariance_is_below_the_marginal_one(reduced):
 
 def test_cross_covariance_is_the_dense_one(reduced, dense, sigma):
     expected = blocks_of(dense.covariance, dense.n_calib)[1]
-    scale = sigma[dense.n_calib :].reshape(-1, 2)[:, :, None] * sigma[: dense.n_calib]
+    of_sources = sigma[dense.n_calib :].reshape(-1, 2).T
+    scale = sigma[: dense.n_calib, None, None] * of_sources
     found = reduced.cross_covariance(reduced.spread())
     np.testing.assert_allclose(found / scale, expected / scale, atol=AGREEMENT)
 
 
 def test_response_is_minus_the_shift_of_sources_per_unit_of_the_calibration(reduced, dense):
     n = dense.n_calib
-    expected = np.linalg.solve(dense.hessian[n:, n:], dense.hessian[n:, :n])
-    found = reduced.response().reshape(expected.shape)
+    expected = np.linalg.solve(dense.hessian[n:, n:], dense.hessian[n:, :n]).T
+    found = reduced.response().swapaxes(1, 2).reshape(expected.shape)
     np.testing.assert_allclose(found, expected, atol=AGREEMENT * np.abs(expected).max())
 
 
@@ -101,7 +95,7 @@ def test_solve_takes_any_right_hand_side(reduced, dense, sigma):
 def test_blocks_of_the_data_are_not_changed(equations, problem, expansion_point):
     """They outlive a change of the priors."""
     before = {k: np.copy(getattr(equations, k)) for k in ("theta", "source", "cross")}
-    reduce(equations, problem.priors, *expansion_point)
+    reduce(equations, problem.priors)
     for name, values in before.items():
         np.testing.assert_array_equal(getattr(equations, name), values)
 
@@ -111,12 +105,12 @@ def test_open_direction_makes_no_solution(equations, problem, expansion_point):
     theta = equations.theta.copy()
     theta[0], theta[:, 0] = 0.0, 0.0
     cross = equations.cross.copy()
-    cross[:, :, 0] = 0.0
+    cross[0] = 0.0
     width = problem.priors.width.copy()
     width[0] = np.inf
     priors = problem.priors._replace(width=width)
     open_ = replace(equations, theta=theta, cross=cross)
-    assert reduce(open_, priors, *expansion_point) is None
+    assert reduce(open_, priors) is None
 
 
 def test_combination_that_only_priors_hold_makes_no_solution_without_them(
@@ -127,10 +121,10 @@ def test_combination_that_only_priors_hold_makes_no_solution_without_them(
         width=np.full(problem.layout.size, np.inf),
         is_gamma=np.zeros(problem.layout.size, dtype=bool),
     )
-    assert reduce(equations, flat_prior, *expansion_point) is None
+    assert reduce(equations, flat_prior) is None
 
 
 def test_values_that_are_not_finite_make_no_solution(equations, problem, expansion_point):
     theta = equations.theta.copy()
     theta[2, 2] = np.nan
-    assert reduce(replace(equations, theta=theta), problem.priors, *expansion_point) is None
+    assert reduce(replace(equations, theta=theta), problem.priors) is None

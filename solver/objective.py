@@ -1,0 +1,58 @@
+"""The data's chi2 and its gradient, without the Hessian: one reverse pass of the model."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from solver.forward import AnyArray, Geometry, Index, Offsets, predict
+from solver.problem import Problem
+
+
+class Gradient(NamedTuple):
+    """chi2 of the data, and minus the gradient of half of it by calibration and sources."""
+
+    chi2: float
+    by_theta: Float[np.ndarray, " calib"]
+    by_source: Float[np.ndarray, "src 2"]
+
+
+def gradient(
+    problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
+) -> Gradient:
+    """Return chi2 of the data and its gradient at one point."""
+    offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
+    total = jax.tree.map(jnp.zeros_like, (0.0, offsets))
+    for i in range(len(problem.tiles.measured)):
+        total = _add_chunk(total, offsets, geometry, *problem.tiles.chunk(i))
+    half, by_group = jax.tree.map(np.asarray, total)
+    by_theta, by_source = problem.gathered(by_group)
+    return Gradient(2.0 * float(half), -by_theta, -by_source)
+
+
+def half_chi2(
+    offsets: Offsets,
+    geometry: Geometry,
+    index: Index,
+    measured: Float[AnyArray, "2 ..."],
+    weight: Float[AnyArray, "2 ..."],
+) -> Float[Array, ""]:
+    """Return half of the data's chi2: minus the logarithm of the likelihood, but a constant.
+
+    Parameters
+    ----------
+    measured : pixels
+    weight : 1/sigma, pixel^-1
+    """
+    x, y = predict(offsets, geometry, index).pixel
+    whitened = (measured[0] - x) * weight[0], (measured[1] - y) * weight[1]
+    return 0.5 * (jnp.sum(whitened[0] ** 2) + jnp.sum(whitened[1] ** 2))
+
+
+@jax.jit
+def _add_chunk(
+    total: tuple[Float[Array, ""], Offsets], offsets: Offsets, *chunk: AnyArray
+) -> tuple[Float[Array, ""], Offsets]:
+    return jax.tree.map(jnp.add, total, jax.value_and_grad(half_chi2)(offsets, *chunk))

@@ -1,0 +1,73 @@
+"""Tiles: measurements of one exposure on one detector, side by side.
+
+A tile is a row of `SLOTS` places, filled from the measurements in working order; the last
+one of an exposure and detector is filled up with copies of no weight. What belongs to the
+exposure or the detector is then looked up once for each tile, and every loop over
+measurements runs along contiguous memory. Tiles are worked on a chunk at a time.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from solver.forward import Index
+
+# Long enough for the vector units, short enough to waste few places.
+SLOTS = 128
+# Long enough to keep the cores busy, short enough to stay in their caches. One length means
+# one compilation, whatever the number of measurements.
+CHUNK = 256
+
+
+class Tiles(NamedTuple):
+    """The measurements of an orbit in chunks of tiles.
+
+    Attributes
+    ----------
+    index : `source` (chunk, tile, slot), `exposure` and `detector` (chunk, tile, 1)
+    measured : pixels from the detector's centre
+    weight : 1/sigma, pixel^-1; zero where there is no measurement
+    place : of each measurement in working order among all slots
+    """
+
+    index: Index
+    measured: Float[np.ndarray, "chunk 2 tile slot"]
+    weight: Float[np.ndarray, "chunk 2 tile slot"]
+    place: Int[np.ndarray, " obs"]
+
+    def chunk(self, i: int) -> tuple[Index, np.ndarray, np.ndarray]:
+        """Return index, measured and weight of one chunk."""
+        return Index(*(part[i] for part in self.index)), self.measured[i], self.weight[i]
+
+    def by_source(self, n_src: int) -> tuple[Int[np.ndarray, " slots"], Int[np.ndarray, " bounds"]]:
+        """Return all slots in order of their source, and where each source begins."""
+        source = self.index.source.ravel()
+        count = np.bincount(source, minlength=n_src)
+        return np.argsort(source, kind="stable"), np.concatenate([[0], np.cumsum(count)])
+
+
+def lay_tiles(
+    index: Index, measured: Float[np.ndarray, "obs 2"], sigma: Float[np.ndarray, "obs 2"]
+) -> Tiles:
+    """Lay measurements, sorted by exposure and detector, in a whole number of chunks."""
+    n_obs = len(measured)
+    changes = np.flatnonzero(np.diff(index.exposure) | np.diff(index.detector)) + 1
+    first = np.concatenate([[0], changes])
+    length = np.diff(first, append=n_obs)
+    tiles = -(-length // SLOTS)
+    n_chunks = -(-tiles.sum() // CHUNK)
+    place = np.repeat(SLOTS * (np.cumsum(tiles) - tiles) - first, length) + np.arange(n_obs)
+    # Empty slots repeat the measurement before them.
+    row = np.zeros(n_chunks * CHUNK * SLOTS, dtype=np.int64)
+    row[place] = np.arange(n_obs)
+    row = np.maximum.accumulate(row).reshape(n_chunks, CHUNK, SLOTS)
+    weight = np.zeros((2, row.size))
+    weight[:, place] = 1.0 / sigma.T
+    head = row[:, :, :1]
+    return Tiles(
+        Index(index.source[row], index.exposure[head], index.detector[head]),
+        np.ascontiguousarray(measured.T[:, row].swapaxes(0, 1)),
+        np.ascontiguousarray(weight.reshape(2, *row.shape).swapaxes(0, 1)),
+        place,
+    )

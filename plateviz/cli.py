@@ -16,6 +16,7 @@ import typer
 
 from plateviz.cache import keep_compilations
 from solver.errors import FitError, InputError
+from solver.exclusions import parse_exclusions
 from solver.parameters import PARAMETERS
 from solver.settings import ENGINES, FitSettings, parse_width
 
@@ -147,6 +148,14 @@ def fit(
             metavar="GROUP=VALUE",
         ),
     ] = None,
+    exclude: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Leave out measurements: source=ID, exposure=FIELD/PLATE or detector=ID; "
+            "may be repeated.",
+            metavar="WHAT",
+        ),
+    ] = None,
     aberration: Annotated[
         bool, typer.Option(help="Model the aberration by the observer's velocity.")
     ] = True,
@@ -160,7 +169,9 @@ def fit(
 
     start = time.perf_counter()
     require_writable(output)
-    settings = FitSettings(order, engine, _prior_widths(prior or []), aberration)
+    settings = FitSettings(
+        order, engine, _prior_widths(prior or []), aberration, parse_exclusions(exclude or [])
+    )
     files = OrbitFiles(str(observations), str(reference), _text(truth), orbit, _text(instrument))
     with reporting("reading the orbit") as reporter:
         focal_plane, data = files.read_instrument(), files.read(orbit)

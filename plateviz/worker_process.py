@@ -23,10 +23,8 @@ from typing import TextIO
 from plateviz.source import source_from_dict
 from plateviz.store import write_run
 from solver.errors import CancelledError, FitError, InputError
-from solver.fit import fit_orbit
+from solver.fit import OrbitFitter
 from solver.gauss_newton import Iteration
-from solver.instrument import Instrument
-from solver.orbit import OrbitData
 from solver.settings import FitSettings
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
@@ -107,14 +105,14 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> None:
 
 def _fit(request: Request, progress: Callable[..., None]) -> None:
     progress(stage="reading the orbit")
-    data, instrument = _orbit(json.dumps(request["source"], sort_keys=True), request["orbit"])
+    fitter = _fitter(json.dumps(request["source"], sort_keys=True), request["orbit"])
     settings = FitSettings.from_dict(request["settings"])
 
     def on_iteration(iteration: Iteration) -> None:
         progress(stage=f"iteration {iteration.iteration}", **iteration._asdict())
 
     progress(stage="linearising")
-    result = fit_orbit(data, instrument, settings, on_iteration)
+    result = fitter.fit(settings, on_iteration)
     progress(stage="writing the result")
     write_run(Path(request["directory"]), result)
 
@@ -129,9 +127,9 @@ def _simulate(request: Request, progress: Callable[..., None]) -> None:
 
 
 @lru_cache(maxsize=4)
-def _orbit(source: str, orbit: int | None) -> tuple[OrbitData, Instrument]:
+def _fitter(source: str, orbit: int | None) -> OrbitFitter:
     origin = source_from_dict(json.loads(source))
-    return origin.read(orbit), origin.read_instrument()
+    return OrbitFitter(origin.read(orbit), origin.read_instrument())
 
 
 if __name__ == "__main__":

@@ -2,10 +2,9 @@
 
 Each iteration solves the linearised model with the sources eliminated and takes the full
 step, or half of it, or a quarter, if the posterior's chi2 would rise. The gradient is exact
-at every point; the Jacobians are those of the last point that was further than
-`_KEEP_BELOW` from the next. The fit has converged when every step is below the tolerance
-times the uncertainty of its parameter, which is what "nothing changes any more" means to
-somebody who reads the result.
+at every point; the Jacobians are made anew as soon as those before give no small step. The
+fit has converged when every step is below the tolerance times the uncertainty of its
+parameter, which is what "nothing changes any more" means to somebody who reads the result.
 """
 
 import time
@@ -25,11 +24,11 @@ from solver.schur import Reduced, reduce
 from solver.settings import FitSettings
 
 _SMALLEST_SHARE = 1e-6
-# A step of so few sigmas leaves the Jacobians good enough for the next one. It is no more
-# because what pointings and detectors have in common is held by the priors alone: in that
-# direction the smallest change of the Jacobians is amplified by its uncertainty.
+# The Jacobians are kept as long as they give steps of at most so many sigmas, each so much
+# smaller than the one before. More would not do: what pointings and detectors have in common
+# is held by the priors alone, and in that direction the smallest change of the Jacobians is
+# amplified by its uncertainty.
 _KEEP_BELOW = 1.0
-# Steps that do not shrink by this much are not those of a nearly linear model.
 _KEEP_SHRINKING = 0.1
 # Fits of more sources than this start from a fit of about so many of them, done to within
 # some sigmas of its own, which is as good as a step of the whole at a fraction of its cost.
@@ -55,8 +54,7 @@ class Mode(NamedTuple):
     """Where the engine ended.
 
     `theta` and `sources` are offsets from the origins; `reduced` is the posterior
-    factorised at the last linearisation point, from which the mode is less than
-    `_KEEP_BELOW` sigmas away.
+    factorised at the last linearisation point, and `equations` those of the data there.
     """
 
     theta: Float[np.ndarray, " calib"]
@@ -64,6 +62,7 @@ class Mode(NamedTuple):
     reduced: Reduced | None
     status: FitStatus
     trace: list[Iteration]
+    equations: NormalEquations
 
 
 class _Point(NamedTuple):
@@ -71,18 +70,6 @@ class _Point(NamedTuple):
     sources: Float[np.ndarray, "src 2"]
     gradient: Gradient
     objective: float
-    equations: NormalEquations | None
-
-
-class _Scale(NamedTuple):
-    """Uncertainties in which steps are measured.
-
-    Marginal ones for the calibration; for the sources the conditional ones, which are
-    smaller by a few per cent and cost nothing.
-    """
-
-    theta: Float[np.ndarray, " calib"]
-    sources: Float[np.ndarray, "src 2"]
 
 
 def find_mode(
@@ -97,14 +84,16 @@ def find_mode(
     progress : called after every iteration; what it raises stops the fit
     """
     begin = time.perf_counter()
-    keep = _rough_selection(problem)
     theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
-    if not keep.all():
+    few = _rough_selection(problem)
+    if not few.all():
         rough = replace(settings, tolerance=max(settings.tolerance, _ROUGH_TOLERANCE))
-        mode = _iterate(thinned(problem, keep), rough, theta, sources[keep], lambda _: None, begin)
+        part = thinned(problem, few)
+        at_origin = accumulate(part, theta, sources[few])
+        mode = _iterate(part, rough, at_origin, lambda _: None, begin)
         if mode.status is FitStatus.CONVERGED:
-            theta, sources[keep] = mode.theta, mode.sources
-    return _iterate(problem, settings, theta, sources, progress, begin)
+            theta, sources[few] = mode.theta, mode.sources
+    return _iterate(problem, settings, accumulate(problem, theta, sources), progress, begin)
 
 
 def _rough_selection(problem: Problem) -> Bool[np.ndarray, " src"]:
@@ -116,8 +105,7 @@ def _rough_selection(problem: Problem) -> Bool[np.ndarray, " src"]:
 def _iterate(
     problem: Problem,
     settings: FitSettings,
-    theta: Float[np.ndarray, " calib"],
-    sources: Float[np.ndarray, "src 2"],
+    equations: NormalEquations,
     progress: Callable[[Iteration], None],
     begin: float,
 ) -> Mode:
@@ -131,60 +119,70 @@ def _iterate(
         )
         progress(trace[-1])
 
-    point = _evaluate(problem, theta, sources)
+    def end(point: _Point, reduced: Reduced | None, status: FitStatus) -> Mode:
+        return Mode(point.theta, point.sources, reduced, status, trace, equations)
+
+    point = _point(problem, *equations.at, equations.gradient)
     report(point, float("nan"), "", 0.0)
     if not np.isfinite(point.objective):
-        return Mode(point.theta, point.sources, None, FitStatus.NOT_FINITE, trace)
-    reduced, scale, before = None, None, np.inf
+        return end(point, None, FitStatus.NOT_FINITE)
+    reduced, limit = reduce(equations, problem.priors), np.inf
     while True:
-        if point.equations is not None:
-            reduced = reduce(point.equations, problem.priors)
-            scale = None if reduced is None else _scale(reduced)
-        if reduced is None or scale is None:
-            return Mode(point.theta, point.sources, None, FitStatus.SINGULAR, trace)
-        step = reduced.solve(*_downhill(problem, point))
-        largest, parameter = _largest(problem, step, scale)
+        if reduced is None:
+            return end(point, None, FitStatus.SINGULAR)
+        step = reduced.solve(*downhill(problem, *point[:3]))
+        largest, parameter = largest_step(problem, step, reduced)
+        if largest > limit:
+            equations = accumulate(problem, point.theta, point.sources)
+            reduced, limit = reduce(equations, problem.priors), np.inf
+            continue
         if largest < settings.tolerance:
             point = point._replace(theta=point.theta + step[0], sources=point.sources + step[1])
             report(point, largest, parameter, 0.0)
-            return Mode(point.theta, point.sources, reduced, FitStatus.CONVERGED, trace)
+            return end(point, reduced, FitStatus.CONVERGED)
         if len(trace) > settings.max_iterations:
-            return Mode(point.theta, point.sources, reduced, FitStatus.MAX_ITERATIONS, trace)
-        keep = largest < min(_KEEP_BELOW, _KEEP_SHRINKING * before)
-        moved, damping = _descend(problem, point, step, keep)
+            return end(point, reduced, FitStatus.MAX_ITERATIONS)
+        moved, damping = _descend(problem, point, step)
         if moved is None:
-            return Mode(point.theta, point.sources, reduced, FitStatus.STUCK, trace)
-        point, before = moved, largest
+            return end(point, reduced, FitStatus.STUCK)
+        point, limit = moved, min(_KEEP_BELOW, _KEEP_SHRINKING * largest)
         report(point, largest, parameter, damping)
 
 
-def _evaluate(
+def _point(
     problem: Problem,
     theta: Float[np.ndarray, " calib"],
     sources: Float[np.ndarray, "src 2"],
-    keep: bool = False,
+    at: Gradient,
 ) -> _Point:
-    """Evaluate the posterior at a point, without its Jacobians if those before are kept."""
-    equations = None if keep else accumulate(problem, theta, sources)
-    at = gradient(problem, theta, sources) if equations is None else equations.gradient
-    objective = at.chi2 + problem.priors.penalty(theta, sources)
-    return _Point(theta, sources, at, objective, equations)
+    return _Point(theta, sources, at, objective(problem, theta, sources, at))
 
 
-def _downhill(
-    problem: Problem, point: _Point
+def objective(
+    problem: Problem,
+    theta: Float[np.ndarray, " calib"],
+    sources: Float[np.ndarray, "src 2"],
+    at: Gradient,
+) -> float:
+    """Return the posterior's chi2: the data's, and the priors' penalty."""
+    return at.chi2 + problem.priors.penalty(theta, sources)
+
+
+def downhill(
+    problem: Problem,
+    theta: Float[np.ndarray, " calib"],
+    sources: Float[np.ndarray, "src 2"],
+    at: Gradient,
 ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
     """Return minus the gradient of half the posterior's chi2."""
-    priors, at = problem.priors, point.gradient
-    by_theta = at.by_theta - priors.gradient(point.theta)
-    return by_theta, at.by_source - priors.source_gradient(point.sources)
+    by_theta = at.by_theta - problem.priors.gradient(theta)
+    return by_theta, at.by_source - problem.priors.source_gradient(sources)
 
 
 def _descend(
     problem: Problem,
     point: _Point,
     step: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
-    keep: bool,
 ) -> tuple[_Point | None, float]:
     """Take the step, or as much of it as it takes for the objective not to rise.
 
@@ -193,25 +191,26 @@ def _descend(
     share = 1.0
     while share > _SMALLEST_SHARE:
         theta, sources = point.theta + share * step[0], point.sources + share * step[1]
-        moved = _evaluate(problem, theta, sources, keep)
+        moved = _point(problem, theta, sources, gradient(problem, theta, sources))
         if moved.objective <= point.objective * (1.0 + _ROUNDING):
             return moved, 1.0 - share
         share *= 0.5
     return None, 1.0 - share
 
 
-def _scale(reduced: Reduced) -> _Scale:
-    variances = np.diagonal(reduced.conditional_covariance(), axis1=1, axis2=2)
-    return _Scale(np.sqrt(np.diag(reduced.theta_covariance())), np.sqrt(variances))
-
-
-def _largest(
+def largest_step(
     problem: Problem,
     step: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
-    scale: _Scale,
+    reduced: Reduced,
 ) -> tuple[float, str]:
-    """Return the largest step over its uncertainty, and the parameter's name."""
-    of_theta, of_sources = np.abs(step[0]) / scale.theta, np.abs(step[1]) / scale.sources
+    """Return the largest step over its uncertainty, and the parameter's name.
+
+    Marginal uncertainties for the calibration; for the sources the conditional ones,
+    which are smaller by a few per cent and cost nothing.
+    """
+    of_theta = np.abs(step[0]) / np.sqrt(np.diag(reduced.theta_covariance()))
+    variances = np.diagonal(reduced.conditional_covariance(), axis1=1, axis2=2)
+    of_sources = np.abs(step[1]) / np.sqrt(variances)
     if of_theta.max() > of_sources.max():
         column = int(of_theta.argmax())
         return float(of_theta[column]), _name_of(problem, column)

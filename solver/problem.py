@@ -41,6 +41,7 @@ class Problem:
     measured : pixels from the detector's centre
     sigma : pixels
     row : row of each measurement in the input table
+    label : of that row, the same in a table from which others were taken out
     sources : catalogue rows of the measured sources, in ascending source_id
     exposures : environment rows, in order of (field_id, plate_id)
     priors : in offsets from the origins
@@ -53,6 +54,7 @@ class Problem:
     measured: Float[np.ndarray, "obs 2"]
     sigma: Float[np.ndarray, "obs 2"]
     row: Int[np.ndarray, " obs"]
+    label: Int[np.ndarray, " obs"]
     sources: pd.DataFrame
     exposures: pd.DataFrame
     priors: Priors
@@ -118,6 +120,7 @@ def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
         measured=problem.measured[rows],
         sigma=problem.sigma[rows],
         row=problem.row[rows],
+        label=problem.label[rows],
         sources=problem.sources[keep].reset_index(drop=True),
         priors=problem.priors._replace(precision=problem.priors.precision[keep]),
     )
@@ -149,6 +152,7 @@ def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings
         measured=table[["nx", "ny"]].to_numpy(),
         sigma=table[["sx", "sy"]].to_numpy(),
         row=row,
+        label=table.index.to_numpy(),
         sources=sources,
         exposures=exposures,
         priors=_priors(places.covariance, centres, settings, layout),

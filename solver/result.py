@@ -15,6 +15,7 @@ class FitStatus(Enum):
     """How a fit ended; the value is the message for people."""
 
     CONVERGED = "every step of the last iteration is below the tolerance times its uncertainty"
+    RE_SOLVED = "one step of the linearised model, which a refit would confirm"
     MAX_ITERATIONS = "the limit of iterations was reached before the steps became small"
     STUCK = "no part of the step made chi2 fall any further, and the steps are not small"
     SINGULAR = "the data and the priors together leave a direction of the solution open"

@@ -14,6 +14,11 @@ from jaxtyping import Float
 from solver.normal import NormalEquations
 from solver.priors import Priors
 
+# Directions with less than this share of the information that their parameters have alone.
+_WEAK = 1e-6
+# At most so many of them are looked for.
+_BLOCK = 16
+
 
 @dataclass(frozen=True)
 class Reduced:
@@ -35,12 +40,22 @@ class Reduced:
     factor: Float[np.ndarray, "calib calib"]
 
     def solve(
-        self, by_theta: Float[np.ndarray, " calib"], by_source: Float[np.ndarray, "src 2"]
+        self,
+        by_theta: Float[np.ndarray, " calib"],
+        by_source: Float[np.ndarray, "src 2"],
+        held: Float[np.ndarray, "calib weak"] | None = None,
     ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
-        """Solve the whole system for one right-hand side."""
+        """Solve the whole system for one right-hand side.
+
+        Parameters
+        ----------
+        held : directions, as from `weak_directions`, in which the calibration does not move
+        """
         whitened = _lower_solve(self.source_factor, by_source.T)
         rows = self.whitened.reshape(len(by_theta), -1)
         theta = sl.cho_solve((self.factor, False), by_theta - rows @ whitened.ravel())
+        if held is not None:
+            theta = theta - held @ (held.T @ (np.diag(self.theta) * theta))
         remainder = whitened - (theta @ rows).reshape(whitened.shape)
         return theta, _upper_solve(self.source_factor, remainder).T.copy()
 
@@ -68,6 +83,23 @@ class Reduced:
                 inner[a, b] = np.einsum("ks,ks->s", spread[:, a], spread[:, b]) + (a == b)
         half = _upper_solve(self.source_factor, inner)
         return _upper_solve(self.source_factor, half.swapaxes(0, 1)).transpose(2, 1, 0).copy()
+
+    def weak_directions(self) -> Float[np.ndarray, "calib weak"]:
+        """Return the directions of the calibration that only the priors hold.
+
+        They are eigenvectors of the reduced system, each parameter in units of its
+        conditional sigma, whose eigenvalue all but vanishes: what pointings, roll and focal
+        lengths have in common with the places, rotations and pitches of the detectors.
+        """
+        scale = 1.0 / np.sqrt(np.diag(self.theta))
+        block = np.random.default_rng(0).standard_normal((len(scale), min(_BLOCK, len(scale))))
+        # So wide is the gap to the other eigenvalues that two inverse iterations do.
+        for _ in range(2):
+            block = sl.cho_solve((self.factor, False), block / scale[:, None]) / scale[:, None]
+            block = np.linalg.qr(block)[0]
+        image = self.factor @ (scale[:, None] * block)
+        values, vectors = np.linalg.eigh(image.T @ image)
+        return scale[:, None] * (block @ vectors[:, values < _WEAK])
 
     def theta_covariance(self) -> Float[np.ndarray, "calib calib"]:
         """Return the marginal covariance of the calibration."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from solver.errors import InputError
+from solver.exclusions import Exclusions
 from solver.parameters import BY_NAME
 
 MAX_ORDER = 9
@@ -24,6 +25,7 @@ class FitSettings:
         `width_unit`; for "sources" a factor on the catalogue's uncertainties;
         `inf` for a flat prior. Groups not named keep the default of `parameters`.
     aberration : whether stellar aberration is part of the forward model
+    exclusions : measurements that are not to be used
     max_iterations : limit of the engine
     tolerance : the fit has converged when every step is below this times its uncertainty
     """
@@ -32,6 +34,7 @@ class FitSettings:
     engine: str = "gauss-newton"
     prior_widths: Mapping[str, float] = field(default_factory=dict)
     aberration: bool = True
+    exclusions: Exclusions = Exclusions()
     max_iterations: int = 20
     tolerance: float = 1e-3
 
@@ -72,12 +75,14 @@ class FitSettings:
             "max_iterations": self.max_iterations,
             "tolerance": self.tolerance,
             "prior_widths": dict(self.prior_widths),
+            "exclusions": self.exclusions.to_dict(),
         }
 
     @staticmethod
     def from_dict(values: Mapping[str, object]) -> "FitSettings":
         """Return the settings that `to_dict` wrote."""
-        return FitSettings(**values)  # type: ignore[arg-type]
+        exclusions = Exclusions.from_dict(values.get("exclusions", Exclusions().to_dict()))  # type: ignore[arg-type]
+        return FitSettings(**{**values, "exclusions": exclusions})  # type: ignore[arg-type]
 
 
 def _is_whole(number: object) -> bool:

@@ -44,6 +44,7 @@ def primary_header(result: FitResult) -> fits.Header:
         ("MAXITER", settings.max_iterations, "limit of iterations"),
         ("TOLER", settings.tolerance, "steps over sigma at convergence"),
         ("PRIORS", json.dumps(dict(settings.prior_widths)), ""),
+        ("EXCLUDED", json.dumps(settings.exclusions.to_dict()), ""),
         ("NITER", int(result.trace["iteration"].max()) if len(result.trace) else 0, "iterations"),
         *_figures(result),
     ]

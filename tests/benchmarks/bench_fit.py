@@ -27,6 +27,7 @@ import solver  # noqa: F401, I001
 
 import numpy as np
 
+from solver.exclusions import Exclusions
 from solver.fit import fit_orbit
 from solver.gauss_newton import find_mode
 from solver.instrument import MINI_MOCK
@@ -40,11 +41,19 @@ from solver.settings import FitSettings
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.measure import measure_orbit
 from solver.simulate.settings import SurveySettings
+from solver.what_if import re_solve
 
 ORBIT = 0
 # What the paper's catalogue of 132,651 stars leaves on the detectors in that orbit.
 SOURCES_OF_THE_PAPER = 6480
 UNIT_REPEATS = 5
+CHANGES = {
+    "sources' priors": (FitSettings(), FitSettings(prior_widths={"sources": 2.0})),
+    "detectors' priors": (FitSettings(), FitSettings(prior_widths={"detector_x": 10.0})),
+    "no detector 1": (FitSettings(), FitSettings(exclusions=Exclusions(detectors=frozenset([1])))),
+    # From one order more than the distortion has, so that the lower one fits as well.
+    "order 6 to 5": (FitSettings(order=6), FitSettings()),
+}
 PACKAGES = ("numpy", "scipy", "jax", "jaxlib")
 
 
@@ -121,6 +130,7 @@ def stages(
         "all covariances": lambda: covariances(reduced),
         "residuals with leverage": lambda: residuals(problem, theta, sources, covariance),
         "from the catalogue to marginal sigmas": lambda: fit_with_sigmas(problem, settings),
+        **{f"what if: {name}": what_if(data, *change) for name, change in CHANGES.items()},
         "fit_orbit, with all tables": lambda: fit_orbit(data, MINI_MOCK, settings),
     }
 
@@ -129,6 +139,21 @@ def fit_with_sigmas(problem: Problem, settings: FitSettings) -> object:
     # A problem of its own, whose tiles are still to be laid.
     reduced = find_mode(replace(problem), settings).reduced
     return None if reduced is None else marginal_sigmas(reduced)
+
+
+def what_if(data: OrbitData, before: FitSettings, after: FitSettings) -> Callable[[], object]:
+    """Return the re-solution of one change, from a fit made and a problem built beforehand."""
+    solved = build_problem(data, MINI_MOCK, before)
+    changed = build_problem(after.exclusions.without(data), MINI_MOCK, after)
+    mode = find_mode(solved, before)
+
+    def work() -> object:
+        found = re_solve(mode, solved, changed, after)
+        if found is None or found.reduced is None:
+            sys.exit(f"no re-solution from {before} to {after}")
+        return marginal_sigmas(found.reduced)
+
+    return work
 
 
 def marginal_sigmas(reduced: Reduced) -> object:

@@ -291,9 +291,12 @@ def test_wrong_settings_are_refused(written, key, value, message):
         read_result(_edited(written, change))
 
 
-def test_flipped_byte_is_refused(tmp_path, written):
+@pytest.mark.parametrize("hdu", range(1, 4))
+def test_flipped_byte_is_refused(tmp_path, written, hdu):
     content = bytearray(written.read_bytes())
-    content[len(content) // 2] ^= 4
+    with fits.open(written) as hdus:
+        first = hdus.fileinfo(hdu)["datLoc"]
+    content[first + 40] ^= 4
     path = tmp_path / "flipped.fits"
     path.write_bytes(content)
     with pytest.raises(InputError, match=r"flipped\.fits, HDU \w+: expected"):

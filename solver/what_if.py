@@ -1,0 +1,80 @@
+"""What if: the solution under other priors, a lower order or less data, without a refit.
+
+The posterior is all but Gaussian about its mode. So the normal equations that a fit ended
+with, carried over to the changed problem, give its solution in one step. That step moves
+what pointings and detectors have in common, which nothing but priors holds, so far that
+the rest needs to follow: one or two short steps with the same Jacobians and the exact
+gradient do that, and show whether the first was short enough for a linear model.
+"""
+
+import time
+
+import numpy as np
+
+from solver.carry import carry_over
+from solver.gauss_newton import Iteration, Mode, downhill, largest_step, objective
+from solver.normal import accumulate
+from solver.objective import gradient
+from solver.problem import Problem
+from solver.result import FitStatus
+from solver.schur import reduce
+from solver.settings import FitSettings
+
+# Steps that are not small after so many are not those of a nearly linear model.
+_MAX_STEPS = 5
+
+
+def re_solve(mode: Mode, solved: Problem, changed: Problem, settings: FitSettings) -> Mode | None:
+    """Return the mode of a changed problem, from that of one that was solved.
+
+    Parameters
+    ----------
+    mode : where the engine ended for `solved`
+    settings : those of `changed`
+
+    Returns
+    -------
+    None if only a refit can tell: `changed` asks for more data or terms than `solved` had,
+    or is so different that the model is not linear on the way.
+    """
+    begin = time.perf_counter()
+    equations = carry_over(mode.equations, solved, changed)
+    reduced = None if equations is None else reduce(equations, changed.priors)
+    if equations is None or reduced is None:
+        return None
+    trace: list[Iteration] = []
+    (theta, sources), at, held, limit = equations.at, equations.gradient, None, np.inf
+    largest, parameter = float("nan"), ""
+    while len(trace) <= _MAX_STEPS:
+        total, elapsed = objective(changed, theta, sources, at), time.perf_counter() - begin
+        trace.append(Iteration(len(trace), total, at.chi2, largest, parameter, 0.0, elapsed))
+        if largest < settings.tolerance:
+            mode = Mode(theta, sources, reduced, FitStatus.RE_SOLVED, trace, equations)
+            same_terms = changed.geometry.order == solved.geometry.order
+            return mode if same_terms else _linearised_anew(mode, changed)
+        step = reduced.solve(*downhill(changed, theta, sources, at), held)
+        largest, parameter = largest_step(changed, step, reduced)
+        if largest > limit:
+            return None
+        theta, sources = theta + step[0], sources + step[1]
+        # The second step puts right what the first left behind, and is shorter.
+        limit = 1.1 * largest
+        if largest >= settings.tolerance:
+            at = gradient(changed, theta, sources)
+        held = reduced.weak_directions() if held is None else held
+    return None
+
+
+def _linearised_anew(mode: Mode, problem: Problem) -> Mode | None:
+    """Return the mode with the Jacobians of its own point, and one step with them.
+
+    Those carried over are bent by the terms that were dropped, which the leverage of the
+    measurements would not forgive.
+    """
+    equations = accumulate(problem, mode.theta, mode.sources)
+    reduced = reduce(equations, problem.priors)
+    if reduced is None:
+        return None
+    step = reduced.solve(*downhill(problem, mode.theta, mode.sources, equations.gradient))
+    theta, sources = mode.theta + step[0], mode.sources + step[1]
+    return mode._replace(theta=theta, sources=sources, reduced=reduced, equations=equations)

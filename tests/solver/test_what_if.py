@@ -1,0 +1,139 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.carry import carry_over
+from solver.exclusions import Exclusions
+from solver.fit import OrbitFitter, fit_orbit
+from solver.normal import accumulate
+from solver.problem import build_problem
+from solver.result import FitStatus
+from solver.settings import FitSettings
+from tests.solver.conftest import CHUNK
+from tests.solver.small_orbit import make_orbit
+
+# What a refit has to confirm, in sigmas.
+AGREEMENT = 1e-3
+
+
+@pytest.fixture(scope="module")
+def orbit():
+    return make_orbit()
+
+
+@pytest.fixture(scope="module")
+def fitter(orbit):
+    return fitted(OrbitFitter(orbit.data, orbit.instrument))
+
+
+@pytest.fixture(scope="module")
+def sample_fitter(sample_orbit):
+    return fitted(OrbitFitter(sample_orbit))
+
+
+def fitted(fitter):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("solver.tiles.CHUNK", CHUNK)
+        fitter.fit(FitSettings(order=6))
+    return fitter
+
+
+def first(data, *columns):
+    return tuple(data.measurements[list(columns)].iloc[0].tolist())
+
+
+CHANGES = {
+    "nothing": lambda data: {},
+    "detectors-held": lambda data: {"prior_widths": {"detector_x": 10.0, "pitch_x": 1e-3}},
+    "sources-loose": lambda data: {"prior_widths": {"sources": 3.0}},
+    "pointing-held": lambda data: {"prior_widths": {"pointing_ra": 600.0, "pointing_dec": 600.0}},
+    "distortion-held": lambda data: {"prior_widths": {"distortion_x": 0.1}},
+    "lower-order": lambda data: {"order": 5},
+    "no-source": lambda data: {"exclusions": Exclusions(frozenset(first(data, "source_id")))},
+    "no-exposure": lambda data: {
+        "exclusions": Exclusions(exposures=frozenset([first(data, "field_id", "plate_id")]))
+    },
+    "no-detector": lambda data: {
+        "exclusions": Exclusions(detectors=frozenset(first(data, "detector_id")))
+    },
+}
+
+
+@pytest.fixture(scope="module", params=CHANGES)
+def pair(request, sample_orbit, sample_fitter):
+    """The sample orbit re-solved and fitted again, under changed settings."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("solver.tiles.CHUNK", CHUNK)
+        settings = FitSettings(**{"order": 6, **CHANGES[request.param](sample_orbit)})
+        return sample_fitter.what_if(settings), fit_orbit(sample_orbit, settings=settings)
+
+
+def test_refit_confirms_the_positions_and_their_uncertainties(pair):
+    found, expected = pair
+    assert found.summary["reason"] == FitStatus.RE_SOLVED.value
+    assert list(found.sources["source_id"]) == list(expected.sources["source_id"])
+    for axis in ("ra", "dec"):
+        sigma = expected.sources[f"sigma_{axis}_marginal"]
+        moved = found.sources[f"offset_{axis}"] - expected.sources[f"offset_{axis}"]
+        assert np.abs(moved / sigma).max() < AGREEMENT
+        for kind in ("marginal", "conditional"):
+            column = f"sigma_{axis}_{kind}"
+            np.testing.assert_allclose(
+                found.sources[column], expected.sources[column], rtol=AGREEMENT
+            )
+
+
+def test_refit_confirms_the_diagnostics(pair):
+    found, expected = pair
+    for axis in "xy":
+        column = f"standardised_{axis}"
+        np.testing.assert_allclose(found.residuals[column], expected.residuals[column], atol=5e-3)
+    for key in ("chi2_per_dof", "effective_parameters", "mean_error_ra", "normalised_deviation_ra"):
+        assert found.summary[key] == pytest.approx(expected.summary[key], rel=1e-3)
+    assert list(found.calibration["label"]) == list(expected.calibration["label"])
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [FitSettings(order=7), FitSettings(order=6, aberration=False)],
+    ids=["higher-order", "other-model"],
+)
+def test_what_the_fit_did_not_hold_needs_a_refit(fitter, settings):
+    assert fitter.what_if(settings) is None
+
+
+def test_orbit_that_was_not_fitted_needs_a_fit(orbit):
+    assert OrbitFitter(orbit.data, orbit.instrument).what_if(FitSettings()) is None
+
+
+def test_change_too_large_for_a_linear_model_needs_a_refit(orbit, fitter):
+    """A distortion of the fifth order that is to be none: the stars would have to move."""
+    assert fitter.what_if(FitSettings(order=0)) is None
+
+
+def test_what_if_starts_from_the_fit_and_not_from_another(fitter):
+    before = fitter.what_if(FitSettings(order=6))
+    fitter.what_if(FitSettings(order=6, prior_widths={"sources": 3.0}))
+    after = fitter.what_if(FitSettings(order=6))
+    np.testing.assert_array_equal(before.sources["ra"], after.sources["ra"])
+
+
+def test_blocks_without_some_measurements_are_those_of_the_others(orbit, problem, expansion_point):
+    """The blocks are sums, so that what is taken out is what would not be added."""
+    equations = accumulate(problem, *expansion_point)
+    detector = first(orbit.data, "detector_id")
+    data = Exclusions(detectors=frozenset(detector)).without(orbit.data)
+    fewer = build_problem(data, orbit.instrument, FitSettings())
+    found = carry_over(equations, problem, fewer)
+    theta, sources = found.at
+    expected = accumulate(fewer, theta, sources)
+    for name in ("theta", "source", "cross"):
+        values = getattr(expected, name)
+        np.testing.assert_allclose(getattr(found, name), values, atol=1e-9 * np.abs(values).max())
+    assert found.gradient.chi2 == pytest.approx(expected.gradient.chi2, rel=1e-6)
+
+
+def test_more_measurements_cannot_be_carried_over(problem, expansion_point):
+    fewer = replace(problem, label=problem.label + 1)
+    assert carry_over(accumulate(problem, *expansion_point), problem, fewer) is None

@@ -53,9 +53,27 @@ def build_app(workbench: Workbench) -> pmui.Page:
         page.busy = False
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     _set_theme(session, page.dark_theme)
+    _follow_address(session)
     _keep_up(session, figures)
     session.show_orbit(session.selection.orbit)
     return page
+
+
+def _follow_address(session: Session) -> None:
+    """Take the selection from the page's address, and write it there when it changes."""
+    # Nobody can type bytes that are no text; what is left of them is no selection either.
+    arguments = {k: v[0].decode("utf-8", "replace") for k, v in pn.state.session_args.items()}
+    session.selection.want(arguments)
+    location = pn.state.location
+    if location is None:
+        return
+
+    def write(*_: object) -> None:
+        if session.shown is not None:
+            # Panel declares each value as a mapping; it takes anything that has words.
+            location.update_query(**session.selection.address())  # type: ignore[arg-type]
+
+    session.selection.param.watch(write, ["orbit", "field", "plates", "detector"])
 
 
 def _keep_up(session: Session, figures: FigureGrid) -> None:

@@ -1,5 +1,6 @@
 """What the user of one browser session has chosen; bounds are enforced here, on the server."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +11,7 @@ from solver.result import FitResult
 from solver.settings import MAX_ORDER, FitSettings, format_width, parse_width
 
 ALL = "all"
+_PLATES = re.compile(r"(-?\d+)-(-?\d+)")
 
 
 class Selection(param.Parameterized):
@@ -22,6 +24,11 @@ class Selection(param.Parameterized):
         default=ALL, objects=[ALL], doc="detector of the residual map, or all"
     )
 
+    def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
+        """Start with nothing to choose from."""
+        super().__init__(**values)
+        self._wanted: dict[str, Any] = {}
+
     def fit_to(self, result: FitResult, detectors: list[int]) -> None:
         """Offer what a solution holds; choices that it does not hold are given up."""
         exposures = result.exposures
@@ -32,12 +39,36 @@ class Selection(param.Parameterized):
         self.param["field"].objects = fields
         self.param["detector"].objects = numbers
         self.param["plates"].bounds = plates
-        lowest, highest = (min(max(p, plates[0]), plates[1]) for p in self.plates)
+        wanted: dict[str, Any] = self.address() | {"plates": self.plates}
+        if first:
+            wanted |= {"field": fields[1], "detector": numbers[1], **self._wanted}
+        lowest, highest = (min(max(p, plates[0]), plates[1]) for p in wanted["plates"])
         self.param.update(
-            field=fields[1] if first else self.field if self.field in fields else ALL,
-            detector=numbers[1] if first else self.detector if self.detector in numbers else ALL,
+            field=wanted["field"] if wanted["field"] in fields else ALL,
+            detector=wanted["detector"] if wanted["detector"] in numbers else ALL,
             plates=(lowest, highest),
         )
+
+    def want(self, address: Mapping[str, str]) -> None:
+        """Take the wishes of a page's address; what no solution holds will be ignored.
+
+        Parameters
+        ----------
+        address : as from `address`; anything else in it is not looked at
+        """
+        wanted: dict[str, Any] = {k: address[k] for k in ("field", "detector") if k in address}
+        plates = _PLATES.fullmatch(address.get("plates", ""))
+        if plates:
+            wanted["plates"] = tuple(sorted(int(number) for number in plates.groups()))
+        self._wanted = wanted
+        orbits = {str(orbit): orbit for orbit in self.param["orbit"].objects}
+        self.orbit = orbits.get(address.get("orbit", ""), self.orbit)
+
+    def address(self) -> dict[str, str]:
+        """Return the selection as words for the page's address, which `want` reads back."""
+        first, last = self.plates
+        words = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
+        return words if self.orbit is None else {"orbit": str(self.orbit), **words}
 
     @property
     def detector_id(self) -> int | None:

@@ -187,3 +187,38 @@ def test_solutions_are_described_by_what_departs_from_the_paper():
     assert describe(FitSettings()) == "order 5"
     changed = FitSettings(order=3, aberration=False, prior_widths={"distortion_x": 0.5})
     assert describe(changed) == "order 3, distortion_x 0.5 um, no aberration"
+
+
+def test_address_brings_back_the_selection(fit_result):
+    numbers = [d.detector_id for d in MINI_MOCK.detectors]
+    first, second = Selection(), Selection()
+    first.fit_to(fit_result, numbers)
+    last = first.param["plates"].bounds[1]
+    first.param.update(field=ALL, detector=str(numbers[-1]), plates=(last, last))
+    second.want(first.address())
+    second.fit_to(fit_result, numbers)
+    assert second.address() == first.address()
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        {"field": "99", "detector": "none", "plates": "many", "orbit": "7", "unknown": "x"},
+        {"plates": "3", "field": ""},
+    ],
+    ids=["nonsense", "half"],
+)
+def test_address_that_makes_no_sense_is_not_looked_at(fit_result, address):
+    selection = Selection()
+    selection.want(address)
+    selection.fit_to(fit_result, [1, 2])
+    assert selection.plates[0] == selection.param["plates"].bounds[0]
+    assert selection.field in selection.param["field"].objects
+    assert selection.orbit is None
+
+
+def test_address_asks_for_an_orbit_of_the_workbench(fit_result):
+    session = Session(Bench(fit_result))
+    session.selection.want({"orbit": "1"})
+    assert session.selection.orbit == 1
+    assert session.selection.address()["orbit"] == "1"

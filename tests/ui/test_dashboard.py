@@ -115,3 +115,24 @@ def test_the_dark_theme_reaches_the_figures(page):
     page.get_by_label("Toggle theme").click()
     page.wait_for_function(f"() => ({backgrounds})()[0] !== '{light[0]}'")
     assert len(page.evaluate(backgrounds)) == 1
+
+
+def choose(page, label, option):
+    page.get_by_role("combobox", name=label).click()
+    page.locator(".MuiMenuItem-root").get_by_text(option, exact=True).click()
+
+
+def test_the_address_carries_the_selection(page, open_page):
+    choose(page, "Detector", "3")
+    choose(page, "Field", "all")
+    page.wait_for_url("**detector=3**")
+    page.wait_for_url("**field=all**")
+    again = open_page(page.url)
+    expect(again.get_by_role("combobox", name="Detector")).to_have_text("3")
+    expect(again.get_by_role("combobox", name="Field")).to_have_text("all")
+
+
+def test_an_address_of_nonsense_opens_the_page(demo, open_page):
+    page = open_page(f"{demo}?field=%FF&plates=1e9-x&detector=none&orbit=%00")
+    page.locator(".figure-footprint canvas").first.wait_for(state="attached")
+    expect(page.get_by_role("combobox", name="Field")).to_have_text("all")

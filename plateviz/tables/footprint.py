@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import id_strings
-from plateviz.tables.sky import mean_direction, offsets_arcmin, sky_of_focal_plane
+from plateviz.tables.sky import mean_direction, offsets_arcmin, offsets_deg, sky_of_focal_plane
 from plateviz.tables.sources import ordered_by_class
 from solver.instrument import Instrument
 from solver.result import FitResult
@@ -30,7 +30,8 @@ def footprint_fields(result: FitResult, instrument: Instrument) -> pd.DataFrame:
 
     The nominal corners are taken through the fitted pointing, position angle and focal
     length; distortion (below a pixel) is left out. The pointing is that of the observed,
-    aberrated sky, so an outline may lie up to 0.35 arcmin off the sources.
+    aberrated sky: each outline is moved by the mean difference between the places where
+    the sources of its exposure were seen and where they are, up to 0.35 arcmin.
 
     Parameters
     ----------
@@ -47,7 +48,10 @@ def footprint_fields(result: FitResult, instrument: Instrument) -> pd.DataFrame:
     exposures = result.exposures.reset_index(drop=True)
     first = exposures.sort_values(["field_id", "plate_id"]).drop_duplicates("field_id")
     corners = np.concatenate([d.corners_um()[[0, 1, 2, 3, 0]] for d in instrument.detectors])
-    frames = [_outline(corners, optics.loc[index], instrument) for index in first.index]
+    frames = [
+        _outline(corners, optics.loc[index], instrument, _seen(result, exposures.loc[index]))
+        for index in first.index
+    ]
     if not frames:
         return pd.DataFrame(columns=_FIELD_COLUMNS)
     table = pd.concat(frames, keys=first["field_id"], names=["field_id"]).reset_index(level=0)
@@ -68,8 +72,23 @@ _FIELD_COLUMNS = [
 ]
 
 
-def _outline(corners: np.ndarray, pointing: pd.Series, instrument: Instrument) -> pd.DataFrame:
+def _seen(result: FitResult, exposure: pd.Series) -> pd.DataFrame:
+    """Return where the sources of an exposure lie on its ideal focal plane and on the sky."""
+    rows = result.residuals
+    here = (rows["field_id"] == exposure["field_id"]) & (rows["plate_id"] == exposure["plate_id"])
+    places = result.sources[["source_id", "ra", "dec"]]
+    return rows.loc[here, ["source_id", "ideal_x", "ideal_y"]].merge(places, on="source_id")
+
+
+def _outline(
+    corners: np.ndarray, pointing: pd.Series, instrument: Instrument, seen: pd.DataFrame
+) -> pd.DataFrame:
     ra, dec = sky_of_focal_plane(corners, pointing)
+    if len(seen):
+        apparent = sky_of_focal_plane(seen[["ideal_x", "ideal_y"]].to_numpy(), pointing)
+        east, north = offsets_deg(*apparent, seen["ra"].to_numpy(), seen["dec"].to_numpy())
+        dec = dec - north.mean()
+        ra = (ra - east.mean() / np.cos(np.radians(dec))) % 360.0
     ids = [d.detector_id for d in instrument.detectors]
     return pd.DataFrame(
         {

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from plateviz.cli import main
+from plateviz.source import SurveyFolder
 from solver.io.result import read_result
 
 
@@ -98,7 +99,7 @@ def test_inspect_of_something_else_ends_with_two(run, tmp_path):
 def test_a_folder_that_is_no_survey_is_not_served(run, tmp_path):
     code, _, err = run("serve", tmp_path, "--port", "0", "--no-open")
     assert code == 2
-    assert "survey.toml" in err
+    assert "expected no survey there yet, found a finished one" in err
 
 
 def test_a_port_in_use_is_said_before_any_work(run, tmp_path):
@@ -106,3 +107,77 @@ def test_a_port_in_use_is_said_before_any_work(run, tmp_path):
         code, _, err = run("serve", tmp_path, "--port", taken.getsockname()[1], "--no-open")
     assert code == 2
     assert "expected an address and a port that are free" in err
+
+
+SMALL = ("--orbits", "1", "--stars", "2000")
+
+
+def test_simulate_makes_a_survey_whose_orbit_can_be_read(run, tmp_path):
+    folder = tmp_path / "survey"
+    code, out, _ = run("simulate", folder, *SMALL, "--json")
+    assert code == 0
+    assert json.loads(out) | {"seconds": 0} == {"output": str(folder), "orbits": 1, "seconds": 0}
+    made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert {"survey.toml", "reference.parquet", "truth.parquet", "exposures.parquet"} <= made
+    assert "measurements/orbit=0000.parquet" in made
+    data = SurveyFolder(str(folder)).read(0)
+    assert len(data.measurements) > 0
+    assert data.truth is not None
+
+
+def test_simulate_says_what_it_made_to_people(run, tmp_path):
+    code, out, _ = run("simulate", tmp_path / "survey", *SMALL)
+    assert code == 0
+    assert "a survey of 1 orbits" in out
+
+
+def test_simulate_does_not_go_on_with_another_survey(run, tmp_path):
+    run("simulate", tmp_path / "survey", *SMALL)
+    before = (tmp_path / "survey" / "survey.toml").read_bytes()
+    code, _, err = run("simulate", tmp_path / "survey", *SMALL, "--seed", "5")
+    assert code == 2
+    assert "expected no survey there yet, found a finished one" in err
+    assert (tmp_path / "survey" / "survey.toml").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--orbits", "0"], "--orbits"),
+        (["--stars", "none"], "--stars"),
+        (["--catalog", "none.fits"], "none.fits"),
+    ],
+    ids=["no-orbits", "no-number", "no-catalogue"],
+)
+def test_simulate_refuses_and_writes_nothing(run, tmp_path, options, message):
+    code, _, err = run("simulate", tmp_path / "survey", *options)
+    assert code == 2
+    assert message in err
+    assert not (tmp_path / "survey" / "survey.toml").exists()
+
+
+def test_simulate_into_a_file_is_refused(run, tmp_path):
+    (tmp_path / "survey").write_text("a letter")
+    code, _, err = run("simulate", tmp_path / "survey", *SMALL)
+    assert code == 2
+    assert str(tmp_path / "survey") in err
+    assert (tmp_path / "survey").read_text() == "a letter"
+
+
+def test_demo_with_a_port_in_use_makes_no_survey(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        code, _, err = run("demo", "--port", taken.getsockname()[1], "--no-open")
+    assert code == 2
+    assert "port" in err
+    assert list(tmp_path.rglob("survey.toml")) == []
+
+
+def test_excluded_measurements_are_not_used(run, sample, tmp_path):
+    output = tmp_path / "r.fits"
+    code, out, _ = run("fit", *sample[:2], "-o", output, "--exclude", "detector=1", "--json")
+    assert code == 0
+    assert 0 < json.loads(out)["n_measurements"] < 36_312
+    assert 1 not in set(read_result(output).residuals["detector_id"])

@@ -120,7 +120,7 @@ def accumulate(
     return NormalEquations(at, gradient, hessian, of_sources, cross)
 
 
-def flatten(nested: Iterable[Iterable[AnyArray]]) -> list[AnyArray]:
+def _flatten(nested: Iterable[Iterable[AnyArray]]) -> list[AnyArray]:
     """Return the arrays of a list of rows, row after row."""
     return [values for row in nested for values in row]
 
@@ -143,10 +143,10 @@ def _sum_tiles(chunk: Linearised, i: int, sums: _TileSums) -> None:
     for axis in range(2):
         for a in range(2):
             sums.shared[axis, a, i] = products.displacement_source[axis][a]
-    rows = np.stack(flatten([*chunk.local, chunk.residual]), axis=1)
+    rows = np.stack(_flatten([*chunk.local, chunk.residual]), axis=1)
     rows = rows.reshape(len(rows), N_LOCAL + 1, -1)
     np.matmul(rows, rows.swapaxes(1, 2), out=sums.local[i])
-    mixed = np.stack(flatten(products.local_displacement), axis=1) @ basis
+    mixed = np.stack(_flatten(products.local_displacement), axis=1) @ basis
     sums.mixed[i] = mixed.reshape(sums.mixed[i].shape)
 
 

@@ -13,7 +13,8 @@ class OrbitData:
     Attributes
     ----------
     measurements : `schema.MEASUREMENT`, any row order
-    exposures : `schema.ENVIRONMENT`, one row per exposure
+    exposures : `schema.ENVIRONMENT`, one row per exposure with measurements: one without
+        has no roll, whose prior is flat, and a fit would say that the system is singular
     catalogue : `schema.CATALOGUE`, at least every measured source
     truth : `schema.TRUTH`, or None where there is no truth
     provenance : file name -> SHA-256 of what was read

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from solver.errors import InputError
+from solver.normal import chunks
 from solver.parameters import BY_NAME
-from solver.problem import build_problem
+from solver.problem import build_problem, thinned
 from solver.settings import MAX_ORDER, FitSettings
 from tests.solver.small_orbit import Design, epoch_places, make_orbit
 
@@ -125,3 +126,27 @@ def test_order_that_the_data_cannot_hold_is_refused_with_the_highest_that_they_c
 def test_data_that_hold_no_order_are_refused():
     with pytest.raises(InputError, match="no order fits"):
         build_problem(cut_down(12), Design().instrument, FitSettings(order=0))
+
+
+def test_thinned_problem_holds_the_measurements_of_the_kept_sources(problem, expansion_point):
+    theta, sources = expansion_point
+    keep = np.arange(problem.n_src) % 3 == 1
+    part = thinned(problem, keep)
+    rows = keep[problem.index.source]
+    np.testing.assert_array_equal(part.label, problem.label[rows])
+    ids = problem.sources["source_id"].to_numpy()
+    np.testing.assert_array_equal(part.sources["source_id"], ids[keep])
+    np.testing.assert_array_equal(
+        part.sources["source_id"].to_numpy()[part.index.source], ids[problem.index.source[rows]]
+    )
+    # Its model is that of the whole: the same measurements have the same residuals.
+    whole, found = (
+        np.concatenate([np.ravel(c.residual[0]) for c in chunks(p, theta, s)])[p.tiles.place]
+        for p, s in ((problem, sources), (part, sources[keep]))
+    )
+    np.testing.assert_allclose(found, whole[rows], atol=1e-6)
+
+
+def test_thinned_problem_has_the_shapes_of_the_whole(problem):
+    part = thinned(problem, np.arange(problem.n_src) % 2 == 0)
+    assert part.geometry.source_frame.shape == problem.geometry.source_frame.shape

@@ -3,7 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver.normal import accumulate
+from solver.problem import build_problem
 from solver.schur import reduce
+from solver.settings import FitSettings
 
 # The agreement that the elimination is held to, relative to the uncertainties.
 AGREEMENT = 1e-8
@@ -128,3 +131,27 @@ def test_values_that_are_not_finite_make_no_solution(equations, problem, expansi
     theta = equations.theta.copy()
     theta[2, 2] = np.nan
     assert reduce(replace(equations, theta=theta), problem.priors) is None
+
+
+def test_weak_directions_are_those_that_pointings_and_detectors_share(small_orbit, problem):
+    """Two shifts, a rotation and a scale, where the priors are as wide as the paper's."""
+    wide = build_problem(small_orbit.data, small_orbit.instrument, FitSettings())
+    origin = np.zeros(wide.layout.size), np.zeros((wide.n_src, 2))
+    reduced = reduce(accumulate(wide, *origin), wide.priors)
+    weak = reduced.weak_directions()
+    assert weak.shape[1] == 4
+    # A conditional sigma along them costs next to nothing, unlike one of any parameter alone.
+    cost = np.sum((reduced.factor @ weak) ** 2, axis=0)
+    assert cost.max() < 1e-6
+
+
+def test_held_directions_do_not_move(small_orbit):
+    wide = build_problem(small_orbit.data, small_orbit.instrument, FitSettings())
+    origin = np.zeros(wide.layout.size), np.zeros((wide.n_src, 2))
+    reduced = reduce(accumulate(wide, *origin), wide.priors)
+    weak = reduced.weak_directions()
+    right = np.random.default_rng(1).normal(size=wide.layout.size)
+    step, _ = reduced.solve(right, np.zeros((wide.n_src, 2)), weak)
+    scale = np.sqrt(np.diag(reduced.theta))
+    share = (weak * scale[:, None]).T @ (scale * step)
+    assert np.abs(share).max() < 1e-9 * np.linalg.norm(scale * step)

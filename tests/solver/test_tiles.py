@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from solver.forward import Index
+from solver.tiles import SLOTS, lay_tiles
+
+
+def measurements(lengths, seed=0):
+    """Return measurements of so many per exposure and detector, in working order."""
+    rng = np.random.default_rng(seed)
+    exposure = np.repeat([m for m, _ in lengths], list(lengths.values()))
+    detector = np.repeat([n for _, n in lengths], list(lengths.values()))
+    n_obs = len(exposure)
+    index = Index(rng.integers(0, 50, n_obs), exposure, detector)
+    return index, rng.normal(size=(n_obs, 2)), rng.uniform(0.5, 2.0, (n_obs, 2))
+
+
+LENGTHS = {
+    "one": {(0, 0): 1},
+    "exactly-full": {(0, 0): SLOTS, (0, 1): SLOTS},
+    "one-more": {(0, 0): SLOTS + 1, (1, 0): 3},
+    "uneven": {(0, 1): 5, (0, 3): 3 * SLOTS + 7, (2, 0): 40, (2, 1): 2 * SLOTS},
+}
+
+
+@pytest.fixture(params=LENGTHS)
+def laid(request):
+    index, measured, sigma = measurements(LENGTHS[request.param])
+    return index, measured, sigma, lay_tiles(index, measured, sigma)
+
+
+def by_slot(values, tiles):
+    """Return values as they lie in memory, one column for each of two axes."""
+    return np.moveaxis(values, 1, -1).reshape(-1, 2)[tiles.place]
+
+
+def test_every_measurement_has_a_slot_of_its_own(laid):
+    index, measured, sigma, tiles = laid
+    assert len(set(tiles.place)) == len(measured)
+    np.testing.assert_array_equal(by_slot(tiles.measured, tiles), measured)
+    np.testing.assert_array_equal(by_slot(tiles.weight, tiles), 1.0 / sigma)
+    np.testing.assert_array_equal(tiles.index.source.ravel()[tiles.place], index.source)
+
+
+def test_a_tile_holds_one_exposure_and_one_detector(laid):
+    index, _, _, tiles = laid
+    for found, expected in zip(tiles.index[1:], index[1:], strict=True):
+        whole = np.broadcast_to(found, tiles.index.source.shape)
+        np.testing.assert_array_equal(whole.ravel()[tiles.place], expected)
+
+
+def test_other_slots_have_no_weight(laid):
+    _, measured, _, tiles = laid
+    assert (tiles.weight != 0.0).sum() == measured.size
+
+
+def test_slots_by_source_hold_those_of_each_source(laid):
+    tiles = laid[-1]
+    order, first = tiles.by_source(50)
+    source = tiles.index.source.ravel()
+    assert first[-1] == len(order) == source.size
+    for i in range(50):
+        assert (source[order[first[i] : first[i + 1]]] == i).all()

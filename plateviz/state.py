@@ -125,6 +125,7 @@ def describe(settings: FitSettings) -> str:
     words += [f"{name} {format_width(name, w)}" for name, w in _changed(settings).items()]
     if not settings.aberration:
         words.append("no aberration")
+    words += [f"without {name}" for name in settings.exclusions.names()]
     return ", ".join(words)
 
 

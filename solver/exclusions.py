@@ -69,6 +69,14 @@ class Exclusions:
             data, measurements=rows, exposures=data.exposures[used].reset_index(drop=True)
         )
 
+    def names(self) -> list[str]:
+        """Return what is left out in words, in order."""
+        return [
+            *(f"source {number}" for number in sorted(self.sources)),
+            *(f"exposure {_text(pair)}" for pair in sorted(self.exposures)),
+            *(f"detector {number}" for number in sorted(self.detectors)),
+        ]
+
     def to_dict(self) -> dict[str, list]:
         """Return plain values; `from_dict` reads them back."""
         return {

@@ -74,3 +74,8 @@ def test_settings_written_before_there_were_exclusions_are_read():
     values = FitSettings().to_dict()
     del values["exclusions"]
     assert FitSettings.from_dict(values) == FitSettings()
+
+
+def test_exclusions_have_names_for_people():
+    found = parse_exclusions(["source=12", "exposure=1/20", "detector=3"]).names()
+    assert found == ["source 12", "exposure 1/20", "detector 3"]

@@ -18,7 +18,7 @@ from plateviz.cache import keep_compilations
 from solver.errors import FitError, InputError
 from solver.exclusions import parse_exclusions
 from solver.parameters import PARAMETERS
-from solver.settings import ENGINES, FitSettings, parse_width
+from solver.settings import ENGINES, FitSettings, NutsSettings, parse_width, svi_settings
 
 if TYPE_CHECKING:
     from plateviz.workbench import Workbench
@@ -139,7 +139,9 @@ def fit(
     truth: Annotated[Path | None, _TRUTH] = None,
     orbit: Annotated[int | None, _ORBIT] = None,
     order: Annotated[int, typer.Option(help="Order of the distortion, 0 to 9.")] = 5,
-    engine: Annotated[str, typer.Option(help=f"One of: {', '.join(ENGINES)}.")] = ENGINES[0],
+    engine: Annotated[
+        str, typer.Option(help=f"One of: {', '.join(ENGINES)}; or all, to see whether they agree.")
+    ] = ENGINES[0],
     prior: Annotated[
         list[str] | None,
         typer.Option(
@@ -159,43 +161,41 @@ def fit(
     aberration: Annotated[
         bool, typer.Option(help="Model the aberration by the observer's velocity.")
     ] = True,
+    thin: Annotated[
+        int, typer.Option(help="Use one in so many sources, for a quick look or nuts.", min=1)
+    ] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of svi and nuts.", min=0)] = 0,
+    steps: Annotated[
+        int | None, typer.Option(help="Steps over which svi's learning rate falls.", min=1)
+    ] = None,
+    compat: Annotated[
+        str | None,
+        typer.Option(help="warpfield: svi in the units and with the rates of the published code."),
+    ] = None,
+    checkpoint: Annotated[
+        Path | None,
+        typer.Option(help="File to keep an svi run in; a run that was stopped goes on from it."),
+    ] = None,
     instrument: Annotated[Path | None, _INSTRUMENT] = None,
     as_json: Annotated[bool, _JSON] = False,
 ) -> None:
     """Solve one orbit and write the solution."""
-    from plateviz.cli_output import print_fit, print_json, reporting
+    from plateviz.cli_fit import FitRequest, run_fit
     from plateviz.source import OrbitFiles
-    from solver.io.atomic import require_writable
 
-    start = time.perf_counter()
-    require_writable(output)
     settings = FitSettings(
-        order, engine, _prior_widths(prior or []), aberration, parse_exclusions(exclude or [])
+        order,
+        ENGINES[0] if engine == "all" else engine,
+        _prior_widths(prior or []),
+        aberration,
+        parse_exclusions(exclude or []),
+        thin=thin,
+        svi=svi_settings(compat, steps, seed),
+        nuts=NutsSettings(seed=seed),
     )
     files = OrbitFiles(str(observations), str(reference), _text(truth), orbit, _text(instrument))
-    with reporting("reading the orbit") as reporter:
-        focal_plane, data = files.read_instrument(), files.read(orbit)
-        read = time.perf_counter()
-        reporter.say("loading the solver")
-        keep_compilations()
-        from solver.fit import fit_orbit
-        from solver.io.result import write_result
-
-        result = fit_orbit(
-            data, focal_plane, settings, lambda it: reporter.say(f"iteration {it.iteration}")
-        )
-        reporter.say("writing the result")
-        fitted = time.perf_counter()
-        write_result(result, output)
-    seconds = {"read": read - start, **dict(result.summary["seconds"])}
-    seconds["write"] = time.perf_counter() - fitted
-    summary = {**result.summary, "seconds": seconds, "output": str(output)}
-    if as_json:
-        print_json(summary)
-    else:
-        print_fit(summary, output)
-    if not summary["converged"]:
-        raise FitError(f"orbit {summary['orbit']} has not converged: {summary['reason']}")
+    engines = ENGINES if engine == "all" else (engine,)
+    run_fit(FitRequest(files, orbit, settings, engines, output, checkpoint), as_json)
 
 
 @app.command()

@@ -1,16 +1,19 @@
 """What the command line prints: progress on standard error, results on standard output."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from plateviz.job import Job, JobStatus
+
+if TYPE_CHECKING:
+    from solver.agreement import Comparison
 
 _ERRORS = Console(stderr=True)
 
@@ -73,7 +76,8 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
             f"{summary['n_measurements']} measurements of {summary['n_sources']} sources "
             f"({summary['n_reference']} reference) on {summary['n_exposures']} exposures",
         ),
-        ("fit", f"{verdict} after {summary['iterations']} iterations: {summary['reason']}"),
+        ("engine", _engine(summary)),
+        ("fit", f"{verdict}: {summary['reason']}"),
         ("chi2 per degree of freedom", _chi2(summary)),
         ("residual rms", _milli_pixels(summary)),
         ("normalised deviation", _deviations(summary)),
@@ -85,6 +89,13 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
     width = max(len(name) for name, _ in rows)
     for name, words in rows:
         typer.echo(f"{name:<{width}}  {words}")
+
+
+def print_agreement(rows: Iterable["Comparison"]) -> None:
+    """Print what the engines say of each other, for people."""
+    for row in rows:
+        verdict = "agrees" if row.agrees else "DOES NOT AGREE"
+        typer.echo(f"{row.engine}: {row.what}: {row.found:.3g} (limit {row.limit:.3g}), {verdict}")
 
 
 def print_inspection(reports: list[dict[str, Any]]) -> None:
@@ -104,6 +115,21 @@ def _column(column: Mapping[str, Any]) -> str:
     values = f"{column['min']} to {column['max']}" if column.get("min") is not None else ""
     unit = f" {column['unit']}" if column.get("unit") else ""
     return f"{column['name']:<18} {column['type']:<8} {values}{unit}  ({meaning})"
+
+
+def _engine(summary: Mapping[str, Any]) -> str:
+    if summary["engine"] == "nuts" and "samples" in summary:
+        return (
+            f"nuts, {summary['samples']} samples of {summary['chains']} chains, "
+            f"{summary['divergences']} divergent steps, R-hat at most "
+            f"{summary['largest_r_hat']:.3f}, at least "
+            f"{summary['smallest_effective_samples']:.0f} effective samples "
+            f"(by {summary['mixing_by']})"
+        )
+    return f"{summary['engine']}, {summary['iterations']} {_COUNTED[summary['engine']]}"
+
+
+_COUNTED = {"gauss-newton": "iterations", "svi": "steps", "nuts": "samples"}
 
 
 def _chi2(summary: Mapping[str, Any]) -> str:

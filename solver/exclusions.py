@@ -61,13 +61,7 @@ class Exclusions:
                 f"exclusions: expected some measurements of orbit {data.orbit_id} to be left, "
                 f"found that all {len(rows)} are excluded"
             )
-        rows = rows[~gone]
-        left = set(zip(rows["field_id"], rows["plate_id"], strict=True))
-        plates = zip(data.exposures["field_id"], data.exposures["plate_id"], strict=True)
-        used = np.fromiter((plate in left for plate in plates), bool, len(data.exposures))
-        return replace(
-            data, measurements=rows, exposures=data.exposures[used].reset_index(drop=True)
-        )
+        return _of_rows(data, ~gone)
 
     def names(self) -> list[str]:
         """Return what is left out in words, in order."""
@@ -93,6 +87,32 @@ class Exclusions:
             frozenset((field, plate) for field, plate in values["exposures"]),
             frozenset(values["detectors"]),
         )
+
+
+def thinned_orbit(data: OrbitData, whole: OrbitData, every: int) -> OrbitData:
+    """Return the orbit with one in so many of its reference sources and of its others.
+
+    Parameters
+    ----------
+    data : the orbit, or what exclusions left of it
+    whole : the orbit, from which the sources are chosen: the same whatever is excluded
+    """
+    if every == 1:
+        return data
+    measured = np.unique(whole.measurements["source_id"].to_numpy())
+    reference = whole.catalogue.set_index("source_id").loc[measured, "is_reference"].to_numpy(bool)
+    kept = np.concatenate([measured[reference][::every], measured[~reference][::every]])
+    return _of_rows(data, data.measurements["source_id"].isin(kept).to_numpy())
+
+
+def _of_rows(data: OrbitData, chosen: np.ndarray) -> OrbitData:
+    """Return the orbit with some measurements, and the exposures that these are of."""
+    rows = data.measurements[chosen]
+    left = set(zip(rows["field_id"], rows["plate_id"], strict=True))
+    plates = zip(data.exposures["field_id"], data.exposures["plate_id"], strict=True)
+    used = np.fromiter((plate in left for plate in plates), bool, len(data.exposures))
+    exposures = data.exposures[used].reset_index(drop=True)
+    return replace(data, measurements=rows, exposures=exposures)
 
 
 def parse_exclusions(texts: Iterable[str]) -> Exclusions:

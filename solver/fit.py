@@ -3,20 +3,23 @@
 import time
 from collections.abc import Callable
 
+from solver.engines import Resumption, estimate
 from solver.errors import FitError
-from solver.gauss_newton import Iteration, Mode, find_mode
+from solver.estimate import Estimate
+from solver.exclusions import thinned_orbit
+from solver.gauss_newton import Iteration, Mode
 from solver.instrument import MINI_MOCK, Instrument
-from solver.leverage import covariances, residuals
 from solver.orbit import OrbitData
 from solver.problem import Problem, build_problem
-from solver.result import FitResult, FitStatus
+from solver.result import FitResult
 from solver.settings import FitSettings
 from solver.summary import summarise, truth_summary
 from solver.tables import (
-    Solution,
     calibration_table,
     exposure_table,
+    loss_table,
     residual_table,
+    solution_of,
     source_table,
     trace_table,
     true_places,
@@ -29,6 +32,7 @@ def fit_orbit(
     instrument: Instrument = MINI_MOCK,
     settings: FitSettings | None = None,
     progress: Callable[[Iteration], None] = lambda _: None,
+    resumption: Resumption | None = None,
 ) -> FitResult:
     """Solve one orbit.
 
@@ -38,6 +42,7 @@ def fit_orbit(
     instrument : nominal focal plane; its detectors' ids are those of the measurements
     settings : the defaults are the paper's
     progress : called after every iteration; what it raises stops the fit
+    resumption : where the svi engine is to go on, and who keeps its state
 
     Returns
     -------
@@ -50,7 +55,7 @@ def fit_orbit(
     FitError
         If no solution with uncertainties exists; the message says why.
     """
-    return OrbitFitter(data, instrument).fit(settings or FitSettings(), progress)
+    return OrbitFitter(data, instrument).fit(settings or FitSettings(), progress, resumption)
 
 
 class OrbitFitter:
@@ -61,21 +66,26 @@ class OrbitFitter:
         self._data = data
         self._instrument = instrument
         self._kept: tuple[FitSettings, Problem, Mode] | None = None
+        self._stopped: tuple[FitSettings, object] | None = None
 
     def fit(
         self,
         settings: FitSettings,
         progress: Callable[[Iteration], None] = lambda _: None,
+        resumption: Resumption | None = None,
     ) -> FitResult:
-        """Solve the orbit from the start; arguments and errors as those of `fit_orbit`."""
+        """Solve the orbit from the start; arguments and errors as those of `fit_orbit`.
+
+        A run of the svi engine that was stopped is gone on with where it was.
+        """
         start = time.perf_counter()
-        data = settings.exclusions.without(self._data)
-        problem = build_problem(data, self._instrument, settings)
+        data, problem = self._prepare(settings)
         prepared = time.perf_counter()
-        mode = find_mode(problem, settings, progress)
-        result = _result(data, self._instrument, settings, problem, mode, (start, prepared))
-        if mode.status is FitStatus.CONVERGED:
-            self._kept = settings, problem, mode
+        found = estimate(problem, settings, progress, resumption or self._resumption(settings))
+        result = _result(data, self._instrument, settings, problem, found, (start, prepared))
+        self._stopped = None
+        if found.mode.status.is_solution:
+            self._kept = settings, problem, found.mode
         return result
 
     def what_if(self, settings: FitSettings) -> FitResult | None:
@@ -89,13 +99,25 @@ class OrbitFitter:
         if self._kept is None or self._kept[0].aberration != settings.aberration:
             return None
         start = time.perf_counter()
-        data = settings.exclusions.without(self._data)
-        problem = build_problem(data, self._instrument, settings)
+        data, problem = self._prepare(settings)
         prepared = time.perf_counter()
         mode = re_solve(self._kept[2], self._kept[1], problem, settings)
         if mode is None:
             return None
-        return _result(data, self._instrument, settings, problem, mode, (start, prepared))
+        found = Estimate(mode)
+        return _result(data, self._instrument, settings, problem, found, (start, prepared))
+
+    def _prepare(self, settings: FitSettings) -> tuple[OrbitData, Problem]:
+        data = settings.exclusions.without(self._data)
+        data = thinned_orbit(data, self._data, settings.thin)
+        return data, build_problem(data, self._instrument, settings)
+
+    def _resumption(self, settings: FitSettings) -> Resumption:
+        def keep(state: object) -> None:
+            self._stopped = settings, state
+
+        asked_again = self._stopped is not None and self._stopped[0] == settings
+        return Resumption(self._stopped[1] if asked_again and self._stopped else None, keep)
 
 
 def _result(
@@ -103,16 +125,15 @@ def _result(
     instrument: Instrument,
     settings: FitSettings,
     problem: Problem,
-    mode: Mode,
+    found: Estimate,
     times: tuple[float, float],
 ) -> FitResult:
+    mode = found.mode
     if mode.reduced is None:
         raise FitError(f"orbit {data.orbit_id}: {mode.status.value}")
     start, prepared = times
-    covariance = covariances(mode.reduced)
     solved = time.perf_counter()
-    at_mode = residuals(problem, mode.theta, mode.sources, covariance)
-    solution = Solution(problem, mode, mode.reduced, covariance, at_mode)
+    solution = solution_of(problem, found, mode.reduced)
     sources, places = source_table(solution), true_places(solution, data.truth)
     tables = {
         "sources": sources,
@@ -121,13 +142,14 @@ def _result(
         "exposures": exposure_table(solution),
         "trace": trace_table(mode),
         "true_places": places,
+        "losses": loss_table(found.losses),
     }
     seconds = {
         "prepare": prepared - start,
         "fit": solved - prepared,
         "diagnose": time.perf_counter() - solved,
     }
-    summary = summarise(solution, settings, seconds)
+    summary = {**summarise(solution, settings, seconds), **found.figures}
     if places is not None:
         summary["truth"] = truth_summary(sources, places)
     return FitResult(**tables, summary=summary, settings=settings, provenance=dict(data.provenance))

@@ -6,6 +6,7 @@ one measurement touches lie in three runs of columns.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int, Shaped
@@ -15,6 +16,8 @@ from solver.parameters import CALIBRATION_GROUPS, Group, groups_on
 PER_EXPOSURE = groups_on("exp")
 PER_COEFFICIENT = groups_on("coef")
 PER_DETECTOR = groups_on("det")
+# NumPy's or JAX's.
+AnyArray = Any
 # The groups of which a measurement touches one element each.
 LOCAL_GROUPS = PER_EXPOSURE + PER_DETECTOR
 
@@ -77,6 +80,6 @@ class Layout:
             flat[self.columns(group)] = values[group.name]
         return flat
 
-    def scatter(self, flat: Shaped[np.ndarray, " calib"]) -> dict[str, Shaped[np.ndarray, " _"]]:
-        """Return the values per group of a flat vector."""
+    def scatter(self, flat: Shaped[AnyArray, " calib"]) -> dict[str, Shaped[AnyArray, " _"]]:
+        """Return the values per group of a flat vector, of NumPy or JAX."""
         return {group.name: flat[self.columns(group)] for group in CALIBRATION_GROUPS}

@@ -51,6 +51,39 @@ def half_chi2(
     return 0.5 * (jnp.sum(whitened[0] ** 2) + jnp.sum(whitened[1] ** 2))
 
 
+@jax.custom_vjp
+def half_chi2_of_chunks(
+    offsets: Offsets,
+    geometry: Geometry,
+    index: Index,
+    measured: Float[AnyArray, "chunk 2 tile slot"],
+    weight: Float[AnyArray, "chunk 2 tile slot"],
+) -> Float[Array, ""]:
+    """Return `half_chi2` of all chunks, for JAX to differentiate once by the offsets.
+
+    Value and gradient are made together, one chunk after the other, so that neither needs
+    more memory than one chunk does.
+    """
+    return _with_gradient(offsets, geometry, index, measured, weight)[0]
+
+
+def _with_gradient(
+    offsets: Offsets, geometry: Geometry, *chunks: AnyArray
+) -> tuple[Float[Array, ""], Offsets]:
+    def add(total: tuple, chunk: tuple) -> tuple[tuple, None]:
+        return _add_chunk(total, offsets, geometry, *chunk), None
+
+    start = jax.tree.map(jnp.zeros_like, (jnp.zeros(()), offsets))
+    return jax.lax.scan(add, start, chunks)[0]
+
+
+def _scaled_gradient(gradient: Offsets, scale: Float[Array, ""]) -> tuple:
+    return jax.tree.map(lambda values: scale * values, gradient), None, None, None, None
+
+
+half_chi2_of_chunks.defvjp(_with_gradient, _scaled_gradient)
+
+
 @jax.jit
 def _add_chunk(
     total: tuple[Float[Array, ""], Offsets], offsets: Offsets, *chunk: AnyArray

@@ -245,7 +245,10 @@ def _priors(
     layout: Layout,
 ) -> Priors:
     is_gamma = {
-        g.name: np.full(len(centres[g.name]), g.family == "gamma") for g in CALIBRATION_GROUPS
+        g.name: np.full(
+            len(centres[g.name]), g.family == "gamma" and np.isfinite(settings.width(g.name))
+        )
+        for g in CALIBRATION_GROUPS
     }
     return Priors(
         centre=layout.gather(centres),

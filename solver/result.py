@@ -18,8 +18,26 @@ class FitStatus(Enum):
     RE_SOLVED = "one step of the linearised model, which a refit would confirm"
     MAX_ITERATIONS = "the limit of iterations was reached before the steps became small"
     STUCK = "no part of the step made chi2 fall any further, and the steps are not small"
+    AT_REST = "the loss has come to rest, and the linearised problem puts the mode there"
+    SAMPLED = "the chains agree with each other, and none of their steps diverged"
+    UNMIXED = "the chains do not agree with each other yet, or some of their steps diverged"
+    STALLED = "the loss has come to rest, but the linearised problem puts the mode elsewhere"
+    MAX_STEPS = "the limit of steps was reached before the loss came to rest"
     SINGULAR = "the data and the priors together leave a direction of the solution open"
     NOT_FINITE = "the residuals are not finite: a start value is far from the truth"
+
+    @property
+    def is_solution(self) -> bool:
+        """Whether the engine ended where it was to."""
+        return self in _SOLUTIONS
+
+
+_SOLUTIONS = (
+    FitStatus.CONVERGED,
+    FitStatus.RE_SOLVED,
+    FitStatus.AT_REST,
+    FitStatus.SAMPLED,
+)
 
 
 @dataclass(frozen=True)
@@ -37,6 +55,7 @@ class FitResult:
     settings : the choices that made it
     provenance : file name -> SHA-256 of the inputs
     true_places : `schema.TRUE_PLACES`, or None where there is no truth
+    losses : `schema.LOSSES`, or None of an engine without a loss
     """
 
     sources: pd.DataFrame
@@ -48,6 +67,7 @@ class FitResult:
     settings: FitSettings
     provenance: Mapping[str, str] = field(default_factory=dict)
     true_places: pd.DataFrame | None = None
+    losses: pd.DataFrame | None = None
 
     @property
     def orbit_id(self) -> int:

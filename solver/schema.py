@@ -267,6 +267,14 @@ TRACE = Table(
     ),
 )
 
+LOSSES = Table(
+    "losses",
+    (
+        Column("step", "int64", "", "step of the svi engine, from 1"),
+        Column("loss", "float64", "", "minus the evidence lower bound, of one draw"),
+    ),
+)
+
 TRUE_PLACES = Table(
     "true_places",
     (
@@ -279,4 +287,4 @@ TRUE_PLACES = Table(
     key=("source_id",),
 )
 
-RESULT_TABLES = (SOURCES, RESIDUALS, CALIBRATION, EXPOSURES, TRACE, TRUE_PLACES)
+RESULT_TABLES = (SOURCES, RESIDUALS, CALIBRATION, EXPOSURES, TRACE, LOSSES, TRUE_PLACES)

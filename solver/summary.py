@@ -9,7 +9,6 @@ from solver.diagnostics import (
     mean_covariance,
     normalised_deviation,
 )
-from solver.result import FitStatus
 from solver.settings import FitSettings
 from solver.tables import Solution
 
@@ -32,11 +31,11 @@ def summarise(
     dof = whitened.size - parameters
     scatter = np.sqrt(np.mean((whitened * problem.sigma) ** 2, axis=0))
     return {
-        "converged": mode.status is FitStatus.CONVERGED,
+        "converged": mode.status.is_solution,
         "reason": mode.status.value,
         "engine": settings.engine,
         "order": settings.order,
-        "iterations": len(mode.trace) - 1,
+        "iterations": mode.trace[-1].iteration,
         "orbit": int(problem.exposures["orbit_id"].iloc[0]),
         "epoch_mjd": problem.epoch,
         "n_measurements": problem.n_obs,

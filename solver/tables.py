@@ -10,25 +10,65 @@ from solver.astrometry import frames_at, sky_position
 from solver.diagnostics import induced_shift
 from solver.distortion import terms
 from solver.ephemeris import observer_at
+from solver.estimate import Estimate
 from solver.gauss_newton import Mode
 from solver.instrument import Instrument
-from solver.leverage import Covariances, Residuals
+from solver.leverage import Covariances, Residuals, covariances, residuals
 from solver.parameters import CALIBRATION_GROUPS, Group
 from solver.problem import Problem
 from solver.projection import displace
-from solver.schema import CALIBRATION, EXPOSURES, RESIDUALS, SOURCES, TRACE, TRUE_PLACES, Table
+from solver.schema import (
+    CALIBRATION,
+    EXPOSURES,
+    LOSSES,
+    RESIDUALS,
+    SOURCES,
+    TRACE,
+    TRUE_PLACES,
+    Table,
+)
 from solver.schur import Reduced
 from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
 
 
 class Solution(NamedTuple):
-    """A mode with what follows from it, from which all tables are made."""
+    """A mode with what follows from it, from which all tables are made.
+
+    `covariance` holds those of the linearised problem; what the tables say of the sources is
+    `conditional`, with the calibration held fixed, and `marginal` (both mas^2), and of the
+    calibration `theta_variance`: the engine's own where it has them.
+    """
 
     problem: Problem
     mode: Mode
     reduced: Reduced
     covariance: Covariances
     residuals: Residuals
+    conditional: Float[np.ndarray, "src 2 2"]
+    marginal: Float[np.ndarray, "src 2 2"]
+    theta_variance: Float[np.ndarray, " calib"]
+
+
+def solution_of(problem: Problem, found: Estimate, reduced: Reduced) -> Solution:
+    """Return an estimate with all covariances and the residuals.
+
+    Parameters
+    ----------
+    reduced : the problem linearised at the estimate
+    """
+    covariance = covariances(reduced)
+    theta, sources = found.mode.theta, found.mode.sources
+    conditional, marginal, calibration = found.conditional, found.marginal, found.calibration
+    return Solution(
+        problem,
+        found.mode,
+        reduced,
+        covariance,
+        residuals(problem, theta, sources, covariance),
+        reduced.conditional_covariance() if conditional is None else conditional,
+        covariance.source if marginal is None else marginal,
+        np.diag(covariance.theta if calibration is None else calibration),
+    )
 
 
 def source_table(solution: Solution) -> pd.DataFrame:
@@ -47,8 +87,8 @@ def source_table(solution: Solution) -> pd.DataFrame:
         "n_obs": np.bincount(index, minlength=n_src),
         "ra": ra,
         "dec": dec,
-        **_uncertainties("conditional", solution.reduced.conditional_covariance()),
-        **_uncertainties("marginal", solution.covariance.source),
+        **_uncertainties("conditional", solution.conditional),
+        **_uncertainties("marginal", solution.marginal),
         "prior_ra": prior_ra,
         "prior_dec": prior_dec,
         "prior_sigma_ra": prior_sigma[:, 0],
@@ -96,7 +136,7 @@ def calibration_table(solution: Solution, instrument: Instrument) -> pd.DataFram
     """Return `schema.CALIBRATION`: every group of the parameter table but the sources."""
     problem, theta = solution.problem, solution.mode.theta
     priors = problem.priors
-    marginal = np.diag(solution.covariance.theta)
+    marginal = solution.theta_variance
     of_columns = {
         "offset": theta,
         "prior_sigma": priors.width,
@@ -127,6 +167,13 @@ def calibration_table(solution: Solution, instrument: Instrument) -> pd.DataFram
 def trace_table(mode: Mode) -> pd.DataFrame:
     """Return `schema.TRACE`."""
     return pd.DataFrame(mode.trace, columns=TRACE.names)
+
+
+def loss_table(losses: Float[np.ndarray, " step"] | None) -> pd.DataFrame | None:
+    """Return `schema.LOSSES`, of an engine that has a loss."""
+    if losses is None:
+        return None
+    return _frame({"step": np.arange(1, len(losses) + 1), "loss": losses}, LOSSES)
 
 
 def true_places(solution: Solution, truth: pd.DataFrame | None) -> pd.DataFrame | None:

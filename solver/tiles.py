@@ -1,6 +1,6 @@
 """Tiles: measurements of one exposure on one detector, side by side.
 
-A tile is a row of `SLOTS` places, filled from the measurements in working order; the last
+A tile is a row of slots, filled from the measurements in working order; the last
 one of an exposure and detector is filled up with copies of no weight. What belongs to the
 exposure or the detector is then looked up once for each tile, and every loop over
 measurements runs along contiguous memory. Tiles are worked on a chunk at a time.
@@ -13,8 +13,10 @@ from jaxtyping import Float, Int
 
 from solver.forward import Index
 
-# Long enough for the vector units, short enough to waste few places.
+# Long enough for the vector units, short enough to waste few places; the shorter where an
+# exposure has few measurements on a detector. Each length is a compilation.
 SLOTS = 128
+FEW_SLOTS = 16
 # Long enough to keep the cores busy, short enough to stay in their caches. One length means
 # one compilation, whatever the number of measurements.
 CHUNK = 256
@@ -55,13 +57,14 @@ def lay_tiles(
     changes = np.flatnonzero(np.diff(index.exposure) | np.diff(index.detector)) + 1
     first = np.concatenate([[0], changes])
     length = np.diff(first, append=n_obs)
-    tiles = -(-length // SLOTS)
+    slots = SLOTS if length.mean() > 2 * FEW_SLOTS else FEW_SLOTS
+    tiles = -(-length // slots)
     n_chunks = -(-tiles.sum() // CHUNK)
-    place = np.repeat(SLOTS * (np.cumsum(tiles) - tiles) - first, length) + np.arange(n_obs)
+    place = np.repeat(slots * (np.cumsum(tiles) - tiles) - first, length) + np.arange(n_obs)
     # Empty slots repeat the measurement before them.
-    row = np.zeros(n_chunks * CHUNK * SLOTS, dtype=np.int64)
+    row = np.zeros(n_chunks * CHUNK * slots, dtype=np.int64)
     row[place] = np.arange(n_obs)
-    row = np.maximum.accumulate(row).reshape(n_chunks, CHUNK, SLOTS)
+    row = np.maximum.accumulate(row).reshape(n_chunks, CHUNK, slots)
     weight = np.zeros((2, row.size))
     weight[:, place] = 1.0 / sigma.T
     head = row[:, :, :1]

@@ -13,4 +13,4 @@ def convergence(result: FitResult) -> pd.DataFrame:
     The columns of `schema.TRACE` and `tolerance`, the limit of `largest_step` (both in
     units of the parameter's uncertainty)
     """
-    return result.trace.assign(tolerance=result.settings.tolerance).reset_index(drop=True)
+    return result.trace.assign(tolerance=result.settings.step_tolerance).reset_index(drop=True)

@@ -2,6 +2,7 @@
 
 import struct
 import warnings
+import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -33,6 +34,7 @@ _RAISED_ON_DAMAGE = (
     VerifyError,
     YamlParseError,
     struct.error,
+    zipfile.BadZipFile,
     zlib.error,
 )
 _LONGEST_REASON = 300

@@ -22,6 +22,8 @@ from solver.settings import FitSettings
 
 _SUMMARY = "SUMMARY"
 _SECTIONS = ("summary", "settings", "provenance")
+# Tables that not every result has.
+_OPTIONAL = {"true_places": layout.TRUE_PLACES, "losses": layout.LOSSES}
 _KINDS = {"int64": "iu", "float64": "f", "bool": "b", "str": "SU"}
 
 
@@ -58,8 +60,10 @@ def write_result(result: FitResult, path: Path) -> None:
                 _derived_hdu(_SUMMARY, _summary_columns(result)),
             ]
         )
-        if result.true_places is not None:
-            hdus.append(_table_hdu(layout.TRUE_PLACES, result.true_places))
+        for name, kept in _OPTIONAL.items():
+            frame = getattr(result, name)
+            if frame is not None:
+                hdus.append(_table_hdu(kept, frame))
         hdus.writeto(temporary, overwrite=True, checksum=True)
 
 
@@ -83,7 +87,6 @@ def to_result(path: Path, file: FitsFile) -> FitResult:
     sections = _read_summary(path, _table(path, file, _SUMMARY))
     with reading(f"{path}, HDU {_SUMMARY}", "the settings of a fit"):
         settings = FitSettings.from_dict(sections["settings"])
-    places = layout.TRUE_PLACES
     return FitResult(
         sources=_frame(path, file, layout.RESULT),
         residuals=_frame(path, file, layout.SAMPLE),
@@ -93,7 +96,10 @@ def to_result(path: Path, file: FitsFile) -> FitResult:
         summary=sections["summary"],
         settings=settings,
         provenance=sections["provenance"],
-        true_places=_frame(path, file, places) if places.hdu in file.tables else None,
+        **{
+            name: _frame(path, file, kept) if kept.hdu in file.tables else None
+            for name, kept in _OPTIONAL.items()
+        },
     )
 
 

@@ -45,8 +45,22 @@ def test_fit_prints_one_object_and_writes_the_result(run, sample, tmp_path):
 def test_fit_prints_a_summary_for_people(run, sample, tmp_path):
     code, out, _ = run("fit", *sample[:2], "-o", tmp_path / "r.fits", "--order", "3")
     assert code == 0
-    assert "converged after" in out
+    assert "converged: every step" in out
+    assert "gauss-newton, " in out
     assert "36312 measurements of 814 sources (58 reference)" in out
+
+
+def test_svi_that_was_stopped_goes_on_from_its_file(run, sample, tmp_path):
+    """At its limit of steps it is no solution, and says so; its file is gone all the same."""
+    output, kept = tmp_path / "r.fits", tmp_path / "run.npz"
+    options = ["--engine", "svi", "--steps", "50", "--thin", "20", "--checkpoint", kept]
+    code, out, err = run("fit", *sample[:2], "-o", output, *options, "--json")
+    summary = json.loads(out)
+    assert code == 1
+    assert "the limit of steps was reached" in err
+    assert (summary["engine"], summary["iterations"]) == ("svi", 100)
+    assert not kept.exists()
+    assert len(read_result(output).losses) == 100
 
 
 @pytest.mark.parametrize(
@@ -54,13 +68,25 @@ def test_fit_prints_a_summary_for_people(run, sample, tmp_path):
     [
         (["--order", "12"], "expected a distortion order from 0 to 9, found 12"),
         (["--engine", "magic"], "found 'magic'"),
+        (["--engine", "svi", "--compat", "pyro"], "expected warpfield"),
+        (["--checkpoint", "run.npz"], "--checkpoint: expected the engine svi"),
         (["--prior", "distortion_x"], "expected GROUP=VALUE, found 'distortion_x'"),
         (["--prior", "nothing=1"], "found 'nothing'"),
         (["--prior", "distortion_x=1deg"], "prior of distortion_x: expected a unit out of"),
         (["--orbit", "99"], "99"),
         (["--instrument", "none.toml"], "none.toml: expected an instrument in TOML"),
     ],
-    ids=["order", "engine", "no value", "group", "unit", "orbit", "instrument"],
+    ids=[
+        "order",
+        "engine",
+        "compat",
+        "checkpoint",
+        "no value",
+        "group",
+        "unit",
+        "orbit",
+        "instrument",
+    ],
 )
 def test_a_mistake_ends_with_two_and_one_message(run, sample, tmp_path, options, message):
     code, out, err = run("fit", *sample[:2], "-o", tmp_path / "r.fits", *options)

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
+from solver.estimate import Estimate
 from solver.fit import fit_orbit
 from solver.forward import predict
 from solver.gauss_newton import find_mode
 from solver.io.read import read_orbit
-from solver.leverage import covariances, residuals
 from solver.normal import accumulate
 from solver.parameters import CALIBRATION_GROUPS, SOURCES
 from solver.problem import build_problem
 from solver.schur import reduce
 from solver.settings import FitSettings
-from solver.tables import Solution
+from solver.tables import solution_of
 from tests.solver.small_orbit import make_orbit, true_offsets
 
 # Tiles; one length for all, since each costs a compilation. A small orbit fills it twice.
@@ -64,9 +64,7 @@ def solve(orbit, settings=None):
     settings = settings or FitSettings()
     problem = build_problem(orbit.data, orbit.instrument, settings)
     mode = find_mode(problem, settings)
-    covariance = covariances(mode.reduced)
-    at_mode = residuals(problem, mode.theta, mode.sources, covariance)
-    return Solution(problem, mode, mode.reduced, covariance, at_mode)
+    return solution_of(problem, Estimate(mode), mode.reduced)
 
 
 @pytest.fixture(scope="session")

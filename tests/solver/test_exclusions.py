@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from solver.errors import InputError
-from solver.exclusions import Exclusions, parse_exclusions
+from solver.exclusions import Exclusions, parse_exclusions, thinned_orbit
 from solver.settings import FitSettings
 
 
@@ -79,3 +79,22 @@ def test_settings_written_before_there_were_exclusions_are_read():
 def test_exclusions_have_names_for_people():
     found = parse_exclusions(["source=12", "exposure=1/20", "detector=3"]).names()
     assert found == ["source 12", "exposure 1/20", "detector 3"]
+
+
+def test_thinned_orbit_keeps_a_share_of_each_class(small_orbit):
+    data = small_orbit.data
+    is_reference = data.catalogue.set_index("source_id")["is_reference"]
+
+    def counts(orbit):
+        return np.bincount(is_reference.loc[orbit.measurements["source_id"].unique()], minlength=2)
+
+    thinned = thinned_orbit(data, data, 3)
+    np.testing.assert_array_equal(counts(thinned), -(-counts(data) // 3))
+    assert thinned_orbit(data, data, 1) is data
+
+
+def test_thinned_orbit_keeps_the_same_sources_whatever_is_excluded(small_orbit):
+    data = small_orbit.data
+    kept = thinned_orbit(data, data, 3).measurements["source_id"].unique()
+    left = Exclusions(sources=frozenset([int(kept[0])])).without(data)
+    assert set(thinned_orbit(left, data, 3).measurements["source_id"]) == set(kept[1:])

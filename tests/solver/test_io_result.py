@@ -84,6 +84,12 @@ def test_round_trip_without_truth(tmp_path, result):
     _assert_equal(read_result(path), without_truth(result))
 
 
+def test_round_trip_with_the_losses_of_svi(tmp_path, result):
+    losses = pd.DataFrame({"step": np.arange(1, 4), "loss": [3.5e9, -2.25, np.pi]})
+    write_result(replace(result, losses=losses), tmp_path / "r.fits")
+    pd.testing.assert_frame_equal(read_result(tmp_path / "r.fits").losses, losses)
+
+
 def test_round_trip_without_distortion_or_trace(tmp_path, result):
     kept = ~result.calibration["group"].str.startswith("distortion")
     bare = replace(

@@ -5,7 +5,15 @@ import pytest
 
 from solver.errors import InputError
 from solver.parameters import BY_NAME, PARAMETERS
-from solver.settings import FitSettings, format_width, parse_width
+from solver.settings import (
+    WARPFIELD,
+    FitSettings,
+    NutsSettings,
+    SviSettings,
+    format_width,
+    parse_width,
+    svi_settings,
+)
 
 
 def test_defaults_are_the_papers():
@@ -118,3 +126,46 @@ def test_written_width_that_is_none_is_refused(name, text, complaint):
 @pytest.mark.parametrize("width", [0.25, 3600.0, np.inf], ids=str)
 def test_formatted_width_is_read_back(name, width):
     assert parse_width(name, format_width(name, width)) == width
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: SviSettings(steps=0), "svi steps to be 1 or more, found 0"),
+        (lambda: SviSettings(patience=2.5), "svi patience to be 1 or more, found 2.5"),
+        (lambda: SviSettings(max_steps=100), r"not to be below steps \(2000\), found 100"),
+        (lambda: SviSettings(last_rate=1e5), "rates that fall and are positive"),
+        (lambda: SviSettings(last_rate=0.0), "rates that fall and are positive"),
+        (lambda: SviSettings(tolerance=0.0), "positive svi tolerance, found 0.0"),
+        (lambda: SviSettings(seed=-1), "svi seed to be 0 or more, found -1"),
+        (lambda: NutsSettings(chains=0), "nuts chains to be 1 or more, found 0"),
+        (lambda: NutsSettings(samples=3), "nuts samples to be 4 or more, found 3"),
+        (lambda: FitSettings(thin=0), "thin to be 1 or more, found 0"),
+        (lambda: svi_settings("pyro", None, 0), "expected warpfield .* found 'pyro'"),
+    ],
+)
+def test_what_no_engine_can_use_is_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_choices_of_the_engines_come_back():
+    settings = FitSettings(
+        engine="svi", thin=3, svi=svi_settings("warpfield", 500, 7), nuts=NutsSettings(samples=9)
+    )
+    plain = json.loads(json.dumps(settings.to_dict()))
+    assert FitSettings.from_dict(plain) == settings
+
+
+def test_published_rates_are_the_papers():
+    chosen = svi_settings("warpfield", 500, 7)
+    assert (chosen.first_rate, chosen.last_rate, chosen.patience) == (1e-3, 1e-10, 10_000)
+    assert not chosen.conditioned
+    assert (chosen.steps, chosen.max_steps, chosen.seed) == (500, 1000, 7)
+    assert svi_settings("warpfield", None, 0) == WARPFIELD
+    assert svi_settings(None, None, 4) == SviSettings(seed=4)
+
+
+def test_every_engine_knows_when_it_is_there():
+    assert FitSettings().step_tolerance == FitSettings().tolerance
+    assert FitSettings(engine="svi").step_tolerance == SviSettings().tolerance

@@ -171,6 +171,8 @@ def _styling(theme: Theme, subtitle: str, width: int, equal: bool) -> Callable:
         figure.background_fill_color = figure.border_fill_color = theme.background
         figure.outline_line_color = theme.muted
         figure.sizing_mode = None
+        # Figures that are drawn anew on a page that stays lose their points under WebGL.
+        figure.output_backend = "canvas"
         figure.toolbar.logo = None
         figure.toolbar.autohide = True
         _style_titles(figure, theme, wrapped)

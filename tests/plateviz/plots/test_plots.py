@@ -124,6 +124,12 @@ def _texts(figure):
 
 
 @with_every_plot
+def test_no_figure_is_drawn_by_webgl(figures, name):
+    """Which loses the points of a figure that replaces another on a page that stays."""
+    assert {figure.output_backend for figure in figures(name)} == {"canvas"}
+
+
+@with_every_plot
 def test_no_legend_covers_the_data(figures, name):
     for figure in figures(name):
         assert all(legend in figure.below for legend in figure.legend if legend.items)

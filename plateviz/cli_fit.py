@@ -10,7 +10,7 @@ from plateviz.cli_output import Reporter, print_agreement, print_fit, print_json
 from plateviz.source import OrbitFiles
 from solver.errors import FitError, InputError
 from solver.io.atomic import require_writable
-from solver.settings import ENGINES, FitSettings
+from solver.settings import COUNTED, ENGINES, FitSettings
 
 if TYPE_CHECKING:
     from solver.fit import OrbitFitter
@@ -82,9 +82,8 @@ def _fit(
         from solver.checkpoint import resume_from
 
         resumption = resume_from(request.checkpoint, data, settings)
-    unit = {"gauss-newton": "iteration", "svi": "step", "nuts": "sample"}[engine]
     return fitter.fit(
-        settings, lambda it: reporter.say(f"{engine}: {unit} {it.iteration}"), resumption
+        settings, lambda it: reporter.say(f"{engine}: {COUNTED[engine]} {it.iteration}"), resumption
     )
 
 

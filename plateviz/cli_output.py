@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from plateviz.job import Job, JobStatus
+from solver.settings import COUNTED
 
 if TYPE_CHECKING:
     from solver.agreement import Comparison
@@ -126,10 +127,7 @@ def _engine(summary: Mapping[str, Any]) -> str:
             f"{summary['smallest_effective_samples']:.0f} effective samples "
             f"(by {summary['mixing_by']})"
         )
-    return f"{summary['engine']}, {summary['iterations']} {_COUNTED[summary['engine']]}"
-
-
-_COUNTED = {"gauss-newton": "iterations", "svi": "steps", "nuts": "samples"}
+    return f"{summary['engine']}, {summary['iterations']} {COUNTED[summary['engine']]}s"
 
 
 def _chi2(summary: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ from plateviz.state import FitChoices, Selection, describe
 from plateviz.workbench import Workbench
 from solver.errors import InputError
 from solver.result import FitResult
-from solver.settings import FitSettings
+from solver.settings import ENGINES, FitSettings
 
 
 class Stage(Enum):
@@ -26,16 +26,20 @@ class Stage(Enum):
 
 
 class Solution(NamedTuple):
-    """One solution of the session and what it was asked for."""
+    """One solution of the session and what it was asked for.
+
+    One on trial was asked for by a change of the choices alone, and is gone with the next.
+    """
 
     orbit: int | None
     settings: FitSettings
     result: FitResult
+    is_trial: bool = False
 
     @property
     def label(self) -> str:
         """The solution in a few words."""
-        return describe(self.settings)
+        return f"what if: {describe(self.settings)}" if self.is_trial else describe(self.settings)
 
 
 class Session(param.Parameterized):
@@ -62,6 +66,11 @@ class Session(param.Parameterized):
         self.selection.orbit = workbench.orbits[0]
         self._job: Job | None = None
         self._asked: FitSettings = FitSettings()
+        self._asked_on_trial = False
+        self._next_trial: FitSettings | None = None
+        self.choices.param.watch(
+            lambda _: self.try_out(), ["order", "aberration", "widths", "exclusions", "live"]
+        )
 
     @property
     def job(self) -> Job | None:
@@ -84,8 +93,42 @@ class Session(param.Parameterized):
             return
         self._ask(settings)
 
+    def try_out(self) -> None:
+        """Show what the choices would change, while the solution that was fitted is kept.
+
+        Only the gauss-newton engine is quick enough. While one trial is under way, the last
+        of the choices made since waits for it.
+        """
+        fitted = self.fitted
+        if not self.choices.live or fitted is None or self.choices.engine != ENGINES[0]:
+            return
+        try:
+            settings = self.choices.settings()
+        except InputError as error:
+            self.param.update(stage=Stage.FAILED, message=str(error))
+            return
+        known = next((s for s in self.solutions if s.settings == settings), None)
+        if self._job is not None:
+            self._next_trial = settings if self._asked_on_trial else None
+        elif known is not None:
+            self._bring_back(known)
+        elif self.shown is None or settings != self.shown.settings:
+            self._ask(settings, on_trial=True)
+
+    @property
+    def fitted(self) -> Solution | None:
+        """The solution on the screen, or the one that a trial is compared with."""
+        return self.other if self.shown is not None and self.shown.is_trial else self.shown
+
+    def keep(self) -> None:
+        """Keep the solution that is on trial."""
+        if self.shown is not None and self.shown.is_trial:
+            kept = self.shown._replace(is_trial=False)
+            self.param.update(solutions=[*self.solutions, kept], shown=kept)
+
     def cancel(self) -> None:
         """Stop the job that is under way."""
+        self._next_trial = None
         if self._job is not None:
             self.workbench.cancel(self._job)
 
@@ -97,6 +140,9 @@ class Session(param.Parameterized):
         if status is JobStatus.DONE:
             self._job = None
             self._show(self._asked)
+            if self._next_trial is not None:
+                self._next_trial = None
+                self.try_out()
         elif status.is_over:
             reason = self._job.message or "The fit was cancelled; the last solution stays."
             self._job = None
@@ -107,31 +153,37 @@ class Session(param.Parameterized):
     def bring_up(self, solution: Solution) -> None:
         """Show a solution that was made before; the one on the screen becomes the other."""
         if solution is not self.shown:
-            self.param.update(shown=solution, other=self.shown)
+            self.param.update(shown=solution, other=self.fitted)
             self.choices.take(solution.settings)
 
-    def _ask(self, settings: FitSettings) -> None:
+    def _bring_back(self, solution: Solution) -> None:
+        """Leave the trial for a solution that was kept; where it was compared with that, alone."""
+        if solution is not self.shown:
+            other = self.fitted if self.fitted is not solution else None
+            self.param.update(shown=solution, other=other, stage=Stage.READY, message="")
+
+    def _ask(self, settings: FitSettings, on_trial: bool = False) -> None:
         if self._job is not None:
             self.workbench.cancel(self._job)
-        self._asked = settings
-        self._job = self.workbench.request(self.selection.orbit, settings)
+        self._asked, self._asked_on_trial, self._next_trial = settings, on_trial, None
+        self._job = self.workbench.request(self.selection.orbit, settings, on_trial)
         stage = Stage.STALE if self.shown else Stage.LOADING
         self.param.update(stage=stage, message=_words(self._job))
         self.poll()
 
     def _show(self, settings: FitSettings) -> None:
         orbit = self.selection.orbit
-        result = self.workbench.result(orbit, settings)
+        result = self.workbench.result(orbit, settings, self._asked_on_trial)
         if result is None:
             self.param.update(stage=Stage.FAILED, message="The result of the fit is gone.")
             return
         numbers = [d.detector_id for d in self.workbench.instrument.detectors]
         self.selection.fit_to(result, numbers)
-        solution = Solution(orbit, settings, result)
-        before = self.shown if self.shown and self.shown.orbit == orbit else None
+        solution = Solution(orbit, settings, result, self._asked_on_trial)
+        before = self.fitted if self.fitted and self.fitted.orbit == orbit else None
         kept = [s for s in self.solutions if s.settings != settings]
         self.param.update(
-            solutions=[*kept, solution],
+            solutions=self.solutions if solution.is_trial else [*kept, solution],
             other=before if before and before.settings != settings else None,
             shown=solution,
             stage=Stage.READY,

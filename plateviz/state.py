@@ -6,9 +6,10 @@ from typing import Any
 
 import param
 
+from solver.exclusions import parse_exclusions
 from solver.parameters import PARAMETERS
 from solver.result import FitResult
-from solver.settings import MAX_ORDER, FitSettings, format_width, parse_width
+from solver.settings import ENGINES, MAX_ORDER, FitSettings, format_width, parse_width
 
 ALL = "all"
 _PLATES = re.compile(r"(-?\d+)-(-?\d+)")
@@ -88,9 +89,12 @@ class Selection(param.Parameterized):
 class FitChoices(param.Parameterized):
     """What a refit is to use; prior widths are kept as the words that people write."""
 
+    live = param.Boolean(default=True, doc="whether a change is tried out at once")
+    engine = param.Selector(default=ENGINES[0], objects=list(ENGINES), doc="engine of a refit")
     order = param.Integer(default=5, bounds=(0, MAX_ORDER), doc="order of the distortion")
     aberration = param.Boolean(default=True, doc="stellar aberration in the model")
     widths = param.Dict(default={}, doc="group name -> prior width as text")
+    exclusions = param.String(default="", doc="what is left out, as on the command line")
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
         """Start from the paper's priors."""
@@ -105,12 +109,24 @@ class FitChoices(param.Parameterized):
             for name, text in self.widths.items()
             if text.strip() != defaults[name]
         }
-        return FitSettings(order=self.order, aberration=self.aberration, prior_widths=changed)
+        return FitSettings(
+            order=self.order,
+            engine=self.engine,
+            aberration=self.aberration,
+            prior_widths=changed,
+            exclusions=parse_exclusions(self.exclusions.replace(",", " ").split()),
+        )
 
     def take(self, settings: FitSettings) -> None:
         """Show the choices that `settings` were made from."""
         widths = {g.name: format_width(g.name, settings.width(g.name)) for g in PARAMETERS}
-        self.param.update(order=settings.order, aberration=settings.aberration, widths=widths)
+        self.param.update(
+            order=settings.order,
+            engine=settings.engine,
+            aberration=settings.aberration,
+            widths=widths,
+            exclusions=", ".join(n.replace(" ", "=") for n in settings.exclusions.names()),
+        )
 
 
 def default_widths() -> dict[str, str]:
@@ -122,6 +138,8 @@ def default_widths() -> dict[str, str]:
 def describe(settings: FitSettings) -> str:
     """Return the choices of a fit in a few words, the paper's priors going without saying."""
     words = [f"order {settings.order}"]
+    if settings.engine != ENGINES[0]:
+        words.append(settings.engine)
     words += [f"{name} {format_width(name, w)}" for name, w in _changed(settings).items()]
     if not settings.aberration:
         words.append("no aberration")

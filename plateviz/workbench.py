@@ -40,13 +40,18 @@ class Workbench:
         """What people call the source."""
         return self.source.title
 
-    def request(self, orbit: int | None, settings: FitSettings) -> Job:
-        """Ask for an orbit fitted with `settings`; the same question gives the same job."""
-        directory = self._directory(orbit, settings)
+    def request(self, orbit: int | None, settings: FitSettings, what_if: bool = False) -> Job:
+        """Ask for an orbit fitted with `settings`; the same question gives the same job.
+
+        Parameters
+        ----------
+        what_if : whether a step from the last fit will do, where that can tell
+        """
+        directory = self._directory(orbit, settings, what_if)
         with self._lock:
             job = self._jobs.get(directory)
             if job is None or job.status in (JobStatus.FAILED, JobStatus.CANCELLED):
-                job = self._worker.submit(Job(self._request(orbit, settings, directory)))
+                job = self._worker.submit(Job(self._request(orbit, settings, what_if, directory)))
                 self._jobs[directory] = job
             return job
 
@@ -54,9 +59,11 @@ class Workbench:
         """Stop a job that is waiting or running."""
         self._worker.cancel(job)
 
-    def result(self, orbit: int | None, settings: FitSettings) -> FitResult | None:
+    def result(
+        self, orbit: int | None, settings: FitSettings, what_if: bool = False
+    ) -> FitResult | None:
         """Return a solution that was asked for before and is whole, else None."""
-        directory = self._directory(orbit, settings)
+        directory = self._directory(orbit, settings, what_if)
         return self._read(directory) if is_complete(directory) else None
 
     def close(self) -> None:
@@ -65,17 +72,18 @@ class Workbench:
         shutil.rmtree(self._scratch, ignore_errors=True)
 
     def _request(
-        self, orbit: int | None, settings: FitSettings, directory: Path
+        self, orbit: int | None, settings: FitSettings, what_if: bool, directory: Path
     ) -> dict[str, object]:
         return {
             "do": "fit",
             "source": source_to_dict(self.source),
             "orbit": orbit,
             "settings": settings.to_dict(),
+            "what_if": what_if,
             "directory": str(directory),
         }
 
-    def _directory(self, orbit: int | None, settings: FitSettings) -> Path:
-        question = json.dumps([orbit, settings.to_dict()], sort_keys=True)
+    def _directory(self, orbit: int | None, settings: FitSettings, what_if: bool) -> Path:
+        question = json.dumps([orbit, settings.to_dict(), what_if], sort_keys=True)
         name = hashlib.sha256(question.encode()).hexdigest()[:16]
         return self._scratch / f"orbit={'file' if orbit is None else f'{orbit:04d}'}-{name}"

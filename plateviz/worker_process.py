@@ -5,7 +5,7 @@ imports JAX, it stays warm between fits, and it ends with its standard input. A 
 ours ends it too, with a traceback on standard error: `plateviz.worker` reports that and
 starts another.
 
-Requests: {"do": "fit", "job", "source", "orbit", "settings", "directory"},
+Requests: {"do": "fit", "job", "source", "orbit", "settings", "what_if", "directory"},
 {"do": "simulate", "job", "directory", "settings"}, {"do": "cancel", "job"}.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
@@ -25,7 +25,7 @@ from plateviz.store import write_run
 from solver.errors import CancelledError, FitError, InputError
 from solver.fit import OrbitFitter
 from solver.gauss_newton import Iteration
-from solver.settings import FitSettings
+from solver.settings import COUNTED, FitSettings
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 
@@ -109,10 +109,13 @@ def _fit(request: Request, progress: Callable[..., None]) -> None:
     settings = FitSettings.from_dict(request["settings"])
 
     def on_iteration(iteration: Iteration) -> None:
-        progress(stage=f"iteration {iteration.iteration}", **iteration._asdict())
+        stage = f"{COUNTED[settings.engine]} {iteration.iteration}"
+        progress(stage=stage, **iteration._asdict())
 
     progress(stage="linearising")
-    result = fitter.fit(settings, on_iteration)
+    result = fitter.what_if(settings) if request["what_if"] else None
+    if result is None:
+        result = fitter.fit(settings, on_iteration)
     progress(stage="writing the result")
     write_run(Path(request["directory"]), result)
 

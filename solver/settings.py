@@ -10,7 +10,9 @@ from solver.exclusions import Exclusions
 from solver.parameters import BY_NAME
 
 MAX_ORDER = 9
-ENGINES = ("gauss-newton", "svi", "nuts")
+# Engine -> what its progress is counted in.
+COUNTED = {"gauss-newton": "iteration", "svi": "step", "nuts": "sample"}
+ENGINES = tuple(COUNTED)
 
 
 def _is_whole(number: object) -> bool:

@@ -22,9 +22,26 @@ class RefitView(pn.viewable.Viewer):
             choices.param.order, label="Distortion order", sizing_mode="stretch_width"
         )
         aberration = pmui.Switch.from_param(choices.param.aberration, label="Stellar aberration")
+        live = pmui.Switch.from_param(
+            choices.param.live, label="Try every change at once", margin=(0, 10)
+        )
+        engine = pmui.Select.from_param(
+            choices.param.engine, label="Engine", size="small", sizing_mode="stretch_width"
+        )
+        exclusions = pmui.TextInput.from_param(
+            choices.param.exclusions,
+            label="Leave out",
+            placeholder="detector=1, exposure=0/3",
+            description="source=ID, exposure=FIELD/PLATE or detector=ID, as many as you like.",
+            size="small",
+            sizing_mode="stretch_width",
+        )
         self._widths = {group.name: self._width_input(group) for group in PARAMETERS}
         self._reset = pmui.Button(label="The paper's priors", variant="text", size="small")
         self._fit = pmui.Button(label="Fit", color="primary", sizing_mode="stretch_width")
+        self._keep = pmui.Button(
+            label="Keep this solution", variant="outlined", sizing_mode="stretch_width"
+        )
         self._stop = pmui.Button(
             label="Cancel", color="warning", variant="outlined", sizing_mode="stretch_width"
         )
@@ -42,12 +59,16 @@ class RefitView(pn.viewable.Viewer):
             variant="outlined",
         )
         self._column = pmui.Column(
+            live,
             order,
             aberration,
             priors,
+            exclusions,
+            engine,
             pmui.Row(self._fit, self._stop, sizing_mode="stretch_width", margin=0),
             self._bar,
             self._news,
+            self._keep,
             self._solutions,
             sizing_mode="stretch_width",
             margin=0,
@@ -62,6 +83,7 @@ class RefitView(pn.viewable.Viewer):
         session = self._session
         self._fit.on_click(lambda _: session.refit())
         self._stop.on_click(lambda _: session.cancel())
+        self._keep.on_click(lambda _: session.keep())
         self._reset.on_click(lambda _: setattr(session.choices, "widths", default_widths()))
         self._solutions.param.watch(self._bring_up, "value")
         session.choices.param.watch(self._show_widths, "widths")
@@ -103,9 +125,12 @@ class RefitView(pn.viewable.Viewer):
 
     def _show_solutions(self, *_: object) -> None:
         solutions = {solution.label: solution for solution in self._session.solutions}
-        self._solutions.param.update(
-            options=solutions, value=self._session.shown, visible=len(solutions) > 1
-        )
+        shown = self._session.shown
+        self._keep.visible = False
+        if shown is not None and shown.is_trial:
+            self._keep.visible = True
+            solutions[shown.label] = shown
+        self._solutions.param.update(options=solutions, value=shown, visible=len(solutions) > 1)
 
     def _bring_up(self, event: object) -> None:
         chosen = event.new  # type: ignore[attr-defined]

@@ -29,7 +29,7 @@ import numpy as np
 
 from solver.exclusions import Exclusions
 from solver.fit import fit_orbit
-from solver.gauss_newton import find_mode
+from solver.gauss_newton import Mode, find_mode
 from solver.instrument import MINI_MOCK
 from solver.leverage import covariances, residuals
 from solver.normal import accumulate
@@ -41,6 +41,7 @@ from solver.settings import FitSettings
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.measure import measure_orbit
 from solver.simulate.settings import SurveySettings
+from solver.svi import blocks, start_state
 from solver.what_if import re_solve
 
 ORBIT = 0
@@ -71,6 +72,8 @@ def main() -> None:
         name: time_of(work, arguments.repeat)
         for name, work in stages(data, problem, settings).items()
     }
+    # A step is timed as its share of a block, linearisations included.
+    timings["svi, one step"] /= settings.svi.block
     write(machine())
     write(
         f"{problem.n_obs} measurements, {problem.n_src} sources, "
@@ -133,6 +136,7 @@ def stages(
         "residuals with leverage": lambda: residuals(problem, theta, sources, covariance),
         "from the catalogue to marginal sigmas": lambda: fit_with_sigmas(problem, settings),
         **{f"what if: {name}": what_if(data, *change) for name, change in CHANGES.items()},
+        "svi, one step": svi_block(problem, settings, mode),
         "fit_orbit, with all tables": lambda: fit_orbit(data, MINI_MOCK, settings),
     }
 
@@ -155,6 +159,14 @@ def what_if(data: OrbitData, before: FitSettings, after: FitSettings) -> Callabl
             sys.exit(f"no re-solution from {before} to {after}")
         return marginal_sigmas(found.reduced)
 
+    return work
+
+
+def svi_block(problem: Problem, settings: FitSettings, mode: Mode) -> Callable[[], object]:
+    """Return one block of steps from the mode."""
+    start = start_state(problem, settings.svi)._replace(theta=mode.theta, sources=mode.sources)
+    work = lambda: next(blocks(problem, settings, start))  # noqa: E731 timed as the others are
+    work()
     return work
 
 

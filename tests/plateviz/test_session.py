@@ -21,23 +21,32 @@ class Bench:
         self._result = result
         self.asked, self.cancelled = [], []
 
-    def request(self, orbit, settings):
-        self.asked.append((orbit, settings, Job({"do": "fit"})))
+    def request(self, orbit, settings, what_if=False):
+        self.asked.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
         return self.asked[-1][2]
 
     def cancel(self, job):
         self.cancelled.append(job)
         job.cancel()
 
-    def result(self, orbit, settings):
+    def result(self, orbit, settings, what_if=False):
         return self._result
 
 
 @pytest.fixture
 def session(fit_result):
     made = Session(Bench(fit_result))
+    made.choices.live = False
     made.show_orbit(0)
     return made
+
+
+@pytest.fixture
+def live(session):
+    """A session with the first solution on the screen, that tries out every change."""
+    finish(session)
+    session.choices.live = True
+    return session
 
 
 def finish(session):
@@ -126,6 +135,97 @@ def test_bringing_up_an_older_solution_compares_with_the_newer(session):
     session.bring_up(older)
     assert (session.shown, session.other) == (older, newer)
     assert session.choices.order == 5
+
+
+def test_a_change_is_tried_out_at_once(live):
+    first = live.shown
+    live.choices.order = 4
+    assert live.stage is Stage.STALE
+    assert live.job.request["what_if"]
+    finish(live)
+    assert (live.shown.settings.order, live.shown.is_trial) == (4, True)
+    assert live.shown.label == "what if: order 4"
+    assert live.other is first
+    assert live.solutions == [first]
+
+
+def test_the_next_trial_is_compared_with_what_was_fitted(live):
+    first = live.shown
+    for order in (4, 3):
+        live.choices.order = order
+        finish(live)
+    assert (live.shown.settings.order, live.other) == (3, first)
+
+
+def test_only_the_last_of_the_changes_made_meanwhile_is_tried_out(live):
+    live.choices.order = 4
+    for order in (3, 2, 1):
+        live.choices.order = order
+    finish(live)
+    finish(live)
+    assert [settings.order for _, settings, _ in live.workbench.asked] == [5, 4, 1]
+    assert live.workbench.cancelled == []
+    assert live.job is None
+
+
+def test_a_change_taken_back_brings_back_what_was_fitted(live):
+    first = live.shown
+    live.choices.order = 4
+    finish(live)
+    live.choices.order = 5
+    assert (live.shown, live.other, live.job) == (first, None, None)
+
+
+def test_a_trial_can_be_kept(live):
+    live.choices.order = 4
+    finish(live)
+    live.keep()
+    assert not live.shown.is_trial
+    assert [s.settings.order for s in live.solutions] == [5, 4]
+    live.choices.order = 3
+    finish(live)
+    assert live.other.settings.order == 4
+
+
+def test_a_trial_that_is_fitted_is_no_trial_any_more(live):
+    first = live.shown
+    live.choices.order = 4
+    finish(live)
+    live.refit()
+    assert not live.job.request["what_if"]
+    finish(live)
+    assert (live.shown.is_trial, live.other) == (False, first)
+    assert len(live.solutions) == 2
+
+
+def test_a_trial_that_is_cancelled_drops_what_waits_for_it(live):
+    live.choices.order = 4
+    live.choices.order = 3
+    live.cancel()
+    live.poll()
+    assert live.job is None
+    assert len(live.workbench.asked) == 2
+
+
+def test_nothing_is_tried_out_with_an_engine_that_takes_long(live):
+    live.choices.engine = "svi"
+    live.choices.order = 4
+    assert live.job is None
+
+
+def test_a_change_that_cannot_be_used_is_said_at_once(live):
+    live.choices.exclusions = "detector 1"
+    assert live.stage is Stage.FAILED
+    assert "expected source=ID" in live.message
+    assert live.job is None
+
+
+def test_what_is_left_out_comes_back_as_it_is_written(session):
+    session.choices.exclusions = "detector=1, exposure=0/3 source=77"
+    settings = session.choices.settings()
+    assert settings.exclusions.names() == ["source 77", "exposure 0/3", "detector 1"]
+    session.choices.take(settings)
+    assert session.choices.settings() == settings
 
 
 def test_another_orbit_forgets_the_solutions_of_the_last(session):

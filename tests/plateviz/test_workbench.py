@@ -120,3 +120,20 @@ def test_sources_are_plain_values_and_back(source):
 def test_a_folder_that_is_no_survey_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"survey\.toml"):
         SurveyFolder(str(tmp_path)).orbits()
+
+
+def test_a_what_if_is_a_step_from_the_last_fit(workbench):
+    assert workbench.request(0, FitSettings()).wait(LONG) is JobStatus.DONE
+    settings = FitSettings(prior_widths={"sources": 2.0})
+    # The fitter of an orbit starts from its own last fit.
+    job = workbench.request(0, settings, what_if=True)
+    assert job.wait(LONG) is JobStatus.DONE, job.message
+    assert workbench.result(0, settings) is None
+    assert workbench.result(0, settings, what_if=True).summary["converged"]
+
+
+def test_a_what_if_that_a_step_cannot_tell_is_fitted(workbench):
+    settings = FitSettings(order=6)
+    assert workbench.request(0, settings, what_if=True).wait(LONG) is JobStatus.DONE
+    result = workbench.result(0, settings, what_if=True)
+    assert result.summary["reason"].startswith("every step of the last iteration")

@@ -89,7 +89,29 @@ def test_another_order_changes_the_summary_and_the_residual_map(page):
     assert page.locator(".figure-comparison canvas").count() > 0
 
 
+def test_a_change_is_tried_out_at_once_and_can_be_kept(page):
+    chi2 = value(page, "χ² per degree of freedom")
+    set_order(page, 4)
+    shown = page.locator(".solution").first
+    expect(shown).to_contain_text("what if: order 4")
+    assert value(page, "χ² per degree of freedom") != chi2
+    page.get_by_role("button", name="Keep this solution").click()
+    expect(shown).not_to_contain_text("what if")
+    expect(shown).to_contain_text("order 4")
+    expect(page.get_by_role("radio")).to_have_count(2)
+
+
+def test_what_is_left_out_is_left_out(page):
+    before = int(value(page, "Measurements").replace(",", ""))
+    entry = page.get_by_role("textbox", name="Leave out")
+    entry.fill("detector=1")
+    entry.press("Enter")
+    expect(page.locator(".solution").first).to_contain_text("without detector 1")
+    assert int(value(page, "Measurements").replace(",", "")) < before
+
+
 def test_a_refit_can_be_cancelled_and_the_old_solution_stays(page):
+    page.get_by_label("Try every change at once").click()
     before = value(page, "χ² per degree of freedom")
     set_order(page, 8)
     page.get_by_role("button", name="Fit", exact=True).click()

@@ -161,6 +161,9 @@ def fit(
     aberration: Annotated[
         bool, typer.Option(help="Model the aberration by the observer's velocity.")
     ] = True,
+    robust: Annotated[
+        bool, typer.Option("--robust", help="Look for outliers, list them and leave them out.")
+    ] = False,
     thin: Annotated[
         int, typer.Option(help="Use one in so many sources, for a quick look or nuts.", min=1)
     ] = 1,
@@ -189,6 +192,7 @@ def fit(
         _prior_widths(prior or []),
         aberration,
         parse_exclusions(exclude or []),
+        robust=robust,
         thin=thin,
         svi=svi_settings(compat, steps, seed),
         nuts=NutsSettings(seed=seed),

@@ -77,6 +77,7 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
             f"{summary['n_measurements']} measurements of {summary['n_sources']} sources "
             f"({summary['n_reference']} reference) on {summary['n_exposures']} exposures",
         ),
+        *_outlier_row(summary),
         ("engine", _engine(summary)),
         ("fit", f"{verdict}: {summary['reason']}"),
         ("chi2 per degree of freedom", _chi2(summary)),
@@ -116,6 +117,12 @@ def _column(column: Mapping[str, Any]) -> str:
     values = f"{column['min']} to {column['max']}" if column.get("min") is not None else ""
     unit = f" {column['unit']}" if column.get("unit") else ""
     return f"{column['name']:<18} {column['type']:<8} {values}{unit}  ({meaning})"
+
+
+def _outlier_row(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    if "n_outliers" not in summary:
+        return []
+    return [("outliers", f"{summary['n_outliers']} more, left out; listed in the result")]
 
 
 def _engine(summary: Mapping[str, Any]) -> str:

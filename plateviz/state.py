@@ -93,6 +93,7 @@ class FitChoices(param.Parameterized):
     engine = param.Selector(default=ENGINES[0], objects=list(ENGINES), doc="engine of a refit")
     order = param.Integer(default=5, bounds=(0, MAX_ORDER), doc="order of the distortion")
     aberration = param.Boolean(default=True, doc="stellar aberration in the model")
+    robust = param.Boolean(default=False, doc="whether outliers are looked for and left out")
     widths = param.Dict(default={}, doc="group name -> prior width as text")
     exclusions = param.String(default="", doc="what is left out, as on the command line")
 
@@ -113,6 +114,7 @@ class FitChoices(param.Parameterized):
             order=self.order,
             engine=self.engine,
             aberration=self.aberration,
+            robust=self.robust,
             prior_widths=changed,
             exclusions=parse_exclusions(self.exclusions.replace(",", " ").split()),
         )
@@ -124,6 +126,7 @@ class FitChoices(param.Parameterized):
             order=settings.order,
             engine=settings.engine,
             aberration=settings.aberration,
+            robust=settings.robust,
             widths=widths,
             exclusions=", ".join(n.replace(" ", "=") for n in settings.exclusions.names()),
         )
@@ -143,6 +146,8 @@ def describe(settings: FitSettings) -> str:
     words += [f"{name} {format_width(name, w)}" for name, w in _changed(settings).items()]
     if not settings.aberration:
         words.append("no aberration")
+    if settings.robust:
+        words.append("without outliers")
     words += [f"without {name}" for name in settings.exclusions.names()]
     return ", ".join(words)
 

@@ -61,7 +61,7 @@ class Exclusions:
                 f"exclusions: expected some measurements of orbit {data.orbit_id} to be left, "
                 f"found that all {len(rows)} are excluded"
             )
-        return _of_rows(data, ~gone)
+        return of_rows(data, ~gone)
 
     def names(self) -> list[str]:
         """Return what is left out in words, in order."""
@@ -102,11 +102,16 @@ def thinned_orbit(data: OrbitData, whole: OrbitData, every: int) -> OrbitData:
     measured = np.unique(whole.measurements["source_id"].to_numpy())
     reference = whole.catalogue.set_index("source_id").loc[measured, "is_reference"].to_numpy(bool)
     kept = np.concatenate([measured[reference][::every], measured[~reference][::every]])
-    return _of_rows(data, data.measurements["source_id"].isin(kept).to_numpy())
+    return of_rows(data, data.measurements["source_id"].isin(kept).to_numpy())
 
 
-def _of_rows(data: OrbitData, chosen: np.ndarray) -> OrbitData:
-    """Return the orbit with some measurements, and the exposures that these are of."""
+def of_rows(data: OrbitData, chosen: np.ndarray) -> OrbitData:
+    """Return the orbit with some measurements, and the exposures that these are of.
+
+    Parameters
+    ----------
+    chosen : of every measurement, whether to take it
+    """
     rows = data.measurements[chosen]
     left = set(zip(rows["field_id"], rows["plate_id"], strict=True))
     plates = zip(data.exposures["field_id"], data.exposures["plate_id"], strict=True)

@@ -2,16 +2,21 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import pandas as pd
 
 from solver.engines import Resumption, estimate
 from solver.errors import FitError
 from solver.estimate import Estimate
-from solver.exclusions import thinned_orbit
+from solver.exclusions import of_rows, thinned_orbit
 from solver.gauss_newton import Iteration, Mode
 from solver.instrument import MINI_MOCK, Instrument
 from solver.orbit import OrbitData
 from solver.problem import Problem, build_problem
 from solver.result import FitResult
+from solver.robust import find_outliers, outlier_table
 from solver.settings import FitSettings
 from solver.summary import summarise, truth_summary
 from solver.tables import (
@@ -58,6 +63,15 @@ def fit_orbit(
     return OrbitFitter(data, instrument).fit(settings or FitSettings(), progress, resumption)
 
 
+class _Fitted(NamedTuple):
+    """What the last fit leaves for the next question."""
+
+    settings: FitSettings
+    problem: Problem
+    mode: Mode
+    outliers: pd.DataFrame | None
+
+
 class OrbitFitter:
     """One orbit, fitted again and again: it keeps what a change of settings can start from."""
 
@@ -65,7 +79,7 @@ class OrbitFitter:
         """Take checked tables, as from `solver.read_orbit`."""
         self._data = data
         self._instrument = instrument
-        self._kept: tuple[FitSettings, Problem, Mode] | None = None
+        self._kept: _Fitted | None = None
         self._stopped: tuple[FitSettings, object] | None = None
 
     def fit(
@@ -80,36 +94,51 @@ class OrbitFitter:
         """
         start = time.perf_counter()
         data, problem = self._prepare(settings)
+        outliers = None
+        if settings.robust:
+            outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
+            data, problem = self._prepare(settings, outliers)
         prepared = time.perf_counter()
         found = estimate(problem, settings, progress, resumption or self._resumption(settings))
         result = _result(data, self._instrument, settings, problem, found, (start, prepared))
         self._stopped = None
         if found.mode.status.is_solution:
-            self._kept = settings, problem, found.mode
-        return result
+            self._kept = _Fitted(settings, problem, found.mode, outliers)
+        return _with_outliers(result, outliers)
 
     def what_if(self, settings: FitSettings) -> FitResult | None:
         """Return the solution under other settings by one step from the last fit.
+
+        The outliers are those of that fit.
 
         Returns
         -------
         None if there is no fit to start from, or only a refit can tell; see
         `solver.what_if.re_solve`.
         """
-        if self._kept is None or self._kept[0].aberration != settings.aberration:
+        kept = self._kept
+        if kept is None or kept.settings.aberration != settings.aberration:
+            return None
+        if kept.settings.robust != settings.robust:
             return None
         start = time.perf_counter()
-        data, problem = self._prepare(settings)
+        data, problem = self._prepare(settings, kept.outliers)
         prepared = time.perf_counter()
-        mode = re_solve(self._kept[2], self._kept[1], problem, settings)
+        mode = re_solve(kept.mode, kept.problem, problem, settings)
         if mode is None:
             return None
         found = Estimate(mode)
-        return _result(data, self._instrument, settings, problem, found, (start, prepared))
+        result = _result(data, self._instrument, settings, problem, found, (start, prepared))
+        return _with_outliers(result, kept.outliers)
 
-    def _prepare(self, settings: FitSettings) -> tuple[OrbitData, Problem]:
+    def _prepare(
+        self, settings: FitSettings, outliers: pd.DataFrame | None = None
+    ) -> tuple[OrbitData, Problem]:
         data = settings.exclusions.without(self._data)
         data = thinned_orbit(data, self._data, settings.thin)
+        if outliers is not None:
+            # Its labels are those of the table of measurements.
+            data = of_rows(data, ~data.measurements.index.isin(outliers.index))
         return data, build_problem(data, self._instrument, settings)
 
     def _resumption(self, settings: FitSettings) -> Resumption:
@@ -118,6 +147,13 @@ class OrbitFitter:
 
         asked_again = self._stopped is not None and self._stopped[0] == settings
         return Resumption(self._stopped[1] if asked_again and self._stopped else None, keep)
+
+
+def _with_outliers(result: FitResult, outliers: pd.DataFrame | None) -> FitResult:
+    if outliers is None:
+        return result
+    summary = {**result.summary, "n_outliers": len(outliers)}
+    return replace(result, summary=summary, outliers=outliers.reset_index(drop=True))
 
 
 def _result(

@@ -76,14 +76,19 @@ def find_mode(
     problem: Problem,
     settings: FitSettings,
     progress: Callable[[Iteration], None] = lambda _: None,
+    start: Mode | None = None,
 ) -> Mode:
     """Find the posterior mode from the origins of all parameters.
 
     Parameters
     ----------
     progress : called after every iteration; what it raises stops the fit
+    start : where to begin instead, of a problem with the same parameters
     """
     begin = time.perf_counter()
+    if start is not None:
+        equations = accumulate(problem, start.theta, start.sources)
+        return _iterate(problem, settings, equations, progress, begin)
     theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
     few = _rough_selection(problem)
     if not few.all():

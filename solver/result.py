@@ -55,6 +55,7 @@ class FitResult:
     settings : the choices that made it
     provenance : file name -> SHA-256 of the inputs
     true_places : `schema.TRUE_PLACES`, or None where there is no truth
+    outliers : `schema.OUTLIERS`, or None where none were looked for
     losses : `schema.LOSSES`, or None of an engine without a loss
     """
 
@@ -68,6 +69,7 @@ class FitResult:
     provenance: Mapping[str, str] = field(default_factory=dict)
     true_places: pd.DataFrame | None = None
     losses: pd.DataFrame | None = None
+    outliers: pd.DataFrame | None = None
 
     @property
     def orbit_id(self) -> int:

@@ -13,6 +13,7 @@ _FIELD = Column("field_id", "int64", "", "field of the orbit")
 _PLATE = Column("plate_id", "int64", "", "exposure of the field")
 _DETECTOR = Column("detector_id", "int64", "", "detector")
 _SOURCE = Column("source_id", "int64", "", "source")
+_MEASURED = (_ORBIT, _FIELD, _PLATE, _DETECTOR, _SOURCE)
 _OBSTIME = Column(
     "obstime", "float64", "d", "time of the exposure, MJD in TCB", ("exptime", "time", "mjd")
 )
@@ -20,11 +21,7 @@ _OBSTIME = Column(
 MEASUREMENT = Table(
     "measurement",
     (
-        _ORBIT,
-        _FIELD,
-        _PLATE,
-        _DETECTOR,
-        _SOURCE,
+        *_MEASURED,
         Column("nx", "float64", "pix", "measured x, from the detector centre"),
         Column("ny", "float64", "pix", "measured y, from the detector centre"),
         Column("sx", "float64", "pix", "uncertainty of nx", ("sx0",), positive=True),
@@ -186,11 +183,7 @@ SOURCES = Table(
 RESIDUALS = Table(
     "residuals",
     (
-        _ORBIT,
-        _FIELD,
-        _PLATE,
-        _DETECTOR,
-        _SOURCE,
+        *_MEASURED,
         Column("nx", "float64", "pix", "measured x"),
         Column("ny", "float64", "pix", "measured y"),
         Column("sx", "float64", "pix", "uncertainty of nx"),
@@ -267,6 +260,20 @@ TRACE = Table(
     ),
 )
 
+OUTLIERS = Table(
+    "outliers",
+    (
+        *_MEASURED,
+        Column("nx", "float64", "pix", "measured x"),
+        Column("ny", "float64", "pix", "measured y"),
+        Column("residual_x", "float64", "pix", "measured minus predicted x"),
+        Column("residual_y", "float64", "pix", "measured minus predicted y"),
+        Column("distance", "float64", "", "residual over its uncertainty, both coordinates"),
+        Column("shift_ra", "float64", "", "shift of the source if used, over its marginal sigma"),
+        Column("shift_dec", "float64", "", "the same in Dec"),
+    ),
+)
+
 LOSSES = Table(
     "losses",
     (
@@ -287,4 +294,4 @@ TRUE_PLACES = Table(
     key=("source_id",),
 )
 
-RESULT_TABLES = (SOURCES, RESIDUALS, CALIBRATION, EXPOSURES, TRACE, LOSSES, TRUE_PLACES)
+RESULT_TABLES = (SOURCES, RESIDUALS, CALIBRATION, EXPOSURES, TRACE, LOSSES, OUTLIERS, TRUE_PLACES)

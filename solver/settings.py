@@ -142,6 +142,7 @@ class FitSettings:
     exclusions : measurements that are not to be used
     max_iterations : limit of the engine
     tolerance : the fit has converged when every step is below this times its uncertainty
+    robust : whether outliers are looked for and left out
     thin : of the sources of each class one in so many is used, for a quick look or nuts
     svi, nuts : the choices of those engines
     """
@@ -153,6 +154,7 @@ class FitSettings:
     exclusions: Exclusions = Exclusions()
     max_iterations: int = 20
     tolerance: float = 1e-3
+    robust: bool = False
     thin: int = 1
     svi: SviSettings = SviSettings()
     nuts: NutsSettings = NutsSettings()
@@ -202,6 +204,7 @@ class FitSettings:
             "tolerance": self.tolerance,
             "prior_widths": dict(self.prior_widths),
             "exclusions": self.exclusions.to_dict(),
+            "robust": self.robust,
             "thin": self.thin,
             "svi": asdict(self.svi),
             "nuts": asdict(self.nuts),

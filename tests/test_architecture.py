@@ -35,7 +35,7 @@ RUNGS = (
     ("solver.gauss_newton", "solver.leverage", "solver.carry"),
     ("solver.estimate", "solver.bend", "solver.model"),
     ("solver.guide",),
-    ("solver.svi", "solver.nuts", "solver.what_if"),
+    ("solver.svi", "solver.nuts", "solver.what_if", "solver.robust"),
     ("solver.engines",),
     ("solver.checkpoint", "solver.agreement"),
     ("solver.diagnostics",),

@@ -1,14 +1,14 @@
-"""CalibrationView: the fitted calibration as tables, a tab for each axis."""
+"""CalibrationView: the fitted calibration and the outliers as tables, a tab for each."""
 
 import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.session import Session
-from plateviz.tables import calibration_tables
+from plateviz.tables import calibration_tables, outlier_list
 
 
 class CalibrationView(pn.viewable.Viewer):
-    """Tables of exposures, detectors and distortion of the solution on the screen."""
+    """Tables of exposures, detectors, distortion and outliers of the solution on the screen."""
 
     def __init__(self, session: Session, **params: object) -> None:
         """Follow `session`."""
@@ -25,6 +25,9 @@ class CalibrationView(pn.viewable.Viewer):
     def _fill(self, *_: object) -> None:
         shown = self._session.shown
         tables = calibration_tables(shown.result) if shown else {}
+        outliers = outlier_list(shown.result) if shown else None
+        if outliers is not None:
+            tables[f"Outliers ({len(outliers)})"] = outliers
         self._tabs[:] = [
             (
                 title,

@@ -22,6 +22,9 @@ class RefitView(pn.viewable.Viewer):
             choices.param.order, label="Distortion order", sizing_mode="stretch_width"
         )
         aberration = pmui.Switch.from_param(choices.param.aberration, label="Stellar aberration")
+        robust = pmui.Switch.from_param(
+            choices.param.robust, label="Leave out outliers", margin=(0, 10)
+        )
         live = pmui.Switch.from_param(
             choices.param.live, label="Try every change at once", margin=(0, 10)
         )
@@ -62,6 +65,7 @@ class RefitView(pn.viewable.Viewer):
             live,
             order,
             aberration,
+            robust,
             priors,
             exclusions,
             engine,

@@ -88,6 +88,7 @@ SAMPLE = Layout(
 CALIBRATION = Layout("CALIBRATION", schema.CALIBRATION)
 EXPOSURES = Layout("EXPOSURES", schema.EXPOSURES)
 TRUE_PLACES = Layout("TRUE_PLACES", schema.TRUE_PLACES)
+OUTLIERS = Layout("OUTLIERS", schema.OUTLIERS)
 LOSSES = Layout("LOSSES", schema.LOSSES)
 TRACE = Layout("TRACE", schema.TRACE, {"objective": "loss"})
 

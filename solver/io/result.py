@@ -23,7 +23,11 @@ from solver.settings import FitSettings
 _SUMMARY = "SUMMARY"
 _SECTIONS = ("summary", "settings", "provenance")
 # Tables that not every result has.
-_OPTIONAL = {"true_places": layout.TRUE_PLACES, "losses": layout.LOSSES}
+_OPTIONAL = {
+    "true_places": layout.TRUE_PLACES,
+    "losses": layout.LOSSES,
+    "outliers": layout.OUTLIERS,
+}
 _KINDS = {"int64": "iu", "float64": "f", "bool": "b", "str": "SU"}
 
 

@@ -127,17 +127,17 @@ def small_result(seed=2) -> FitResult:
     """Return a result of the right shape with random contents."""
     rng = np.random.default_rng(seed)
     measured, exposed = measurement().to_pandas(), environment().to_pandas()
-    sources = _random(SOURCES, N_SOURCES, rng).assign(
+    sources = random_table(SOURCES, N_SOURCES, rng).assign(
         source_id=FIRST_ID + np.arange(N_SOURCES),
         is_reference=np.arange(N_SOURCES) < 2,
         dec=-29.2 + rng.uniform(-0.2, 0.2, N_SOURCES),
     )
-    residuals = _random(RESIDUALS, len(measured), rng)
+    residuals = random_table(RESIDUALS, len(measured), rng)
     residuals = residuals.assign(**{c: measured[c] for c in measured if c in residuals})
     residuals.loc[3, "standardised_x"] = np.nan
-    exposures = _random(EXPOSURES, N_EXPOSURES, rng)
+    exposures = random_table(EXPOSURES, N_EXPOSURES, rng)
     exposures = exposures.assign(**{c: exposed[c] for c in exposed if c in exposures})
-    trace = _random(TRACE, 3, rng).assign(
+    trace = random_table(TRACE, 3, rng).assign(
         iteration=np.arange(3), largest_parameter=["", "pitch_x detector 3", "µ Å "]
     )
     trace.loc[0, "largest_step"] = np.nan
@@ -158,7 +158,7 @@ def small_result(seed=2) -> FitResult:
         },
         settings=FitSettings(order=5, prior_widths={"focal_length": float("inf"), "sources": 2.0}),
         provenance={"OBS.fits": "ab" * 32, "a long name, it's é.fits" * 4: "cd" * 32},
-        true_places=_random(TRUE_PLACES, 4, rng),
+        true_places=random_table(TRUE_PLACES, 4, rng),
     )
 
 
@@ -169,7 +169,7 @@ def without_truth(result: FitResult) -> FitResult:
 
 def _calibration(rng: np.random.Generator) -> pd.DataFrame:
     parts = [
-        _random(CALIBRATION, ELEMENTS[group.axis], rng).assign(
+        random_table(CALIBRATION, ELEMENTS[group.axis], rng).assign(
             group=group.name,
             element=np.arange(ELEMENTS[group.axis]),
             value_unit=group.value_unit,
@@ -181,7 +181,7 @@ def _calibration(rng: np.random.Generator) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _random(table, rows, rng) -> pd.DataFrame:
+def random_table(table, rows, rng) -> pd.DataFrame:
     makers = {
         "int64": lambda: FIRST_ID + rng.integers(0, 10**6, rows),
         "float64": lambda: rng.normal(size=rows),

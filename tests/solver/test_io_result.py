@@ -9,11 +9,18 @@ import pytest
 from astropy.io import fits
 from astropy.table import QTable
 
+from solver import schema
 from solver.errors import InputError
 from solver.io import header
 from solver.io.result import read_result, write_result
 from solver.settings import FitSettings
-from tests.solver.io_samples import small_result, without_truth, write_fits, write_orbit
+from tests.solver.io_samples import (
+    random_table,
+    small_result,
+    without_truth,
+    write_fits,
+    write_orbit,
+)
 
 PUBLISHED = {
     "RESULT": {
@@ -88,6 +95,12 @@ def test_round_trip_with_the_losses_of_svi(tmp_path, result):
     losses = pd.DataFrame({"step": np.arange(1, 4), "loss": [3.5e9, -2.25, np.pi]})
     write_result(replace(result, losses=losses), tmp_path / "r.fits")
     pd.testing.assert_frame_equal(read_result(tmp_path / "r.fits").losses, losses)
+
+
+def test_round_trip_with_outliers(tmp_path, result):
+    outliers = random_table(schema.OUTLIERS, 3, np.random.default_rng(0))
+    write_result(replace(result, outliers=outliers), tmp_path / "r.fits")
+    pd.testing.assert_frame_equal(read_result(tmp_path / "r.fits").outliers, outliers)
 
 
 def test_round_trip_without_distortion_or_trace(tmp_path, result):

@@ -1,0 +1,36 @@
+"""Table of the measurements that a robust fit has left out."""
+
+import pandas as pd
+
+from plateviz.tables.labels import exposure_labels, id_strings
+from solver.result import FitResult
+
+
+def outlier_list(result: FitResult) -> pd.DataFrame | None:
+    """Return the outliers for people, the farthest first.
+
+    Parameters
+    ----------
+    result : the fit
+
+    Returns
+    -------
+    `exposure`, `detector`, `source`, the residuals in pixels, and in sigmas how far the
+    measurement lies from its prediction and how far it would move its source; None
+    where no outliers were looked for
+    """
+    found = result.outliers
+    if found is None:
+        return None
+    return pd.DataFrame(
+        {
+            "source": id_strings(found["source_id"]),
+            "exposure": exposure_labels(found),
+            "detector": found["detector_id"],
+            "residual x [pix]": found["residual_x"],
+            "residual y [pix]": found["residual_y"],
+            "distance [σ]": found["distance"].round(1),
+            "would move α by [σ]": found["shift_ra"].round(2),
+            "would move δ by [σ]": found["shift_dec"].round(2),
+        }
+    )

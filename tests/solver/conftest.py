@@ -26,13 +26,15 @@ from tests.solver.small_orbit import make_orbit, true_offsets
 CHUNK = 16
 
 
-@pytest.fixture(autouse=True)
-def _small_chunks(monkeypatch):
+@pytest.fixture(scope="package", autouse=True)
+def _small_chunks():
     """Linearise a small orbit a little at a time, in more than one chunk."""
-    monkeypatch.setattr("solver.tiles.CHUNK", CHUNK)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("solver.tiles.CHUNK", CHUNK)
+        yield
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def small_orbit():
     """Two fields of four exposures on four detectors, with the paper's aberration."""
     return make_orbit()
@@ -52,7 +54,7 @@ HELD = {
 }
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def problem(small_orbit):
     """The small orbit, its detectors held more tightly than by default."""
     settings = FitSettings(prior_widths=HELD)
@@ -67,31 +69,25 @@ def solve(orbit, settings=None):
     return solution_of(problem, Estimate(mode), mode.reduced)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def solution(small_orbit):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.tiles.CHUNK", CHUNK)
-        return solve(small_orbit)
+    return solve(small_orbit)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def result(small_orbit):
     """The result of the small orbit."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.tiles.CHUNK", CHUNK)
-        return fit_orbit(small_orbit.data, small_orbit.instrument)
+    return fit_orbit(small_orbit.data, small_orbit.instrument)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def mocks():
     """Truth and solution of orbits whose every parameter is drawn from its prior."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.tiles.CHUNK", CHUNK)
-        orbits = [make_orbit(seed=seed, scatter=1.0) for seed in range(100, 116)]
-        return [(orbit, solve(orbit)) for orbit in orbits]
+    orbits = [make_orbit(seed=seed, scatter=1.0) for seed in range(100, 116)]
+    return [(orbit, solve(orbit)) for orbit in orbits]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def sample_orbit(sample_orbit_dir):
     """The tables of the sample orbit."""
     return read_orbit(
@@ -173,7 +169,7 @@ def inverse_of_normal(jacobian):
     return root @ root.T
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def make_dense():
     """Return the function that builds the dense posterior of a problem at a point."""
 
@@ -198,13 +194,13 @@ def make_dense():
     return make
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def expansion_point(small_orbit, problem):
     """The truth: about one sigma away from the mode, and nowhere at an origin."""
     return true_offsets(small_orbit, problem)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def dense(problem, expansion_point, make_dense):
     """The dense posterior of the small orbit at `expansion_point`."""
     return make_dense(problem, *expansion_point)

@@ -46,13 +46,11 @@ def test_ids_of_gaias_size_are_kept(result):
 @pytest.fixture(scope="module")
 def by_order():
     """Fits of every order to one orbit whose distortion is of the fifth."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.tiles.CHUNK", 16)
-        orbit = make_orbit()
-        return [
-            fit_orbit(orbit.data, orbit.instrument, FitSettings(order=order))
-            for order in range(MAX_ORDER + 1)
-        ]
+    orbit = make_orbit()
+    return [
+        fit_orbit(orbit.data, orbit.instrument, FitSettings(order=order))
+        for order in range(MAX_ORDER + 1)
+    ]
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ def at_point(problem, reduced, expansion_point):
     return residuals(problem, *expansion_point, covariances(reduced))
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def hat(dense):
     """The 2 x 2 leverage of every measurement, from the dense posterior."""
     jacobian = dense.jacobian.reshape(-1, 2, dense.jacobian.shape[1])

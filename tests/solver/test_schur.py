@@ -12,7 +12,7 @@ from solver.settings import FitSettings
 AGREEMENT = 1e-8
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def sigma(dense):
     return np.sqrt(np.diag(dense.covariance))
 

@@ -10,7 +10,6 @@ from solver.normal import accumulate
 from solver.problem import build_problem
 from solver.result import FitStatus
 from solver.settings import FitSettings
-from tests.solver.conftest import CHUNK
 from tests.solver.small_orbit import make_orbit
 
 # What a refit has to confirm, in sigmas.
@@ -33,9 +32,7 @@ def sample_fitter(sample_orbit):
 
 
 def fitted(fitter):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.tiles.CHUNK", CHUNK)
-        fitter.fit(FitSettings(order=6))
+    fitter.fit(FitSettings(order=6))
     return fitter
 
 
@@ -63,10 +60,8 @@ CHANGES = {
 @pytest.fixture(scope="module", params=CHANGES)
 def pair(request, sample_orbit, sample_fitter):
     """The sample orbit re-solved and fitted again, under changed settings."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.tiles.CHUNK", CHUNK)
-        settings = FitSettings(**{"order": 6, **CHANGES[request.param](sample_orbit)})
-        return sample_fitter.what_if(settings), fit_orbit(sample_orbit, settings=settings)
+    settings = FitSettings(**{"order": 6, **CHANGES[request.param](sample_orbit)})
+    return sample_fitter.what_if(settings), fit_orbit(sample_orbit, settings=settings)
 
 
 def test_refit_confirms_the_positions_and_their_uncertainties(pair):

@@ -3,7 +3,9 @@
 import panel as pn
 import panel_material_ui as pmui
 import param
+from bokeh.document import Document
 from bokeh.themes import Theme
+from panel.io.resources import get_dist_path
 
 from plateviz.gallery import diagnostics
 from plateviz.session import Session
@@ -43,10 +45,8 @@ def build_app(workbench: Workbench) -> pmui.Page:
         sidebar_width=300,
         theme_config={"typography": {"fontSize": 13}},
     )
-    # Figures come styled, in both themes; a theme that names these models keeps the page's
-    # own style off them.
     if pn.state.curdoc is not None:
-        pn.state.curdoc.theme = Theme(json={"attrs": {name: {} for name in _STYLED}})
+        _prepare(pn.state.curdoc)
     # The page's busy light changes with every event, and each change of the page makes Panel
     # walk all models of all figures: half a second every time. The refit panel says it instead.
     with param.edit_constant(page):
@@ -57,6 +57,15 @@ def build_app(workbench: Workbench) -> pmui.Page:
     _keep_up(session, figures)
     session.show_orbit(session.selection.orbit)
     return page
+
+
+def _prepare(document: Document) -> None:
+    # Figures come styled, in both themes; a theme that names these models keeps the page's
+    # own style off them.
+    document.theme = Theme(json={"attrs": {name: {} for name in _STYLED}})
+    # Where a browser loads so slowly that its session was given up and is made anew, Panel has
+    # not set this yet, and would have the style sheets fetched from far away.
+    document.template_variables["dist_url"] = get_dist_path()
 
 
 def _follow_address(session: Session) -> None:

@@ -11,6 +11,9 @@ from plateviz.app import build_app
 from plateviz.workbench import Workbench
 from solver.errors import InputError
 
+# How long a page may take to load its scripts before its session is given up.
+_PATIENCE_MILLISECONDS = 120_000
+
 
 def serve(workbench: Workbench, *, port: int, address: str, ready: Callable[[str], None]) -> None:
     """Serve the dashboard until it is interrupted; the workbench is closed at the end.
@@ -34,6 +37,7 @@ def serve(workbench: Workbench, *, port: int, address: str, ready: Callable[[str
         show=False,
         start=False,
         verbose=False,
+        unused_session_lifetime_milliseconds=_PATIENCE_MILLISECONDS,
     )
     try:
         server.start()

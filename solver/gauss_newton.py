@@ -213,9 +213,9 @@ def largest_step(
     Marginal uncertainties for the calibration; for the sources the conditional ones,
     which are smaller by a few per cent and cost nothing.
     """
-    of_theta = np.abs(step[0]) / np.sqrt(np.diag(reduced.theta_covariance()))
-    variances = np.diagonal(reduced.conditional_covariance(), axis1=1, axis2=2)
-    of_sources = np.abs(step[1]) / np.sqrt(variances)
+    of_theta, of_sources = (
+        np.abs(moved) / sigma for moved, sigma in zip(step, reduced.sigmas, strict=True)
+    )
     if of_theta.max() > of_sources.max():
         column = int(of_theta.argmax())
         return float(of_theta[column]), _name_of(problem, column)

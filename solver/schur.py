@@ -6,6 +6,7 @@ calibration, and that of source i is V_i^-1 + V_i^-1 W_i' S^-1 W_i V_i^-1.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sl
@@ -30,6 +31,7 @@ class Reduced:
     theta : U with priors
     source_factor : lower Cholesky factor of V with priors
     whitened : Z
+    of_data : S without the calibration's priors
     factor : upper Cholesky factor R of S = R'R
     """
 
@@ -37,6 +39,7 @@ class Reduced:
     theta: Float[np.ndarray, "calib calib"]
     source_factor: Float[np.ndarray, "src 2 2"]
     whitened: Float[np.ndarray, "calib 2 src"]
+    of_data: Float[np.ndarray, "calib calib"]
     factor: Float[np.ndarray, "calib calib"]
 
     def solve(
@@ -58,6 +61,13 @@ class Reduced:
             theta = theta - held @ (held.T @ (np.diag(self.theta) * theta))
         remainder = whitened - (theta @ rows).reshape(whitened.shape)
         return theta, _upper_solve(self.source_factor, remainder).T.copy()
+
+    @cached_property
+    def sigmas(self) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
+        """Marginal sigmas of the calibration, and conditional ones of the sources, mas."""
+        inverse, _ = sl.lapack.dtrtri(self.factor)
+        of_sources = np.diagonal(self.conditional_covariance(), axis1=1, axis2=2)
+        return np.sqrt(np.einsum("ij,ij->i", inverse, inverse)), np.sqrt(of_sources)
 
     def conditional_covariance(self) -> Float[np.ndarray, "src 2 2"]:
         """Return the covariance of each source with the calibration held fixed, mas^2."""
@@ -126,32 +136,50 @@ class Reduced:
         return float(2.0 * (of_sources + np.log(np.diag(self.factor)).sum()))
 
 
-def reduce(equations: NormalEquations, priors: Priors) -> Reduced | None:
+def reduce(
+    equations: NormalEquations, priors: Priors, before: Reduced | None = None
+) -> Reduced | None:
     """Add the priors, eliminate the sources and factorise.
+
+    Parameters
+    ----------
+    before : of the same equations under other priors. If those of the sources are the same, so
+        is all that is costly.
 
     Returns
     -------
     None if the system is singular: the data and the priors leave a direction open, or hold
     it so weakly that rounding hides it.
     """
-    diagonal = np.diag(equations.theta) + priors.curvature(equations.at[0])
-    hessian = equations.theta.copy()
-    np.fill_diagonal(hessian, diagonal)
-    source = equations.source + priors.precision
+    curvature = priors.curvature(equations.at[0])
     try:
-        source_factor = np.linalg.cholesky(source)
-        whitened = _lower_solve(source_factor, equations.cross)
-        rows = whitened.reshape(len(hessian), -1)
+        source_factor = np.linalg.cholesky(equations.source + priors.precision)
+        if before is not None and np.array_equal(before.source_factor, source_factor):
+            whitened, of_data = before.whitened, before.of_data
+        else:
+            whitened = _lower_solve(source_factor, equations.cross)
+            rows = whitened.reshape(len(curvature), -1)
+            of_data = equations.theta - rows @ rows.T
         # NumPy's, like the product before it: SciPy has a BLAS of its own, whose threads would
         # wait for those of NumPy's, which go on spinning for a while.
-        factor = np.linalg.cholesky(hessian - rows @ rows.T).T
+        factor = np.linalg.cholesky(_with_diagonal(of_data, curvature)).T
     except np.linalg.LinAlgError:
         return None
+    hessian = _with_diagonal(equations.theta, curvature)
     # A pivot is what is left of the diagonal once all else is accounted for.
-    smallest = len(hessian) * np.finfo(float).eps * diagonal
+    smallest = len(hessian) * np.finfo(float).eps * np.diag(hessian)
     if not (np.diag(factor) ** 2 >= smallest).all():
         return None
-    return Reduced(equations.at, hessian, source_factor, whitened, factor)
+    return Reduced(equations.at, hessian, source_factor, whitened, of_data, factor)
+
+
+def _with_diagonal(
+    matrix: Float[np.ndarray, "n n"], added: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n n"]:
+    """Return the matrix with something added to its diagonal."""
+    total = matrix.copy()
+    total[np.diag_indices(len(added))] += added
+    return total
 
 
 def _lower_solve(

@@ -18,7 +18,8 @@ from plateviz.cache import keep_compilations
 from solver.errors import FitError, InputError
 from solver.exclusions import parse_exclusions
 from solver.parameters import PARAMETERS
-from solver.settings import ENGINES, FitSettings, NutsSettings, parse_width, svi_settings
+from solver.prior_text import parse_shift, parse_width
+from solver.settings import ENGINES, FitSettings, NutsSettings, svi_settings
 
 if TYPE_CHECKING:
     from plateviz.workbench import Workbench
@@ -150,6 +151,15 @@ def fit(
             metavar="GROUP=VALUE",
         ),
     ] = None,
+    centre: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Shift the centre of a prior from the value in the files, such as "
+            "focal_length=100um or detector_x[2]=-5um; may be repeated. An element is "
+            "FIELD/PLATE, a detector, K/L of a distortion term, or ra or dec of sources.",
+            metavar="GROUP[ELEMENT]=SHIFT",
+        ),
+    ] = None,
     exclude: Annotated[
         list[str] | None,
         typer.Option(
@@ -196,6 +206,7 @@ def fit(
         thin=thin,
         svi=svi_settings(compat, steps, seed),
         nuts=NutsSettings(seed=seed),
+        prior_shifts=dict(map(parse_shift, centre or [])),
     )
     files = OrbitFiles(str(observations), str(reference), _text(truth), orbit, _text(instrument))
     engines = ENGINES if engine == "all" else (engine,)

@@ -2,14 +2,16 @@
 
 import re
 from collections.abc import Mapping
+from itertools import starmap
 from typing import Any
 
 import param
 
 from solver.exclusions import parse_exclusions
 from solver.parameters import PARAMETERS
+from solver.prior_text import format_shift, format_width, parse_shift, parse_width
 from solver.result import FitResult
-from solver.settings import ENGINES, MAX_ORDER, FitSettings, format_width, parse_width
+from solver.settings import ENGINES, MAX_ORDER, FitSettings
 
 ALL = "all"
 _PLATES = re.compile(r"(-?\d+)-(-?\d+)")
@@ -95,6 +97,7 @@ class FitChoices(param.Parameterized):
     aberration = param.Boolean(default=True, doc="stellar aberration in the model")
     robust = param.Boolean(default=False, doc="whether outliers are looked for and left out")
     widths = param.Dict(default={}, doc="group name -> prior width as text")
+    shifts = param.String(default="", doc="where priors are centred, as on the command line")
     exclusions = param.String(default="", doc="what is left out, as on the command line")
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
@@ -116,7 +119,8 @@ class FitChoices(param.Parameterized):
             aberration=self.aberration,
             robust=self.robust,
             prior_widths=changed,
-            exclusions=parse_exclusions(self.exclusions.replace(",", " ").split()),
+            prior_shifts=dict(map(parse_shift, _words(self.shifts))),
+            exclusions=parse_exclusions(_words(self.exclusions)),
         )
 
     def take(self, settings: FitSettings) -> None:
@@ -128,8 +132,13 @@ class FitChoices(param.Parameterized):
             aberration=settings.aberration,
             robust=settings.robust,
             widths=widths,
+            shifts=", ".join(starmap(format_shift, settings.prior_shifts.items())),
             exclusions=", ".join(n.replace(" ", "=") for n in settings.exclusions.names()),
         )
+
+
+def _words(text: str) -> list[str]:
+    return text.replace(",", " ").split()
 
 
 def default_widths() -> dict[str, str]:
@@ -144,6 +153,7 @@ def describe(settings: FitSettings) -> str:
     if settings.engine != ENGINES[0]:
         words.append(settings.engine)
     words += [f"{name} {format_width(name, w)}" for name, w in _changed(settings).items()]
+    words += starmap(format_shift, settings.prior_shifts.items())
     if not settings.aberration:
         words.append("no aberration")
     if settings.robust:

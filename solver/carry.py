@@ -1,21 +1,25 @@
 """Carry normal equations over to a changed problem: other priors, a lower order, less data.
 
-The blocks of the data know nothing of the priors, hold every lower distortion order, and
-are sums over the measurements. So those of a problem that was solved before make those of
-the changed one, but for the small change of the Jacobians on the way to its solution.
+The blocks of the data know nothing of the priors and are sums over the measurements. So those
+of a problem that was solved before make those of the changed one, but for the small change of
+the Jacobians on the way to its solution. They hold every lower distortion order, too, but bent
+by the terms that are dropped, which neither the leverage of the measurements nor what the
+priors alone hold would forgive: those are made anew, where the fit ended.
 """
 
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from solver.forward import Index
 from solver.layout import PER_COEFFICIENT, PER_DETECTOR, PER_EXPOSURE
 from solver.normal import NormalEquations, accumulate
 from solver.objective import Gradient
+from solver.parameters import BY_NAME
 from solver.problem import Problem
+from solver.units import RAD_PER_MAS
 
 
 def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> NormalEquations | None:
@@ -30,16 +34,16 @@ def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> Normal
     gone = ~np.isin(old.label, new.label)
     if old.n_obs - gone.sum() != new.n_obs:
         return None
+    columns, sources = _columns(old, new), _rows_of(new.sources, old.sources, ["source_id"])
+    at = _same_point(equations, old, new, columns, sources)
+    if new.geometry.order < old.geometry.order:
+        return accumulate(new, *at)
     if gone.any():
         equations = _without(equations, old, gone)
-    columns, sources = _columns(old, new), _rows_of(new.sources, old.sources, ["source_id"])
-    if len(columns) < old.layout.size:
-        equations = _at_zero(equations, np.setdiff1d(_coefficients(old), columns))
     if len(columns) == old.layout.size and len(sources) == old.n_src:
-        return equations
-    theta, positions = equations.at
+        return replace(equations, at=at)
     return NormalEquations(
-        (theta[columns], positions[sources]),
+        at,
         Gradient(
             equations.gradient.chi2,
             equations.gradient.by_theta[columns],
@@ -54,6 +58,24 @@ def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> Normal
 def _same_model(old: Problem, new: Problem) -> bool:
     aberrated = [bool(np.any(problem.geometry.velocity)) for problem in (old, new)]
     return aberrated[0] == aberrated[1] and old.layout.n_det == new.layout.n_det
+
+
+def _same_point(
+    equations: NormalEquations,
+    old: Problem,
+    new: Problem,
+    columns: Int[np.ndarray, " calib"],
+    rows: Int[np.ndarray, " src"],
+) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
+    """Return where the equations were made, in offsets from the origins of `new`."""
+    theta, sources = equations.at
+    moved = old.priors.centre[columns] - new.priors.centre
+    declination = np.radians(new.exposures["dec_est"].to_numpy())
+    moved[new.layout.columns(BY_NAME["pointing_ra"])] *= np.cos(declination)
+    frame = new.geometry.source_frame[: new.n_src]
+    shift = np.einsum("sij,sj->si", frame[:, 1:], old.geometry.source_frame[rows, 0] - frame[:, 0])
+    shift /= RAD_PER_MAS
+    return theta[columns] + moved, sources[rows] + shift
 
 
 def _without(
@@ -84,22 +106,6 @@ def _without(
     )
 
 
-def _at_zero(equations: NormalEquations, columns: Int[np.ndarray, " gone"]) -> NormalEquations:
-    """Return the equations where the parameters of some columns are zero."""
-    theta, sources = equations.at
-    by_theta, by_source, step = *equations.gradient[1:], -theta[columns]
-    bent = equations.theta[:, columns] @ step
-    chi2 = equations.gradient.chi2 - 2.0 * by_theta[columns] @ step + step @ bent[columns]
-    moved = theta.copy()
-    moved[columns] = 0.0
-    shift = np.einsum("kas,k->sa", equations.cross[columns], step)
-    return replace(
-        equations,
-        at=(moved, sources),
-        gradient=Gradient(float(chi2), by_theta - bent, by_source - shift),
-    )
-
-
 def _columns(old: Problem, new: Problem) -> Int[np.ndarray, " calib"]:
     """Return the column of `old` of each calibration parameter of `new`."""
     exposures = _rows_of(new.exposures, old.exposures, ["field_id", "plate_id"])
@@ -112,10 +118,6 @@ def _columns(old: Problem, new: Problem) -> Int[np.ndarray, " calib"]:
         for group in groups:
             columns[new.layout.columns(group)] = old.layout.columns(group)[kept]
     return columns
-
-
-def _coefficients(problem: Problem) -> Int[np.ndarray, " coef"]:
-    return np.arange(problem.layout.size)[problem.layout.coefficients()]
 
 
 def _rows_of(new: pd.DataFrame, old: pd.DataFrame, key: list[str]) -> Int[np.ndarray, " kept"]:

@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Bool, Float, Int
 
-from solver.astrometry import propagate
+from solver.astrometry import propagate, sky_position
+from solver.centres import calibration_centres, catalogue_shift
 from solver.distortion import terms
 from solver.ephemeris import observer_at
 from solver.errors import InputError
@@ -23,9 +24,10 @@ from solver.layout import Layout
 from solver.orbit import OrbitData
 from solver.parameters import CALIBRATION_GROUPS, PARAMETERS, SOURCES
 from solver.priors import Priors, group_widths
-from solver.projection import tangent_frame
+from solver.projection import displace, tangent_frame
 from solver.settings import MAX_ORDER, FitSettings
 from solver.tiles import Tiles, lay_tiles
+from solver.units import ARCSEC_PER_DEG, RAD_PER_MAS
 
 _KEY = ["field_id", "plate_id"]
 
@@ -144,10 +146,11 @@ def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings
 
     epoch = float(exposures["obstime"].mean())
     places = propagate(sources, epoch, observer_at(np.array([epoch])).position[0])
-    centres = calibration_centres(exposures, instrument, layout)
+    centres = calibration_centres(exposures, instrument, layout, settings)
+    frame = _shifted(places.frame, catalogue_shift(settings))
     table = data.measurements.iloc[row]
     return Problem(
-        geometry=_geometry(places.frame, exposures, centres, instrument, settings),
+        geometry=_geometry(frame, exposures, centres, instrument, settings),
         index=index,
         measured=table[["nx", "ny"]].to_numpy(),
         sigma=table[["sx", "sy"]].to_numpy(),
@@ -196,20 +199,14 @@ def _check_freedom(n_obs: int, n_src: int, layout: Layout, order: int) -> None:
     )
 
 
-def calibration_centres(
-    exposures: pd.DataFrame, instrument: Instrument, layout: Layout
-) -> dict[str, Float[np.ndarray, " _"]]:
-    """Return the prior centres of every calibration group, in the group's unit."""
-    centres = {}
-    for group in CALIBRATION_GROUPS:
-        if group.origin == "environment":
-            values = exposures[group.column].to_numpy(dtype=np.float64)
-        elif group.origin == "instrument":
-            values = np.array([getattr(d, group.column) for d in instrument.detectors], float)
-        else:
-            values = np.zeros(len(layout.columns(group)))
-        centres[group.name] = values * group.per_value_unit
-    return centres
+def _shifted(
+    frame: Float[np.ndarray, "src 3 3"], shift: Float[np.ndarray, " 2"]
+) -> Float[np.ndarray, "src 3 3"]:
+    """Return the frames with all directions shifted by so many mas."""
+    if not shift.any():
+        return frame
+    east, north = np.broadcast_to(RAD_PER_MAS * shift, (len(frame), 2)).T
+    return tangent_frame(*sky_position(np.asarray(displace(frame, east, north))))
 
 
 def _geometry(
@@ -221,7 +218,9 @@ def _geometry(
 ) -> Geometry:
     satellite = exposures[[f"satellite_v{axis}" for axis in "xyz"]].to_numpy()
     observer = observer_at(exposures["obstime"].to_numpy(), satellite)
-    pointing = tangent_frame(exposures["ra_est"].to_numpy(), exposures["dec_est"].to_numpy())
+    pointing = tangent_frame(
+        centres["pointing_ra"] / ARCSEC_PER_DEG, centres["pointing_dec"] / ARCSEC_PER_DEG
+    )
     sizes = {"exp": _rounded_up(len(exposures), 16)}
     return Geometry(
         source_frame=pad(source_frame, _rounded_up(len(source_frame), 1024)),

@@ -1,13 +1,12 @@
 """FitSettings: everything a person chooses about a fit, checked once, plain enough for JSON."""
 
-import math
-import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 
 from solver.errors import InputError
 from solver.exclusions import Exclusions
 from solver.parameters import BY_NAME
+from solver.prior_text import check_shift, check_width
 
 MAX_ORDER = 9
 # Engine -> what its progress is counted in.
@@ -138,6 +137,9 @@ class FitSettings:
     prior_widths : group name -> standard deviation of its prior, in the group's
         `width_unit`; for "sources" a factor on the catalogue's uncertainties;
         `inf` for a flat prior. Groups not named keep the default of `parameters`.
+    prior_shifts : "GROUP" or "GROUP[ELEMENT]" -> shift of the prior's centre from the value in
+        the files, in the group's unit; an element is written FIELD/PLATE, a detector's number,
+        K/L of a distortion term, or ra or dec of the sources, which shift the whole catalogue
     aberration : whether stellar aberration is part of the forward model
     exclusions : measurements that are not to be used
     max_iterations : limit of the engine
@@ -158,6 +160,7 @@ class FitSettings:
     thin: int = 1
     svi: SviSettings = SviSettings()
     nuts: NutsSettings = NutsSettings()
+    prior_shifts: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse what no fit can use; `InputError` names the setting."""
@@ -178,8 +181,11 @@ class FitSettings:
         if not _is_whole(self.thin) or self.thin < 1:
             raise InputError(f"expected thin to be 1 or more, found {self.thin!r}")
         for name, width in self.prior_widths.items():
-            _check_width(name, width)
-        object.__setattr__(self, "prior_widths", dict(self.prior_widths))
+            check_width(name, width)
+        for name, shift in self.prior_shifts.items():
+            check_shift(name, shift)
+        for name in ("prior_widths", "prior_shifts"):
+            object.__setattr__(self, name, dict(getattr(self, name)))
 
     def width(self, name: str) -> float:
         """Return the prior width of group `name`, in its `width_unit`."""
@@ -203,6 +209,7 @@ class FitSettings:
             "max_iterations": self.max_iterations,
             "tolerance": self.tolerance,
             "prior_widths": dict(self.prior_widths),
+            "prior_shifts": dict(self.prior_shifts),
             "exclusions": self.exclusions.to_dict(),
             "robust": self.robust,
             "thin": self.thin,
@@ -219,70 +226,3 @@ class FitSettings:
             "nuts": NutsSettings(**values.get("nuts", {})),  # type: ignore[arg-type]
         }
         return FitSettings(**{**values, "exclusions": exclusions, **engines})  # type: ignore[arg-type]
-
-
-def _check_width(name: str, width: float) -> None:
-    if name not in BY_NAME:
-        raise InputError(f"expected a parameter group out of {', '.join(BY_NAME)}, found {name!r}")
-    if not width > 0 or math.isnan(width):
-        raise InputError(f"expected a positive prior width for {name}, found {width!r}")
-    if name == "sources" and math.isinf(width):
-        raise InputError(
-            "expected a finite factor on the catalogue's uncertainties for sources, found inf: "
-            "without the reference sources nothing fixes the solution on the sky"
-        )
-
-
-def parse_width(name: str, text: str) -> float:
-    """Return the prior width that a person wrote for group `name`, in its `width_unit`.
-
-    Parameters
-    ----------
-    text : a number, with a unit if the group has one ("0.5 deg", "2um", "0.01"), or "flat"
-
-    Raises
-    ------
-    InputError
-        If the group, the number or the unit is not usable.
-    """
-    if name not in BY_NAME:
-        raise InputError(f"expected a parameter group out of {', '.join(BY_NAME)}, found {name!r}")
-    unit = BY_NAME[name].width_unit
-    match = _WIDTH.fullmatch(text.strip())
-    if match is None:
-        raise InputError(
-            f"prior of {name}: expected a width such as {_example(name)} or flat, found {text!r}"
-        )
-    if match["flat"]:
-        width = math.inf
-    else:
-        width = float(match["number"]) * _factor(name, match["unit"], unit)
-    _check_width(name, width)
-    return width
-
-
-def format_width(name: str, width: float) -> str:
-    """Return a prior width as `parse_width` reads it."""
-    unit = BY_NAME[name].width_unit
-    return "flat" if math.isinf(width) else f"{width:.6g} {unit}".strip()
-
-
-_WIDTH = re.compile(
-    r"(?P<flat>flat|inf)|(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\W\d]\w*)?"
-)
-_IN_ARCSEC = {"deg": 3600.0, "arcmin": 60.0, "arcsec": 1.0, "mas": 1e-3, "uas": 1e-6}
-_IN_UM = {"mm": 1e3, "um": 1.0, "µm": 1.0, "micron": 1.0, "nm": 1e-3}
-
-
-def _factor(name: str, given: str | None, unit: str) -> float:
-    scale = next((s for s in (_IN_ARCSEC, _IN_UM) if unit in s), {})
-    if given is None:
-        return 1.0
-    if given not in scale:
-        expected = f"a unit out of {', '.join(scale)}" if scale else "a number without unit"
-        raise InputError(f"prior of {name}: expected {expected}, found {given!r}")
-    return scale[given] / scale[unit]
-
-
-def _example(name: str) -> str:
-    return f"{format_width(name, 1.0)!r}"

@@ -13,7 +13,6 @@ import numpy as np
 
 from solver.carry import carry_over
 from solver.gauss_newton import Iteration, Mode, downhill, largest_step, objective
-from solver.normal import accumulate
 from solver.objective import gradient
 from solver.problem import Problem
 from solver.result import FitStatus
@@ -39,8 +38,12 @@ def re_solve(mode: Mode, solved: Problem, changed: Problem, settings: FitSetting
     """
     begin = time.perf_counter()
     equations = carry_over(mode.equations, solved, changed)
-    reduced = None if equations is None else reduce(equations, changed.priors)
-    if equations is None or reduced is None:
+    if equations is None:
+        return None
+    # None of the data's blocks is another where the priors alone have changed.
+    before = mode.reduced if equations.cross is mode.equations.cross else None
+    reduced = reduce(equations, changed.priors, before)
+    if reduced is None:
         return None
     trace: list[Iteration] = []
     (theta, sources), at, held, limit = equations.at, equations.gradient, None, np.inf
@@ -49,9 +52,7 @@ def re_solve(mode: Mode, solved: Problem, changed: Problem, settings: FitSetting
         total, elapsed = objective(changed, theta, sources, at), time.perf_counter() - begin
         trace.append(Iteration(len(trace), total, at.chi2, largest, parameter, 0.0, elapsed))
         if largest < settings.tolerance:
-            mode = Mode(theta, sources, reduced, FitStatus.RE_SOLVED, trace, equations)
-            same_terms = changed.geometry.order == solved.geometry.order
-            return mode if same_terms else _linearised_anew(mode, changed)
+            return Mode(theta, sources, reduced, FitStatus.RE_SOLVED, trace, equations)
         step = reduced.solve(*downhill(changed, theta, sources, at), held)
         largest, parameter = largest_step(changed, step, reduced)
         if largest > limit:
@@ -63,18 +64,3 @@ def re_solve(mode: Mode, solved: Problem, changed: Problem, settings: FitSetting
             at = gradient(changed, theta, sources)
         held = reduced.weak_directions() if held is None else held
     return None
-
-
-def _linearised_anew(mode: Mode, problem: Problem) -> Mode | None:
-    """Return the mode with the Jacobians of its own point, and one step with them.
-
-    Those carried over are bent by the terms that were dropped, which the leverage of the
-    measurements would not forgive.
-    """
-    equations = accumulate(problem, mode.theta, mode.sources)
-    reduced = reduce(equations, problem.priors)
-    if reduced is None:
-        return None
-    step = reduced.solve(*downhill(problem, mode.theta, mode.sources, equations.gradient))
-    theta, sources = mode.theta + step[0], mode.sources + step[1]
-    return mode._replace(theta=theta, sources=sources, reduced=reduced, equations=equations)

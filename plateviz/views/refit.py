@@ -39,6 +39,15 @@ class RefitView(pn.viewable.Viewer):
             size="small",
             sizing_mode="stretch_width",
         )
+        shifts = pmui.TextInput.from_param(
+            choices.param.shifts,
+            label="Shift of the centres",
+            placeholder="detector_x[2]=-5um",
+            description="GROUP=SHIFT or GROUP[ELEMENT]=SHIFT, as many as you like. An element is "
+            "FIELD/PLATE, a detector, K/L of a distortion term, or ra or dec of sources.",
+            size="small",
+            sizing_mode="stretch_width",
+        )
         self._widths = {group.name: self._width_input(group) for group in PARAMETERS}
         self._reset = pmui.Button(label="The paper's priors", variant="text", size="small")
         self._fit = pmui.Button(label="Fit", color="primary", sizing_mode="stretch_width")
@@ -51,10 +60,10 @@ class RefitView(pn.viewable.Viewer):
         self._bar = pmui.LinearProgress(variant="indeterminate", sizing_mode="stretch_width")
         self._news = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
-        entries: list[Any] = [*self._widths.values(), self._reset]
+        entries: list[Any] = [*self._widths.values(), shifts, self._reset]
         priors = pmui.Card(
             *entries,
-            title="Prior widths",
+            title="Priors",
             collapsed=True,
             sizing_mode="stretch_width",
             margin=(8, 10),
@@ -88,7 +97,7 @@ class RefitView(pn.viewable.Viewer):
         self._fit.on_click(lambda _: session.refit())
         self._stop.on_click(lambda _: session.cancel())
         self._keep.on_click(lambda _: session.keep())
-        self._reset.on_click(lambda _: setattr(session.choices, "widths", default_widths()))
+        self._reset.on_click(self._take_defaults)
         self._solutions.param.watch(self._bring_up, "value")
         session.choices.param.watch(self._show_widths, "widths")
         session.param.watch(self._show_stage, ["stage", "message"])
@@ -111,6 +120,9 @@ class RefitView(pn.viewable.Viewer):
 
         entry.param.watch(take, "value")
         return entry
+
+    def _take_defaults(self, _: object) -> None:
+        self._session.choices.param.update(widths=default_widths(), shifts="")
 
     def _show_widths(self, *_: object) -> None:
         for name, text in self._session.choices.widths.items():

@@ -13,15 +13,16 @@ import pandas as pd
 from jaxtyping import Array, Bool, Float, Int
 
 from solver.astrometry import frames_at, sky_position
+from solver.centres import calibration_centres
 from solver.distortion import terms
 from solver.ephemeris import observer_at
 from solver.forward import Geometry, Index, predict
 from solver.instrument import MINI_MOCK, Instrument
 from solver.layout import Layout
 from solver.parameters import CALIBRATION_GROUPS, PARAMETERS
-from solver.problem import calibration_centres
 from solver.projection import tangent_frame
 from solver.schema import MEASUREMENT
+from solver.settings import FitSettings
 from solver.simulate.placement import place_detectors
 from solver.simulate.schedule import environment, orbit_attitude
 from solver.simulate.settings import Stream, SurveySettings
@@ -139,7 +140,8 @@ def true_geometry(
         pa_est=attitude["position_angle"],
         focal_length=attitude["true_focal_length"],
     )
-    origin = calibration_centres(true_exposures, place_detectors(instrument, settings), layout)
+    placed = place_detectors(instrument, settings)
+    origin = calibration_centres(true_exposures, placed, layout, FitSettings(order=order))
     for k, j, a, b in settings.distortion_um:
         origin["distortion_x"][terms(order).index((k, j))] = a
         origin["distortion_y"][terms(order).index((k, j))] = b

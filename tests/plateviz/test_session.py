@@ -271,6 +271,8 @@ def test_choices_become_settings_that_name_only_what_was_changed():
     assert choices.settings() == FitSettings()
     choices.widths = {**default_widths(), "pointing_ra": "1 arcmin", "pitch_x": "flat"}
     assert choices.settings().prior_widths == {"pointing_ra": 60.0, "pitch_x": float("inf")}
+    choices.shifts = "detector_x[2]=-5um, focal_length=0.1mm"
+    assert choices.settings().prior_shifts == {"detector_x[2]": -5.0, "focal_length": 100.0}
     again = FitChoices()
     again.take(choices.settings())
     assert again.settings() == choices.settings()

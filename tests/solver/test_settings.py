@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 
 from solver.errors import InputError
-from solver.parameters import BY_NAME, PARAMETERS
+from solver.parameters import PARAMETERS
 from solver.settings import (
     WARPFIELD,
     FitSettings,
     NutsSettings,
     SviSettings,
-    format_width,
-    parse_width,
     svi_settings,
 )
 
@@ -82,50 +80,6 @@ def test_widths_given_are_not_shared():
     settings = FitSettings(prior_widths=widths)
     widths["pitch_x"] = -5.0
     assert settings.width("pitch_x") == 0.1
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "width"),
-    [
-        ("pointing_ra", "0.5 deg", 1800.0),
-        ("pointing_ra", "2arcmin", 120.0),
-        ("detector_x", "3", 3.0),
-        ("detector_x", "0.1 mm", 100.0),
-        ("distortion_x", "500nm", 0.5),
-        ("distortion_x", "2 µm", 2.0),
-        ("pitch_x", "1e-3", 1e-3),
-        ("sources", "2.5", 2.5),
-        ("focal_length", "flat", np.inf),
-        ("position_angle", "inf", np.inf),
-    ],
-)
-def test_written_width_is_read(name, text, width):
-    assert parse_width(name, text) == pytest.approx(width)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "complaint"),
-    [
-        ("pointing_ra", "5 um", "arcsec"),
-        ("detector_x", "5 mas", "mm"),
-        ("pitch_x", "1 um", "without unit"),
-        ("detector_x", "wide", "'wide'"),
-        ("detector_x", "-3 um", "'-3 um'"),
-        ("detector_x", "0", "positive"),
-        ("detector_x", "", "''"),
-        ("sources", "flat", "sources"),
-        ("nothing", "1", "'nothing'"),
-    ],
-)
-def test_written_width_that_is_none_is_refused(name, text, complaint):
-    with pytest.raises(InputError, match=complaint):
-        parse_width(name, text)
-
-
-@pytest.mark.parametrize("name", [n for n in BY_NAME if n != "sources"])
-@pytest.mark.parametrize("width", [0.25, 3600.0, np.inf], ids=str)
-def test_formatted_width_is_read_back(name, width):
-    assert parse_width(name, format_width(name, width)) == width
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,18 @@ CHANGES = {
     "sources-loose": lambda data: {"prior_widths": {"sources": 3.0}},
     "pointing-held": lambda data: {"prior_widths": {"pointing_ra": 600.0, "pointing_dec": 600.0}},
     "distortion-held": lambda data: {"prior_widths": {"distortion_x": 0.1}},
+    "centres-shifted": lambda data: {
+        "prior_shifts": {
+            "detector_x": 20.0,
+            "detector_y[2]": -30.0,
+            "pointing_dec": 20.0,
+            "pointing_ra[0/1]": -40.0,
+            "focal_length": 500.0,
+            "position_angle[0/2]": 5.0,
+            "distortion_x[3/0]": 1.0,
+            "sources[ra]": 0.4,
+        }
+    },
     "lower-order": lambda data: {"order": 5},
     "no-source": lambda data: {"exclusions": Exclusions(frozenset(first(data, "source_id")))},
     "no-exposure": lambda data: {
@@ -83,7 +95,9 @@ def test_refit_confirms_the_diagnostics(pair):
     found, expected = pair
     for axis in "xy":
         column = f"standardised_{axis}"
-        np.testing.assert_allclose(found.residuals[column], expected.residuals[column], atol=5e-3)
+        np.testing.assert_allclose(
+            found.residuals[column], expected.residuals[column], atol=5e-3, rtol=2e-3
+        )
     for key in ("chi2_per_dof", "effective_parameters", "mean_error_ra", "normalised_deviation_ra"):
         assert found.summary[key] == pytest.approx(expected.summary[key], rel=1e-3)
     assert list(found.calibration["label"]) == list(expected.calibration["label"])
@@ -103,8 +117,8 @@ def test_orbit_that_was_not_fitted_needs_a_fit(orbit):
 
 
 def test_change_too_large_for_a_linear_model_needs_a_refit(orbit, fitter):
-    """A distortion of the fifth order that is to be none: the stars would have to move."""
-    assert fitter.what_if(FitSettings(order=0)) is None
+    """A distortion of the fifth order that is to be of the fourth: the stars would have to move."""
+    assert fitter.what_if(FitSettings(order=4)) is None
 
 
 def test_what_if_starts_from_the_fit_and_not_from_another(fitter):

@@ -98,3 +98,37 @@ def induced_shift(
     """
     pull = np.einsum("sij,sj->si", priors.precision, reference_error)
     return reduced.solve(np.zeros(len(reduced.theta)), pull)[1]
+
+
+class ErrorBudget(NamedTuple):
+    """The marginal covariance of each source by the origin of its error, mas^2; the three add up.
+
+    Attributes
+    ----------
+    noise : of the measurements: the scatter over repeated orbits with the same catalogue
+    catalogue : of the sources' priors, which err by the same in every orbit: an offset
+    calibration : of the centres of the calibration's priors
+    """
+
+    noise: Float[np.ndarray, "src 2 2"]
+    catalogue: Float[np.ndarray, "src 2 2"]
+    calibration: Float[np.ndarray, "src 2 2"]
+
+
+def error_budget(reduced: Reduced, priors: Priors, covariance: Covariances) -> ErrorBudget:
+    """Split the covariance of each source into what the data and what the priors cause.
+
+    With H = H_data + P, the estimate errs by H^-1 times a sum: the data's noise, of
+    covariance H_data, and P times the error of the priors' centres, of covariance P. So H^-1
+    is H^-1 H_data H^-1 plus H^-1 P H^-1, of which these are the sources' blocks.
+    """
+    precision, response, cross = priors.precision, reduced.response(), covariance.cross
+    conditional, n_calib = reduced.conditional_covariance(), len(reduced.theta)
+    pulled = np.einsum("sab,kbs->kas", precision, response)
+    shared = pulled.reshape(n_calib, -1) @ response.reshape(n_calib, -1).T
+    by_others = (shared @ cross.reshape(n_calib, -1)).reshape(cross.shape)
+    half = conditional @ precision @ (covariance.source - 0.5 * conditional)
+    catalogue = half + half.swapaxes(1, 2) + np.einsum("kas,kbs->sab", cross, by_others)
+    by_centres = priors.curvature(covariance.at[0])[:, None, None] * cross
+    calibration = np.einsum("kas,kbs->sab", cross, by_centres)
+    return ErrorBudget(covariance.source - catalogue - calibration, catalogue, calibration)

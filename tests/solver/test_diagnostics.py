@@ -5,6 +5,7 @@ from scipy import stats
 
 from solver.diagnostics import (
     effective_parameters,
+    error_budget,
     induced_shift,
     log_evidence,
     mean_covariance,
@@ -45,6 +46,38 @@ def test_induced_shift_is_the_dense_one(problem, reduced, dense):
     expected = (dense.covariance[n:, n:] @ pull).reshape(-1, 2)
     found = induced_shift(reduced, problem.priors, error)
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("part", ["noise", "catalogue", "calibration"])
+def test_error_budget_is_the_dense_one(problem, reduced, dense, part):
+    """H^-1 M H^-1, with M the data's Hessian, or the precision of one kind of prior."""
+    n, of_calibration = dense.n_calib, np.zeros_like(dense.prior)
+    of_calibration[:n, :n] = dense.prior[:n, :n]
+    middle = {
+        "noise": dense.jacobian.T @ dense.jacobian,
+        "catalogue": dense.prior - of_calibration,
+        "calibration": of_calibration,
+    }[part]
+    whole = (dense.covariance @ middle @ dense.covariance)[n:, n:]
+    whole = whole.reshape(problem.n_src, 2, problem.n_src, 2)
+    expected = whole[np.arange(problem.n_src), :, np.arange(problem.n_src), :]
+    covariance = covariances(reduced)
+    found = getattr(error_budget(reduced, problem.priors, covariance), part)
+    # In units of the uncertainties, as all that the elimination is held to.
+    scale = np.sqrt(np.diagonal(covariance.source, axis1=1, axis2=2))
+    scale = scale[:, :, None] * scale[:, None, :]
+    np.testing.assert_allclose(found / scale, expected / scale, atol=1e-8)
+
+
+def test_reference_stars_scatter_by_less_than_their_uncertainty(problem, reduced):
+    """What they owe to the catalogue is the same in every orbit."""
+    covariance = covariances(reduced)
+    noise = error_budget(reduced, problem.priors, covariance).noise
+    share = np.trace(noise, axis1=1, axis2=2) / np.trace(covariance.source, axis1=1, axis2=2)
+    references = ~members_of(problem)
+    assert share[references].max() < 0.5
+    assert share.min() > 0.0
+    assert np.median(share[~references]) > 0.8
 
 
 def test_moving_the_catalogue_of_the_references_moves_the_solution_by_the_induced_shift(

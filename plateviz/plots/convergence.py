@@ -6,7 +6,7 @@ import pandas as pd
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.style import PANEL_WIDTH, drawn, framed, message, side_by_side
 from plateviz.plots.theme import theme_of
-from plateviz.tables.convergence import convergence
+from plateviz.tables.convergence import convergence, loss_excess
 
 _TITLE = "Convergence"
 _X = hv.Dimension("iteration", label="iteration")
@@ -22,16 +22,23 @@ _HOVER = [
 _LOG_FROM = 20.0
 _MARKERS_UP_TO = 200
 _TICKS_UP_TO = 12
+# A hundredth of what one source's two coordinates add to the loss.
+_LOWEST_EXCESS = 0.01
 
 
 def plot_convergence(
-    table: pd.DataFrame, *, theme: str = "light", width: int = PANEL_WIDTH
+    table: pd.DataFrame,
+    losses: pd.DataFrame | None = None,
+    *,
+    theme: str = "light",
+    width: int = PANEL_WIDTH,
 ) -> hv.Layout | hv.Overlay:
-    """Draw the largest scaled step with its tolerance, and the objective beside it.
+    """Draw the largest scaled step with its tolerance, and the objective or loss beside it.
 
     Parameters
     ----------
     table : `tables.convergence`
+    losses : `tables.loss_excess`; drawn instead of the objective where there are any
     theme : "light" or "dark"
     width : of each panel's frame, screen pixels
     """
@@ -44,7 +51,12 @@ def plot_convergence(
             xlabel=_X.label,
             ylabel="largest step (σ of the parameter)",
         )
-    return side_by_side([_steps(table, theme, width), _objective(table, theme, width)], columns=2)
+    fallen = (
+        _objective(table, theme, width)
+        if losses is None or losses.empty
+        else _losses(losses, theme, width)
+    )
+    return side_by_side([_steps(table, theme, width), fallen], columns=2)
 
 
 def _steps(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
@@ -98,6 +110,34 @@ def _objective(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
     )
 
 
+def _losses(losses: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
+    # Draws scatter about the final loss in the end: below it there is no logarithm.
+    above = losses[losses["excess"] > _LOWEST_EXCESS]
+    last = float(losses["step"].iloc[-1])
+    curve = hv.Curve(above, hv.Dimension("step", label="step"), ["excess", "loss"])
+    return framed(
+        [
+            drawn(
+                curve,
+                color=theme_of(theme).mark,
+                line_width=1.4,
+                tools=["hover"],
+                hover_tooltips=[("step", "@{step}"), ("loss", "@{loss}{0,0.00}")],
+            )
+        ],
+        title="Loss above its final level",
+        subtitle=f"minus the evidence lower bound, in the end {losses['loss'].iloc[-1]:,.6g}",
+        theme=theme,
+        width=width,
+        height=round(0.75 * width),
+        logy=True,
+        xlim=(-0.02 * last, 1.02 * last),
+        ylim=(_LOWEST_EXCESS, 2.0 * float(above["excess"].max() if len(above) else 1.0)),
+        xlabel="step",
+        ylabel="loss above its final level",
+    )
+
+
 def _limits(table: pd.DataFrame) -> tuple[float, float]:
     last = float(table["iteration"].max())
     return -0.04 * last - 0.2, 1.04 * last + 0.2
@@ -139,14 +179,14 @@ def _trace(rows: pd.DataFrame, column: str, theme: str) -> list[hv.Element]:
 
 
 def _draw(chosen: Chosen, theme: str) -> hv.Layout | hv.Overlay:
-    return plot_convergence(convergence(chosen.result), theme=theme)
+    return plot_convergence(convergence(chosen.result), loss_excess(chosen.result), theme=theme)
 
 
 DIAGNOSTICS = (
     Diagnostic(
         "convergence",
         "Convergence",
-        "The largest step of any parameter over its uncertainty, and chi2, after each iteration. "
+        "The largest step of any parameter over its uncertainty, and chi2 or svi's loss. "
         "Good: the last step far below the tolerance.",
         90,
         _draw,

@@ -7,7 +7,7 @@ without aberration), or None; what needs a truth is an empty table without one.
 
 from plateviz.tables.calibration import calibration_tables, distortion
 from plateviz.tables.comparison import comparison, difference_histogram
-from plateviz.tables.convergence import convergence
+from plateviz.tables.convergence import convergence, loss_excess
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.outliers import outlier_list
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
@@ -48,6 +48,7 @@ __all__ = [
     "exposure_chi2",
     "footprint_fields",
     "footprint_sources",
+    "loss_excess",
     "outlier_list",
     "pull_histogram",
     "residual_map",

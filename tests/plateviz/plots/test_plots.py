@@ -2,9 +2,11 @@
 
 import functools
 import re
+from dataclasses import replace
 
 import holoviews as hv
 import numpy as np
+import pandas as pd
 import pytest
 from bokeh.models import ColumnDataSource, GlyphRenderer, HoverTool, Plot, Title
 
@@ -233,6 +235,16 @@ def test_convergence_shows_the_tolerance(drawings):
     steps = next(iter(draw(table)))
     line = next(e for e in steps if isinstance(e, hv.HLine))
     assert line.data == table["tolerance"].iloc[0]
+
+
+def test_convergence_shows_the_loss_of_an_engine_that_has_one(fit_result):
+    loss = 1e6 * np.exp(-np.arange(300) / 20.0) - 500.0
+    steps = pd.DataFrame({"step": np.arange(1, 301), "loss": loss})
+    svi = replace(fit_result, losses=steps)
+    _, drawn = plots.plot_convergence(tables.convergence(svi), tables.loss_excess(svi))
+    curve = next(e for e in drawn if isinstance(e, hv.Curve)).dframe()
+    assert curve["excess"].iloc[0] == pytest.approx(1e6, rel=1e-3)
+    assert (np.diff(curve["excess"]) < 0).all()
 
 
 def test_pulls_are_drawn_against_a_unit_normal_of_the_same_area(drawings):

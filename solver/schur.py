@@ -79,6 +79,10 @@ class Reduced:
         """Return W V^-1, minus the shift of each source per unit of the calibration."""
         return _upper_solve(self.source_factor, self.whitened)
 
+    def of_whitened(self, whitened: Float[np.ndarray, "*k 2 src"]) -> Float[np.ndarray, "*k 2 src"]:
+        """Return L_i'^-1 x_i: what stands in units of the sources' own sigmas, in mas."""
+        return _upper_solve(self.source_factor, whitened)
+
     def spread(self) -> Float[np.ndarray, "calib 2 src"]:
         """Return T = R'^-1 Z; I + T_i' T_i is the whitened marginal covariance of source i."""
         return self._solved(self.whitened, trans=True)

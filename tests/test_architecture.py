@@ -16,7 +16,7 @@ PACKAGES = ("solver", "plateviz")
 # Low to high. The modules of a package share its rung, and those of a rung may use each other.
 RUNGS = (
     ("solver.errors", "solver.units"),
-    ("solver.schema", "solver.columns", "solver.parameters"),
+    ("solver.schema", "solver.mode_schema", "solver.columns", "solver.parameters"),
     ("solver.orbit", "solver.instrument"),
     ("solver.exclusions", "solver.prior_text"),
     ("solver.settings",),
@@ -24,6 +24,7 @@ RUNGS = (
     ("solver.io",),
     ("solver.projection", "solver.aberration", "solver.distortion", "solver.detector"),
     ("solver.astrometry", "solver.ephemeris", "solver.layout"),
+    ("solver.simple_structure", "solver.mode_names"),
     ("solver.forward", "solver.centres"),
     ("solver.tiles",),
     ("solver.problem", "solver.priors"),
@@ -33,6 +34,7 @@ RUNGS = (
     ("solver.schur",),
     ("solver.coordinates",),
     ("solver.gauss_newton", "solver.leverage", "solver.carry"),
+    ("solver.spectrum",),
     ("solver.estimate", "solver.bend", "solver.model"),
     ("solver.guide",),
     ("solver.svi", "solver.nuts", "solver.what_if", "solver.robust"),
@@ -40,6 +42,7 @@ RUNGS = (
     ("solver.checkpoint", "solver.agreement"),
     ("solver.diagnostics",),
     ("solver.tables",),
+    ("solver.mode_tables",),
     ("solver.summary",),
     ("solver.fit",),
     ("plateviz.tables", "plateviz.truth", "plateviz.job", "plateviz.cache"),

@@ -13,6 +13,7 @@ from solver.estimate import Estimate
 from solver.exclusions import of_rows, thinned_orbit
 from solver.gauss_newton import Iteration, Mode
 from solver.instrument import MINI_MOCK, Instrument
+from solver.mode_tables import mode_tables
 from solver.orbit import OrbitData
 from solver.problem import Problem, build_problem
 from solver.result import FitResult
@@ -171,14 +172,16 @@ def _result(
     solved = time.perf_counter()
     solution = solution_of(problem, found, mode.reduced)
     sources, places = source_table(solution), true_places(solution, data.truth)
+    calibration = calibration_table(solution, instrument)
     tables = {
         "sources": sources,
         "residuals": residual_table(solution, data.measurements),
-        "calibration": calibration_table(solution, instrument),
+        "calibration": calibration,
         "exposures": exposure_table(solution),
         "trace": trace_table(mode),
         "true_places": places,
         "losses": loss_table(found.losses),
+        **mode_tables(solution, calibration, instrument),
     }
     seconds = {
         "prepare": prepared - start,

@@ -57,6 +57,8 @@ class FitResult:
     true_places : `schema.TRUE_PLACES`, or None where there is no truth
     outliers : `schema.OUTLIERS`, or None where none were looked for
     losses : `schema.LOSSES`, or None of an engine without a loss
+    modes, mode_parameters, mode_shifts : `schema.MODES` with what the weak ones of them move,
+        or None in a result from before there were any
     """
 
     sources: pd.DataFrame
@@ -70,6 +72,9 @@ class FitResult:
     true_places: pd.DataFrame | None = None
     losses: pd.DataFrame | None = None
     outliers: pd.DataFrame | None = None
+    modes: pd.DataFrame | None = None
+    mode_parameters: pd.DataFrame | None = None
+    mode_shifts: pd.DataFrame | None = None
 
     @property
     def orbit_id(self) -> int:

@@ -6,6 +6,7 @@ result tables carry ours. `solver.io` maps them to and from files.
 """
 
 from solver.columns import Column, Table
+from solver.mode_schema import MODE_TABLES
 
 _EXPOSURE_KEY = ("orbit_id", "field_id", "plate_id")
 _ORBIT = Column("orbit_id", "int64", "", "satellite orbit")
@@ -294,4 +295,5 @@ TRUE_PLACES = Table(
     key=("source_id",),
 )
 
-RESULT_TABLES = (SOURCES, RESIDUALS, CALIBRATION, EXPOSURES, TRACE, LOSSES, OUTLIERS, TRUE_PLACES)
+_FIT_TABLES = (SOURCES, RESIDUALS, CALIBRATION, EXPOSURES, TRACE, LOSSES, OUTLIERS, TRUE_PLACES)
+RESULT_TABLES = (*_FIT_TABLES, *MODE_TABLES)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from solver import schema
+from solver import mode_schema, schema
 from solver.result import FitResult
 from solver.units import MAS_PER_DEG
 
@@ -90,6 +90,9 @@ EXPOSURES = Layout("EXPOSURES", schema.EXPOSURES)
 TRUE_PLACES = Layout("TRUE_PLACES", schema.TRUE_PLACES)
 OUTLIERS = Layout("OUTLIERS", schema.OUTLIERS)
 LOSSES = Layout("LOSSES", schema.LOSSES)
+MODES = Layout("MODES", mode_schema.MODES)
+MODE_PARAMETERS = Layout("MODE_PARAMETERS", mode_schema.MODE_PARAMETERS)
+MODE_SHIFTS = Layout("MODE_SHIFTS", mode_schema.MODE_SHIFTS)
 TRACE = Layout("TRACE", schema.TRACE, {"objective": "loss"})
 
 PUBLISHED_ORDER = {

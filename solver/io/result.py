@@ -27,6 +27,9 @@ _OPTIONAL = {
     "true_places": layout.TRUE_PLACES,
     "losses": layout.LOSSES,
     "outliers": layout.OUTLIERS,
+    "modes": layout.MODES,
+    "mode_parameters": layout.MODE_PARAMETERS,
+    "mode_shifts": layout.MODE_SHIFTS,
 }
 _KINDS = {"int64": "iu", "float64": "f", "bool": "b", "str": "SU"}
 

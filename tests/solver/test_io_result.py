@@ -103,6 +103,20 @@ def test_round_trip_with_outliers(tmp_path, result):
     pd.testing.assert_frame_equal(read_result(tmp_path / "r.fits").outliers, outliers)
 
 
+@pytest.mark.parametrize("table", schema.MODE_TABLES, ids=lambda table: table.name)
+@pytest.mark.parametrize("rows", [0, 3])
+def test_round_trip_with_modes(tmp_path, result, table, rows):
+    frame = random_table(table, 3, np.random.default_rng(0)).head(rows)
+    write_result(replace(result, **{table.name: frame}), tmp_path / "r.fits")
+    back = getattr(read_result(tmp_path / "r.fits"), table.name)
+    pd.testing.assert_frame_equal(back, frame, check_exact=True)
+
+
+def test_a_result_from_before_there_were_modes_has_none(written):
+    back = read_result(written)
+    assert [getattr(back, table.name) for table in schema.MODE_TABLES] == [None] * 3
+
+
 def test_round_trip_without_distortion_or_trace(tmp_path, result):
     kept = ~result.calibration["group"].str.startswith("distortion")
     bare = replace(

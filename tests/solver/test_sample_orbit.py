@@ -126,3 +126,17 @@ def test_aberration_left_out_hides_in_the_quadratic_distortion(sample_orbit, sam
 def test_true_flags_are_read(sample_result):
     assert sample_result.summary["n_reference"] == 58
     assert sample_result.sources["is_artificial"].any()
+
+
+def test_modes_that_the_measurements_leave_open_are_those_of_geometry(sample_result):
+    modes = sample_result.modes
+    is_open = modes["data_share"] < 1e-3
+    # Shift, roll and scale of the detectors against the pointings; shift, roll, scale and
+    # stretch of the sky; and the two quadratic maps that pointings, focal lengths, position
+    # angles and the distortion can follow.
+    assert is_open.sum() == 11
+    weakest = modes[is_open].head(4)
+    assert (weakest["relative_information"] < 1e-6).all()
+    assert (modes[is_open]["relative_information"].iloc[4:] > 1e-3).all()
+    assert (modes[is_open]["reference_share"].iloc[4:] > 0.999).all()
+    assert weakest["name"].str.contains("detector").all()

@@ -13,6 +13,10 @@ from plateviz.plots.convergence import plot_convergence
 from plateviz.plots.deviation import plot_deviation
 from plateviz.plots.distortion import plot_distortion
 from plateviz.plots.footprint import plot_footprint
+from plateviz.plots.mode_groups import plot_mode_groups
+from plateviz.plots.mode_shifts import plot_mode_shifts
+from plateviz.plots.modes import plot_mode_deciders, plot_mode_spectrum
+from plateviz.plots.prior_shares import plot_prior_shares
 from plateviz.plots.pulls import plot_exposure_chi2, plot_pulls
 from plateviz.plots.residual_map import plot_residual_map
 from plateviz.plots.residual_scatter import plot_residual_scatter
@@ -27,6 +31,11 @@ __all__ = [
     "plot_distortion",
     "plot_exposure_chi2",
     "plot_footprint",
+    "plot_mode_deciders",
+    "plot_mode_groups",
+    "plot_mode_shifts",
+    "plot_mode_spectrum",
+    "plot_prior_shares",
     "plot_pulls",
     "plot_residual_map",
     "plot_residual_scatter",

@@ -9,7 +9,9 @@ from plateviz.tables.calibration import calibration_tables, distortion
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.convergence import convergence, loss_excess
 from plateviz.tables.footprint import footprint_fields, footprint_sources
+from plateviz.tables.modes import mode_deciders, mode_groups, mode_shifts, mode_spectrum
 from plateviz.tables.outliers import outlier_list
+from plateviz.tables.prior_shares import prior_shares
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
 from plateviz.tables.residuals import (
     ScatterStatistics,
@@ -49,7 +51,12 @@ __all__ = [
     "footprint_fields",
     "footprint_sources",
     "loss_excess",
+    "mode_deciders",
+    "mode_groups",
+    "mode_shifts",
+    "mode_spectrum",
     "outlier_list",
+    "prior_shares",
     "pull_histogram",
     "residual_map",
     "residual_scatter",

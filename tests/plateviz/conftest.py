@@ -1,12 +1,13 @@
 """A plausible fitted orbit, made with NumPy alone: no fit is run."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from solver import schema
+from solver import mode_schema, schema
 from solver.instrument import MINI_MOCK
 from solver.parameters import CALIBRATION_GROUPS, Group
 from solver.result import FitResult, FitStatus
@@ -64,6 +65,7 @@ def synthetic_fit(seed: int = 1, n_sources: int = N_SOURCES) -> tuple[FitResult,
         settings=FitSettings(order=ORDER),
         true_places=truth[["source_id", "ra", "dec"]].assign(induced_ra=0.02, induced_dec=-0.01),
     )
+    result = replace(result, **_modes(random, result))
     return result, truth[["source_id", "ra", "dec"]]
 
 
@@ -296,3 +298,50 @@ def _summary(
         "seconds": {"read": 0.3, "prepare": 0.2, "fit": 1.6, "write": 0.1},
         "epoch_mjd": float(exposures["obstime"].mean()),
     }
+
+
+MODE_NAMES = ["common detector x with common pointing RA", "common position angle", "common Dec"]
+
+
+def _modes(random: np.random.Generator, result: FitResult) -> dict[str, pd.DataFrame]:
+    """Two modes that only a prior and the reference sources decide, and a third that both do."""
+    calibration, ids = result.calibration, result.sources["source_id"].to_numpy()
+    count, weak = len(calibration), len(MODE_NAMES)
+    names = pd.Series([*MODE_NAMES, *[""] * (count - weak)], dtype="str")
+    data = np.r_[0.0, 0.0, 0.25, np.linspace(0.6, 1.0, count - weak)]
+    of_calibration = np.r_[1.0, 0.0, 0.5, np.zeros(count - weak)]
+    modes = pd.DataFrame(
+        {
+            "mode": np.arange(1, count + 1),
+            "name": names,
+            "data_share": data,
+            "reference_share": 1.0 - data - of_calibration,
+            "source_share": 0.0,
+            "calibration_share": of_calibration,
+            "relative_information": np.geomspace(1e-11, 1.0, count),
+        }
+    )
+    share = random.dirichlet(np.full(count, 0.1), weak)
+    is_x = (calibration["group"] == "detector_x").to_numpy()
+    parameters = pd.concat(
+        [
+            calibration[["group", "element", "label", "unit"]].assign(
+                mode=mode + 1,
+                move=np.sqrt(share[mode]),
+                share=share[mode],
+                prior_share=of_calibration[mode] * is_x / is_x.sum(),
+            )
+            for mode in range(weak)
+        ],
+        ignore_index=True,
+    )
+    shifts = pd.DataFrame(
+        {
+            "mode": np.repeat(np.arange(1, weak + 1), len(ids)),
+            "source_id": np.tile(ids, weak),
+            "shift_ra": np.repeat([1e-4, 0.04, 0.03], len(ids)),
+            "shift_dec": np.repeat([0.0, -0.01, 0.03], len(ids)),
+        }
+    )
+    tables = (modes, parameters, shifts)
+    return {t.name: f[t.names] for t, f in zip(mode_schema.MODE_TABLES, tables, strict=True)}

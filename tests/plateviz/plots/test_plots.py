@@ -42,6 +42,11 @@ def drawings(fit_result, make_fit_result, truth, instrument):
             plots.plot_comparison,
             tables.comparison(fit_result, make_fit_result(2)[0]),
         ),
+        "mode_spectrum": (plots.plot_mode_spectrum, tables.mode_spectrum(fit_result)),
+        "mode_deciders": (plots.plot_mode_deciders, tables.mode_deciders(fit_result)),
+        "mode_groups": (plots.plot_mode_groups, tables.mode_groups(fit_result)),
+        "mode_shifts": (plots.plot_mode_shifts, tables.mode_shifts(fit_result)),
+        "prior_shares": (plots.plot_prior_shares, tables.prior_shares(fit_result)),
     }
 
 
@@ -56,6 +61,11 @@ NAMES = [
     "pulls",
     "exposure_chi2",
     "comparison",
+    "mode_spectrum",
+    "mode_deciders",
+    "mode_groups",
+    "mode_shifts",
+    "prior_shares",
 ]
 with_every_plot = pytest.mark.parametrize("name", NAMES)
 

@@ -184,7 +184,7 @@ DIAGNOSTICS = (
         "Comparison of two solutions",
         "The solution on the screen (B) minus the one before it (A): positions on the sky, and "
         "the differences over the uncertainty. Good: what you changed does not matter.",
-        85,
+        86,
         _draw,
         is_wide=True,
     ),

@@ -69,7 +69,7 @@ class Session(param.Parameterized):
         self._asked_on_trial = False
         self._next_trial: FitSettings | None = None
         self.choices.param.watch(
-            lambda _: self.try_out(),
+            lambda *_: self.try_out(),
             ["order", "aberration", "robust", "widths", "exclusions", "live"],
         )
 

@@ -149,6 +149,14 @@ def test_a_change_is_tried_out_at_once(live):
     assert live.solutions == [first]
 
 
+def test_several_changes_made_at_once_are_one_trial(live):
+    asked = len(live.workbench.asked)
+    live.choices.take(FitSettings(order=4, aberration=False))
+    assert [s for _, s, _ in live.workbench.asked[asked:]] == [
+        FitSettings(order=4, aberration=False)
+    ]
+
+
 def test_the_next_trial_is_compared_with_what_was_fitted(live):
     first = live.shown
     for order in (4, 3):

@@ -15,7 +15,8 @@ from solver.gauss_newton import Iteration, Mode
 from solver.instrument import MINI_MOCK, Instrument
 from solver.mode_tables import mode_tables
 from solver.orbit import OrbitData
-from solver.problem import Problem, build_problem
+from solver.orders import compare_orders
+from solver.problem import Problem, build_problem, orders_held
 from solver.result import FitResult
 from solver.robust import find_outliers, outlier_table
 from solver.settings import FitSettings
@@ -71,6 +72,7 @@ class _Fitted(NamedTuple):
     problem: Problem
     mode: Mode
     outliers: pd.DataFrame | None
+    orders: pd.DataFrame | None
 
 
 class OrbitFitter:
@@ -103,14 +105,18 @@ class OrbitFitter:
         found = estimate(problem, settings, progress, resumption or self._resumption(settings))
         result = _result(data, self._instrument, settings, problem, found, (start, prepared))
         self._stopped = None
+        fitted = time.perf_counter()
+        orders = self._compare_orders(data, problem, settings, progress)
         if found.mode.status.is_solution:
-            self._kept = _Fitted(settings, problem, found.mode, outliers)
-        return _with_outliers(result, outliers)
+            self._kept = _Fitted(settings, problem, found.mode, outliers, orders)
+        result = _with_outliers(result, outliers)
+        return _with_orders(result, orders, time.perf_counter() - fitted)
 
     def what_if(self, settings: FitSettings) -> FitResult | None:
         """Return the solution under other settings by one step from the last fit.
 
-        The outliers are those of that fit.
+        The outliers are those of that fit, and so is the comparison of the orders where it
+        is the order alone that changes.
 
         Returns
         -------
@@ -130,7 +136,9 @@ class OrbitFitter:
             return None
         found = Estimate(mode)
         result = _result(data, self._instrument, settings, problem, found, (start, prepared))
-        return _with_outliers(result, kept.outliers)
+        same_but_order = settings == kept.settings.with_(order=settings.order)
+        orders = kept.orders if same_but_order else None
+        return replace(_with_outliers(result, kept.outliers), orders=orders)
 
     def _prepare(
         self, settings: FitSettings, outliers: pd.DataFrame | None = None
@@ -141,6 +149,19 @@ class OrbitFitter:
             # Its labels are those of the table of measurements.
             data = of_rows(data, ~data.measurements.index.isin(outliers.index))
         return data, build_problem(data, self._instrument, settings)
+
+    def _compare_orders(
+        self,
+        data: OrbitData,
+        problem: Problem,
+        settings: FitSettings,
+        progress: Callable[[Iteration], None],
+    ) -> pd.DataFrame | None:
+        if not settings.compare_orders:
+            return None
+        highest = max(orders_held(problem.n_obs, problem.n_src, problem.layout))
+        highest_problem = build_problem(data, self._instrument, settings.with_(order=highest))
+        return compare_orders(highest_problem, settings, progress)
 
     def _resumption(self, settings: FitSettings) -> Resumption:
         def keep(state: object) -> None:
@@ -155,6 +176,13 @@ def _with_outliers(result: FitResult, outliers: pd.DataFrame | None) -> FitResul
         return result
     summary = {**result.summary, "n_outliers": len(outliers)}
     return replace(result, summary=summary, outliers=outliers.reset_index(drop=True))
+
+
+def _with_orders(result: FitResult, orders: pd.DataFrame | None, seconds: float) -> FitResult:
+    if orders is None:
+        return result
+    taken = {**dict(result.summary["seconds"]), "orders": seconds}
+    return replace(result, summary={**result.summary, "seconds": taken}, orders=orders)
 
 
 def _result(

@@ -188,13 +188,12 @@ def _index(
 
 def _check_freedom(n_obs: int, n_src: int, layout: Layout, order: int) -> None:
     """Refuse a distortion order for which there are more parameters than data."""
-    others = 2 * n_src + layout.size - 2 * layout.n_coef
-    if 2 * n_obs > others + 2 * layout.n_coef:
+    possible = orders_held(n_obs, n_src, layout)
+    if order in possible:
         return
-    possible = [n for n in range(MAX_ORDER + 1) if 2 * n_obs > others + 2 * len(terms(n))]
     hint = f"the highest order they can hold is {max(possible)}" if possible else "no order fits"
     raise InputError(
-        f"distortion order {order}: expected more than {others + 2 * layout.n_coef} coordinates "
+        f"distortion order {order}: expected more than {2 * n_src + layout.size} coordinates "
         f"measured for as many parameters, found {2 * n_obs} ({n_obs} measurements); {hint}"
     )
 
@@ -207,6 +206,17 @@ def _shifted(
         return frame
     east, north = np.broadcast_to(RAD_PER_MAS * shift, (len(frame), 2)).T
     return tangent_frame(*sky_position(np.asarray(displace(frame, east, north))))
+
+
+def orders_held(n_obs: int, n_src: int, layout: Layout) -> list[int]:
+    """Return the distortion orders, of any, that leave fewer parameters than data.
+
+    Parameters
+    ----------
+    layout : of an order that need not be one of them
+    """
+    others = 2 * n_src + layout.size - 2 * layout.n_coef
+    return [n for n in range(MAX_ORDER + 1) if 2 * n_obs > others + 2 * len(terms(n))]
 
 
 def _geometry(

@@ -56,6 +56,7 @@ class FitResult:
     provenance : file name -> SHA-256 of the inputs
     true_places : `schema.TRUE_PLACES`, or None where there is no truth
     outliers : `schema.OUTLIERS`, or None where none were looked for
+    orders : `schema.ORDERS`, or None where they were not compared
     losses : `schema.LOSSES`, or None of an engine without a loss
     modes, mode_parameters, mode_shifts : `schema.MODES` with what the weak ones of them move,
         or None in a result from before there were any
@@ -75,6 +76,7 @@ class FitResult:
     modes: pd.DataFrame | None = None
     mode_parameters: pd.DataFrame | None = None
     mode_shifts: pd.DataFrame | None = None
+    orders: pd.DataFrame | None = None
 
     @property
     def orbit_id(self) -> int:

@@ -7,6 +7,7 @@ result tables carry ours. `solver.io` maps them to and from files.
 
 from solver.columns import Column, Table
 from solver.mode_schema import MODE_TABLES
+from solver.schema_orders import ORDERS as ORDERS
 
 _EXPOSURE_KEY = ("orbit_id", "field_id", "plate_id")
 _ORBIT = Column("orbit_id", "int64", "", "satellite orbit")
@@ -296,4 +297,4 @@ TRUE_PLACES = Table(
 )
 
 _FIT_TABLES = (SOURCES, RESIDUALS, CALIBRATION, EXPOSURES, TRACE, LOSSES, OUTLIERS, TRUE_PLACES)
-RESULT_TABLES = (*_FIT_TABLES, *MODE_TABLES)
+RESULT_TABLES = (*_FIT_TABLES, ORDERS, *MODE_TABLES)

@@ -145,6 +145,7 @@ class FitSettings:
     max_iterations : limit of the engine
     tolerance : the fit has converged when every step is below this times its uncertainty
     robust : whether outliers are looked for and left out
+    compare_orders : whether every order of the distortion is solved beside this one
     thin : of the sources of each class one in so many is used, for a quick look or nuts
     svi, nuts : the choices of those engines
     """
@@ -161,6 +162,7 @@ class FitSettings:
     svi: SviSettings = SviSettings()
     nuts: NutsSettings = NutsSettings()
     prior_shifts: Mapping[str, float] = field(default_factory=dict)
+    compare_orders: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what no fit can use; `InputError` names the setting."""
@@ -213,6 +215,7 @@ class FitSettings:
             "exclusions": self.exclusions.to_dict(),
             "robust": self.robust,
             "thin": self.thin,
+            "compare_orders": self.compare_orders,
             "svi": asdict(self.svi),
             "nuts": asdict(self.nuts),
         }

@@ -16,7 +16,8 @@ PACKAGES = ("solver", "plateviz")
 # Low to high. The modules of a package share its rung, and those of a rung may use each other.
 RUNGS = (
     ("solver.errors", "solver.units"),
-    ("solver.schema", "solver.mode_schema", "solver.columns", "solver.parameters"),
+    ("solver.schema", "solver.mode_schema", "solver.schema_orders", "solver.columns"),
+    ("solver.parameters",),
     ("solver.orbit", "solver.instrument"),
     ("solver.exclusions", "solver.prior_text"),
     ("solver.settings",),
@@ -41,6 +42,7 @@ RUNGS = (
     ("solver.engines",),
     ("solver.checkpoint", "solver.agreement"),
     ("solver.diagnostics",),
+    ("solver.orders",),
     ("solver.tables",),
     ("solver.mode_tables",),
     ("solver.summary",),

@@ -30,6 +30,7 @@ _OPTIONAL = {
     "modes": layout.MODES,
     "mode_parameters": layout.MODE_PARAMETERS,
     "mode_shifts": layout.MODE_SHIFTS,
+    "orders": layout.ORDERS,
 }
 _KINDS = {"int64": "iu", "float64": "f", "bool": "b", "str": "SU"}
 

@@ -39,6 +39,30 @@ def fit_result() -> FitResult:
 
 
 @pytest.fixture(scope="session")
+def compared(fit_result) -> FitResult:
+    """The fit beside all orders: the fifth best by evidence, the sixth by its predictions."""
+    order = np.arange(10)
+    misfit = 10.0 ** (5 - order.clip(max=5)) - 1.0
+    terms = np.array([0, 0, 6, 14, 24, 36, 50, 66, 84, 104])
+    orders = pd.DataFrame(
+        {
+            "order": order,
+            "n_terms": terms,
+            "converged": True,
+            "chi2": 70_000.0 * (1.0 + 1e-3 * misfit),
+            "dof": 70_000.0 - terms,
+            "effective_parameters": 1900.0 + terms,
+            "log_evidence": 2e5 - 10.0 * misfit - 5.0 * (order - 5).clip(min=0),
+            "n_reserved": 24,
+            "held_out_chi2": 7000.0 * (1.0 + 1e-3 * misfit),
+            "held_out_dof": 7000,
+            "held_out_log_density": 2e4 - misfit - 0.5 * np.abs(order - 6),
+        }
+    )
+    return replace(fit_result, orders=orders[schema.ORDERS.names])
+
+
+@pytest.fixture(scope="session")
 def truth() -> pd.DataFrame:
     """True directions of the sources of `fit_result` at its mean epoch."""
     return synthetic_fit(1)[1]

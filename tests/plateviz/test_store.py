@@ -26,6 +26,11 @@ def test_a_run_is_read_back_as_it_was(fit_result, tmp_path):
     assert back.sources["source_id"].dtype == "int64"
 
 
+def test_a_run_keeps_the_orders_compared(compared, tmp_path):
+    write_run(tmp_path / "run", compared)
+    pd.testing.assert_frame_equal(read_run(tmp_path / "run").orders, compared.orders)
+
+
 def test_a_run_that_is_there_is_never_changed(fit_result, make_fit_result, tmp_path):
     write_run(tmp_path / "run", fit_result)
     before = {p.name: p.read_bytes() for p in (tmp_path / "run").iterdir()}

@@ -117,6 +117,13 @@ def test_a_result_from_before_there_were_modes_has_none(written):
     assert [getattr(back, table.name) for table in schema.MODE_TABLES] == [None] * 3
 
 
+def test_round_trip_with_the_orders_compared(tmp_path, result):
+    orders = random_table(schema.ORDERS, 10, np.random.default_rng(0))
+    orders.loc[3, "log_evidence"] = np.nan
+    write_result(replace(result, orders=orders), tmp_path / "r.fits")
+    pd.testing.assert_frame_equal(read_result(tmp_path / "r.fits").orders, orders)
+
+
 def test_round_trip_without_distortion_or_trace(tmp_path, result):
     kept = ~result.calibration["group"].str.startswith("distortion")
     bare = replace(

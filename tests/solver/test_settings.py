@@ -123,3 +123,11 @@ def test_published_rates_are_the_papers():
 def test_every_engine_knows_when_it_is_there():
     assert FitSettings().step_tolerance == FitSettings().tolerance
     assert FitSettings(engine="svi").step_tolerance == SviSettings().tolerance
+
+
+def test_orders_are_compared_when_asked_for_and_old_results_never_asked():
+    settings = FitSettings(compare_orders=True)
+    plain = json.loads(json.dumps(settings.to_dict()))
+    assert FitSettings.from_dict(plain) == settings
+    del plain["compare_orders"]
+    assert FitSettings.from_dict(plain) == FitSettings()

@@ -174,6 +174,12 @@ def fit(
     robust: Annotated[
         bool, typer.Option("--robust", help="Look for outliers, list them and leave them out.")
     ] = False,
+    compare_orders: Annotated[
+        bool,
+        typer.Option(
+            "--compare-orders", help="Also solve every order, to see which one the data ask for."
+        ),
+    ] = False,
     thin: Annotated[
         int, typer.Option(help="Use one in so many sources, for a quick look or nuts.", min=1)
     ] = 1,
@@ -203,6 +209,7 @@ def fit(
         aberration,
         parse_exclusions(exclude or []),
         robust=robust,
+        compare_orders=compare_orders,
         thin=thin,
         svi=svi_settings(compat, steps, seed),
         nuts=NutsSettings(seed=seed),

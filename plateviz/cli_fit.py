@@ -6,7 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from plateviz.cache import keep_compilations
-from plateviz.cli_output import Reporter, print_agreement, print_fit, print_json, reporting
+from plateviz.cli_output import (
+    Reporter,
+    print_agreement,
+    print_fit,
+    print_json,
+    print_orders,
+    reporting,
+)
 from plateviz.source import OrbitFiles
 from solver.errors import FitError, InputError
 from solver.io.atomic import require_writable
@@ -57,6 +64,7 @@ def run_fit(request: FitRequest, as_json: bool) -> None:
             seconds = {"read": read, **dict(result.summary["seconds"])}
             seconds["write"] = time.perf_counter() - fitted
             summaries[engine] = {**result.summary, "seconds": seconds, "output": str(output)}
+            summaries[engine] |= _orders(result)
             results[engine] = result
     _report(summaries, results, outputs, as_json)
 
@@ -76,7 +84,9 @@ def _fit(
     engine: str,
     reporter: Reporter,
 ) -> "FitResult":
-    settings = request.settings.with_(engine=engine)
+    # What the orders are worth does not depend on the engine.
+    compared = request.settings.compare_orders and engine == request.engines[0]
+    settings = request.settings.with_(engine=engine, compare_orders=compared)
     resumption = None
     if engine == "svi" and request.checkpoint is not None:
         from solver.checkpoint import resume_from
@@ -85,6 +95,18 @@ def _fit(
     return fitter.fit(
         settings, lambda it: reporter.say(f"{engine}: {COUNTED[engine]} {it.iteration}"), resumption
     )
+
+
+def _orders(result: "FitResult") -> dict[str, Any]:
+    """Return what the comparison of the orders adds to the summary, if there was one."""
+    from plateviz.tables.orders import order_comparison, order_verdict
+
+    table = order_comparison(result)
+    if table.empty:
+        return {}
+    # JSON knows no NaN.
+    plain = table.astype(object).where(table.notna(), None)
+    return {"orders": plain.to_dict("records"), "preferred_order": order_verdict(table)}
 
 
 def _report(
@@ -106,6 +128,8 @@ def _report(
     else:
         for engine, summary in summaries.items():
             print_fit(summary, outputs[engine])
+            if "orders" in summary:
+                print_orders(summary["orders"], summary["preferred_order"])
         print_agreement(rows)
     for summary in summaries.values():
         if not summary["converged"]:

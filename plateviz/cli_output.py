@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
+from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
 from plateviz.job import Job, JobStatus
 from solver.settings import COUNTED
@@ -91,6 +93,41 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
     width = max(len(name) for name, _ in rows)
     for name, words in rows:
         typer.echo(f"{name:<{width}}  {words}")
+
+
+def print_orders(rows: Iterable[Mapping[str, Any]], verdict: str) -> None:
+    """Print the comparison of the orders, rows of `tables.order_comparison`, for people."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title in _ORDER_TITLES:
+        table.add_column(title, justify="right")
+    for row in rows:
+        spread = row["held_out_sd"]
+        table.add_row(
+            f"{row['order']}{' *' if row['is_fitted'] else ''}",
+            str(row["n_terms"]),
+            _number(row["chi2_per_dof"], ".4f"),
+            _number(row["evidence_below_best"], ",.1f"),
+            _number(row["held_out_chi2_per_dof"], ".4f") + _number(spread, " ± .4f"),
+            _number(row["log_density_below_best"], ",.1f"),
+        )
+    Console(highlight=False).print(table)
+    typer.echo(f"* fitted. {verdict}")
+
+
+_ORDER_TITLES = (
+    "order",
+    "terms",
+    "chi2/dof",
+    "log evidence\nbelow best",
+    "held-out\nchi2/dof",
+    "log density\nbelow best",
+)
+
+
+def _number(value: float | None, form: str) -> str:
+    """Return a figure in a format that may have words before it, or a dash for none."""
+    words, _, form = form.rpartition(" ")
+    return "-" if value is None else f"{words} {value:{form}}" if words else f"{value:{form}}"
 
 
 def print_agreement(rows: Iterable["Comparison"]) -> None:

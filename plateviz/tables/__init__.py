@@ -10,6 +10,7 @@ from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.convergence import convergence, loss_excess
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.modes import mode_deciders, mode_groups, mode_shifts, mode_spectrum
+from plateviz.tables.orders import order_comparison, order_verdict
 from plateviz.tables.outliers import outlier_list
 from plateviz.tables.prior_shares import prior_shares
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
@@ -55,6 +56,8 @@ __all__ = [
     "mode_groups",
     "mode_shifts",
     "mode_spectrum",
+    "order_comparison",
+    "order_verdict",
     "outlier_list",
     "prior_shares",
     "pull_histogram",

@@ -211,3 +211,16 @@ def test_excluded_measurements_are_not_used(run, sample, tmp_path):
     assert code == 0
     assert 0 < json.loads(out)["n_measurements"] < 36_312
     assert 1 not in set(read_result(output).residuals["detector_id"])
+
+
+def test_orders_are_compared_on_demand(run, sample, tmp_path, compared, monkeypatch):
+    monkeypatch.setattr("solver.fit.compare_orders", lambda *_: compared.orders)
+    output = tmp_path / "r.fits"
+    code, out, _ = run("fit", *sample[:2], "-o", output, "--compare-orders", "--json")
+    summary = json.loads(out)
+    assert code == 0
+    assert [row["order"] for row in summary["orders"]] == list(range(10))
+    best = [row["order"] for row in summary["orders"] if row["evidence_below_best"] == 0.0]
+    assert best == [5]
+    assert "Order 5 has the highest evidence" in summary["preferred_order"]
+    assert read_result(output).orders.equals(compared.orders)

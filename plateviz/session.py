@@ -104,7 +104,7 @@ class Session(param.Parameterized):
         if not self.choices.live or fitted is None or self.choices.engine != ENGINES[0]:
             return
         try:
-            settings = self.choices.settings()
+            settings = _on_trial(self.choices.settings(), fitted.settings)
         except InputError as error:
             self.param.update(stage=Stage.FAILED, message=str(error))
             return
@@ -190,6 +190,12 @@ class Session(param.Parameterized):
             stage=Stage.READY,
             message="",
         )
+
+
+def _on_trial(settings: FitSettings, fitted: FitSettings) -> FitSettings:
+    """Return what to try out: no orders are compared anew, but those of the fit may still hold."""
+    still_holds = settings.with_(order=fitted.order, compare_orders=True) == fitted
+    return settings.with_(compare_orders=still_holds)
 
 
 def _words(job: Job) -> str:

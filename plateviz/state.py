@@ -96,6 +96,7 @@ class FitChoices(param.Parameterized):
     order = param.Integer(default=5, bounds=(0, MAX_ORDER), doc="order of the distortion")
     aberration = param.Boolean(default=True, doc="stellar aberration in the model")
     robust = param.Boolean(default=False, doc="whether outliers are looked for and left out")
+    compare_orders = param.Boolean(default=False, doc="whether a fit compares all orders")
     widths = param.Dict(default={}, doc="group name -> prior width as text")
     shifts = param.String(default="", doc="where priors are centred, as on the command line")
     exclusions = param.String(default="", doc="what is left out, as on the command line")
@@ -118,6 +119,7 @@ class FitChoices(param.Parameterized):
             engine=self.engine,
             aberration=self.aberration,
             robust=self.robust,
+            compare_orders=self.compare_orders,
             prior_widths=changed,
             prior_shifts=dict(map(parse_shift, _words(self.shifts))),
             exclusions=parse_exclusions(_words(self.exclusions)),
@@ -131,6 +133,7 @@ class FitChoices(param.Parameterized):
             engine=settings.engine,
             aberration=settings.aberration,
             robust=settings.robust,
+            compare_orders=settings.compare_orders,
             widths=widths,
             shifts=", ".join(starmap(format_shift, settings.prior_shifts.items())),
             exclusions=", ".join(n.replace(" ", "=") for n in settings.exclusions.names()),
@@ -158,6 +161,8 @@ def describe(settings: FitSettings) -> str:
         words.append("no aberration")
     if settings.robust:
         words.append("without outliers")
+    if settings.compare_orders:
+        words.append("orders compared")
     words += [f"without {name}" for name in settings.exclusions.names()]
     return ", ".join(words)
 

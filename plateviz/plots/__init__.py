@@ -17,6 +17,7 @@ from plateviz.plots.mode_groups import plot_mode_groups
 from plateviz.plots.mode_shifts import plot_mode_shifts
 from plateviz.plots.modes import plot_mode_deciders, plot_mode_spectrum
 from plateviz.plots.prior_shares import plot_prior_shares
+from plateviz.plots.orders import plot_orders
 from plateviz.plots.pulls import plot_exposure_chi2, plot_pulls
 from plateviz.plots.residual_map import plot_residual_map
 from plateviz.plots.residual_scatter import plot_residual_scatter
@@ -36,6 +37,7 @@ __all__ = [
     "plot_mode_shifts",
     "plot_mode_spectrum",
     "plot_prior_shares",
+    "plot_orders",
     "plot_pulls",
     "plot_residual_map",
     "plot_residual_scatter",

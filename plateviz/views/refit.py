@@ -25,6 +25,9 @@ class RefitView(pn.viewable.Viewer):
         robust = pmui.Switch.from_param(
             choices.param.robust, label="Leave out outliers", margin=(0, 10)
         )
+        compare_orders = pmui.Switch.from_param(
+            choices.param.compare_orders, label="Compare all orders", margin=(0, 10)
+        )
         live = pmui.Switch.from_param(
             choices.param.live, label="Try every change at once", margin=(0, 10)
         )
@@ -75,6 +78,7 @@ class RefitView(pn.viewable.Viewer):
             order,
             aberration,
             robust,
+            compare_orders,
             priors,
             exclusions,
             engine,

@@ -228,6 +228,29 @@ def test_a_change_that_cannot_be_used_is_said_at_once(live):
     assert live.job is None
 
 
+@pytest.mark.parametrize(
+    ("changes", "kept"),
+    [({"order": 4}, True), ({"order": 4, "aberration": False}, False)],
+    ids=["order-alone", "more"],
+)
+def test_a_trial_keeps_the_comparison_of_the_orders_where_it_holds(session, changes, kept):
+    session.choices.compare_orders = True
+    session.refit()
+    finish(session)
+    session.choices.param.update(live=True, **changes)
+    settings = session.workbench.asked[-1][1]
+    assert settings == FitSettings(**changes, compare_orders=kept)
+
+
+def test_a_comparison_that_was_not_made_waits_for_the_fit(live):
+    live.choices.compare_orders = True
+    assert live.job is None
+    live.choices.order = 4
+    assert not live.workbench.asked[-1][1].compare_orders
+    live.refit()
+    assert live.workbench.asked[-1][1] == FitSettings(order=4, compare_orders=True)
+
+
 def test_what_is_left_out_comes_back_as_it_is_written(session):
     session.choices.exclusions = "detector=1, exposure=0/3 source=77"
     settings = session.choices.settings()
@@ -281,6 +304,8 @@ def test_choices_become_settings_that_name_only_what_was_changed():
     assert choices.settings().prior_widths == {"pointing_ra": 60.0, "pitch_x": float("inf")}
     choices.shifts = "detector_x[2]=-5um, focal_length=0.1mm"
     assert choices.settings().prior_shifts == {"detector_x[2]": -5.0, "focal_length": 100.0}
+    choices.compare_orders = True
+    assert choices.settings().compare_orders
     again = FitChoices()
     again.take(choices.settings())
     assert again.settings() == choices.settings()
@@ -297,6 +322,7 @@ def test_solutions_are_described_by_what_departs_from_the_paper():
     assert describe(FitSettings()) == "order 5"
     changed = FitSettings(order=3, aberration=False, prior_widths={"distortion_x": 0.5})
     assert describe(changed) == "order 3, distortion_x 0.5 um, no aberration"
+    assert describe(FitSettings(compare_orders=True)) == "order 5, orders compared"
 
 
 def test_address_brings_back_the_selection(fit_result):

@@ -15,12 +15,13 @@ from plateviz.plots.style import CLASS_COLOURS
 from plateviz.plots.theme import THEMES, theme_of
 
 _LABELLED_UNIT = re.compile(
-    r"\(.+\)|per bin|χ² / dof|expected scatter|iteration|in order|N$|σ of A$"
+    r"\(.+\)|per bin|χ² / dof|expected scatter|iteration|in order|N$|σ of A$|"
+    r"order of the distortion$"
 )
 
 
 @pytest.fixture(scope="module")
-def drawings(fit_result, make_fit_result, truth, instrument):
+def drawings(fit_result, compared, make_fit_result, truth, instrument):
     """Return name -> (draw, table): the plot as a function of table and theme."""
     residuals = tables.residual_map(fit_result, instrument, detector_id=0)
     fields = tables.footprint_fields(fit_result, instrument)
@@ -38,6 +39,7 @@ def drawings(fit_result, make_fit_result, truth, instrument):
         "distortion": (plots.plot_distortion, tables.distortion(fit_result, instrument)),
         "pulls": (plots.plot_pulls, tables.pull_histogram(fit_result)),
         "exposure_chi2": (plots.plot_exposure_chi2, tables.exposure_chi2(fit_result)),
+        "orders": (plots.plot_orders, tables.order_comparison(compared)),
         "comparison": (
             plots.plot_comparison,
             tables.comparison(fit_result, make_fit_result(2)[0]),
@@ -60,6 +62,7 @@ NAMES = [
     "distortion",
     "pulls",
     "exposure_chi2",
+    "orders",
     "comparison",
     "mode_spectrum",
     "mode_deciders",

@@ -7,7 +7,7 @@ result tables carry ours. `solver.io` maps them to and from files.
 
 from solver.columns import Column, Table
 from solver.mode_schema import MODE_TABLES
-from solver.schema_orders import ORDERS as ORDERS
+from solver.order_schema import ORDERS as ORDERS
 
 _EXPOSURE_KEY = ("orbit_id", "field_id", "plate_id")
 _ORBIT = Column("orbit_id", "int64", "", "satellite orbit")

@@ -16,8 +16,8 @@ from plateviz.plots.footprint import plot_footprint
 from plateviz.plots.mode_groups import plot_mode_groups
 from plateviz.plots.mode_shifts import plot_mode_shifts
 from plateviz.plots.modes import plot_mode_deciders, plot_mode_spectrum
-from plateviz.plots.prior_shares import plot_prior_shares
 from plateviz.plots.orders import plot_orders
+from plateviz.plots.prior_shares import plot_prior_shares
 from plateviz.plots.pulls import plot_exposure_chi2, plot_pulls
 from plateviz.plots.residual_map import plot_residual_map
 from plateviz.plots.residual_scatter import plot_residual_scatter

@@ -23,8 +23,10 @@ def gradient(
     problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
 ) -> Gradient:
     """Return chi2 of the data and its gradient at one point."""
-    offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
-    total = jax.tree.map(jnp.zeros_like, (0.0, offsets))
+    offsets = problem.offsets(theta, sources)
+    # NumPy's zeros: each of JAX's is a compilation, and a bare 0.0 would be one more of the sum.
+    total = jax.tree.map(np.zeros_like, (np.zeros(()), offsets))
+    offsets, geometry = jax.device_put((offsets, problem.geometry))
     for i in range(len(problem.tiles.measured)):
         total = _add_chunk(total, offsets, geometry, *problem.tiles.chunk(i))
     half, by_group = jax.tree.map(np.asarray, total)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from solver.device import require_device
 from solver.engines import Resumption, estimate
 from solver.errors import FitError
 from solver.estimate import Estimate
@@ -79,7 +80,8 @@ class OrbitFitter:
     """One orbit, fitted again and again: it keeps what a change of settings can start from."""
 
     def __init__(self, data: OrbitData, instrument: Instrument = MINI_MOCK) -> None:
-        """Take checked tables, as from `solver.read_orbit`."""
+        """Take checked tables, as from `solver.read_orbit`; InputError if JAX has no device."""
+        require_device()
         self._data = data
         self._instrument = instrument
         self._kept: _Fitted | None = None

@@ -70,10 +70,12 @@ def chunks(
 
     The next chunk is under way in JAX while the caller works on this one.
     """
-    offsets, n_chunks = problem.offsets(theta, sources), len(problem.tiles.measured)
+    n_chunks = len(problem.tiles.measured)
+    # Once, and not with every chunk.
+    offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
 
     def start(i: int) -> Linearised:
-        return linearise(offsets, problem.geometry, *problem.tiles.chunk(i))
+        return linearise(offsets, geometry, *problem.tiles.chunk(i))
 
     ahead = start(0)
     for i in range(n_chunks):

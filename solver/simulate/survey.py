@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from solver.device import require_device
 from solver.errors import InputError
 from solver.instrument import MINI_MOCK, Instrument, write_instrument
 from solver.io.atomic import sha256_of
@@ -61,8 +62,9 @@ def simulate_survey(
     ------
     InputError
         If the directory holds anything but this survey unfinished, the catalogue cannot
-        be used, or an orbit sees no reference star.
+        be used, an orbit sees no reference star, or JAX has no device.
     """
+    require_device()
     directory, settings = Path(directory), settings or SurveySettings()
     header = _header(settings, instrument, catalogue)
     _claim(directory, header)

@@ -40,9 +40,6 @@ def small_orbit():
     return make_orbit()
 
 
-# A test runs next to nothing of what it compiles.
-jax.config.update("jax_disable_most_optimizations", True)
-
 # With the default priors the common shift, roll and scale of the detectors are so weakly
 # held that a dense inverse has but seven digits to compare with.
 HELD = {

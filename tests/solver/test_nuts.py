@@ -26,13 +26,14 @@ ENGINES = {
 @pytest.fixture(scope="module")
 def results():
     """A small orbit by every engine."""
+    before = jax.config.jax_disable_most_optimizations
     jax.config.update("jax_disable_most_optimizations", False)
     orbit = make_orbit()
     found = {
         name: fit_orbit(orbit.data, orbit.instrument, settings)
         for name, settings in ENGINES.items()
     }
-    jax.config.update("jax_disable_most_optimizations", True)
+    jax.config.update("jax_disable_most_optimizations", before)
     return found
 
 

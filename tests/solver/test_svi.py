@@ -22,9 +22,10 @@ SETTINGS = FitSettings(engine="svi")
 @pytest.fixture(scope="module", autouse=True)
 def _optimised():
     """Thousands of steps are worth an optimised program."""
+    before = jax.config.jax_disable_most_optimizations
     jax.config.update("jax_disable_most_optimizations", False)
     yield
-    jax.config.update("jax_disable_most_optimizations", True)
+    jax.config.update("jax_disable_most_optimizations", before)
 
 
 @pytest.fixture(scope="module")

@@ -8,15 +8,8 @@ needs. It is timed in the same run, so that results of different machines compar
 """
 
 import argparse
-import os
-import platform
-import resource
-import statistics
 import sys
-import time
 from collections.abc import Callable
-from dataclasses import replace
-from importlib import metadata
 from pathlib import Path
 
 # The checkout is measured, wherever it is run from.
@@ -24,8 +17,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 # Before NumPy, as in the program: it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
-
-import numpy as np
 
 from solver.exclusions import Exclusions
 from solver.fit import fit_orbit
@@ -36,18 +27,19 @@ from solver.normal import accumulate
 from solver.objective import gradient
 from solver.orbit import OrbitData
 from solver.problem import Problem, build_problem
-from solver.schur import Reduced, reduce
+from solver.schur import reduce
 from solver.settings import FitSettings
-from solver.simulate.catalogue import reference_catalogue, truth_catalogue
-from solver.simulate.measure import measure_orbit
-from solver.simulate.settings import SurveySettings
 from solver.svi import blocks, start_state
-from solver.what_if import re_solve
+from tests.benchmarks.machine import device, machine, peak_memory_mib, time_of, write
+from tests.benchmarks.orbits import simulated_orbit, survey_of
+from tests.benchmarks.stages import (
+    UNIT_REPEATS,
+    fit_with_sigmas,
+    marginal_sigmas,
+    unit_product,
+    what_if,
+)
 
-ORBIT = 0
-# What the paper's catalogue of 132,651 stars leaves on the detectors in that orbit.
-SOURCES_OF_THE_PAPER = 6480
-UNIT_REPEATS = 5
 CHANGES = {
     "sources' priors": (FitSettings(), FitSettings(prior_widths={"sources": 2.0})),
     "detectors' priors": (FitSettings(), FitSettings(prior_widths={"detector_x": 10.0})),
@@ -55,12 +47,11 @@ CHANGES = {
     # From one order more than the distortion has, so that the lower one fits as well.
     "order 6 to 5": (FitSettings(order=6), FitSettings()),
 }
-PACKAGES = ("numpy", "scipy", "jax", "jaxlib")
 
 
 def main() -> None:
     arguments = parse_arguments()
-    data = full_size_orbit(arguments.sources)
+    data = simulated_orbit(survey_of(arguments.sources))
     settings = FitSettings()
     problem = build_problem(data, MINI_MOCK, settings)
     # Warm: everything compiled, memory touched.
@@ -75,6 +66,7 @@ def main() -> None:
     # A step is timed as its share of a block, linearisations included.
     timings["svi, one step"] /= settings.svi.block
     write(machine())
+    write(f"JAX on {device()}")
     write(
         f"{problem.n_obs} measurements, {problem.n_src} sources, "
         f"{len(problem.exposures)} exposures, {problem.layout.size} calibration parameters"
@@ -92,27 +84,6 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--sources", type=int, default=7000, help="about as many in the orbit")
     parser.add_argument("--repeat", type=int, default=5, help="runs of each stage; medians count")
     return parser.parse_args()
-
-
-def full_size_orbit(sources: int) -> OrbitData:
-    """Simulate an orbit of the mini-mock survey with about so many sources."""
-    share = sources / SOURCES_OF_THE_PAPER
-    paper = SurveySettings()
-    survey = SurveySettings(
-        n_stars=round(share * paper.n_stars),
-        n_reference=round(share * paper.n_reference),
-        n_artificial=round(share * paper.n_artificial),
-    )
-    truth = truth_catalogue(survey)
-    measured = measure_orbit(ORBIT, truth, survey, MINI_MOCK)
-    catalogue = reference_catalogue(truth, survey)
-    return OrbitData(measured.measurements, measured.exposures, catalogue, truth)
-
-
-def unit_product(problem: Problem) -> Callable[[], object]:
-    shape = (2 * problem.n_src, problem.layout.size)
-    matrix = np.random.default_rng(0).standard_normal(shape)
-    return lambda: matrix.T @ matrix
 
 
 def stages(
@@ -141,73 +112,12 @@ def stages(
     }
 
 
-def fit_with_sigmas(problem: Problem, settings: FitSettings) -> object:
-    # A problem of its own, whose tiles are still to be laid.
-    reduced = find_mode(replace(problem), settings).reduced
-    return None if reduced is None else marginal_sigmas(reduced)
-
-
-def what_if(data: OrbitData, before: FitSettings, after: FitSettings) -> Callable[[], object]:
-    """Return the re-solution of one change, from a fit made and a problem built beforehand."""
-    solved = build_problem(data, MINI_MOCK, before)
-    changed = build_problem(after.exclusions.without(data), MINI_MOCK, after)
-    mode = find_mode(solved, before)
-
-    def work() -> object:
-        found = re_solve(mode, solved, changed, after)
-        if found is None or found.reduced is None:
-            sys.exit(f"no re-solution from {before} to {after}")
-        return marginal_sigmas(found.reduced)
-
-    return work
-
-
 def svi_block(problem: Problem, settings: FitSettings, mode: Mode) -> Callable[[], object]:
     """Return one block of steps from the mode."""
     start = start_state(problem, settings.svi)._replace(theta=mode.theta, sources=mode.sources)
     work = lambda: next(blocks(problem, settings, start))  # noqa: E731 timed as the others are
     work()
     return work
-
-
-def marginal_sigmas(reduced: Reduced) -> object:
-    return reduced.marginal_covariance(reduced.spread())
-
-
-def time_of(work: Callable[[], object], repeat: int) -> float:
-    """Return the median time, s."""
-    seconds = []
-    for _ in range(repeat):
-        start = time.perf_counter()
-        work()
-        seconds.append(time.perf_counter() - start)
-    return statistics.median(seconds)
-
-
-def machine() -> str:
-    versions = ", ".join(f"{name} {metadata.version(name)}" for name in PACKAGES)
-    return f"{cpu_model()}, {usable_cores()} cores, Python {platform.python_version()}, {versions}"
-
-
-def cpu_model() -> str:
-    cpuinfo = Path("/proc/cpuinfo")
-    lines = cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []
-    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(names, platform.processor() or platform.machine())
-
-
-def usable_cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def peak_memory_mib() -> float:
-    # In KiB on Linux, in bytes on macOS.
-    per_mib = 1024.0**2 if sys.platform == "darwin" else 1024.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / per_mib
-
-
-def write(line: str) -> None:
-    sys.stdout.write(line + "\n")
 
 
 if __name__ == "__main__":

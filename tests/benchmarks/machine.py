@@ -1,0 +1,59 @@
+"""What a benchmark runs on, and how it times and prints: shared by all of them."""
+
+import os
+import platform
+import resource
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+
+import jax
+
+_PACKAGES = ("numpy", "scipy", "jax", "jaxlib")
+
+
+def machine() -> str:
+    versions = ", ".join(f"{name} {metadata.version(name)}" for name in _PACKAGES)
+    return f"{cpu_model()}, {usable_cores()} cores, Python {platform.python_version()}, {versions}"
+
+
+def device() -> str:
+    """Return what JAX computes on: "cpu", or the platform and the name of the device."""
+    used = jax.devices()[0]
+    return used.platform if used.platform == "cpu" else f"{used.platform} ({used.device_kind})"
+
+
+def cpu_model() -> str:
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor() or platform.machine())
+
+
+def usable_cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def peak_memory_mib() -> float:
+    """Return the most memory that this process has held so far."""
+    # In KiB on Linux, in bytes on macOS.
+    per_mib = 1024.0**2 if sys.platform == "darwin" else 1024.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / per_mib
+
+
+def time_of(work: Callable[[], object], repeat: int) -> float:
+    """Return the median time, s."""
+    seconds = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - start)
+    return statistics.median(seconds)
+
+
+def write(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()

@@ -1,0 +1,30 @@
+"""Simulated orbits of any size, for the benchmarks."""
+
+from dataclasses import replace
+
+from solver.instrument import MINI_MOCK
+from solver.orbit import OrbitData
+from solver.simulate.catalogue import reference_catalogue, truth_catalogue
+from solver.simulate.measure import measure_orbit
+from solver.simulate.settings import SurveySettings
+
+ORBIT = 0
+# What the paper's catalogue of 132,651 stars leaves on the detectors in that orbit.
+SOURCES_OF_THE_PAPER = 6480
+MEASUREMENTS_OF_THE_PAPER = 247_932
+EXPOSURES_OF_THE_PAPER = 96
+
+
+def survey_of(sources: float, exposures: int = EXPOSURES_OF_THE_PAPER) -> SurveySettings:
+    """Return the mini-mock survey with about so many sources and just so many exposures."""
+    paper = SurveySettings()
+    scaled = paper.scaled(round(sources / SOURCES_OF_THE_PAPER * paper.n_stars))
+    return replace(scaled, orbits=1, exposures_per_field=exposures // scaled.n_fields)
+
+
+def simulated_orbit(survey: SurveySettings) -> OrbitData:
+    """Simulate one orbit of a survey."""
+    truth = truth_catalogue(survey)
+    measured = measure_orbit(ORBIT, truth, survey, MINI_MOCK)
+    catalogue = reference_catalogue(truth, survey)
+    return OrbitData(measured.measurements, measured.exposures, catalogue, truth)

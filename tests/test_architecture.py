@@ -17,8 +17,7 @@ PACKAGES = ("solver", "plateviz")
 RUNGS = (
     ("solver.errors", "solver.units"),
     ("solver.schema", "solver.mode_schema", "solver.order_schema", "solver.columns"),
-    ("solver.parameters",),
-    ("solver.schema", "solver.columns", "solver.parameters", "solver.device"),
+    ("solver.parameters", "solver.device"),
     ("solver.orbit", "solver.instrument"),
     ("solver.exclusions", "solver.prior_text"),
     ("solver.settings",),

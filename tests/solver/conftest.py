@@ -34,6 +34,15 @@ def _small_chunks():
         yield
 
 
+@pytest.fixture(scope="module")
+def optimised():
+    """Compile with all optimisations, for those who run what they compile for long."""
+    before = jax.config.values["jax_disable_most_optimizations"]
+    jax.config.update("jax_disable_most_optimizations", False)
+    yield
+    jax.config.update("jax_disable_most_optimizations", before)
+
+
 @pytest.fixture(scope="package")
 def small_orbit():
     """Two fields of four exposures on four detectors, with the paper's aberration."""

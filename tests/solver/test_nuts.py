@@ -4,7 +4,6 @@ import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
-import jax
 import numpy as np
 import pytest
 
@@ -24,17 +23,13 @@ ENGINES = {
 
 
 @pytest.fixture(scope="module")
-def results():
+def results(optimised):
     """A small orbit by every engine."""
-    before = jax.config.jax_disable_most_optimizations
-    jax.config.update("jax_disable_most_optimizations", False)
     orbit = make_orbit()
-    found = {
+    return {
         name: fit_orbit(orbit.data, orbit.instrument, settings)
         for name, settings in ENGINES.items()
     }
-    jax.config.update("jax_disable_most_optimizations", before)
-    return found
 
 
 @pytest.mark.slow

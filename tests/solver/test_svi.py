@@ -19,17 +19,12 @@ from solver.svi import blocks, rate, start_state, variational
 SETTINGS = FitSettings(engine="svi")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _optimised():
-    """Thousands of steps are worth an optimised program."""
-    before = jax.config.jax_disable_most_optimizations
-    jax.config.update("jax_disable_most_optimizations", False)
-    yield
-    jax.config.update("jax_disable_most_optimizations", before)
+# Thousands of steps are worth an optimised program.
+pytestmark = pytest.mark.usefixtures("optimised")
 
 
 @pytest.fixture(scope="module")
-def svi_problem(small_orbit):
+def svi_problem(small_orbit, optimised):
     return build_problem(small_orbit.data, small_orbit.instrument, SETTINGS)
 
 

@@ -13,12 +13,11 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Bool, Float, Int
 
-from solver.forward import Index
 from solver.layout import PER_COEFFICIENT, PER_DETECTOR, PER_EXPOSURE
 from solver.normal import NormalEquations, accumulate
 from solver.objective import Gradient
 from solver.parameters import BY_NAME
-from solver.problem import Problem
+from solver.problem import Problem, of_rows
 from solver.units import RAD_PER_MAS
 
 
@@ -82,17 +81,7 @@ def _without(
     equations: NormalEquations, old: Problem, gone: Bool[np.ndarray, " obs"]
 ) -> NormalEquations:
     """Return the equations without what some measurements added."""
-    part = accumulate(
-        replace(
-            old,
-            index=Index(*(column[gone] for column in old.index)),
-            measured=old.measured[gone],
-            sigma=old.sigma[gone],
-            row=old.row[gone],
-            label=old.label[gone],
-        ),
-        *equations.at,
-    )
+    part = accumulate(of_rows(old, gone), *equations.at)
     return NormalEquations(
         equations.at,
         Gradient(

@@ -78,7 +78,9 @@ def residuals(
             index = Index(*(part[i] for part in tiles.index))
             leverage = _leverage(index, next(jacobians), problem.layout, covariance)
             at = chunk.prediction
-            parts.append([leverage, *map(_pairs, (chunk.residual, at.pixel, at.ideal, at.focal))])
+            parts.append(
+                [leverage, *map(side_by_side, (chunk.residual, at.pixel, at.ideal, at.focal))]
+            )
     leverage, residual, pixel, ideal, focal = (
         np.concatenate(columns)[tiles.place] for columns in zip(*parts, strict=True)
     )
@@ -86,7 +88,8 @@ def residuals(
     return Residuals(residual, _standardised(residual, leverage), trace, pixel, ideal, focal)
 
 
-def _pairs(pair: Pair) -> Float[np.ndarray, "slots 2"]:
+def side_by_side(pair: Pair) -> Float[np.ndarray, "slots 2"]:
+    """Return x and y of every slot of a chunk."""
     return np.stack([values.ravel() for values in pair], axis=-1)
 
 

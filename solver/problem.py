@@ -102,27 +102,31 @@ class Problem:
         return self.layout.gather(values), offsets[SOURCES.name][: self.n_src]
 
 
+def of_rows(problem: Problem, chosen: Bool[np.ndarray, " obs"]) -> Problem:
+    """Return the problem with some of its measurements, and all of its parameters."""
+    return replace(
+        problem,
+        index=Index(*(column[chosen] for column in problem.index)),
+        measured=problem.measured[chosen],
+        sigma=problem.sigma[chosen],
+        row=problem.row[chosen],
+        label=problem.label[chosen],
+    )
+
+
 def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
     """Return the problem with the measurements of some sources alone.
 
     Its arrays in JAX have the shapes of the whole problem's, so that nothing is compiled anew.
     """
-    rows = keep[problem.index.source]
+    part = of_rows(problem, keep[problem.index.source])
     number = np.cumsum(keep) - 1
     frames = problem.geometry.source_frame
     kept_first = np.argsort(~np.pad(keep, (0, len(frames) - len(keep))), kind="stable")
     return replace(
-        problem,
+        part,
         geometry=replace(problem.geometry, source_frame=frames[kept_first]),
-        index=Index(
-            number[problem.index.source[rows]],
-            problem.index.exposure[rows],
-            problem.index.detector[rows],
-        ),
-        measured=problem.measured[rows],
-        sigma=problem.sigma[rows],
-        row=problem.row[rows],
-        label=problem.label[rows],
+        index=part.index._replace(source=number[part.index.source]),
         sources=problem.sources[keep].reset_index(drop=True),
         priors=problem.priors._replace(precision=problem.priors.precision[keep]),
     )

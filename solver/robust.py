@@ -14,12 +14,11 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Bool, Float
 
-from solver.forward import Index
 from solver.gauss_newton import Iteration, Mode, find_mode
-from solver.leverage import covariances
+from solver.leverage import covariances, side_by_side
 from solver.normal import chunks
 from solver.orbit import OrbitData
-from solver.problem import Problem
+from solver.problem import Problem, of_rows
 from solver.schema import OUTLIERS
 from solver.settings import FitSettings
 
@@ -102,30 +101,19 @@ def _weighted(problem: Problem, weight: Float[np.ndarray, " obs"]) -> Problem:
 
 
 def _whitened(problem: Problem, mode: Mode) -> Float[np.ndarray, "obs 2"]:
-    parts = [
-        np.stack([values.ravel() for values in chunk.residual], axis=-1)
-        for chunk in chunks(problem, mode.theta, mode.sources)
-    ]
+    parts = [side_by_side(c.residual) for c in chunks(problem, mode.theta, mode.sources)]
     return np.concatenate(parts)[problem.tiles.place]
 
 
 def _described(problem: Problem, mode: Mode, found: Bool[np.ndarray, " obs"]) -> Outliers:
     if mode.reduced is None or not found.any():
         return Outliers(found, np.empty((0, 2)), np.empty(0), np.empty((0, 2)))
-    few = replace(
-        problem,
-        index=Index(*(column[found] for column in problem.index)),
-        measured=problem.measured[found],
-        sigma=problem.sigma[found],
-        row=problem.row[found],
-        label=problem.label[found],
-    )
+    few = of_rows(problem, found)
     place = few.tiles.place
     whitened, jacobian = [], []
     for chunk in chunks(few, mode.theta, mode.sources):
-        whitened.append(np.stack([values.ravel() for values in chunk.residual], axis=-1))
-        by_source = [np.stack([v.ravel() for v in pair], axis=-1) for pair in chunk.source]
-        jacobian.append(np.stack(by_source, axis=-1))
+        whitened.append(side_by_side(chunk.residual))
+        jacobian.append(np.stack([side_by_side(pair) for pair in chunk.source], axis=-1))
     residual, by_source = np.concatenate(whitened)[place], np.concatenate(jacobian)[place]
     covariance = covariances(mode.reduced).source[few.index.source]
     # As one more measurement of the source moves it: gain times residual.

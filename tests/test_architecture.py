@@ -47,8 +47,8 @@ RUNGS = (
     ("solver.mode_tables",),
     ("solver.summary",),
     ("solver.fit",),
-    ("plateviz.tables", "plateviz.truth", "plateviz.job", "plateviz.cache"),
-    ("plateviz.source", "plateviz.runs", "plateviz.store"),
+    ("plateviz.tables", "plateviz.job", "plateviz.cache"),
+    ("plateviz.source", "plateviz.store"),
     ("plateviz.plots",),
     ("plateviz.gallery",),
     ("plateviz.state", "plateviz.worker", "plateviz.worker_process"),
@@ -59,7 +59,6 @@ RUNGS = (
     ("plateviz.demo", "plateviz.cli_output"),
     ("plateviz.cli_fit",),
     ("plateviz.cli",),
-    ("plateviz.__main__",),
 )
 
 USER_INTERFACE = ("panel", "param", "holoviews", "bokeh", "datashader")
@@ -67,13 +66,11 @@ NEVER = {
     "solver": ("plateviz", *USER_INTERFACE),
     "solver.simulate": ("solver.io.result",),
     "plateviz.tables": USER_INTERFACE,
-    "plateviz.truth": USER_INTERFACE,
     "plateviz.source": USER_INTERFACE,
     "plateviz.job": USER_INTERFACE,
     "plateviz.cache": USER_INTERFACE,
-    "plateviz.runs": USER_INTERFACE,
     "plateviz.store": USER_INTERFACE,
-    "plateviz.plots": ("panel", "param", "plateviz.source", "plateviz.runs", "plateviz.store"),
+    "plateviz.plots": ("panel", "param", "plateviz.source", "plateviz.store"),
     "plateviz.state": ("panel",),
     "plateviz.worker": ("panel",),
     "plateviz.worker_process": USER_INTERFACE,

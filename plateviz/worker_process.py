@@ -31,6 +31,8 @@ from solver.simulate.survey import simulate_survey
 
 Request = dict
 Send = Callable[[dict], None]
+# Work that makes the next request quicker, for when none waits.
+Later = Callable[[], None]
 
 
 class _Cancellations:
@@ -56,7 +58,9 @@ def main() -> None:
     reader.start()
     send({"event": "ready"})
     while (request := requests.get()) is not None:
-        _serve(request, send, cancellations)
+        later = _serve(request, send, cancellations)
+        if later is not None and requests.empty():
+            later()
 
 
 def _sender() -> Send:
@@ -85,7 +89,7 @@ def _read(
     os._exit(0)
 
 
-def _serve(request: Request, send: Send, cancellations: _Cancellations) -> None:
+def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later | None:
     job = request["job"]
     work = {"fit": _fit, "simulate": _simulate}[request["do"]]
 
@@ -95,15 +99,17 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> None:
 
     try:
         cancellations.check(job)
-        work(request, progress)
+        later = work(request, progress)
         send({"event": "done", "job": job})
+        return later
     except CancelledError:
         send({"event": "cancelled", "job": job})
     except (InputError, FitError) as error:
         send({"event": "failed", "job": job, "message": str(error)})
+    return None
 
 
-def _fit(request: Request, progress: Callable[..., None]) -> None:
+def _fit(request: Request, progress: Callable[..., None]) -> Later:
     progress(stage="reading the orbit")
     fitter = _fitter(json.dumps(request["source"], sort_keys=True), request["orbit"])
     settings = FitSettings.from_dict(request["settings"])
@@ -118,6 +124,7 @@ def _fit(request: Request, progress: Callable[..., None]) -> None:
         result = fitter.fit(settings, on_iteration)
     progress(stage="writing the result")
     write_run(Path(request["directory"]), result)
+    return lambda: fitter.get_ready(settings.order)
 
 
 def _simulate(request: Request, progress: Callable[..., None]) -> None:

@@ -7,7 +7,9 @@ by the terms that are dropped, which neither the leverage of the measurements no
 priors alone hold would forgive: those are made anew, where the fit ended.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,9 +22,25 @@ from solver.parameters import BY_NAME
 from solver.problem import Problem, of_rows
 from solver.units import RAD_PER_MAS
 
+# Beyond this, what each detector added is made anew when it is asked for.
+_MOST_KEPT_BYTES = 2**29
 
-def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> NormalEquations | None:
+
+class Part(NamedTuple):
+    """What some measurements, a boolean mask, added to the equations at the same point."""
+
+    rows: Bool[np.ndarray, " obs"]
+    equations: NormalEquations
+
+
+def carry_over(
+    equations: NormalEquations, old: Problem, new: Problem, parts: Sequence[Part] = ()
+) -> NormalEquations | None:
     """Return normal equations for `new`, made of those of `old`.
+
+    Parameters
+    ----------
+    parts : of measurements that `new` may not have; others are made anew
 
     Returns
     -------
@@ -37,21 +55,25 @@ def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> Normal
     at = _same_point(equations, old, new, columns, sources)
     if new.geometry.order < old.geometry.order:
         return accumulate(new, *at)
-    if gone.any():
-        equations = _without(equations, old, gone)
-    if len(columns) == old.layout.size and len(sources) == old.n_src:
+    if not gone.any():
         return replace(equations, at=at)
-    return NormalEquations(
-        at,
-        Gradient(
-            equations.gradient.chi2,
-            equations.gradient.by_theta[columns],
-            equations.gradient.by_source[sources],
-        ),
-        equations.theta[np.ix_(columns, columns)],
-        equations.source[sources],
-        equations.cross[columns][:, :, sources],
-    )
+    part = next((p.equations for p in parts if np.array_equal(p.rows, gone)), None)
+    if part is None:
+        part = accumulate(of_rows(old, gone), *equations.at)
+    return _without(equations, part, at, columns, sources)
+
+
+def parts_by_detector(equations: NormalEquations, problem: Problem) -> list[Part]:
+    """Return what the measurements of each detector added, where that is not too much to keep."""
+    n_det = problem.layout.n_det
+    if n_det * equations.cross.nbytes > _MOST_KEPT_BYTES:
+        return []
+    by_detector = [problem.index.detector == number for number in range(n_det)]
+    return [
+        Part(rows, accumulate(of_rows(problem, rows), *equations.at))
+        for rows in by_detector
+        if rows.any() and not rows.all()
+    ]
 
 
 def _same_model(old: Problem, new: Problem) -> bool:
@@ -78,20 +100,30 @@ def _same_point(
 
 
 def _without(
-    equations: NormalEquations, old: Problem, gone: Bool[np.ndarray, " obs"]
+    equations: NormalEquations,
+    part: NormalEquations,
+    at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
+    columns: Int[np.ndarray, " calib"],
+    sources: Int[np.ndarray, " src"],
 ) -> NormalEquations:
-    """Return the equations without what some measurements added."""
-    part = accumulate(of_rows(old, gone), *equations.at)
+    """Return the equations less a part of them, for some of the parameters."""
+    whole, less = equations.gradient, part.gradient
+    cross = np.empty((len(columns), 2, len(sources)))
+    # Row by row and without fresh memory, of which the whole would be too much for the caches.
+    rest = np.empty(equations.cross.shape[1:])
+    for row, column in zip(cross, columns, strict=True):
+        np.subtract(equations.cross[column], part.cross[column], out=rest)
+        np.take(rest, sources, axis=1, out=row, mode="clip")
     return NormalEquations(
-        equations.at,
+        at,
         Gradient(
-            equations.gradient.chi2 - part.gradient.chi2,
-            equations.gradient.by_theta - part.gradient.by_theta,
-            equations.gradient.by_source - part.gradient.by_source,
+            whole.chi2 - less.chi2,
+            (whole.by_theta - less.by_theta)[columns],
+            (whole.by_source - less.by_source)[sources],
         ),
-        equations.theta - part.theta,
-        equations.source - part.source,
-        equations.cross - part.cross,
+        (equations.theta - part.theta)[np.ix_(columns, columns)],
+        (equations.source - part.source)[sources],
+        cross,
     )
 
 

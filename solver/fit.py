@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from solver.carry import Part, parts_by_detector
 from solver.device import require_device
 from solver.engines import Resumption, estimate
-from solver.errors import FitError
+from solver.errors import FitError, InputError
 from solver.estimate import Estimate
 from solver.exclusions import of_rows, thinned_orbit
 from solver.gauss_newton import Iteration, Mode
@@ -32,7 +33,7 @@ from solver.tables import (
     trace_table,
     true_places,
 )
-from solver.what_if import re_solve
+from solver.what_if import carried, re_solve
 
 
 def fit_orbit(
@@ -76,6 +77,14 @@ class _Fitted(NamedTuple):
     orders: pd.DataFrame | None
 
 
+class _Start(NamedTuple):
+    """Where a change of settings can start from: a linearised problem and parts of it."""
+
+    problem: Problem
+    mode: Mode
+    parts: list[Part]
+
+
 class OrbitFitter:
     """One orbit, fitted again and again: it keeps what a change of settings can start from."""
 
@@ -85,6 +94,7 @@ class OrbitFitter:
         self._data = data
         self._instrument = instrument
         self._kept: _Fitted | None = None
+        self._starts: list[_Start] = []
         self._stopped: tuple[FitSettings, object] | None = None
 
     def fit(
@@ -111,6 +121,7 @@ class OrbitFitter:
         orders = self._compare_orders(data, problem, settings, progress)
         if found.mode.status.is_solution:
             self._kept = _Fitted(settings, problem, found.mode, outliers, orders)
+            self._starts = [_Start(problem, found.mode, [])]
         result = _with_outliers(result, outliers)
         return _with_orders(result, orders, time.perf_counter() - fitted)
 
@@ -133,7 +144,11 @@ class OrbitFitter:
         start = time.perf_counter()
         data, problem = self._prepare(settings, kept.outliers)
         prepared = time.perf_counter()
-        mode = re_solve(kept.mode, kept.problem, problem, settings)
+        # The one of the lowest order that still holds the one asked for.
+        near = [s for s in self._starts if s.problem.geometry.order >= settings.order]
+        if not near:
+            return None
+        mode = re_solve(near[-1].mode, near[-1].problem, problem, settings, near[-1].parts)
         if mode is None:
             return None
         found = Estimate(mode)
@@ -141,6 +156,34 @@ class OrbitFitter:
         same_but_order = settings == kept.settings.with_(order=settings.order)
         orders = kept.orders if same_but_order else None
         return replace(_with_outliers(result, kept.outliers), orders=orders)
+
+    def get_ready(self, order: int) -> None:
+        """Prepare, while nobody waits, for what may be asked of the last fit next.
+
+        A lower order than the given one needs Jacobians of its own, and to leave out a detector
+        a share of the linearised problem; with them both are as quick as other priors.
+        """
+        if self._kept is None:
+            return
+        fitted = self._starts[0]
+        if not fitted.parts:
+            self._starts[0] = fitted._replace(
+                parts=parts_by_detector(fitted.mode.equations, fitted.problem)
+            )
+        if all(start.problem.geometry.order != order - 1 for start in self._starts):
+            self._starts = [*self._starts[:1], *self._lowered(self._kept, order - 1)]
+
+    def _lowered(self, kept: _Fitted, order: int) -> list[_Start]:
+        """Return the last fit linearised with a lower order, where there can be one."""
+        if not 0 <= order < kept.settings.order:
+            return []
+        try:
+            _, problem = self._prepare(kept.settings.with_(order=order), kept.outliers)
+        except InputError:
+            # A prior is shifted of a term that the lower order has not.
+            return []
+        mode = carried(kept.mode, kept.problem, problem)
+        return [] if mode is None else [_Start(problem, mode, [])]
 
     def _prepare(
         self, settings: FitSettings, outliers: pd.DataFrame | None = None

@@ -138,6 +138,8 @@ def _iterate(
         step = reduced.solve(*downhill(problem, *point[:3]))
         largest, parameter = largest_step(problem, step, reduced)
         if largest > limit:
+            # Given back first: they are large, and memory that was in use is quicker than fresh.
+            del equations, reduced
             equations = accumulate(problem, point.theta, point.sources)
             reduced, limit = reduce(equations, problem.priors), np.inf
             continue

@@ -8,10 +8,11 @@ gradient do that, and show whether the first was short enough for a linear model
 """
 
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
-from solver.carry import carry_over
+from solver.carry import Part, carry_over
 from solver.gauss_newton import Iteration, Mode, downhill, largest_step, objective
 from solver.objective import gradient
 from solver.problem import Problem
@@ -23,21 +24,20 @@ from solver.settings import FitSettings
 _MAX_STEPS = 5
 
 
-def re_solve(mode: Mode, solved: Problem, changed: Problem, settings: FitSettings) -> Mode | None:
-    """Return the mode of a changed problem, from that of one that was solved.
+def carried(
+    mode: Mode, solved: Problem, changed: Problem, parts: Sequence[Part] = ()
+) -> Mode | None:
+    """Return the posterior of a changed problem, linearised where that of `solved` was.
 
     Parameters
     ----------
-    mode : where the engine ended for `solved`
-    settings : those of `changed`
+    parts : of the equations of `mode`, as `solver.carry.carry_over` takes them
 
     Returns
     -------
-    None if only a refit can tell: `changed` asks for more data or terms than `solved` had,
-    or is so different that the model is not linear on the way.
+    None if `solved` does not hold what `changed` asks for, or that is singular.
     """
-    begin = time.perf_counter()
-    equations = carry_over(mode.equations, solved, changed)
+    equations = carry_over(mode.equations, solved, changed, parts)
     if equations is None:
         return None
     # None of the data's blocks is another where the priors alone have changed.
@@ -45,14 +45,41 @@ def re_solve(mode: Mode, solved: Problem, changed: Problem, settings: FitSetting
     reduced = reduce(equations, changed.priors, before)
     if reduced is None:
         return None
-    trace: list[Iteration] = []
-    (theta, sources), at, held, limit = equations.at, equations.gradient, None, np.inf
+    return Mode(*equations.at, reduced, FitStatus.RE_SOLVED, [], equations)
+
+
+def re_solve(
+    mode: Mode,
+    solved: Problem,
+    changed: Problem,
+    settings: FitSettings,
+    parts: Sequence[Part] = (),
+) -> Mode | None:
+    """Return the mode of a changed problem, from that of one that was solved.
+
+    Parameters
+    ----------
+    mode : where the engine ended for `solved`
+    settings : those of `changed`
+    parts : of the equations of `mode`, as `solver.carry.carry_over` takes them
+
+    Returns
+    -------
+    None if only a refit can tell: `changed` asks for more data or terms than `solved` had,
+    or is so different that the model is not linear on the way.
+    """
+    begin = time.perf_counter()
+    start = carried(mode, solved, changed, parts)
+    if start is None or start.reduced is None:
+        return None
+    theta, sources, reduced, trace = start.theta, start.sources, start.reduced, start.trace
+    at, held, limit = start.equations.gradient, None, np.inf
     largest, parameter = float("nan"), ""
     while len(trace) <= _MAX_STEPS:
         total, elapsed = objective(changed, theta, sources, at), time.perf_counter() - begin
         trace.append(Iteration(len(trace), total, at.chi2, largest, parameter, 0.0, elapsed))
         if largest < settings.tolerance:
-            return Mode(theta, sources, reduced, FitStatus.RE_SOLVED, trace, equations)
+            return Mode(theta, sources, reduced, FitStatus.RE_SOLVED, trace, start.equations)
         step = reduced.solve(*downhill(changed, theta, sources, at), held)
         largest, parameter = largest_step(changed, step, reduced)
         if largest > limit:

@@ -40,14 +40,6 @@ from tests.benchmarks.stages import (
     what_if,
 )
 
-CHANGES = {
-    "sources' priors": (FitSettings(), FitSettings(prior_widths={"sources": 2.0})),
-    "detectors' priors": (FitSettings(), FitSettings(prior_widths={"detector_x": 10.0})),
-    "no detector 1": (FitSettings(), FitSettings(exclusions=Exclusions(detectors=frozenset([1])))),
-    # From one order more than the distortion has, so that the lower one fits as well.
-    "order 6 to 5": (FitSettings(order=6), FitSettings()),
-}
-
 
 def main() -> None:
     arguments = parse_arguments()
@@ -106,9 +98,30 @@ def stages(
         "all covariances": lambda: covariances(reduced),
         "residuals with leverage": lambda: residuals(problem, theta, sources, covariance),
         "from the catalogue to marginal sigmas": lambda: fit_with_sigmas(problem, settings),
-        **{f"what if: {name}": what_if(data, *change) for name, change in CHANGES.items()},
+        **{f"what if: {name}": what_if(data, *change) for name, change in changes(problem).items()},
         "svi, one step": svi_block(problem, settings, mode),
         "fit_orbit, with all tables": lambda: fit_orbit(data, MINI_MOCK, settings),
+    }
+
+
+def changes(problem: Problem) -> dict[str, tuple[FitSettings, FitSettings]]:
+    """Return the settings of a fit and those that it is re-solved for, by what changes."""
+    middle = problem.exposures.iloc[len(problem.exposures) // 2]
+    reference = problem.sources.loc[problem.sources["is_reference"], "source_id"]
+    left_out = {
+        "no reference star": Exclusions(sources=frozenset([int(reference.iloc[0])])),
+        "no exposure": Exclusions(
+            exposures=frozenset([(int(middle["field_id"]), int(middle["plate_id"]))])
+        ),
+        "no detector 1": Exclusions(detectors=frozenset([1])),
+    }
+    default = FitSettings()
+    return {
+        "sources' priors": (default, FitSettings(prior_widths={"sources": 2.0})),
+        "detectors' priors": (default, FitSettings(prior_widths={"detector_x": 10.0})),
+        **{name: (default, FitSettings(exclusions=gone)) for name, gone in left_out.items()},
+        # From one order more than the distortion has, so that the lower one fits as well.
+        "order 6 to 5": (FitSettings(order=6), default),
     }
 
 

@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.carry import parts_by_detector
 from solver.gauss_newton import find_mode
 from solver.instrument import MINI_MOCK
 from solver.orbit import OrbitData
 from solver.problem import Problem, build_problem
 from solver.schur import Reduced
 from solver.settings import FitSettings
-from solver.what_if import re_solve
+from solver.what_if import carried, re_solve
 
 UNIT_REPEATS = 5
 
@@ -35,9 +36,17 @@ def what_if(data: OrbitData, before: FitSettings, after: FitSettings) -> Callabl
     solved = build_problem(data, MINI_MOCK, before)
     changed = build_problem(after.exclusions.without(data), MINI_MOCK, after)
     mode = find_mode(solved, before)
+    # What follows the worker makes while nobody waits: `OrbitFitter.get_ready`.
+    parts = parts_by_detector(mode.equations, solved) if after.exclusions.detectors else []
+    if after.order < before.order:
+        lower = build_problem(data, MINI_MOCK, before.with_(order=after.order))
+        lowered = carried(mode, solved, lower)
+        if lowered is None:
+            sys.exit(f"no lower order than that of {before}")
+        solved, mode = lower, lowered
 
     def work() -> object:
-        found = re_solve(mode, solved, changed, after)
+        found = re_solve(mode, solved, changed, after, parts)
         if found is None or found.reduced is None:
             sys.exit(f"no re-solution from {before} to {after}")
         return marginal_sigmas(found.reduced)

@@ -112,6 +112,39 @@ def test_what_the_fit_did_not_hold_needs_a_refit(fitter, settings):
     assert fitter.what_if(settings) is None
 
 
+PREPARED = {
+    "lower-order": lambda data: {"order": 5},
+    "lower-order-held": lambda data: {"order": 5, "prior_widths": {"detector_x": 10.0}},
+    "no-detector": CHANGES["no-detector"],
+}
+
+
+@pytest.mark.parametrize("change", PREPARED)
+def test_what_was_made_ready_is_not_linearised_again(
+    change, sample_orbit, sample_fitter, monkeypatch
+):
+    settings = FitSettings(**{"order": 6, **PREPARED[change](sample_orbit)})
+    expected = sample_fitter.what_if(settings)
+    ready = fitted(OrbitFitter(sample_orbit))
+    ready.get_ready(6)
+
+    def refuse(*_):
+        raise AssertionError("linearised again")
+
+    monkeypatch.setattr("solver.carry.accumulate", refuse)
+    found = ready.what_if(settings)
+    for name in ("offset_ra", "sigma_dec_marginal", "chi2"):
+        np.testing.assert_allclose(found.sources[name], expected.sources[name], rtol=1e-6)
+
+
+def test_lower_order_without_a_term_whose_prior_is_shifted_is_not_made_ready(orbit):
+    fitter = OrbitFitter(orbit.data, orbit.instrument)
+    settings = FitSettings(order=2, prior_shifts={"distortion_x[2/0]": 1.0})
+    fitter.fit(settings)
+    fitter.get_ready(2)
+    assert fitter.what_if(settings) is not None
+
+
 def test_orbit_that_was_not_fitted_needs_a_fit(orbit):
     assert OrbitFitter(orbit.data, orbit.instrument).what_if(FitSettings()) is None
 

@@ -13,7 +13,7 @@ class Column:
     Attributes
     ----------
     name : the canonical name, used everywhere inside the project
-    dtype : "int64", "float64", "bool" or "str"
+    dtype : "int64", "float64", "float32", "bool" or "str"
     unit : astropy unit string of the canonical table; "" where there is none
     meaning : one line for people
     aliases : other names accepted when reading, in order of preference

@@ -16,7 +16,13 @@ PACKAGES = ("solver", "plateviz")
 # Low to high. The modules of a package share its rung, and those of a rung may use each other.
 RUNGS = (
     ("solver.errors", "solver.units"),
-    ("solver.schema", "solver.mode_schema", "solver.order_schema", "solver.columns"),
+    (
+        "solver.schema",
+        "solver.mode_schema",
+        "solver.order_schema",
+        "solver.survey_schema",
+        "solver.columns",
+    ),
     ("solver.parameters", "solver.device"),
     ("solver.orbit", "solver.instrument"),
     ("solver.exclusions", "solver.prior_text"),

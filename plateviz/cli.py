@@ -1,4 +1,4 @@
-"""The command line: `plateviz demo | simulate | inspect | fit | serve`.
+"""The command line: `plateviz demo | simulate | inspect | fit | survey | serve`.
 
 A user's mistake ends with exit code 2 and one message; a fit that has no solution, or
 has not converged, with exit code 1. What takes long to import is imported by the
@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from plateviz import cli_options as options
 from plateviz.cache import keep_compilations
+from plateviz.runs import DEFAULT_RUN
 from solver.errors import FitError, InputError
-from solver.exclusions import parse_exclusions
-from solver.parameters import PARAMETERS
-from solver.prior_text import parse_shift, parse_width
-from solver.settings import ENGINES, FitSettings, NutsSettings, svi_settings
+from solver.settings import ENGINES, NutsSettings, svi_settings
 
 if TYPE_CHECKING:
     from plateviz.workbench import Workbench
@@ -31,7 +30,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-_GROUPS = ", ".join(group.name for group in PARAMETERS)
 _PORT = typer.Option(help="TCP port to serve on; 0 takes a free one.", min=0, max=65535)
 _ADDRESS = typer.Option(help="Interface to serve on. Only this machine can reach the default.")
 _OPEN = typer.Option("--open/--no-open", help="Open the page in your browser.")
@@ -139,58 +137,25 @@ def fit(
     ],
     truth: Annotated[Path | None, _TRUTH] = None,
     orbit: Annotated[int | None, _ORBIT] = None,
-    order: Annotated[int, typer.Option(help="Order of the distortion, 0 to 9.")] = 5,
+    order: options.Order = 5,
     engine: Annotated[
         str, typer.Option(help=f"One of: {', '.join(ENGINES)}; or all, to see whether they agree.")
     ] = ENGINES[0],
-    prior: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Prior width of a parameter group, such as distortion_x=0.5um or "
-            f"position_angle=flat; may be repeated. Groups: {_GROUPS}.",
-            metavar="GROUP=VALUE",
-        ),
-    ] = None,
-    centre: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Shift the centre of a prior from the value in the files, such as "
-            "focal_length=100um or detector_x[2]=-5um; may be repeated. An element is "
-            "FIELD/PLATE, a detector, K/L of a distortion term, or ra or dec of sources.",
-            metavar="GROUP[ELEMENT]=SHIFT",
-        ),
-    ] = None,
-    exclude: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Leave out measurements: source=ID, exposure=FIELD/PLATE or detector=ID; "
-            "may be repeated.",
-            metavar="WHAT",
-        ),
-    ] = None,
-    aberration: Annotated[
-        bool, typer.Option(help="Model the aberration by the observer's velocity.")
-    ] = True,
-    robust: Annotated[
-        bool, typer.Option("--robust", help="Look for outliers, list them and leave them out.")
-    ] = False,
+    prior: options.Prior = None,
+    centre: options.Centre = None,
+    exclude: options.Exclude = None,
+    aberration: options.Aberration = True,
+    robust: options.Robust = False,
     compare_orders: Annotated[
         bool,
         typer.Option(
             "--compare-orders", help="Also solve every order, to see which one the data ask for."
         ),
     ] = False,
-    thin: Annotated[
-        int, typer.Option(help="Use one in so many sources, for a quick look or nuts.", min=1)
-    ] = 1,
-    seed: Annotated[int, typer.Option(help="Seed of svi and nuts.", min=0)] = 0,
-    steps: Annotated[
-        int | None, typer.Option(help="Steps over which svi's learning rate falls.", min=1)
-    ] = None,
-    compat: Annotated[
-        str | None,
-        typer.Option(help="warpfield: svi in the units and with the rates of the published code."),
-    ] = None,
+    thin: options.Thin = 1,
+    seed: options.Seed = 0,
+    steps: options.Steps = None,
+    compat: options.Compat = None,
     checkpoint: Annotated[
         Path | None,
         typer.Option(help="File to keep an svi run in; a run that was stopped goes on from it."),
@@ -202,22 +167,68 @@ def fit(
     from plateviz.cli_fit import FitRequest, run_fit
     from plateviz.source import OrbitFiles
 
-    settings = FitSettings(
-        order,
-        ENGINES[0] if engine == "all" else engine,
-        _prior_widths(prior or []),
-        aberration,
-        parse_exclusions(exclude or []),
+    settings = options.fit_settings(
+        order=order,
+        engine=ENGINES[0] if engine == "all" else engine,
+        prior=prior,
+        centre=centre,
+        exclude=exclude,
+        aberration=aberration,
         robust=robust,
         compare_orders=compare_orders,
         thin=thin,
         svi=svi_settings(compat, steps, seed),
         nuts=NutsSettings(seed=seed),
-        prior_shifts=dict(map(parse_shift, centre or [])),
     )
     files = OrbitFiles(str(observations), str(reference), _text(truth), orbit, _text(instrument))
     engines = ENGINES if engine == "all" else (engine,)
     run_fit(FitRequest(files, orbit, settings, engines, output, checkpoint), as_json)
+
+
+@app.command()
+def survey(
+    directory: Annotated[Path, typer.Argument(help="Survey directory.", metavar="DIR")],
+    run: Annotated[
+        str, typer.Option(help="Name of the run; one that was begun is gone on with.")
+    ] = DEFAULT_RUN,
+    orbits: Annotated[
+        str | None, typer.Option(help="Orbits to fit, such as 0-9,12; all by default.")
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Processes on this machine; one for each core by default.", min=1),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a Dask scheduler whose workers are to do it instead."),
+    ] = None,
+    order: options.Order = 5,
+    engine: Annotated[str, typer.Option(help=f"One of: {', '.join(ENGINES)}.")] = ENGINES[0],
+    prior: options.Prior = None,
+    centre: options.Centre = None,
+    exclude: options.Exclude = None,
+    aberration: options.Aberration = True,
+    robust: options.Robust = False,
+    thin: options.Thin = 1,
+    seed: options.Seed = 0,
+    as_json: Annotated[bool, _JSON] = False,
+) -> None:
+    """Fit every orbit of a survey; one that was interrupted is gone on with."""
+    from plateviz.cli_survey import parse_orbits, run_survey
+
+    settings = options.fit_settings(
+        order=order,
+        engine=engine,
+        prior=prior,
+        centre=centre,
+        exclude=exclude,
+        aberration=aberration,
+        robust=robust,
+        thin=thin,
+        svi=svi_settings(None, None, seed),
+        nuts=NutsSettings(seed=seed),
+    )
+    run_survey(directory, run, settings, parse_orbits(orbits), workers, scheduler, as_json)
 
 
 @app.command()
@@ -271,16 +282,6 @@ def _serve(workbench: "Workbench", port: int, address: str, open_browser: bool) 
             webbrowser.open(page)
 
     run(workbench, port=port, address=address, ready=ready)
-
-
-def _prior_widths(texts: list[str]) -> dict[str, float]:
-    widths = {}
-    for text in texts:
-        name, found, value = text.partition("=")
-        if not found:
-            raise InputError(f"--prior: expected GROUP=VALUE, found {text!r}")
-        widths[name.strip()] = parse_width(name.strip(), value)
-    return widths
 
 
 def _text(path: Path | None) -> str | None:

@@ -6,52 +6,58 @@ the file `COMPLETE` written last; it is never edited afterwards.
 
 import json
 import os
+import secrets
 import shutil
-import tempfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from solver.errors import InputError
 from solver.result import FitResult
-from solver.schema import RESULT_TABLES
+from solver.schema import RESULT_TABLES, TRACE
 from solver.settings import FitSettings
 
 FORMAT = 1
 _COMPLETE = "COMPLETE"
 _HEAD = "result.json"
+# Apart from all else, so that two runs of the same work differ in nothing but this file.
+_TIMINGS = "timings.json"
 
 
-def write_run(directory: Path, result: FitResult) -> None:
+def write_run(
+    directory: Path, result: FitResult, beside: Mapping[str, pd.DataFrame] | None = None
+) -> None:
     """Write one fitted orbit; an existing directory is left as it is.
 
     Parameters
     ----------
     directory : does not exist yet; its parent is made where needed
+    beside : further tables to keep with it, by name
     """
     directory.parent.mkdir(parents=True, exist_ok=True)
-    beside = Path(tempfile.mkdtemp(prefix=f".{directory.name}-", dir=directory.parent))
+    staging = directory.with_name(f".{directory.name}-{secrets.token_hex(6)}")
+    staging.mkdir()
     try:
-        for table in RESULT_TABLES:
-            frame = getattr(result, table.name)
-            if frame is not None:
-                frame.to_parquet(beside / f"{table.name}.parquet", index=False)
-        head = {
-            "format": FORMAT,
-            "settings": result.settings.to_dict(),
-            "summary": dict(result.summary),
-            "provenance": dict(result.provenance),
-        }
-        (beside / _HEAD).write_text(json.dumps(head, indent=1), encoding="utf-8")
-        for path in beside.iterdir():
+        _write_tables(staging, result, beside or {})
+        _write_head(staging, result)
+        for path in staging.iterdir():
             _flush(path)
-        (beside / _COMPLETE).touch()
-        _flush(beside)
+        (staging / _COMPLETE).touch()
+        _flush(staging)
         if not directory.exists():
-            beside.rename(directory)
+            staging.rename(directory)
             _flush(directory.parent)
     finally:
-        shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove what was left of runs in a folder whose writing was cut short."""
+    for staging in folder.glob(".*-*"):
+        if staging.is_dir():
+            shutil.rmtree(staging, ignore_errors=True)
 
 
 def read_run(directory: Path) -> FitResult:
@@ -70,18 +76,50 @@ def read_run(directory: Path) -> FitResult:
             f"{directory}: expected a run of format {FORMAT} or older, found {head['format']}; "
             "it was written by a newer plateviz"
         )
+    timings = json.loads((directory / _TIMINGS).read_text(encoding="utf-8"))
     tables = {table.name: _read_table(directory, table.name) for table in RESULT_TABLES}
+    trace = pd.read_parquet(directory / "trace.parquet")
+    tables["trace"] = trace.assign(seconds=timings["trace"])[TRACE.names]
     return FitResult(
         **tables,  # type: ignore[arg-type]
-        summary=head["summary"],
+        summary={**head["summary"], "seconds": timings["seconds"]},
         settings=FitSettings.from_dict(head["settings"]),
         provenance=head["provenance"],
     )
 
 
+def read_summary(directory: Path) -> dict[str, Any]:
+    """Return the summary of a complete run alone, with its `seconds`."""
+    head, timings = (
+        json.loads((directory / name).read_text(encoding="utf-8")) for name in (_HEAD, _TIMINGS)
+    )
+    return {**head["summary"], "seconds": timings["seconds"]}
+
+
 def is_complete(directory: Path) -> bool:
     """Return whether a directory holds a whole run."""
     return (directory / _COMPLETE).is_file()
+
+
+def _write_tables(directory: Path, result: FitResult, beside: Mapping[str, pd.DataFrame]) -> None:
+    tables = {table.name: getattr(result, table.name) for table in RESULT_TABLES}
+    tables["trace"] = result.trace.drop(columns="seconds")
+    for name, frame in {**tables, **beside}.items():
+        if frame is not None:
+            frame.to_parquet(directory / f"{name}.parquet", index=False, compression="zstd")
+
+
+def _write_head(directory: Path, result: FitResult) -> None:
+    summary = dict(result.summary)
+    timings = {"seconds": summary.pop("seconds"), "trace": result.trace["seconds"].tolist()}
+    head = {
+        "format": FORMAT,
+        "settings": result.settings.to_dict(),
+        "summary": summary,
+        "provenance": dict(result.provenance),
+    }
+    for name, content in ((_HEAD, head), (_TIMINGS, timings)):
+        (directory / name).write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
 def _read_table(directory: Path, name: str) -> pd.DataFrame | None:

@@ -40,7 +40,7 @@ def propagate(
     """
     return Places(
         frames_at(catalogue, mjd_tcb, observer_position),
-        _covariance(catalogue, _years_since_epoch(catalogue, mjd_tcb), observer_position),
+        _covariance(catalogue, years_since_epoch(catalogue, mjd_tcb), observer_position),
     )
 
 
@@ -51,7 +51,7 @@ def frames_at(
 
     The columns of uncertainties are not used, so that a true catalogue will do.
     """
-    years = _years_since_epoch(catalogue, mjd_tcb)
+    years = years_since_epoch(catalogue, mjd_tcb)
     start = tangent_frame(catalogue["ra"].to_numpy(), catalogue["dec"].to_numpy())
     velocity = (
         catalogue["pmra"].to_numpy()[:, None] * start[:, 1]
@@ -72,9 +72,48 @@ def sky_position(
     return np.where(ra < 360.0, ra, 0.0), np.arctan2(z, np.hypot(x, y)) / RAD_PER_DEG
 
 
-def _years_since_epoch(catalogue: pd.DataFrame, mjd_tcb: float) -> Float[np.ndarray, " src"]:
+def years_since_epoch(catalogue: pd.DataFrame, mjd_tcb: float) -> Float[np.ndarray, " src"]:
+    """Return the Julian years from each source's reference epoch to an epoch, MJD in TCB."""
     julian_year = 2000.0 + (mjd_tcb - MJD_J2000) / DAYS_PER_JULIAN_YEAR
     return julian_year - catalogue["ref_epoch"].to_numpy()
+
+
+def catalogue_covariance(catalogue: pd.DataFrame) -> Float[np.ndarray, "src 5 5"]:
+    """Return the covariance of (alpha*, delta, parallax, pmra, pmdec) of each source, mas and yr.
+
+    Parameters
+    ----------
+    catalogue : `schema.CATALOGUE`, errors and correlations
+    """
+    sigma = np.stack([catalogue[f"{name}_error"].to_numpy() for name in _PARAMETERS], axis=-1)
+    correlation = np.tile(np.eye(5), (len(catalogue), 1, 1))
+    for i, first in enumerate(_PARAMETERS):
+        for j in range(i + 1, 5):
+            name = f"{first}_{_PARAMETERS[j]}_corr"
+            correlation[:, i, j] = correlation[:, j, i] = catalogue[name].to_numpy()
+    return correlation * sigma[:, :, None] * sigma[:, None, :]
+
+
+def jacobian_at(
+    frame: Float[np.ndarray, "n 3 3"],
+    years: Float[np.ndarray, " n"],
+    observer_position: Float[np.ndarray, "n 3"] | Float[np.ndarray, " 3"],
+) -> Float[np.ndarray, "n 2 5"]:
+    """Return the derivative of (alpha*, delta) by the five astrometric parameters.
+
+    Parameters
+    ----------
+    frame : direction, east and north of each source
+    years : since the epoch of its parameters
+    observer_position : barycentric, au, one for all or for each
+    """
+    jacobian = np.zeros((len(frame), 2, 5))
+    jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
+    jacobian[:, :, 2] = -np.einsum(
+        "nij,nj->ni", frame[:, 1:], np.broadcast_to(observer_position, (len(frame), 3))
+    )
+    jacobian[:, 0, 3] = jacobian[:, 1, 4] = years
+    return jacobian
 
 
 def _covariance(
@@ -83,16 +122,6 @@ def _covariance(
     observer_position: Float[np.ndarray, " 3"],
 ) -> Float[np.ndarray, "src 2 2"]:
     """Propagate the 5 x 5 covariance of the catalogue to (alpha*, delta) at the epoch."""
-    sigma = np.stack([catalogue[f"{name}_error"].to_numpy() for name in _PARAMETERS], axis=-1)
-    correlation = np.tile(np.eye(5), (len(catalogue), 1, 1))
-    for i, first in enumerate(_PARAMETERS):
-        for j in range(i + 1, 5):
-            name = f"{first}_{_PARAMETERS[j]}_corr"
-            correlation[:, i, j] = correlation[:, j, i] = catalogue[name].to_numpy()
     frame = tangent_frame(catalogue["ra"].to_numpy(), catalogue["dec"].to_numpy())
-    jacobian = np.zeros((len(catalogue), 2, 5))
-    jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
-    jacobian[:, :, 2] = -frame[:, 1:] @ observer_position
-    jacobian[:, 0, 3] = jacobian[:, 1, 4] = years
-    scaled = jacobian * sigma[:, None, :]
-    return scaled @ correlation @ scaled.transpose(0, 2, 1)
+    jacobian = jacobian_at(frame, years, observer_position)
+    return jacobian @ catalogue_covariance(catalogue) @ jacobian.transpose(0, 2, 1)

@@ -88,16 +88,17 @@ def mean_covariance(
 def induced_shift(
     reduced: Reduced,
     priors: Priors,
-    reference_error: Float[np.ndarray, "src 2"],
-) -> Float[np.ndarray, "src 2"]:
+    reference_error: Float[np.ndarray, "*k src 2"],
+) -> Float[np.ndarray, "*k src 2"]:
     """Return the shift of every source that errors of the reference positions cause, mas.
 
     Parameters
     ----------
-    reference_error : catalogue minus truth of reference stars, zero for the others, mas
+    reference_error : catalogue minus truth of reference stars, zero for the others, mas; one
+        set, or several
     """
-    pull = np.einsum("sij,sj->si", priors.precision, reference_error)
-    return reduced.solve(np.zeros(len(reduced.theta)), pull)[1]
+    pull = np.einsum("sij,...sj->...si", priors.precision, reference_error)
+    return reduced.pulled(pull.reshape(-1, *pull.shape[-2:])).reshape(pull.shape)
 
 
 class ErrorBudget(NamedTuple):

@@ -14,6 +14,7 @@ from solver.errors import FitError, InputError
 from solver.estimate import Estimate
 from solver.exclusions import of_rows, thinned_orbit
 from solver.gauss_newton import Iteration, Mode
+from solver.history import history_table
 from solver.instrument import MINI_MOCK, Instrument
 from solver.mode_tables import mode_tables
 from solver.orbit import OrbitData
@@ -156,6 +157,21 @@ class OrbitFitter:
         same_but_order = settings == kept.settings.with_(order=settings.order)
         orders = kept.orders if same_but_order else None
         return replace(_with_outliers(result, kept.outliers), orders=orders)
+
+    def history(self, result: FitResult) -> pd.DataFrame:
+        """Return what the last fit, whose result is given, adds to the history of its sources.
+
+        See `solver.history.history_table`.
+
+        Raises
+        ------
+        FitError
+            If the last fit is no solution.
+        """
+        kept = self._kept
+        if kept is None or kept.settings != result.settings or kept.mode.reduced is None:
+            raise FitError(f"orbit {self._data.orbit_id}: {result.summary['reason']}")
+        return history_table(kept.problem, kept.mode.reduced, result)
 
     def get_ready(self, order: int) -> None:
         """Prepare, while nobody waits, for what may be asked of the last fit next.

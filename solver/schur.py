@@ -62,6 +62,14 @@ class Reduced:
         remainder = whitened - (theta @ rows).reshape(whitened.shape)
         return theta, _upper_solve(self.source_factor, remainder).T.copy()
 
+    def pulled(self, by_source: Float[np.ndarray, "k src 2"]) -> Float[np.ndarray, "k src 2"]:
+        """Return the shifts of the sources that pulls on them alone cause, for k sets of pulls."""
+        whitened = _lower_solve(self.source_factor, by_source.swapaxes(1, 2))
+        rows, n_sets = self.whitened.reshape(len(self.factor), -1), len(by_source)
+        theta = sl.cho_solve((self.factor, False), -rows @ whitened.reshape(n_sets, -1).T)
+        remainder = whitened - (theta.T @ rows).reshape(whitened.shape)
+        return _upper_solve(self.source_factor, remainder).swapaxes(1, 2)
+
     @cached_property
     def sigmas(self) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
         """Marginal sigmas of the calibration, and conditional ones of the sources, mas."""

@@ -123,6 +123,22 @@ MOTIONS = Table(
     key=("source_id",),
 )
 
+# How the errors of mean positions fall with the number of orbits averaged.
+ERRORS_BY_COUNT = Table(
+    "errors_by_count",
+    (
+        Column("n_orbits", "int64", "", "number of orbits averaged, N"),
+        Column("n_sources", "int64", "", "number of sources with so many orbits"),
+        Column("error_mas", "float64", "mas", "rms error in one coordinate, both pooled"),
+        Column("error_low_mas", "float64", "mas", "one sigma below"),
+        Column("error_high_mas", "float64", "mas", "one sigma above"),
+        Column("expected_mas", "float64", "mas", "noise and floor together"),
+        Column("noise_mas", "float64", "mas", "of the noise, which falls with sqrt(N)"),
+        Column("floor_mas", "float64", "mas", "of the catalogue's errors, which does not"),
+    ),
+    key=("n_orbits",),
+)
+
 # A row per orbit of a run; figures are missing where the orbit failed or is still to be fitted.
 RUN_ORBITS = Table(
     "orbits",

@@ -188,7 +188,7 @@ def true_places(solution: Solution, truth: pd.DataFrame | None) -> pd.DataFrame 
     direction = frames_at(rows, problem.epoch, observer)[:, 0]
     ra, dec = sky_position(direction)
     error = np.zeros((problem.n_src, 2))
-    error[known] = _separation(source_frame(problem)[known], direction)
+    error[known] = separation(source_frame(problem)[known], direction)
     error[~problem.sources["is_reference"].to_numpy(bool)] = 0.0
     induced = induced_shift(solution.reduced, problem.priors, error)[known]
     columns = {
@@ -206,10 +206,16 @@ def source_frame(problem: Problem) -> Float[np.ndarray, "src 3 3"]:
     return np.asarray(problem.geometry.source_frame)[: problem.n_src]
 
 
-def _separation(
+def separation(
     frame: Float[np.ndarray, "src 3 3"], direction: Float[np.ndarray, "src 3"]
 ) -> Float[np.ndarray, "src 2"]:
-    """Return prior minus true position in the frame of the prior, mas."""
+    """Return prior minus true position in the frame of the prior, mas.
+
+    Parameters
+    ----------
+    frame : of the prior position
+    direction : of the true one
+    """
     return -np.einsum("sij,sj->si", frame[:, 1:], direction) / RAD_PER_MAS
 
 

@@ -15,7 +15,7 @@ PACKAGES = ("solver", "plateviz")
 
 # Low to high. The modules of a package share its rung, and those of a rung may use each other.
 RUNGS = (
-    ("solver.errors", "solver.units"),
+    ("solver.errors", "solver.units", "solver.versions"),
     (
         "solver.schema",
         "solver.mode_schema",
@@ -23,7 +23,7 @@ RUNGS = (
         "solver.survey_schema",
         "solver.columns",
     ),
-    ("solver.parameters", "solver.device"),
+    ("solver.parameters", "solver.device", "solver.threads"),
     ("solver.orbit", "solver.instrument"),
     ("solver.exclusions", "solver.prior_text"),
     ("solver.settings",),
@@ -52,9 +52,15 @@ RUNGS = (
     ("solver.tables",),
     ("solver.mode_tables",),
     ("solver.summary",),
+    ("solver.shared_errors",),
+    ("solver.history", "solver.motion"),
+    ("solver.time_series",),
     ("solver.fit",),
     ("plateviz.tables", "plateviz.job", "plateviz.cache"),
     ("plateviz.source", "plateviz.store"),
+    ("plateviz.runs",),
+    ("plateviz.history", "plateviz.survey_worker"),
+    ("plateviz.survey",),
     ("plateviz.plots",),
     ("plateviz.gallery",),
     ("plateviz.state", "plateviz.worker", "plateviz.worker_process"),
@@ -62,8 +68,8 @@ RUNGS = (
     ("plateviz.views",),
     ("plateviz.app",),
     ("plateviz.server",),
-    ("plateviz.demo", "plateviz.cli_output"),
-    ("plateviz.cli_fit",),
+    ("plateviz.demo", "plateviz.cli_output", "plateviz.cli_options"),
+    ("plateviz.cli_fit", "plateviz.cli_survey"),
     ("plateviz.cli",),
 )
 
@@ -76,6 +82,8 @@ NEVER = {
     "plateviz.job": USER_INTERFACE,
     "plateviz.cache": USER_INTERFACE,
     "plateviz.store": USER_INTERFACE,
+    "plateviz.runs": (*USER_INTERFACE, "jax"),
+    "plateviz.history": (*USER_INTERFACE, "jax"),
     "plateviz.plots": ("panel", "param", "plateviz.source", "plateviz.store"),
     "plateviz.state": ("panel",),
     "plateviz.worker": ("panel",),

@@ -2,12 +2,12 @@
 
 import json
 import math
-from importlib import metadata
 
 import numpy as np
 from astropy.io import fits
 
 from solver.result import FitResult
+from solver.versions import versions_of
 
 ORIGIN = "plateviz"
 FORMAT = 1
@@ -21,12 +21,12 @@ Card = tuple[str, object, str]
 def primary_header(result: FitResult) -> fits.Header:
     """Return the primary header: format, versions, settings, inputs and figures."""
     inputs = list(result.provenance.items())
-    settings = result.settings
+    settings, versions = result.settings, versions_of(_VERSIONS.values())
     cards: list[Card] = [
         ("ORIGIN", ORIGIN, "program that wrote this file"),
         ("FORMAT", FORMAT, "version of this layout"),
         *(
-            (keyword, _version(package), f"version of {package}")
+            (keyword, versions[package], f"version of {package}")
             for keyword, package in _VERSIONS.items()
         ),
         ("INPUT", inputs[0][0] if inputs else None, ""),
@@ -94,10 +94,3 @@ def _header(cards: list[Card]) -> fits.Header:
             plain = plain.encode("unicode_escape").decode("ascii")
         header[keyword] = (plain, comment)
     return header
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "unknown"

@@ -10,6 +10,7 @@ A directory without `survey.toml` is not read: it is unfinished, or something el
 """
 
 import json
+import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -35,6 +36,7 @@ TRUTH_FILE = "truth.parquet"
 EXPOSURES = "exposures.parquet"
 MEASUREMENTS = "measurements"
 
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _ORBIT_FILE = re.compile(r"orbit=(\d{4,})\.parquet")
 
 
@@ -142,7 +144,7 @@ def write_header(directory: Path, content: Mapping[str, object], name: str = HEA
     lines = [f"{k} = {_toml(v)}" for k, v in values.items() if not isinstance(v, Mapping)]
     for key, table in values.items():
         if isinstance(table, Mapping):
-            lines += ["", f"[{key}]", *(f"{k} = {_toml(v)}" for k, v in table.items())]
+            lines += ["", f"[{key}]", *(f"{_key(k)} = {_toml(v)}" for k, v in table.items())]
     with write_atomically(Path(directory) / name) as path:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -195,14 +197,20 @@ def _ranges(orbits: list[int]) -> str:
     return f"{orbits[0]} to {orbits[-1]}" if consecutive else ", ".join(map(str, orbits))
 
 
+def _key(name: str) -> str:
+    return name if _BARE_KEY.fullmatch(name) else json.dumps(name)
+
+
 def _toml(value: object) -> str:
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(k)} = {_toml(item)}" for k, item in value.items()) + " }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_toml, value)) + "]"
     if isinstance(value, str) and "\n" in value:
         text = value.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
         return f'"""\n{text}"""'
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
     # A text, number or truth value is written alike in JSON and in TOML, but for the one
     # control character that JSON leaves as it is.
     return json.dumps(value).replace("\x7f", "\\u007f")

@@ -1,7 +1,6 @@
 """A simulated survey on disk: catalogue, exposures and the measurements of every orbit."""
 
 from collections.abc import Callable, Mapping
-from importlib import metadata
 from pathlib import Path
 
 import pandas as pd
@@ -31,6 +30,7 @@ from solver.simulate.catalogue import (
 from solver.simulate.measure import measure_orbit
 from solver.simulate.schedule import environment, orbit_attitude
 from solver.simulate.settings import SurveySettings
+from solver.versions import versions_of
 
 UNFINISHED = "unfinished.toml"
 
@@ -93,18 +93,10 @@ def simulate_survey(
 def _header(
     settings: SurveySettings, instrument: Instrument, catalogue: Path | None
 ) -> dict[str, object]:
-    versions = {package: _version(package) for package in _PACKAGES}
-    content = {"versions": versions, "settings": settings.to_dict()}
+    content = {"versions": versions_of(_PACKAGES), "settings": settings.to_dict()}
     if catalogue is not None:
         content["catalogue"] = {"name": Path(catalogue).name, "sha256": sha256_of(catalogue)}
     return {**content, "instrument": write_instrument(instrument)}
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "unknown"
 
 
 def _claim(directory: Path, header: Mapping[str, object]) -> None:

@@ -36,6 +36,8 @@ from solver.time_series import errors_by_count, motion_table
 
 # Rows of the history that are worked on at once: some 200 MB with all draws.
 _ROWS_AT_ONCE = 100_000
+# How long a scheduler may take to answer.
+_PATIENCE = "20s"
 
 
 class Progress(NamedTuple):
@@ -123,7 +125,7 @@ def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:
 def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
     if scheduler is not None:
         try:
-            client = Client(scheduler, timeout="20s")
+            client = Client(scheduler, timeout=_PATIENCE)
         except (OSError, ValueError) as error:
             raise InputError(
                 f"--scheduler: expected the address of a Dask scheduler, found {scheduler}: {error}"

@@ -120,7 +120,9 @@ def _noise(history: pd.DataFrame) -> Float[np.ndarray, "row 2 2"]:
 
 def _inverse(normal: Float[np.ndarray, "src 5 5"]) -> Float[np.ndarray, "src 5 5"]:
     """Return the inverses; NaN of those that are singular."""
-    scale = 1.0 / np.sqrt(np.diagonal(normal, axis1=1, axis2=2))
+    diagonal = np.diagonal(normal, axis1=1, axis2=2)
+    # One orbit at the very epoch says nothing of a motion: that is singular, too.
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     outer = scale[:, :, None] * scale[:, None, :]
     scaled = normal * outer
     usable = _is_regular(scaled)

@@ -76,7 +76,7 @@ def _running(values: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
 
 def _errors_of(
     sums: _Sums, first: Int[np.ndarray, " src"], n_rows: int, count: int
-) -> tuple[float, ...] | None:
+) -> tuple[int | float, ...] | None:
     length = np.diff(first, append=n_rows)
     groups = length // count
     begin = np.repeat(first, groups) + count * (
@@ -93,16 +93,9 @@ def _errors_of(
     spread = np.sqrt(2.0 * of_noise**2 / error.size + float(floors.var()))
     sigma = 0.5 * spread / np.sqrt(expected)
     root = np.sqrt(measured)
-    return (
-        count,
-        int((groups > 0).sum()),
-        root,
-        max(root - sigma, 0.0),
-        root + sigma,
-        np.sqrt(expected),
-        np.sqrt(of_noise),
-        float(np.sqrt(floors.mean())),
-    )
+    floor = float(np.sqrt(floors.mean()))
+    figures = (root, max(root - sigma, 0.0), root + sigma, np.sqrt(expected), np.sqrt(of_noise))
+    return (count, int((groups > 0).sum()), *map(float, figures), floor)
 
 
 def _of_parameters(fit: MotionFit) -> dict[str, Float[np.ndarray, " src"]]:

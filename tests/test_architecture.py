@@ -94,7 +94,7 @@ NEVER = {
 # The web process, the command line that starts it and all that they load stay free of JAX.
 JAX = ("jax", "jaxlib", "equinox", "numpyro", "optax")
 WITHOUT_JAX = ("solver.io", "solver.result", "solver.orbit", "plateviz")
-WITH_JAX = ("plateviz.worker_process",)
+WITH_JAX = ("plateviz.worker_process", "plateviz.survey", "plateviz.cli_survey")
 
 
 def _within(name: str, parents: tuple[str, ...]) -> bool:

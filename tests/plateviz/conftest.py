@@ -1,7 +1,9 @@
 """A plausible fitted orbit, made with NumPy alone: no fit is run."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,6 +14,8 @@ from solver.instrument import MINI_MOCK
 from solver.parameters import CALIBRATION_GROUPS, Group
 from solver.result import FitResult, FitStatus
 from solver.settings import FitSettings
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
 
 FIRST_ID = 4_057_482_027_171_038_209
 N_SOURCES, N_FIELDS, N_PLATES, ORDER = 300, 4, 3, 5
@@ -36,6 +40,26 @@ def make_fit_result() -> Callable[[int], tuple[FitResult, pd.DataFrame]]:
 def fit_result() -> FitResult:
     """About 300 sources, 12 exposures, 4 detectors; complete against `solver.schema`."""
     return synthetic_fit(1)[0]
+
+
+@pytest.fixture(scope="session")
+def made_survey(tmp_path_factory) -> Path:
+    """A simulated survey of three orbits."""
+    directory = tmp_path_factory.mktemp("surveys") / "made"
+    simulate_survey(directory, SurveySettings(orbits=3, seed=3).scaled(6_000))
+    return directory
+
+
+@pytest.fixture
+def survey(made_survey, tmp_path) -> Path:
+    """A survey of its own, without any run."""
+    return Path(shutil.copytree(made_survey, tmp_path / "survey"))
+
+
+@pytest.fixture(scope="module")
+def fitted_survey(made_survey, tmp_path_factory) -> Path:
+    """A survey for the runs of one module."""
+    return Path(shutil.copytree(made_survey, tmp_path_factory.mktemp("runs") / "survey"))
 
 
 @pytest.fixture(scope="session")

@@ -11,10 +11,9 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
+from solver.correlation import ASTROMETRY, correlation_matrices
 from solver.projection import tangent_frame
 from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000, RAD_PER_DEG, RAD_PER_MAS
-
-_PARAMETERS = ("ra", "dec", "parallax", "pmra", "pmdec")
 
 
 class Places(NamedTuple):
@@ -85,13 +84,8 @@ def catalogue_covariance(catalogue: pd.DataFrame) -> Float[np.ndarray, "src 5 5"
     ----------
     catalogue : `schema.CATALOGUE`, errors and correlations
     """
-    sigma = np.stack([catalogue[f"{name}_error"].to_numpy() for name in _PARAMETERS], axis=-1)
-    correlation = np.tile(np.eye(5), (len(catalogue), 1, 1))
-    for i, first in enumerate(_PARAMETERS):
-        for j in range(i + 1, 5):
-            name = f"{first}_{_PARAMETERS[j]}_corr"
-            correlation[:, i, j] = correlation[:, j, i] = catalogue[name].to_numpy()
-    return correlation * sigma[:, :, None] * sigma[:, None, :]
+    sigma = np.stack([catalogue[f"{name}_error"].to_numpy() for name in ASTROMETRY], axis=-1)
+    return correlation_matrices(catalogue) * sigma[:, :, None] * sigma[:, None, :]
 
 
 def jacobian_at(

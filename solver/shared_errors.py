@@ -11,6 +11,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from solver.astrometry import catalogue_covariance, jacobian_at, years_since_epoch
+from solver.correlation import square_roots
 from solver.diagnostics import error_budget, induced_shift
 from solver.ephemeris import observer_at
 from solver.leverage import covariances
@@ -59,10 +60,7 @@ def draws_of(table: pd.DataFrame) -> Float[np.ndarray, "row draw 2"]:
 
 def _drawn_errors(references: pd.DataFrame, epoch: float) -> Float[np.ndarray, "draw src 2"]:
     """Return errors of catalogue positions at an epoch, those of a star from its id alone."""
-    covariance = catalogue_covariance(references)
-    # A parallax may be without error, which leaves no Cholesky factor.
-    values, vectors = np.linalg.eigh(covariance)
-    root = (vectors * np.sqrt(np.clip(values, 0.0, None))[:, None, :]) @ vectors.swapaxes(1, 2)
+    root = square_roots(catalogue_covariance(references))
     normal = np.stack([_normal(int(number)) for number in references["source_id"]])
     frame = tangent_frame(references["ra"].to_numpy(), references["dec"].to_numpy())
     observer = observer_at(np.array([epoch])).position[0]

@@ -71,7 +71,8 @@ def test_source_with_two_orbits_has_no_motion(motions):
 
 def test_one_orbit_at_the_epoch_has_no_motion(motions):
     history = make_history(motions[:1], 1)
-    assert np.isnan(fit_motions(history, float(julian_year(history["epoch"][0]))).motion).all()
+    epoch = float(julian_year(history["epoch"].to_numpy())[0])
+    assert np.isnan(fit_motions(history, epoch).motion).all()
 
 
 def test_sources_with_different_numbers_of_orbits_stay_apart(motions):

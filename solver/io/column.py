@@ -57,6 +57,16 @@ def convert(raw: RawColumn | Quantity | Time, column: Column, where: str) -> Con
     return {"int64": _integers, "bool": _logicals, "str": _texts}[column.dtype](values, where)
 
 
+def missing_rows(raw: RawColumn | Quantity | Time) -> np.ndarray:
+    """Return which rows of a raw column hold no value: those masked, NaN or infinite."""
+    if isinstance(raw, Time):
+        return np.asarray(raw.mask)
+    values, missing = _split(raw)
+    if values.dtype.kind == "f":
+        missing = missing | ~np.isfinite(values)
+    return np.asarray(missing.any(axis=tuple(range(1, missing.ndim))))
+
+
 def _refused(where: str, expected: str, found: str) -> Converted:
     return Converted(None, [f"{where}: expected {expected}, found {found}"])
 
@@ -91,6 +101,9 @@ def _floats(values: np.ndarray, unit: Unit | None, column: Column, where: str) -
     if values.dtype.kind == "f" and values.itemsize < 8 and column.unit in _UNITS_IN_FLOAT64:
         return _refused(where, "float64, for its precision", str(values.dtype))
     canonical = Unit(column.unit)
+    if isinstance(unit, UnrecognizedUnit):
+        # An old VOTable's units are read by rules that do not know "mas.yr**-1".
+        unit = Unit(str(unit), parse_strict="silent")
     converted = values.astype(np.float64)
     if unit is not None and unit not in (Unit(""), canonical):
         if isinstance(unit, UnrecognizedUnit):

@@ -18,6 +18,8 @@ from solver.io.failure import reading
 from solver.io.fits import read_fits
 
 _BYTES_PER_CELL = 8
+# The archive of Gaia writes null where ECSV asks for nothing.
+_NO_VALUE = [("", "0"), ("null", "0")]
 
 
 def read_tables(path: Path) -> dict[str, Table]:
@@ -92,7 +94,7 @@ def _read_csv(path: Path) -> dict[str, Table]:
 
 def _read_ecsv(path: Path) -> dict[str, Table]:
     with reading(str(path), "an ECSV table"):
-        return {path.stem: Table.read(path, format="ascii.ecsv")}
+        return {path.stem: Table.read(path, format="ascii.ecsv", fill_values=_NO_VALUE)}
 
 
 def _read_parquet(path: Path) -> dict[str, Table]:

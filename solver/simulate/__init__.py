@@ -6,6 +6,7 @@
 | sky.py       | Galactic coordinates to ICRS and back                             |
 | seasons.py   | the observation periods                                           |
 | population.py| stars like those that Gaia sees towards the Galactic centre       |
+| gaia.py      | stars of the Gaia archive                                         |
 | catalogue.py | the true catalogue and the reference catalogue resampled from it  |
 | schedule.py  | when and where each exposure is taken, and where it really pointed|
 | placement.py | where the detectors really are                                    |

@@ -3,15 +3,16 @@
 Paper, sections "Ground truth catalog" and "Reference catalog".
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
+from astropy.table import Table as RawTable
 from jaxtyping import Float
 
 from solver.columns import numpy_dtype
+from solver.correlation import ASTROMETRY, CORRELATIONS, correlation_matrices, square_roots
 from solver.errors import InputError
 from solver.schema import CATALOGUE, TRUTH
+from solver.simulate.gaia import gaia_stars
 from solver.simulate.population import Stars, draw_stars, satisfies_cuts
 from solver.simulate.settings import Stream, SurveySettings
 from solver.simulate.sky import galactic_to_icrs, icrs_to_galactic
@@ -24,7 +25,8 @@ FIRST_ARTIFICIAL_ID = 9_000_000_000_000_000_000
 _LONGEST_ID_STEP = 2**33
 
 _ERRORS = ("ra", "dec", "pmra", "pmdec", "parallax")
-_GAIA_COLUMNS = ("source_id", *_ERRORS, *(f"{name}_error" for name in _ERRORS), "ref_epoch")
+# Correlations rounded to three digits may have an eigenvalue this far below zero.
+_ROUNDING = 5e-3
 
 
 def truth_catalogue(settings: SurveySettings) -> pd.DataFrame:
@@ -46,7 +48,7 @@ def truth_catalogue(settings: SurveySettings) -> pd.DataFrame:
 
 
 def truth_from_gaia(
-    table: pd.DataFrame, settings: SurveySettings, name: str = "Gaia table"
+    table: RawTable | pd.DataFrame, settings: SurveySettings, name: str = "Gaia table"
 ) -> pd.DataFrame:
     """Select the true catalogue from a table of the Gaia archive, as the paper does.
 
@@ -55,23 +57,23 @@ def truth_from_gaia(
 
     Parameters
     ----------
-    table : columns named and in units as in the archive: source_id, ra, dec (deg),
-        parallax (mas), pmra, pmdec (mas/yr), their `_error` and ref_epoch (yr)
+    table : columns named as in the archive, in any unit that it states, else in that of
+        the archive: source_id, ra, dec (deg), parallax (mas), pmra, pmdec (mas/yr), their
+        `_error`, ref_epoch (yr), and perhaps their correlations
     name : what messages call the table
 
     Returns
     -------
-    `schema.TRUTH`, in order of id
+    `schema.TRUTH`, in order of id, and beside it the columns `CORRELATIONS`, which only
+    `reference_catalogue` reads: the truth itself is exact
 
     Raises
     ------
     InputError
-        If a column is missing or not numbers, or no reference star is left.
+        If a column is missing or cannot be used, or no reference star is left.
     """
-    _check_gaia(table, name)
-    stars = table.loc[:, list(_GAIA_COLUMNS)]
-    stars = stars[np.isfinite(stars.to_numpy(dtype=np.float64, na_value=np.nan)).all(axis=1)]
-    stars = stars.astype({name: numpy_dtype(TRUTH[name]) for name in _GAIA_COLUMNS})
+    stars = gaia_stars(table, name)
+    _check_ids(stars, name)
     l_deg, b_deg = icrs_to_galactic(stars["ra"].to_numpy(), stars["dec"].to_numpy())
     inside = stars["parallax"] > settings.parallax_over_error * stars["parallax_error"]
     for value, (low, high) in ((l_deg, settings.field_l_deg), (b_deg, settings.field_b_deg)):
@@ -86,14 +88,19 @@ def truth_from_gaia(
             f"found none among {len(table)} rows, {len(stars)} of them in the field with a "
             f"parallax over {settings.parallax_over_error:g} times its error"
         )
-    return _canonical([stars, _artificial(settings, settings.rng(Stream.TRUTH))])
+    _check_correlations(stars[stars["is_reference"]], name)
+    artificial = _artificial(settings, settings.rng(Stream.TRUTH)).assign(
+        **dict.fromkeys(CORRELATIONS, 0.0)
+    )
+    return _canonical([stars, artificial], CORRELATIONS)
 
 
 def reference_catalogue(truth: pd.DataFrame, settings: SurveySettings) -> pd.DataFrame:
     """Resample a true catalogue by Table (exp:resampling).
 
-    Reference stars scatter by their own uncertainties; all other sources by the vague ones
-    of the settings, which replace their uncertainties.
+    Reference stars scatter by their own uncertainties, and by their correlations where
+    `truth` has the columns `CORRELATIONS`; all other sources by the vague ones of the
+    settings, which replace their uncertainties and are not correlated.
 
     Returns
     -------
@@ -102,14 +109,34 @@ def reference_catalogue(truth: pd.DataFrame, settings: SurveySettings) -> pd.Dat
     rng = settings.rng(Stream.REFERENCE)
     catalogue = truth.copy()
     is_reference = truth["is_reference"].to_numpy()
-    for name, vague in _vague_errors(settings).items():
+    vague_errors = _vague_errors(settings)
+    pulls = {name: rng.standard_normal(len(truth)) for name in vague_errors}
+    if set(CORRELATIONS) <= set(truth):
+        catalogue.loc[~is_reference, list(CORRELATIONS)] = 0.0
+        pulls = _correlated(pulls, catalogue)
+    for name, vague in vague_errors.items():
         sigma = np.where(is_reference, truth[f"{name}_error"].to_numpy(), vague)
         catalogue[f"{name}_error"] = sigma
-        catalogue[name] += sigma * rng.standard_normal(len(truth)) * _per_mas(name, truth)
+        catalogue[name] += sigma * pulls[name] * _per_mas(name, truth)
     for column in CATALOGUE:
         if column.name not in catalogue:
             catalogue[column.name] = column.default
     return catalogue[CATALOGUE.names]
+
+
+def _correlated(
+    pulls: dict[str, Float[np.ndarray, " src"]], catalogue: pd.DataFrame
+) -> dict[str, Float[np.ndarray, " src"]]:
+    """Return unit deviates with the catalogue's correlations, made of independent ones."""
+    # Rows without correlations are not computed, so that their deviates stay what they are.
+    chosen = (catalogue[list(CORRELATIONS)] != 0.0).any(axis=1).to_numpy()
+    roots = square_roots(correlation_matrices(catalogue[chosen]))
+    independent = np.stack([pulls[name][chosen] for name in ASTROMETRY], axis=-1)
+    mixed = (roots @ independent[:, :, None])[:, :, 0]
+    result = {name: values.copy() for name, values in pulls.items()}
+    for index, name in enumerate(ASTROMETRY):
+        result[name][chosen] = mixed[:, index]
+    return result
 
 
 def _vague_errors(settings: SurveySettings) -> dict[str, float]:
@@ -165,30 +192,26 @@ def _artificial(settings: SurveySettings, rng: np.random.Generator) -> pd.DataFr
     )
 
 
-def _canonical(parts: list[pd.DataFrame]) -> pd.DataFrame:
+def _canonical(parts: list[pd.DataFrame], more: tuple[str, ...] = ()) -> pd.DataFrame:
     types = {column.name: numpy_dtype(column) for column in TRUTH}
-    whole = pd.concat([part[TRUTH.names].astype(types) for part in parts if len(part)])
+    names = [*TRUTH.names, *more]
+    whole = pd.concat([part[names].astype(types) for part in parts if len(part)])
     return whole.sort_values("source_id", ignore_index=True)
 
 
-def _check_gaia(table: pd.DataFrame, name: str) -> None:
-    if missing := [column for column in _GAIA_COLUMNS if column not in table]:
-        raise InputError(
-            f"{name}: expected the columns {', '.join(_GAIA_COLUMNS)}, "
-            f"found no {', '.join(missing)}"
-        )
-    kinds: Mapping[str, str] = {column: table[column].dtype.kind for column in _GAIA_COLUMNS}
-    if wrong := [column for column, kind in kinds.items() if kind not in "iuf"]:
-        raise InputError(f"{name}: expected numbers, found other values in {', '.join(wrong)}")
-    if kinds["source_id"] == "f":
-        raise InputError(
-            f"{name}, column source_id: expected integers, found floating-point numbers, "
-            f"which cannot hold the ids of Gaia"
-        )
-    if table["source_id"].duplicated().any():
-        raise InputError(f"{name}, column source_id: expected each source once, found repeats")
-    if (table["source_id"] >= FIRST_ARTIFICIAL_ID).any():
+def _check_ids(stars: pd.DataFrame, name: str) -> None:
+    if (stars["source_id"] >= FIRST_ARTIFICIAL_ID).any():
         raise InputError(
             f"{name}, column source_id: expected ids below {FIRST_ARTIFICIAL_ID}, which are "
-            f"kept for artificial sources, found {table['source_id'].max()}"
+            f"kept for artificial sources, found {stars['source_id'].max()}"
+        )
+
+
+def _check_correlations(stars: pd.DataFrame, name: str) -> None:
+    lowest = np.linalg.eigvalsh(correlation_matrices(stars))[:, 0]
+    if (bad := lowest < -_ROUNDING).any():
+        raise InputError(
+            f"{name}, columns *_corr: expected correlations that five parameters can have "
+            f"together, found others in {int(bad.sum())} reference stars, "
+            f"the first is {stars['source_id'].to_numpy()[np.argmax(bad)]}"
         )

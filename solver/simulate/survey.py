@@ -146,7 +146,7 @@ def _truth(settings: SurveySettings, catalogue: Path | None) -> pd.DataFrame:
     if catalogue is None:
         return truth_catalogue(settings)
     located = find_catalogue(Path(catalogue))
-    return truth_from_gaia(located.table.to_pandas(), settings, located.where)
+    return truth_from_gaia(located.table, settings, located.where)
 
 
 def _check_seen(measurements: pd.DataFrame, truth: pd.DataFrame, orbit_id: int) -> None:

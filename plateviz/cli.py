@@ -1,4 +1,4 @@
-"""The command line: `plateviz demo | simulate | inspect | fit | survey | serve`.
+"""The command line: `plateviz demo | simulate | gaia | inspect | fit | survey | serve`.
 
 A user's mistake ends with exit code 2 and one message; a fit that has no solution, or
 has not converged, with exit code 1. What takes long to import is imported by the
@@ -16,6 +16,7 @@ import typer
 
 from plateviz import cli_options as options
 from plateviz.cache import keep_compilations
+from plateviz.cli_gaia import gaia
 from plateviz.runs import DEFAULT_RUN
 from solver.errors import FitError, InputError
 from solver.settings import ENGINES, NutsSettings, svi_settings
@@ -108,6 +109,9 @@ def simulate(
         print_json({"output": str(directory), "orbits": orbits, "seconds": seconds})
     else:
         typer.echo(f"{directory}: a survey of {orbits} orbits, made in {seconds:.1f} s")
+
+
+app.command()(gaia)
 
 
 @app.command()

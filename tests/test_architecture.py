@@ -74,8 +74,9 @@ RUNGS = (
     ("plateviz.views",),
     ("plateviz.app",),
     ("plateviz.server",),
-    ("plateviz.demo", "plateviz.cli_output", "plateviz.cli_options"),
-    ("plateviz.cli_fit", "plateviz.cli_survey"),
+    ("plateviz.demo", "plateviz.cli_output", "plateviz.cli_options", "plateviz.tap"),
+    ("plateviz.gaia",),
+    ("plateviz.cli_fit", "plateviz.cli_survey", "plateviz.cli_gaia"),
     ("plateviz.cli",),
 )
 

@@ -1,4 +1,4 @@
-"""The command line: `plateviz demo | simulate | gaia | inspect | fit | survey | serve`.
+"""The command line: `plateviz simulate | gaia | inspect | fit | survey | serve | reproduce | demo`.
 
 A user's mistake ends with exit code 2 and one message; a fit that has no solution, or
 has not converged, with exit code 1. What takes long to import is imported by the
@@ -17,6 +17,7 @@ import typer
 from plateviz import cli_options as options
 from plateviz.cache import keep_compilations
 from plateviz.cli_gaia import gaia
+from plateviz.cli_reproduce import reproduce
 from plateviz.runs import DEFAULT_RUN
 from solver.errors import FitError, InputError
 from solver.settings import ENGINES, NutsSettings, svi_settings
@@ -263,6 +264,9 @@ def serve(
         # Read once here, so that what is wrong with the files is said before a page opens.
         source.read(orbit)
     _serve(Workbench(source, Worker()), port, address, open_browser)
+
+
+app.command()(reproduce)
 
 
 def main() -> None:

@@ -24,8 +24,27 @@ HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE = (
     "motions.parquet",
     "errors_by_count.parquet",
 )
-# Rows of a group in the gathered file: a source is sought in one or two of them.
-_ROW_GROUP = 8192
+# Rows of a group in the gathered file: a source is sought in one or two of them, but what is
+# known of each group is read first.
+_SMALLEST_GROUP = 8192
+_MOST_GROUPS = 1000
+
+# Of the class of a source as `plateviz.tables.sources` has it.
+_CLASSES = """
+WITH rows AS (
+    SELECT *, count(*) OVER (PARTITION BY source_id) AS n_orbits,
+        CASE WHEN is_reference THEN 'reference' WHEN is_artificial THEN 'artificial'
+             ELSE 'non-reference' END AS source_class,
+        pow(offset_ra - true_offset_ra, 2) + pow(offset_dec - true_offset_dec, 2) AS square
+    FROM read_parquet(?)
+)
+SELECT source_class,
+    sqrt(avg(square) / 2) AS rms_deviation,
+    sqrt(avg(pow(prior_sigma_ra, 2) + pow(prior_sigma_dec, 2)) / 2) AS rms_prior_sigma,
+    sqrt(avg(n_obs * pow(sigma_ra_conditional, 2))) AS sigma_single,
+    median(sigma_ra_marginal) FILTER (n_orbits > ?) AS sigma_often
+FROM rows GROUP BY source_class ORDER BY source_class
+"""
 
 
 class SurveyRun:
@@ -100,10 +119,12 @@ class SurveyRun:
 
     def counts(self) -> pd.DataFrame:
         """Return source_id, is_reference, is_artificial, n_orbits and n_obs of every source."""
+        names = ["source_id", "is_reference", "is_artificial", "n_orbits", "n_obs"]
+        motions = self.directory / MOTIONS_FILE
+        if motions.is_file():
+            return pd.read_parquet(motions, columns=names)
         if not self._has_history:
-            return pd.DataFrame(
-                columns=["source_id", "is_reference", "is_artificial", "n_orbits", "n_obs"]
-            )
+            return pd.DataFrame(columns=names)
         return self._ask(
             "SELECT source_id, any_value(is_reference) AS is_reference, "
             "any_value(is_artificial) AS is_artificial, count(*) AS n_orbits, "
@@ -111,6 +132,21 @@ class SurveyRun:
             "GROUP BY source_id ORDER BY source_id",
             self._history_files,
         )
+
+    def classes(self, often: int) -> pd.DataFrame:
+        """Return what the orbits say of each class of sources, by `source_class`.
+
+        Parameters
+        ----------
+        often : orbits that a source is to exceed for `sigma_often`
+
+        Returns
+        -------
+        `rms_deviation` from the truth and `rms_prior_sigma` in one coordinate, `sigma_single`
+        (rms conditional sigma times sqrt(n_obs)) and `sigma_often` (median marginal sigma in
+        RA of sources measured often), mas
+        """
+        return self._ask(_CLASSES, self._history_files, often).set_index("source_class")
 
     def exposure_residuals(self, orbit: int, field: int, plate: int) -> pd.DataFrame:
         """Return `schema.RESIDUALS` of one exposure."""
@@ -168,19 +204,31 @@ def open_run(survey: Path, name: str) -> SurveyRun:
     )
 
 
+def rows_of_a_group(n_rows: int) -> int:
+    """Return how many rows a group of a gathered history of so many rows has."""
+    return max(_SMALLEST_GROUP, n_rows // _MOST_GROUPS)
+
+
 def gather_history(run: Run) -> Path:
     """Write the history of all orbits that are there in order of source and epoch; the file."""
     target = run.directory / HISTORY_FILE
+    parts = [str(run.orbit_directory(orbit) / HISTORY_FILE) for orbit in run.complete_orbits()]
     with write_atomically(target) as temporary, duckdb.connect() as connection:
         # One thread writes the same bytes every time.
         connection.execute("SET threads = 1")
+        found = connection.execute("SELECT count(*) FROM read_parquet(?)", [parts]).fetchone()
+        group = rows_of_a_group(0 if found is None else int(found[0]))
         connection.execute(
             "COPY (SELECT * FROM read_parquet(?, hive_partitioning = false) "
             "ORDER BY source_id, epoch) "
-            f"TO '{temporary}' (FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE {_ROW_GROUP})",
-            [str(run.directory / "orbit=*" / HISTORY_FILE)],
+            f"TO {_quoted(temporary)} (FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE {group})",
+            [parts],
         )
     return target
+
+
+def _quoted(path: Path) -> str:
+    return "'" + str(path).replace("'", "''") + "'"
 
 
 def _typed(table: pd.DataFrame) -> pd.DataFrame:

@@ -77,6 +77,8 @@ RUNGS = (
     ("plateviz.demo", "plateviz.cli_output", "plateviz.cli_options", "plateviz.tap"),
     ("plateviz.gaia",),
     ("plateviz.cli_fit", "plateviz.cli_survey", "plateviz.cli_gaia"),
+    ("plateviz.reproduction",),
+    ("plateviz.cli_reproduce",),
     ("plateviz.cli",),
 )
 

@@ -12,6 +12,7 @@ import pytest
 
 from plateviz.cli_survey import parse_orbits
 from plateviz.history import SurveyRun, open_run, survey_runs
+from plateviz.reproduction import reproduced
 from plateviz.runs import Run, begin_run
 from plateviz.survey import fit_survey
 from solver.errors import InputError
@@ -144,6 +145,23 @@ def test_errors_by_count_are_of_the_artificial_sources(run):
     errors = run.errors_by_count()
     assert list(errors.columns) == ERRORS_BY_COUNT.names
     assert errors["n_orbits"].iloc[0] == 1
+
+
+def test_classes_scatter_as_their_sources_do(run):
+    classes, motions = run.classes(often=2), run.motions()
+    others = motions[~motions["is_reference"] & ~motions["is_artificial"]]
+    squares = others["n_orbits"] * others["rms_truth_2d"] ** 2
+    expected = np.sqrt(squares.sum() / others["n_orbits"].sum() / 2.0)
+    assert classes.loc["non-reference", "rms_deviation"] == pytest.approx(expected)
+    assert classes.loc["non-reference", "sigma_single"] == pytest.approx(4.0, rel=1e-3)
+
+
+def test_paper_is_reproduced_from_a_run_that_is_there(run, fitted_survey):
+    before = contents(Run(fitted_survey, run.name))
+    table = reproduced(fitted_survey, run.name, None).set_index("quantity")
+    assert table.loc["uncertainty times sqrt(N)", "ratio"] == pytest.approx(1.0, abs=1e-3)
+    assert table.loc["time per orbit", "ratio"] < 1.0
+    assert contents(Run(fitted_survey, run.name)) == before
 
 
 def test_residuals_of_an_exposure_are_found(run):

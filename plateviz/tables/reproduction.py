@@ -1,0 +1,216 @@
+"""The paper's numbers beside ours: what each means, and the ratio of the two.
+
+Where a statement of the paper can be read in more than one way, `reading` says which one is
+compared.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+# "Observed for more than 80 orbits", section "Time-series astrometric analysis".
+OFTEN = 80
+# Few artificial sources reach the largest number of orbits.
+_ENOUGH_SOURCES = 50
+_A100_MINUTES = (50.0, 140.0)
+_SECONDS_PER_MINUTE = 60.0
+
+COLUMNS = ["quantity", "reading", "unit", "paper_low", "paper_high", "ours", "ratio"]
+
+
+@dataclass(frozen=True)
+class SurveyFigures:
+    """What a fitted survey says.
+
+    Attributes
+    ----------
+    orbits : `survey_schema.RUN_ORBITS`
+    motions : `survey_schema.MOTIONS`
+    errors : `survey_schema.ERRORS_BY_COUNT` of the artificial sources
+    classes : a row per class as from `plateviz.history.SurveyRun.classes`, by `source_class`
+    mas_per_pixel : scale of the detectors
+    """
+
+    orbits: pd.DataFrame
+    motions: pd.DataFrame
+    errors: pd.DataFrame
+    classes: pd.DataFrame
+    mas_per_pixel: float
+
+
+def reproduction(figures: SurveyFigures) -> pd.DataFrame:
+    """Return the paper's numbers beside ours.
+
+    Returns
+    -------
+    `quantity`, `reading`, `unit`, `paper_low`, `paper_high` (the same where the paper gives one
+    number), `ours`, and `ratio` of ours to the paper's number, or to the nearer end of its
+    range, one inside it; NaN where the survey does not hold the figure
+    """
+    rows = [
+        *_of_orbits(figures),
+        *_of_classes(figures.classes),
+        *_of_motions(figures.motions),
+        *_of_errors(figures.errors),
+        _time(figures.orbits),
+    ]
+    return pd.DataFrame([_row(*row) for row in rows], columns=COLUMNS)
+
+
+_Row = tuple[str, str, str, float, float, float]
+
+
+def _row(
+    quantity: str, reading: str, unit: str, low: float, high: float, ours: float
+) -> tuple[str, str, str, float, float, float, float]:
+    nearest = float(np.clip(ours, low, high))
+    return quantity, reading, unit, low, high, ours, ours / nearest
+
+
+def _of_orbits(figures: SurveyFigures) -> list[_Row]:
+    orbits = figures.orbits
+    squares = orbits[["residual_rms_x", "residual_rms_y"]].to_numpy() ** 2
+    scatter = float(np.sqrt(np.nanmean(squares)))
+    deviation, expected = (
+        float(np.nanmean(orbits[[f"{p}normalised_deviation_{a}" for a in ("ra", "dec")]]))
+        for p in ("", "expected_")
+    )
+    return [
+        ("residual scatter", "one coordinate, all exposures", "pix", 0.01, 0.01, scatter),
+        (
+            "residual scatter",
+            "the same on the sky",
+            "mas",
+            4.0,
+            4.0,
+            scatter * figures.mas_per_pixel,
+        ),
+        (
+            "normalised deviation",
+            f"of point estimates, for which {expected:.2f} is expected, not 1",
+            "",
+            1.0,
+            1.0,
+            deviation,
+        ),
+    ]
+
+
+def _of_classes(classes: pd.DataFrame) -> list[_Row]:
+    reference, other = (
+        classes.loc[name] if name in classes.index else pd.Series(np.nan, classes.columns)
+        for name in ("reference", "non-reference")
+    )
+    return [
+        (
+            "on-sky deviation, reference",
+            "rms in one coordinate over the rms prior sigma",
+            "",
+            1.0,
+            1.0,
+            float(reference["rms_deviation"] / reference["rms_prior_sigma"]),
+        ),
+        (
+            "on-sky deviation, non-reference",
+            "rms in one coordinate, any number of measurements",
+            "mas",
+            1.0,
+            1.0,
+            float(other["rms_deviation"]),
+        ),
+        (
+            "uncertainty times sqrt(N)",
+            "conditional sigma, non-reference sources",
+            "mas",
+            4.0,
+            4.0,
+            float(other["sigma_single"]),
+        ),
+        (
+            "reported sigma, reference",
+            f"marginal, median of those in over {OFTEN} orbits",
+            "uas",
+            100.0,
+            100.0,
+            1e3 * float(reference["sigma_often"]),
+        ),
+    ]
+
+
+def _of_motions(motions: pd.DataFrame) -> list[_Row]:
+    often = motions[motions["n_orbits"] > OFTEN]
+    is_artificial = often["is_artificial"] & ~often["is_reference"]
+    references = often[often["is_reference"]]
+    others, artificial = often[~often["is_reference"] & ~is_artificial], often[is_artificial]
+    scatter = 1e3 * _median(references[["scatter_ra", "scatter_dec"]])
+    which = f"median of those in over {OFTEN} orbits"
+    fewest = motions.loc[motions["is_artificial"], "n_orbits"].min()
+    return [
+        (
+            "rms separation, reference",
+            f"two-dimensional, {which}",
+            "uas",
+            100.0,
+            500.0,
+            1e3 * _median(references["rms_truth_2d"]),
+        ),
+        ("scatter, reference", f"one coordinate about the motion, {which}", "uas", 30, 30, scatter),
+        (
+            "rms separation, non-reference",
+            f"two-dimensional, {which}",
+            "uas",
+            600.0,
+            800.0,
+            1e3 * _median(others["rms_truth_2d"]),
+        ),
+        (
+            "rms separation, artificial",
+            f"two-dimensional, {which}",
+            "uas",
+            750.0,
+            750.0,
+            1e3 * _median(artificial["rms_truth_2d"]),
+        ),
+        (
+            "orbits per source near the target",
+            "smallest of the artificial sources; the paper has over 30",
+            "",
+            30.0,
+            100.0,
+            float(fewest),
+        ),
+    ]
+
+
+def _of_errors(errors: pd.DataFrame) -> list[_Row]:
+    """Return the last error that enough sources tell, against the paper's and its law."""
+    enough = errors[errors["n_sources"] >= _ENOUGH_SOURCES]
+    if enough.empty:
+        return []
+    last = enough.iloc[-1]
+    count = int(last["n_orbits"])
+    law = 1e3 * 4.0 / np.sqrt(36.0 * count)
+    ours = 1e3 * float(last["error_mas"])
+    expected = 1e3 * float(last["expected_mas"])
+    return [
+        (
+            "error of artificial sources",
+            f"one coordinate, mean of {count} orbits; noise and floor predict {expected:.0f}",
+            "uas",
+            70.0,
+            70.0,
+            ours,
+        ),
+        ("error of artificial sources", f"the law at {count} orbits", "uas", law, law, ours),
+    ]
+
+
+def _time(orbits: pd.DataFrame) -> _Row:
+    minutes = float(orbits["seconds"].median()) / _SECONDS_PER_MINUTE
+    reading = "one core here, one A100 GPU there"
+    return "time per orbit", reading, "min", *_A100_MINUTES, minutes
+
+
+def _median(values: pd.DataFrame | pd.Series) -> float:
+    return float(np.nanmedian(values.to_numpy(float))) if len(values) else float("nan")

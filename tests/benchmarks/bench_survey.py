@@ -1,0 +1,145 @@
+"""Time a survey: simulated, fitted by one worker and by two, killed and gone on with.
+
+    python tests/benchmarks/bench_survey.py [--orbits 8] [--stars 132651] [--kills 0] [--keep DIR]
+
+The unit is that of `bench_fit.py`, for the survey's first orbit. With `--kills` a run of its own
+is killed (SIGKILL, all its processes) so many times at random moments and begun again, and then
+compared with the one that was not, byte for byte.
+"""
+
+import argparse
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+# The checkout is measured, wherever it is run from.
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+# Before NumPy, as in the program: it sets how long idle BLAS threads spin.
+import solver  # noqa: F401, I001
+
+from plateviz.history import SurveyRun
+from plateviz.runs import Run
+from solver.instrument import MINI_MOCK
+from solver.io.survey import read_survey_orbit
+from solver.problem import build_problem
+from solver.settings import FitSettings
+from tests.benchmarks.machine import machine, time_of, write
+from tests.benchmarks.stages import UNIT_REPEATS, unit_product
+
+_MIB_PER_KIB = 1.0 / 1024.0
+ORBITS_OF_THE_PAPER = 100
+
+
+def main() -> None:
+    arguments = parse_arguments()
+    with TemporaryDirectory(prefix="plateviz-") as scratch:
+        survey = Path(arguments.keep or scratch) / "survey"
+        write(machine())
+        simulating = seconds_of(
+            "simulate", survey, "--orbits", arguments.orbits, "--stars", arguments.stars
+        )
+        problem = build_problem(read_survey_orbit(survey, 0), MINI_MOCK, FitSettings())
+        unit = time_of(unit_product(problem), UNIT_REPEATS)
+        write(
+            f"{arguments.orbits} orbits of {problem.n_obs} measurements, {problem.n_src} sources; "
+            f"unit {unit:.4f} s\n"
+        )
+        seconds = {"simulate": simulating}
+        for workers in (1, 2):
+            seconds[f"survey, workers {workers}"] = seconds_of(
+                "survey", survey, "--run", f"by-{workers}", "--workers", workers
+            )
+        report(seconds, arguments.orbits, unit)
+        one, two = (Run(survey, f"by-{workers}") for workers in (1, 2))
+        write(f"\nworkers 2 against 1: {ratio(seconds):.2f} times as fast")
+        write(f"the same bytes by both: {contents(one) == contents(two)}")
+        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * _MIB_PER_KIB
+        write(f"peak memory of one process: {peak:.0f} MiB")
+        disk = sum(path.stat().st_size for path in two.directory.rglob("*") if path.is_file())
+        write(f"disk: {disk / arguments.orbits / 2**20:.1f} MiB for each orbit")
+        ask(SurveyRun(two))
+        if arguments.kills:
+            write(f"the same bytes after {arguments.kills} kills: {killed(survey, two, arguments)}")
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description="Time a survey.")
+    parser.add_argument("--orbits", type=int, default=8)
+    parser.add_argument("--stars", type=int, default=132_651)
+    parser.add_argument("--kills", type=int, default=0, help="times that a run is killed")
+    parser.add_argument("--keep", help="folder to keep the survey in")
+    return parser.parse_args()
+
+
+def command(*words: object) -> list[str]:
+    return [sys.executable, "-m", "plateviz.cli", *map(str, words)]
+
+
+def seconds_of(*words: object) -> float:
+    """Return the wall time of a command of plateviz, imports and compilations included."""
+    start = time.perf_counter()
+    subprocess.run(command(*words), check=True, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - start
+
+
+def ratio(seconds: dict[str, float]) -> float:
+    return seconds["survey, workers 1"] / seconds["survey, workers 2"]
+
+
+def report(seconds: dict[str, float], orbits: int, unit: float) -> None:
+    write(f"{'stage':<24}{'seconds':>9}{'per orbit':>11}{'units':>8}{'of 100':>10}")
+    for name, value in seconds.items():
+        each = value / orbits
+        whole = each * ORBITS_OF_THE_PAPER / 60.0
+        write(f"{name:<24}{value:9.1f}{each:11.2f}{each / unit:8.1f}{whole:6.1f} min")
+
+
+def contents(run: Run) -> dict[str, bytes]:
+    """Return the bytes of every file of a run, but of those that hold times."""
+    return {
+        str(path.relative_to(run.directory)): path.read_bytes()
+        for path in sorted(run.directory.rglob("*"))
+        if path.is_file() and path.name != "timings.json"
+    }
+
+
+def ask(run: SurveyRun) -> None:
+    """Time the store's questions, warm."""
+    counts = run.counts()
+    often = int(counts.loc[counts["n_orbits"].idxmax(), "source_id"])
+    for name, question in {
+        "history of one source": lambda: run.history(often),
+        "counts of all sources": run.counts,
+        "orbits with their health": run.orbits,
+    }.items():
+        write(f"{name}: {1e3 * time_of(question, 5):.0f} ms")
+
+
+def killed(survey: Path, whole: Run, arguments: argparse.Namespace) -> bool:
+    """Return whether a run that is killed over and over ends as one that is not."""
+    rng, run = random.Random(0), Run(survey, "killed")
+    finished: set[int] = set()
+    for kill in range(arguments.kills):
+        words = command("survey", survey, "--run", run.name)
+        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True)
+        time.sleep(rng.uniform(1.0, 25.0))
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        there = set(run.complete_orbits())
+        write(f"kill {kill + 1}: {len(there)} orbits there")
+        if not finished <= there:
+            return False
+        finished = there
+    seconds_of("survey", survey, "--run", run.name)
+    return contents(run) == contents(whole)
+
+
+if __name__ == "__main__":
+    main()

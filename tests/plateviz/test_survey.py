@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pandas as pd
 import pytest
+from distributed import LocalCluster
 
 from plateviz.cli_survey import parse_orbits
 from plateviz.history import SurveyRun, open_run, survey_runs
@@ -194,10 +195,19 @@ def test_orbit_that_is_not_there_is_refused(fitted_survey):
         fit_survey(fitted_survey, "one", SETTINGS, [1, 7])
 
 
+def test_workers_of_a_scheduler_make_the_same_run(report, fitted_survey):
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None, memory_limit=0
+    ) as cluster:
+        address = cluster.scheduler_address
+        other = fit_survey(fitted_survey, "cluster", SETTINGS, scheduler=address)
+    assert contents(other.run) == contents(report.run)
+
+
 def test_scheduler_that_does_not_answer_is_refused(fitted_survey, monkeypatch):
     monkeypatch.setattr("plateviz.survey._PATIENCE", "1s")
     with pytest.raises(InputError, match="--scheduler: expected the address"):
-        fit_survey(fitted_survey, "cluster", SETTINGS, scheduler="tcp://127.0.0.1:9")
+        fit_survey(fitted_survey, "nowhere", SETTINGS, scheduler="tcp://127.0.0.1:9")
 
 
 @pytest.mark.parametrize(

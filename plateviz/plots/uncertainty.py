@@ -1,6 +1,5 @@
 """Uncertainty against the number of measurements (paper, figure "uncertainty")."""
 
-import math
 from typing import Literal
 
 import holoviews as hv
@@ -20,6 +19,7 @@ from plateviz.plots.style import (
     side_by_side,
 )
 from plateviz.plots.theme import theme_of
+from plateviz.plots.ticks import log_ticks
 from plateviz.tables.sources import CLASSES, KINDS, uncertainty, uncertainty_by_count
 
 Coordinate = Literal["ra", "dec", "both"]
@@ -92,8 +92,8 @@ def _panel(
         xlim=limits[0],
         ylim=limits[1],
         height=width,
-        xticks=_ticks(limits[0], whole=True),
-        yticks=_ticks(limits[1]),
+        xticks=log_ticks(limits[0], whole=True),
+        yticks=log_ticks(limits[1]),
         logx=True,
         logy=True,
         xlabel=_X.label,
@@ -108,13 +108,6 @@ def _limits(table: pd.DataFrame) -> tuple[Limits, Limits]:
         (0.85 * float(n.min()), 1.18 * float(n.max())),
         (0.8 * float(sigma.min()), 1.25 * float(sigma.max())),
     )
-
-
-def _ticks(limits: tuple[float, float], *, whole: bool = False) -> list[float]:
-    """Return round numbers within a decade of `limits`; Bokeh's own log ticks are linear here."""
-    powers = range(math.floor(math.log10(limits[0])) - 1, math.ceil(math.log10(limits[1])) + 1)
-    ticks = [float(f"{step}e{power}") for power in powers for step in (1, 2, 3, 5)]
-    return [tick for tick in ticks if tick >= 1.0] if whole else ticks
 
 
 def _with_series(table: pd.DataFrame) -> pd.DataFrame:

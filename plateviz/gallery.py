@@ -1,18 +1,35 @@
-"""The gallery: every diagnostic that a module of `plateviz.plots` defines."""
+"""The gallery: every picture that a module of `plateviz.plots` defines for a page."""
 
 import importlib
 import pkgutil
+from collections.abc import Iterator
 from functools import cache
+from operator import attrgetter
 
 import plateviz.plots
 from plateviz.plots.diagnostic import Diagnostic
+from plateviz.plots.survey_figure import SourceFigure, SurveyFigure
 
 
 @cache
 def diagnostics() -> tuple[Diagnostic, ...]:
     """Return the diagnostics in page order."""
-    found: list[Diagnostic] = []
+    return tuple(sorted(_defined("DIAGNOSTICS"), key=attrgetter("order")))
+
+
+@cache
+def survey_figures() -> tuple[SurveyFigure, ...]:
+    """Return the figures of a survey in page order."""
+    return tuple(sorted(_defined("SURVEY_FIGURES"), key=attrgetter("order")))
+
+
+@cache
+def source_figures() -> tuple[SourceFigure, ...]:
+    """Return the figures of one source in page order."""
+    return tuple(sorted(_defined("SOURCE_FIGURES"), key=attrgetter("order")))
+
+
+def _defined(name: str) -> Iterator:
     for module in pkgutil.iter_modules(plateviz.plots.__path__):
         imported = importlib.import_module(f"plateviz.plots.{module.name}")
-        found.extend(getattr(imported, "DIAGNOSTICS", ()))
-    return tuple(sorted(found, key=lambda diagnostic: diagnostic.order))
+        yield from getattr(imported, name, ())

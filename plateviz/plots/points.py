@@ -99,3 +99,23 @@ def steps(bins: pd.DataFrame, name: str, colour: str) -> hv.Curve:
     counts = np.append(bins["count"].to_numpy(), bins["count"].to_numpy()[-1])
     curve = hv.Curve((edges, counts), "edge", "count", label=name)
     return drawn(curve, interpolation="steps-post", color=colour, line_width=1.8)
+
+
+def unit_normal(area: float, limit: float, theme: str) -> hv.Curve:
+    """Return a unit normal of the same area as a histogram, from -limit to limit."""
+    # Drawn from the density at the centre of each bin, a normal would look like steps.
+    x = np.linspace(-limit, limit, 241)
+    normal = area * np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi)
+    curve = hv.Curve((x, normal), "x", "count", label="unit normal")
+    return drawn(curve, color=theme_of(theme).line, line_width=1.6)
+
+
+def error_bars(
+    table: pd.DataFrame, x: str, y: str, sigma: str, colour: str, *, along: str = "y"
+) -> hv.Segments:
+    """Return a bar of one `sigma` to both sides of each point, along "x" or "y"."""
+    ends = {f"{axis}{end}": table[name] for axis, name in (("x", x), ("y", y)) for end in "01"}
+    for end, sign in (("0", -1.0), ("1", 1.0)):
+        ends[f"{along}{end}"] = table[y if along == "y" else x] + sign * table[sigma]
+    bars = hv.Segments(pd.DataFrame(ends), ["x0", "y0", "x1", "y1"])
+    return drawn(bars, color=colour, alpha=0.45, line_width=1.2, show_legend=False)

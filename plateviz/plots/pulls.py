@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 
 from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.points import steps
+from plateviz.plots.points import steps, unit_normal
 from plateviz.plots.style import (
     FRAME_WIDTH,
     SERIES_COLOURS,
@@ -47,20 +47,17 @@ def plot_pulls(
     if table.empty or not table["n"].any():
         return message(_PULLS, "No residuals", theme=theme, width=width, **_PULL_LABELS)
     one = table[table["axis"] == table["axis"].iloc[0]]
-    # Drawn from the density at the centre of each bin, a normal would look like steps.
-    x = np.linspace(one["left"].min(), one["right"].max(), 241)
-    area = float((one["n"] * (one["right"] - one["left"])).iloc[0])
-    normal = area * np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi)
-    curve = hv.Curve((x, normal), "x", "count", label="unit normal")
     limit = float(one["right"].max())
-    top = 1.1 * float(max(table["count"].max(), normal.max()))
+    area = float((one["n"] * (one["right"] - one["left"])).iloc[0])
+    normal = unit_normal(area, limit, theme)
+    top = 1.1 * float(max(table["count"].max(), normal.range("count")[1]))
     return framed(
         [
             *(
                 steps(rows, f"residual {axis}", SERIES_COLOURS[number])
                 for number, (axis, rows) in enumerate(table.groupby("axis"))
             ),
-            drawn(curve, color=theme_of(theme).line, line_width=1.6),
+            normal,
         ],
         title=_PULLS,
         subtitle=_pull_words(table, limit),

@@ -5,10 +5,12 @@ frame with `source_id`, `ra` and `dec` (deg, direction at the mean epoch of the 
 without aberration), or None; what needs a truth is an empty table without one.
 """
 
+from plateviz.tables.apparent_motion import julian_year
 from plateviz.tables.calibration import calibration_tables, distortion
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.convergence import convergence, loss_excess
 from plateviz.tables.footprint import footprint_fields, footprint_sources
+from plateviz.tables.histogram import pull_bins
 from plateviz.tables.modes import mode_deciders, mode_groups, mode_shifts, mode_spectrum
 from plateviz.tables.orders import order_comparison, order_verdict
 from plateviz.tables.outliers import outlier_list
@@ -51,6 +53,7 @@ __all__ = [
     "exposure_chi2",
     "footprint_fields",
     "footprint_sources",
+    "julian_year",
     "loss_excess",
     "mode_deciders",
     "mode_groups",
@@ -60,6 +63,7 @@ __all__ = [
     "order_verdict",
     "outlier_list",
     "prior_shares",
+    "pull_bins",
     "pull_histogram",
     "residual_map",
     "residual_scatter",

@@ -16,6 +16,7 @@ from solver.result import FitResult, FitStatus
 from solver.settings import FitSettings
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
+from tests.plateviz.survey_tables import SurveySample, synthetic_survey
 
 FIRST_ID = 4_057_482_027_171_038_209
 N_SOURCES, N_FIELDS, N_PLATES, ORDER = 300, 4, 3, 5
@@ -51,7 +52,7 @@ def made_survey(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def survey(made_survey, tmp_path) -> Path:
+def survey_folder(made_survey, tmp_path) -> Path:
     """A survey of its own, without any run."""
     return Path(shutil.copytree(made_survey, tmp_path / "survey"))
 
@@ -393,3 +394,9 @@ def _modes(random: np.random.Generator, result: FitResult) -> dict[str, pd.DataF
     )
     tables = (modes, parameters, shifts)
     return {t.name: f[t.names] for t, f in zip(mode_schema.MODE_TABLES, tables, strict=True)}
+
+
+@pytest.fixture(scope="session")
+def survey() -> SurveySample:
+    """A fitted survey of 90 orbits and 72 sources; complete against `solver.survey_schema`."""
+    return synthetic_survey()

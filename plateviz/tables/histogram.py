@@ -1,0 +1,34 @@
+"""A histogram about zero, to be drawn beside a unit normal."""
+
+import numpy as np
+import pandas as pd
+
+
+def pull_bins(values: pd.Series, *, bins: int = 41, limit: float = 5.0) -> pd.DataFrame:
+    """Return the histogram of values that should be unit normal.
+
+    Parameters
+    ----------
+    values : NaN is left out
+    bins : number of bins from -limit to limit; odd, so that one is centred on zero
+    limit : largest value shown; what lies beyond is counted, not binned
+
+    Returns
+    -------
+    `left`, `right`, `count` of each bin, and repeated: `n`, `outside`, `mean`, and `sd`, the
+    standard deviation about the mean
+    """
+    known = values.dropna().to_numpy(dtype=float)
+    edges = np.linspace(-limit, limit, bins + 1)
+    counts, _ = np.histogram(known, edges)
+    return pd.DataFrame(
+        {
+            "left": edges[:-1],
+            "right": edges[1:],
+            "count": counts,
+            "n": len(known),
+            "outside": len(known) - int(counts.sum()),
+            "mean": float(known.mean()) if len(known) else np.nan,
+            "sd": float(known.std(ddof=1)) if len(known) > 1 else np.nan,
+        }
+    )

@@ -21,6 +21,8 @@ from plateviz.plots.prior_shares import plot_prior_shares
 from plateviz.plots.pulls import plot_exposure_chi2, plot_pulls
 from plateviz.plots.residual_map import plot_residual_map
 from plateviz.plots.residual_scatter import plot_residual_scatter
+from plateviz.plots.sky_track import plot_sky_track
+from plateviz.plots.time_series import plot_time_series
 from plateviz.plots.uncertainty import plot_uncertainty
 
 __all__ = [
@@ -41,5 +43,7 @@ __all__ = [
     "plot_pulls",
     "plot_residual_map",
     "plot_residual_scatter",
+    "plot_sky_track",
+    "plot_time_series",
     "plot_uncertainty",
 ]

@@ -1,4 +1,4 @@
-"""Numbers in words: an angle in the unit that fits, a factor with its thousands."""
+"""Numbers in words: an angle in the unit that fits, a number of orbits."""
 
 import math
 
@@ -19,6 +19,12 @@ def angle_text(value_mas: float) -> str:
     return f"{_digits(value_mas * factor)} {unit}"
 
 
+def orbits_text(number: int) -> str:
+    """Return a number of orbits in words: "1 orbit", "83 orbits"."""
+    return f"{number:,} orbit{'' if number == 1 else 's'}"
+
+
 def _digits(value: float) -> str:
-    decimals = max(0, 1 - math.floor(math.log10(abs(value)))) if value else 0
+    known = value and math.isfinite(value)
+    decimals = max(0, 1 - math.floor(math.log10(abs(value)))) if known else 0
     return f"{value:,.{min(decimals, 6)}f}"

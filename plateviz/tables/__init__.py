@@ -23,6 +23,8 @@ from plateviz.tables.residuals import (
     residual_scatter,
     scatter_statistics,
 )
+from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
+from plateviz.tables.source_track import source_curves, source_track
 from plateviz.tables.sources import (
     ARTIFICIAL,
     CLASSES,
@@ -34,6 +36,7 @@ from plateviz.tables.sources import (
     uncertainty_by_count,
 )
 from plateviz.tables.summary import SummaryItem, summary_strip
+from plateviz.tables.time_series import time_series
 
 __all__ = [
     "ARTIFICIAL",
@@ -42,6 +45,7 @@ __all__ = [
     "REFERENCE",
     "ScatterStatistics",
     "SummaryItem",
+    "TrackStatistics",
     "binned_vectors",
     "calibration_tables",
     "comparison",
@@ -68,7 +72,12 @@ __all__ = [
     "residual_map",
     "residual_scatter",
     "scatter_statistics",
+    "sky_track",
+    "source_curves",
+    "source_track",
     "summary_strip",
+    "time_series",
+    "track_statistics",
     "uncertainty",
     "uncertainty_by_count",
 ]

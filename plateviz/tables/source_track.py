@@ -1,0 +1,166 @@
+"""Tables of one source over the orbits: estimates, catalogue, truth and the fitted motion."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.apparent_motion import N_PARAMETERS, julian_year, mjd_of, motion_design
+from plateviz.tables.labels import id_strings
+from plateviz.tables.sky import offsets_mas
+from plateviz.tables.sources import ordered_by_class
+from solver.survey_schema import MOTION_PARAMETERS
+from solver.units import MAS_PER_DEG
+
+SERIES = ("catalogue", "true", "fit")
+_AXES = ("ra", "dec")
+_CURVE_POINTS = 361
+_TRACK_COLUMNS = [
+    *("id", "source_class", "orbit_id", "n_obs", "year", "mean_year"),
+    *(f"{name}{axis}_mas" for name in ("", "sigma_", "noise_") for axis in _AXES),
+    *(f"{name}_{axis}_mas" for name in SERIES for axis in _AXES),
+]
+
+
+class _Frame(NamedTuple):
+    """Where the offsets of a source are counted from, and how its catalogue entry moves.
+
+    `catalogue` has the five parameters about (ra, dec) at `mean_year`; `origin` is its place
+    at that time, mas; `is_determined` says whether the orbits decide the parameters.
+    """
+
+    ra: float
+    dec: float
+    mean_year: float
+    catalogue: np.ndarray
+    origin: np.ndarray
+    is_determined: bool
+
+
+def source_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
+    """Return the places of one source at the epochs of its orbits.
+
+    Parameters
+    ----------
+    history : rows of `survey_schema.HISTORY` of the source
+    motion : its row of `survey_schema.MOTIONS`, or None
+
+    Returns
+    -------
+    A row per orbit in order of epoch: `id`, `source_class`, `orbit_id`, `n_obs`, `year`
+    (Julian), and in ra cos(dec) and dec, mas: the estimate `ra_mas`, `dec_mas`, its marginal
+    `sigma_ra_mas`, `sigma_dec_mas` and `noise_ra_mas`, `noise_dec_mas` (the part that scatters
+    between orbits), `catalogue_*_mas`, `true_*_mas` and `fit_*_mas` (NaN where there is none),
+    all from the catalogue's place at the mean epoch `mean_year`
+    """
+    rows = history.sort_values(["epoch", "orbit_id"], kind="stable").reset_index(drop=True)
+    if rows.empty:
+        return pd.DataFrame(columns=_TRACK_COLUMNS)
+    frame = _frame(rows)
+    catalogue = _catalogue_places(rows, frame.ra, frame.dec) - frame.origin
+    fit = catalogue + _fitted(frame, rows["epoch"].to_numpy(dtype=float), motion)
+    table = pd.DataFrame(
+        {
+            "id": id_strings(rows["source_id"]),
+            "source_class": ordered_by_class(rows.head(1))["source_class"].iloc[0],
+            "orbit_id": rows["orbit_id"],
+            "n_obs": rows["n_obs"],
+            "year": julian_year(rows["epoch"]),
+            "mean_year": frame.mean_year,
+        }
+    )
+    for k, axis in enumerate(_AXES):
+        table[f"{axis}_mas"] = catalogue[:, k] + rows[f"offset_{axis}"]
+        table[f"sigma_{axis}_mas"] = rows[f"sigma_{axis}_marginal"]
+        table[f"noise_{axis}_mas"] = rows[f"sigma_{axis}_noise"]
+        table[f"catalogue_{axis}_mas"] = catalogue[:, k]
+        table[f"true_{axis}_mas"] = catalogue[:, k] + rows[f"true_offset_{axis}"]
+        table[f"fit_{axis}_mas"] = fit[:, k]
+    return table[_TRACK_COLUMNS]
+
+
+def source_curves(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
+    """Return the motion of one source between its orbits, as `source_track` counts it.
+
+    Returns
+    -------
+    `year` and, mas, `catalogue_*_mas`, `true_*_mas`, `fit_*_mas` and the uncertainty of the
+    fit `fit_sigma_ra_mas`, `fit_sigma_dec_mas`; no rows where the orbits are too few, or too
+    close in time, to say how the source moves
+    """
+    rows = history.sort_values(["epoch", "orbit_id"], kind="stable").reset_index(drop=True)
+    names = [f"{series}_{axis}_mas" for series in (*SERIES, "fit_sigma") for axis in _AXES]
+    frame = _frame(rows) if len(rows) else None
+    if frame is None or not frame.is_determined:
+        return pd.DataFrame(columns=["year", *names], dtype=float)
+    mjd = np.linspace(rows["epoch"].min(), rows["epoch"].max(), _CURVE_POINTS)
+    design = motion_design(frame.ra, frame.dec, mjd, frame.mean_year)
+    at_orbits = motion_design(frame.ra, frame.dec, rows["epoch"].to_numpy(), frame.mean_year)
+    catalogue = design @ frame.catalogue - frame.origin
+    true_offset = _solve(at_orbits, rows[["true_offset_ra", "true_offset_dec"]].to_numpy())
+    series = {
+        "catalogue": catalogue,
+        "true": catalogue + design @ true_offset,
+        "fit": catalogue + _fitted(frame, mjd, motion),
+        "fit_sigma": _fit_sigma(rows, at_orbits, design),
+    }
+    table = pd.DataFrame({"year": julian_year(mjd)})
+    for name, values in series.items():
+        for k, axis in enumerate(_AXES):
+            table[f"{name}_{axis}_mas"] = values[:, k]
+    return table
+
+
+def _frame(rows: pd.DataFrame) -> _Frame:
+    """Find the catalogue's motion from its places at the orbits."""
+    dec = float(rows["dec"].iloc[0] - rows["offset_dec"].iloc[0] / MAS_PER_DEG)
+    east = float(rows["offset_ra"].iloc[0] / np.cos(np.radians(rows["dec"].iloc[0])))
+    ra = float(rows["ra"].iloc[0] - east / MAS_PER_DEG)
+    mjd = rows["epoch"].to_numpy(dtype=float)
+    mean_year = float(julian_year(mjd.mean()))
+    design = motion_design(ra, dec, mjd, mean_year)
+    parameters = _solve(design, _catalogue_places(rows, ra, dec))
+    at_mean = motion_design(ra, dec, mjd_of(np.array([mean_year])), mean_year)[0]
+    rank = int(np.linalg.matrix_rank(design.reshape(-1, N_PARAMETERS)))
+    return _Frame(ra, dec, mean_year, parameters, at_mean @ parameters, rank == N_PARAMETERS)
+
+
+def _catalogue_places(rows: pd.DataFrame, ra: float, dec: float) -> np.ndarray:
+    """Return where the catalogue has the source at each orbit, mas from (ra, dec)."""
+    d_ra, d_dec = offsets_mas(rows["ra"].to_numpy(), rows["dec"].to_numpy(), ra, dec)
+    return np.stack([d_ra, d_dec], axis=-1) - rows[["offset_ra", "offset_dec"]].to_numpy()
+
+
+def _solve(design: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the five parameters of the motion through places, shape (n, 2); NaN without."""
+    if not np.isfinite(places).all():
+        return np.full(N_PARAMETERS, np.nan)
+    return np.linalg.lstsq(design.reshape(-1, N_PARAMETERS), places.reshape(-1), rcond=None)[0]
+
+
+def _fitted(frame: _Frame, mjd: np.ndarray, motion: pd.Series | None) -> np.ndarray:
+    """Return fitted minus catalogue place, mas, shape (n, 2); NaN where there is no fit."""
+    if motion is None:
+        return np.full((len(mjd), 2), np.nan)
+    fit = motion[[f"fit_{name}" for name in MOTION_PARAMETERS]].to_numpy(dtype=float)
+    return motion_design(frame.ra, frame.dec, mjd, float(motion["epoch"])) @ fit
+
+
+def _fit_sigma(rows: pd.DataFrame, at_orbits: np.ndarray, design: np.ndarray) -> np.ndarray:
+    """Return the uncertainty of the fitted place where `design` looks, mas, shape (n, 2).
+
+    The part of the noise follows from the weights of the orbits. That of the catalogue's
+    errors, alike in all orbits, goes with time as those of a place and of a proper motion do.
+    """
+    sigma = rows[["sigma_ra_noise", "sigma_dec_noise"]].to_numpy(dtype=float)
+    covariance = sigma[:, :, None] * sigma[:, None, :]
+    covariance[:, 0, 1] *= rows["corr_noise"]
+    covariance[:, 1, 0] *= rows["corr_noise"]
+    weighted = np.linalg.solve(covariance, at_orbits)
+    of_motion = np.linalg.pinv(np.einsum("nai,naj->ij", at_orbits, weighted), hermitian=True)
+    noise = np.einsum("nai,ij,naj->na", design, of_motion, design)
+    shared = rows[["sigma_ra_catalogue", "sigma_dec_catalogue"]].to_numpy(dtype=float) ** 2
+    # The fourth column of the design is the time in RA, for both coordinates alike.
+    powers, wanted = (np.vander(d[:, 0, 3], 3) for d in (at_orbits, design))
+    catalogue = wanted @ np.linalg.lstsq(powers, shared, rcond=None)[0]
+    return np.sqrt(noise + np.clip(catalogue, 0.0, None))

@@ -16,11 +16,14 @@ from plateviz.plots.footprint import plot_footprint
 from plateviz.plots.mode_groups import plot_mode_groups
 from plateviz.plots.mode_shifts import plot_mode_shifts
 from plateviz.plots.modes import plot_mode_deciders, plot_mode_spectrum
+from plateviz.plots.orbit_counts import plot_orbit_counts
 from plateviz.plots.orders import plot_orders
+from plateviz.plots.prior_separation import plot_prior_separation
 from plateviz.plots.prior_shares import plot_prior_shares
 from plateviz.plots.pulls import plot_exposure_chi2, plot_pulls
 from plateviz.plots.residual_map import plot_residual_map
 from plateviz.plots.residual_scatter import plot_residual_scatter
+from plateviz.plots.sky_distribution import plot_sky_distribution
 from plateviz.plots.sky_track import plot_sky_track
 from plateviz.plots.time_series import plot_time_series
 from plateviz.plots.uncertainty import plot_uncertainty
@@ -38,11 +41,14 @@ __all__ = [
     "plot_mode_groups",
     "plot_mode_shifts",
     "plot_mode_spectrum",
+    "plot_orbit_counts",
     "plot_orders",
+    "plot_prior_separation",
     "plot_prior_shares",
     "plot_pulls",
     "plot_residual_map",
     "plot_residual_scatter",
+    "plot_sky_distribution",
     "plot_sky_track",
     "plot_time_series",
     "plot_uncertainty",

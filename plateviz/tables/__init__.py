@@ -12,8 +12,10 @@ from plateviz.tables.convergence import convergence, loss_excess
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.histogram import pull_bins
 from plateviz.tables.modes import mode_deciders, mode_groups, mode_shifts, mode_spectrum
+from plateviz.tables.orbit_counts import orbit_counts
 from plateviz.tables.orders import order_comparison, order_verdict
 from plateviz.tables.outliers import outlier_list
+from plateviz.tables.prior_separation import prior_separation, prior_separation_histogram
 from plateviz.tables.prior_shares import prior_shares
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
 from plateviz.tables.residuals import (
@@ -23,6 +25,7 @@ from plateviz.tables.residuals import (
     residual_scatter,
     scatter_statistics,
 )
+from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
 from plateviz.tables.source_track import source_curves, source_track
 from plateviz.tables.sources import (
@@ -63,15 +66,20 @@ __all__ = [
     "mode_groups",
     "mode_shifts",
     "mode_spectrum",
+    "orbit_counts",
     "order_comparison",
     "order_verdict",
     "outlier_list",
+    "prior_separation",
+    "prior_separation_histogram",
     "prior_shares",
     "pull_bins",
     "pull_histogram",
     "residual_map",
     "residual_scatter",
     "scatter_statistics",
+    "sky_density",
+    "sky_distribution",
     "sky_track",
     "source_curves",
     "source_track",

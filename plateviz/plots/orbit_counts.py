@@ -1,0 +1,91 @@
+"""How many orbits measured a source (paper, figure "result:ts:orbit")."""
+
+import holoviews as hv
+import pandas as pd
+
+from plateviz.plots.points import steps
+from plateviz.plots.style import CLASS_COLOURS, FRAME_WIDTH, AxisLabels, framed, message
+from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.plots.ticks import log_ticks
+from plateviz.tables.orbit_counts import orbit_counts
+
+_TITLE = "Orbits of each source"
+# Where a bin without a source is put, below the frame: a logarithm has no zero.
+_NONE = 0.1
+_LOWEST = 0.7
+_ALL_TICKS_UP_TO = 200.0
+
+
+def plot_orbit_counts(
+    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
+) -> hv.Overlay:
+    """Draw the histogram of the number of orbits per source for each class, with log counts.
+
+    Parameters
+    ----------
+    table : `tables.orbit_counts`
+    theme : "light" or "dark"
+    width : of the frame, screen pixels
+    """
+    if table.empty:
+        return message(_TITLE, "No sources", theme=theme, width=width, **_labels(1))
+    last = float(table["right"].max())
+    top = 1.8 * float(table["count"].max())
+    return framed(
+        [
+            steps(_closed(rows), str(name), CLASS_COLOURS[str(name)])
+            for name, rows in table.groupby("source_class", sort=False)
+        ],
+        title=_TITLE,
+        subtitle=_words(table),
+        theme=theme,
+        width=width,
+        height=round(0.62 * width),
+        xlim=(-0.01 * last, 1.02 * last),
+        ylim=(_LOWEST, top),
+        logy=True,
+        yticks=log_ticks((_LOWEST, top), whole=True, powers_only=top > _ALL_TICKS_UP_TO),
+        legend_columns=3,
+        **_labels(round(float(table["right"].iloc[0] - table["left"].iloc[0]))),
+    )
+
+
+def _labels(step: int) -> AxisLabels:
+    bins = "" if step == 1 else f", in bins of {step}"
+    return {"xlabel": f"number of orbits N{bins}", "ylabel": "sources per bin"}
+
+
+def _closed(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the bins between two empty ones, so that the outline comes down at both ends."""
+    bins = rows[["left", "right", "count"]].astype(float)
+    bins["count"] = bins["count"].clip(lower=_NONE)
+    low, high = float(bins["left"].iloc[0]), float(bins["right"].iloc[-1])
+    ends = [
+        pd.DataFrame({"left": [edge], "right": [edge], "count": [_NONE]}) for edge in (low, high)
+    ]
+    return pd.concat([ends[0], bins, ends[1]], ignore_index=True)
+
+
+def _words(table: pd.DataFrame) -> str:
+    firsts = table.drop_duplicates("source_class")
+    parts = [
+        f"{row.source_class}: n = {row.n:,}, median {row.median:g}"
+        for row in firsts.itertuples(index=False)
+    ]
+    return "\n".join(parts)
+
+
+def _draw(tables: SurveyTables, theme: str) -> hv.Overlay:
+    return plot_orbit_counts(orbit_counts(tables.motions), theme=theme)
+
+
+SURVEY_FIGURES = (
+    SurveyFigure(
+        "orbit-counts",
+        "Orbits of each source",
+        "How many orbits measured a source, by class. Sources near the target are measured most "
+        "often; the classes should be alike where they share the sky.",
+        30,
+        _draw,
+    ),
+)

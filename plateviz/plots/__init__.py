@@ -12,15 +12,19 @@ from plateviz.plots.comparison import (
 from plateviz.plots.convergence import plot_convergence
 from plateviz.plots.deviation import plot_deviation
 from plateviz.plots.distortion import plot_distortion
+from plateviz.plots.error_by_count import plot_error_by_count
 from plateviz.plots.footprint import plot_footprint
 from plateviz.plots.mode_groups import plot_mode_groups
 from plateviz.plots.mode_shifts import plot_mode_shifts
 from plateviz.plots.modes import plot_mode_deciders, plot_mode_spectrum
+from plateviz.plots.motion_pulls import plot_motion_pulls
 from plateviz.plots.orbit_counts import plot_orbit_counts
+from plateviz.plots.orbit_health import plot_orbit_health
 from plateviz.plots.orders import plot_orders
 from plateviz.plots.prior_separation import plot_prior_separation
 from plateviz.plots.prior_shares import plot_prior_shares
 from plateviz.plots.pulls import plot_exposure_chi2, plot_pulls
+from plateviz.plots.reference_scatter import plot_reference_scatter
 from plateviz.plots.residual_map import plot_residual_map
 from plateviz.plots.residual_scatter import plot_residual_scatter
 from plateviz.plots.sky_distribution import plot_sky_distribution
@@ -35,17 +39,21 @@ __all__ = [
     "plot_convergence",
     "plot_deviation",
     "plot_distortion",
+    "plot_error_by_count",
     "plot_exposure_chi2",
     "plot_footprint",
     "plot_mode_deciders",
     "plot_mode_groups",
     "plot_mode_shifts",
     "plot_mode_spectrum",
+    "plot_motion_pulls",
     "plot_orbit_counts",
+    "plot_orbit_health",
     "plot_orders",
     "plot_prior_separation",
     "plot_prior_shares",
     "plot_pulls",
+    "plot_reference_scatter",
     "plot_residual_map",
     "plot_residual_scatter",
     "plot_sky_distribution",

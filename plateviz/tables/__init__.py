@@ -12,12 +12,15 @@ from plateviz.tables.convergence import convergence, loss_excess
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.histogram import pull_bins
 from plateviz.tables.modes import mode_deciders, mode_groups, mode_shifts, mode_spectrum
+from plateviz.tables.motion_pulls import motion_pulls
 from plateviz.tables.orbit_counts import orbit_counts
+from plateviz.tables.orbit_health import orbit_health
 from plateviz.tables.orders import order_comparison, order_verdict
 from plateviz.tables.outliers import outlier_list
 from plateviz.tables.prior_separation import prior_separation, prior_separation_histogram
 from plateviz.tables.prior_shares import prior_shares
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
+from plateviz.tables.reference_scatter import reference_scatter, scatter_cells
 from plateviz.tables.residuals import (
     ScatterStatistics,
     binned_vectors,
@@ -66,7 +69,9 @@ __all__ = [
     "mode_groups",
     "mode_shifts",
     "mode_spectrum",
+    "motion_pulls",
     "orbit_counts",
+    "orbit_health",
     "order_comparison",
     "order_verdict",
     "outlier_list",
@@ -75,8 +80,10 @@ __all__ = [
     "prior_shares",
     "pull_bins",
     "pull_histogram",
+    "reference_scatter",
     "residual_map",
     "residual_scatter",
+    "scatter_cells",
     "scatter_statistics",
     "sky_density",
     "sky_distribution",

@@ -1,0 +1,175 @@
+"""Errors of the artificial sources against orbits (paper, figure "discussion:test:rms")."""
+
+import holoviews as hv
+import numpy as np
+import pandas as pd
+
+from plateviz.plots.style import (
+    CLASS_COLOURS,
+    FRAME_WIDTH,
+    AxisLabels,
+    Limits,
+    drawn,
+    framed,
+    message,
+)
+from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.plots.theme import theme_of
+from plateviz.plots.ticks import log_ticks
+from plateviz.plots.units import angle_text
+from plateviz.tables.sources import ARTIFICIAL, REFERENCE
+
+_TITLE = "Positional error of the artificial sources"
+_LABELS: AxisLabels = {
+    "xlabel": "number of orbits N",
+    "ylabel": "rms error of the mean, one coordinate (mas)",
+}
+_X, _Y = hv.Dimension("n_orbits"), hv.Dimension("error_mas")
+_HOVER = [
+    ("orbits", "@{n_orbits}"),
+    ("sources", "@{n_sources}"),
+    ("rms error", "@{error_mas}{0.0000} mas"),
+    ("its range", "@{error_low_mas}{0.0000} to @{error_high_mas}{0.0000} mas"),
+    ("expected", "@{expected_mas}{0.0000} mas"),
+]
+_MEASUREMENT_MAS = 4.0
+_PER_ORBIT = 36
+
+
+def plot_error_by_count(
+    table: pd.DataFrame,
+    *,
+    measurement_mas: float = _MEASUREMENT_MAS,
+    per_orbit: int = _PER_ORBIT,
+    theme: str = "light",
+    width: int = FRAME_WIDTH,
+) -> hv.Overlay:
+    """Draw the error of the mean position against the number of orbits, with two predictions.
+
+    Parameters
+    ----------
+    table : a row per number of orbits: `n_orbits`; `n_sources`; `error_mas`, the rms over the
+        sources and both coordinates of the mean of all orbits minus the truth;
+        `error_low_mas` and `error_high_mas`, one sigma of that rms to both sides; `noise_mas`,
+        the noise of one orbit; `floor_mas`, what the reference sources' errors leave however
+        many orbits there are; `expected_mas` = sqrt(noise^2 / N + floor^2)
+    measurement_mas : uncertainty of one measurement, for the paper's guide
+        sigma / sqrt(36 N), section "Discussion"
+    per_orbit : measurements of a source in one orbit, 36 in that guide
+    theme : "light" or "dark"
+    width : of the frame, screen pixels
+    """
+    if table.empty:
+        return message(_TITLE, "No artificial sources", theme=theme, width=width, **_LABELS)
+    rows = table.sort_values("n_orbits", kind="stable")
+    colours = theme_of(theme)
+    guide = f"{measurement_mas:g} mas / √({per_orbit} N)"
+    xlim, ylim = _limits(rows)
+    span = np.array(xlim)
+    law = measurement_mas / np.sqrt(per_orbit * span)
+    predicted = _to_edges(rows, xlim)
+    n = predicted["n_orbits"]
+    return framed(
+        [
+            _curve(span, law, guide, colours.muted, "dotted"),
+            _curve(
+                n, predicted["floor_mas"], "floor: references", CLASS_COLOURS[REFERENCE], "dashed"
+            ),
+            _curve(n, predicted["expected_mas"], "√(noise² / N + floor²)", colours.line, "solid"),
+            *_errors(rows),
+        ],
+        title=_TITLE,
+        subtitle=_words(rows),
+        theme=theme,
+        width=width,
+        height=round(0.8 * width),
+        xlim=xlim,
+        ylim=ylim,
+        logx=True,
+        logy=True,
+        xticks=log_ticks(xlim, whole=True),
+        yticks=log_ticks(ylim),
+        legend_columns=2,
+        **_LABELS,
+    )
+
+
+def _to_edges(rows: pd.DataFrame, xlim: Limits) -> pd.DataFrame:
+    """Return the prediction at each number of orbits and at the edges of the frame."""
+    low, high = rows.head(1).assign(n_orbits=xlim[0]), rows.tail(1).assign(n_orbits=xlim[1])
+    ends = [
+        end.assign(
+            expected_mas=np.hypot(end["noise_mas"] / end["n_orbits"] ** 0.5, end["floor_mas"])
+        )
+        for end in (low, high)
+    ]
+    return pd.concat([ends[0], rows.astype({"n_orbits": float}), ends[1]], ignore_index=True)
+
+
+def _curve(
+    n: np.ndarray | pd.Series, values: np.ndarray | pd.Series, label: str, colour: str, dash: str
+) -> hv.Curve:
+    curve = hv.Curve(
+        (np.asarray(n, dtype=float), np.asarray(values, dtype=float)), _X, _Y, label=label
+    )
+    return drawn(curve, color=colour, line_width=1.8, line_dash=dash)
+
+
+def _errors(rows: pd.DataFrame) -> list[hv.Element]:
+    colour = CLASS_COLOURS[ARTIFICIAL]
+    ends = rows.assign(n_orbits_end=rows["n_orbits"])
+    bars = hv.Segments(ends, ["n_orbits", "error_low_mas", "n_orbits_end", "error_high_mas"])
+    extra = ["n_sources", "error_low_mas", "error_high_mas", "expected_mas"]
+    points = hv.Points(rows, [_X, _Y], extra, label="measured ± 1σ")
+    return [
+        drawn(bars, color=colour, alpha=0.6, line_width=1.4, show_legend=False),
+        drawn(
+            points,
+            color=colour,
+            marker="triangle",
+            size=7,
+            line_color=None,
+            tools=["hover"],
+            hover_tooltips=_HOVER,
+        ),
+    ]
+
+
+def _limits(rows: pd.DataFrame) -> tuple[Limits, Limits]:
+    n = rows["n_orbits"]
+    seen = rows[["error_mas", "expected_mas", "floor_mas"]].to_numpy(dtype=float)
+    # A bar of few sources may reach down to zero, where a logarithm does not.
+    low, high = float(np.nanmin(seen[seen > 0])), float(rows["error_high_mas"].max())
+    return (
+        (0.92 * float(n.min()), 1.09 * float(n.max())),
+        (0.75 * low, 1.2 * max(high, float(np.nanmax(seen)))),
+    )
+
+
+def _words(rows: pd.DataFrame) -> str:
+    weights = rows["n_sources"]
+    noise, floor = (
+        angle_text(float(np.average(rows[name], weights=weights)))
+        for name in ("noise_mas", "floor_mas")
+    )
+    return f"{int(weights.sum()):,} sources; noise of one orbit {noise}, floor {floor}"
+
+
+def _draw(tables: SurveyTables, theme: str) -> hv.Overlay:
+    table = tables.errors_by_count
+    if table is None:
+        return message(_TITLE, "No artificial sources with a truth", theme=theme, **_LABELS)
+    return plot_error_by_count(table, theme=theme)
+
+
+SURVEY_FIGURES = (
+    SurveyFigure(
+        "error-by-count",
+        "Error against number of orbits",
+        "The error of the mean position over N orbits. Good: along the drawn prediction. The "
+        "paper's square-root law has no floor; the errors of the reference sources are the same "
+        "in every orbit and do not average out.",
+        40,
+        _draw,
+    ),
+)

@@ -1,0 +1,98 @@
+"""Pulls of the fitted motions, a panel per parameter."""
+
+import holoviews as hv
+import pandas as pd
+
+from plateviz.plots.points import steps, unit_normal
+from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS, framed, message, side_by_side
+from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.tables.motion_pulls import CHI2, LEAST_ORBITS, motion_pulls
+
+_TITLE = "Pulls of the fitted motions"
+_NAMES = {
+    "ra": "α cos δ",
+    "dec": "δ",
+    "parallax": "Parallax",
+    "pmra": "Proper motion in α cos δ",
+    "pmdec": "Proper motion in δ",
+    CHI2: "χ² of the motion fit",
+}
+_PULL = "(fitted minus true) / σ"
+_DEPARTURE = "(χ² − dof) / √(2 dof)"
+
+
+def plot_motion_pulls(
+    table: pd.DataFrame, *, theme: str = "light", width: int = PANEL_WIDTH
+) -> hv.Layout | hv.Overlay:
+    """Draw the histogram of the pulls of each parameter of the motion with the unit normal.
+
+    Parameters
+    ----------
+    table : `tables.motion_pulls`
+    theme : "light" or "dark"
+    width : of each panel's frame, screen pixels
+    """
+    if table.empty:
+        return message(
+            _TITLE,
+            "No source with enough orbits",
+            theme=theme,
+            width=width,
+            xlabel=_PULL,
+            ylabel="sources per bin",
+        )
+    panels = [
+        _panel(rows, str(name), theme, width)
+        for name, rows in table.groupby("parameter", sort=False)
+    ]
+    return side_by_side(panels, columns=3)
+
+
+def _panel(rows: pd.DataFrame, name: str, theme: str, width: int) -> hv.Overlay:
+    first = rows.iloc[0]
+    limit = float(rows["right"].max())
+    normal = unit_normal(float(first["n"] * (first["right"] - first["left"])), limit, theme)
+    top = 1.1 * max(float(rows["count"].max()), float(normal.range("count")[1]))
+    return framed(
+        [steps(rows, "sources", SERIES_COLOURS[0]), normal],
+        title=_NAMES[name],
+        subtitle=_words(first, limit),
+        theme=theme,
+        width=width,
+        height=round(0.62 * width),
+        xlim=(-limit, limit),
+        ylim=(0.0, top),
+        xlabel=_DEPARTURE if name == CHI2 else _PULL,
+        ylabel="sources per bin",
+        legend_columns=2,
+    )
+
+
+def _words(first: pd.Series, limit: float) -> str:
+    return (
+        f"sd {first['sd']:.3f}, mean {first['mean']:.3f}\n"
+        f"n = {first['n']:,}; {first['outside']:,} beyond ± {limit:g}"
+    )
+
+
+# Three panels side by side on the page.
+_PAGE_WIDTH = 270
+
+
+def _draw(tables: SurveyTables, theme: str) -> hv.Layout | hv.Overlay:
+    return plot_motion_pulls(motion_pulls(tables.motions), theme=theme, width=_PAGE_WIDTH)
+
+
+SURVEY_FIGURES = (
+    SurveyFigure(
+        "motion-pulls",
+        "Pulls of the fitted motions",
+        "Fitted minus true place, parallax and proper motion over their sigmas, for sources "
+        f"other than reference ones in at least {LEAST_ORBITS} orbits. Good: the unit normal. "
+        "Sources of one region share the reference sources' errors, so that a mean off zero is "
+        "no surprise; a width off one is.",
+        60,
+        _draw,
+        is_wide=True,
+    ),
+)

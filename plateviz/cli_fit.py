@@ -17,6 +17,7 @@ from plateviz.cli_output import (
 from plateviz.source import OrbitFiles
 from solver.errors import FitError, InputError
 from solver.io.atomic import require_writable
+from solver.memory import keep_memory
 from solver.settings import COUNTED, ENGINES, FitSettings
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ class FitRequest(NamedTuple):
 def run_fit(request: FitRequest, as_json: bool) -> None:
     """Do what was asked for; raises `FitError` where a fit has not converged."""
     start = time.perf_counter()
+    keep_memory()
     outputs = {engine: _output(request, engine) for engine in request.engines}
     for output in outputs.values():
         require_writable(output)

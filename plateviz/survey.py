@@ -5,6 +5,7 @@ the survey's directory. Each has one thread. An orbit is whole in its directory 
 that work stopped at any moment goes on where it was.
 """
 
+import logging
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -26,10 +27,10 @@ from plateviz.history import (
 from plateviz.runs import Run, begin_run
 from plateviz.store import remove_unfinished
 from plateviz.survey_worker import Outcome, fit_survey_orbit
+from solver.apparent_motion import julian_year
 from solver.errors import InputError
 from solver.io.atomic import write_atomically
 from solver.io.survey import survey_orbits
-from solver.motion import julian_year
 from solver.settings import FitSettings
 from solver.survey_schema import ERRORS_BY_COUNT, MOTIONS
 from solver.time_series import errors_by_count, motion_table
@@ -141,6 +142,8 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             # A page of its own would be one more port, and the limit of memory is the machine's.
             dashboard_address=None,  # type: ignore[arg-type]
             memory_limit=0,
+            # A worker that is slow to end is no news.
+            silence_logs=logging.ERROR,
         ) as cluster,
         Client(cluster) as client,
     ):

@@ -9,6 +9,7 @@ from plateviz.runs import Run
 from solver.errors import FitError, InputError
 from solver.instrument import parse_instrument
 from solver.io.survey import HEADER, read_header, read_survey_orbit
+from solver.memory import keep_memory
 from solver.threads import use_one_thread
 
 
@@ -27,6 +28,7 @@ def fit_survey_orbit(survey: str, name: str, orbit: int) -> Outcome:
     """
     start = time.perf_counter()
     run, message = Run(Path(survey), name), ""
+    keep_memory()
     keep_compilations()
     use_one_thread()
     try:

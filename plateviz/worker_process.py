@@ -25,6 +25,7 @@ from plateviz.store import write_run
 from solver.errors import CancelledError, FitError, InputError
 from solver.fit import OrbitFitter
 from solver.gauss_newton import Iteration
+from solver.memory import keep_memory
 from solver.settings import COUNTED, FitSettings
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
@@ -51,6 +52,7 @@ class _Cancellations:
 
 def main() -> None:
     """Serve requests until standard input ends."""
+    keep_memory()
     send = _sender()
     requests: queue.Queue[Request | None] = queue.Queue()
     cancellations = _Cancellations()

@@ -14,13 +14,9 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Bool, Float, Int
 
-from solver.astrometry import jacobian_at
-from solver.ephemeris import observer_at
-from solver.projection import tangent_frame
+from solver.apparent_motion import motion_design
 from solver.shared_errors import draws_of
-from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000
 
-N_PARAMETERS = 5
 # Beyond this the orbits leave a combination of the parameters open.
 _LARGEST_CONDITION = 1e10
 
@@ -53,11 +49,6 @@ class MotionFit(NamedTuple):
     drawn: Float[np.ndarray, "row draw 2"]
 
 
-def julian_year(mjd_tcb: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-    """Return the Julian year of an epoch, MJD in TCB."""
-    return 2000.0 + (mjd_tcb - MJD_J2000) / DAYS_PER_JULIAN_YEAR
-
-
 def fit_motions(history: pd.DataFrame, epoch: float) -> MotionFit:
     """Fit the motion of every source of a history.
 
@@ -72,7 +63,8 @@ def fit_motions(history: pd.DataFrame, epoch: float) -> MotionFit:
     The motions; NaN of a source whose orbits leave a parameter open.
     """
     ids, first = np.unique(history["source_id"].to_numpy(), return_index=True)
-    design = _design(history, epoch)
+    ra, dec, epochs = history[["ra", "dec", "epoch"]].to_numpy().T
+    design = motion_design(ra, dec, epochs, epoch)
     noise = _noise(history)
     weight = np.linalg.inv(noise)
     weighted = np.einsum("nij,njp->nip", weight, design)
@@ -100,14 +92,6 @@ def fit_motions(history: pd.DataFrame, epoch: float) -> MotionFit:
         np.diagonal(noise, axis1=1, axis2=2) - fitted,
         drawn,
     )
-
-
-def _design(history: pd.DataFrame, epoch: float) -> Float[np.ndarray, "row 2 5"]:
-    """Return A_k of every row."""
-    epochs, which = np.unique(history["epoch"].to_numpy(), return_inverse=True)
-    observer = observer_at(epochs).position[which]
-    frame = tangent_frame(history["ra"].to_numpy(), history["dec"].to_numpy())
-    return jacobian_at(frame, julian_year(epochs)[which] - epoch, observer)
 
 
 def _noise(history: pd.DataFrame) -> Float[np.ndarray, "row 2 2"]:

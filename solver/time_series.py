@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float, Int
 
-from solver.motion import N_PARAMETERS, MotionFit, fit_motions, julian_year
+from solver.apparent_motion import N_PARAMETERS, julian_year
+from solver.motion import MotionFit, fit_motions
 from solver.shared_errors import draws_of
 from solver.survey_schema import ERRORS_BY_COUNT, MOTION_PARAMETERS, MOTIONS
 

@@ -5,7 +5,6 @@ frame with `source_id`, `ra` and `dec` (deg, direction at the mean epoch of the 
 without aberration), or None; what needs a truth is an empty table without one.
 """
 
-from plateviz.tables.apparent_motion import julian_year
 from plateviz.tables.calibration import calibration_tables, distortion
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.convergence import convergence, loss_excess
@@ -43,6 +42,7 @@ from plateviz.tables.sources import (
 )
 from plateviz.tables.summary import SummaryItem, summary_strip
 from plateviz.tables.time_series import time_series
+from solver.apparent_motion import julian_year
 
 __all__ = [
     "ARTIFICIAL",

@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.apparent_motion import mjd_of, parallax_factors
 from plateviz.tables.labels import id_strings
 from plateviz.tables.sky import offsets_mas
+from solver.apparent_motion import mjd_of, parallax_factors
 from solver.ephemeris import observer_at
 
 EPOCH = 2029.0

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.apparent_motion import N_PARAMETERS, julian_year, mjd_of, motion_design
 from plateviz.tables.labels import id_strings
 from plateviz.tables.sky import offsets_mas
 from plateviz.tables.sources import ordered_by_class
+from solver.apparent_motion import N_PARAMETERS, julian_year, mjd_of, motion_design
 from solver.survey_schema import MOTION_PARAMETERS
 from solver.units import MAS_PER_DEG
 

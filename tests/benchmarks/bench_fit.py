@@ -23,6 +23,7 @@ from solver.fit import fit_orbit
 from solver.gauss_newton import Mode, find_mode
 from solver.instrument import MINI_MOCK
 from solver.leverage import covariances, residuals
+from solver.memory import keep_memory
 from solver.normal import accumulate
 from solver.objective import gradient
 from solver.orbit import OrbitData
@@ -43,6 +44,8 @@ from tests.benchmarks.stages import (
 
 def main() -> None:
     arguments = parse_arguments()
+    # As the program does.
+    keep_memory()
     data = simulated_orbit(survey_of(arguments.sources))
     settings = FitSettings()
     problem = build_problem(data, MINI_MOCK, settings)

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.apparent_motion import julian_year, motion_design
 from plateviz.tables.sky import offsets_mas
 from solver import schema, survey_schema
+from solver.apparent_motion import julian_year, motion_design
 from solver.astrometry import frames_at, sky_position
 from solver.ephemeris import observer_at
 from solver.simulate.sky import galactic_to_icrs

@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from plateviz import tables
-from plateviz.tables.apparent_motion import julian_year, mjd_of, motion_design, parallax_factors
 from plateviz.tables.sky import offsets_mas
 from solver import survey_schema
+from solver.apparent_motion import julian_year, mjd_of, motion_design, parallax_factors
 from solver.astrometry import frames_at, sky_position
 from solver.ephemeris import observer_at
 from tests.plateviz.survey_tables import EPOCH, places

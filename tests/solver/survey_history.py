@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
+from solver.apparent_motion import julian_year
 from solver.astrometry import jacobian_at
 from solver.ephemeris import observer_at
-from solver.motion import julian_year
 from solver.projection import tangent_frame
 from solver.survey_schema import HISTORY, N_DRAWS, SHARED_ERRORS
 

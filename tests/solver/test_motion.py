@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from solver.motion import fit_motions, julian_year
+from solver.apparent_motion import julian_year
+from solver.motion import fit_motions
 from solver.survey_schema import N_DRAWS
 from tests.solver.survey_history import EPOCH, epochs_of, make_history
 

@@ -39,12 +39,14 @@ def parallax_factors(
     return -east, -north
 
 
-def motion_design(ra: float, dec: float, mjd: np.ndarray, epoch: float) -> np.ndarray:
-    """Return how a source's five parameters move it at some times.
+def motion_design(
+    ra: np.ndarray | float, dec: np.ndarray | float, mjd: np.ndarray, epoch: float
+) -> np.ndarray:
+    """Return how its five parameters move a source at some times.
 
     Parameters
     ----------
-    ra, dec : of the source, deg
+    ra, dec : of one source, or of that of each time, deg
     mjd : times, MJD in TCB, shape (n,)
     epoch : of the parameters, Julian year
 
@@ -53,9 +55,12 @@ def motion_design(ra: float, dec: float, mjd: np.ndarray, epoch: float) -> np.nd
     Shape (n, 2, 5): offsets in ra cos(dec) and dec, mas, by one unit of each of
     `survey_schema.MOTION_PARAMETERS`
     """
+    # Many sources share the times of few orbits.
+    times, which = np.unique(mjd, return_inverse=True)
+    observer = observer_at(times).position[which]
     years = julian_year(mjd) - epoch
     design = np.zeros((len(years), 2, N_PARAMETERS))
     design[:, 0, 0] = design[:, 1, 1] = 1.0
-    design[:, :, 2] = np.stack(parallax_factors(ra, dec, observer_at(mjd).position), axis=-1)
+    design[:, :, 2] = np.stack(parallax_factors(ra, dec, observer), axis=-1)
     design[:, 0, 3] = design[:, 1, 4] = years
     return design

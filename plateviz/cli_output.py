@@ -117,13 +117,14 @@ def print_orders(rows: Iterable[Mapping[str, Any]], verdict: str) -> None:
 def print_reproduction(rows: Iterable[Mapping[str, Any]]) -> None:
     """Print the paper's numbers beside ours, rows of `tables.reproduction`, for people."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in ("quantity", "unit", "paper", "here", "ratio", "read as"):
-        table.add_column(title, justify="right" if title in ("paper", "here", "ratio") else "left")
+    table.add_column("quantity, and how it is read")
+    for title in ("paper", "here", "unit", "ratio"):
+        table.add_column(title, justify="left" if title == "unit" else "right", no_wrap=True)
     for row in rows:
         low, high = row["paper_low"], row["paper_high"]
         paper = f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
-        here, ratio = f"{row['ours']:.3g}", f"{row['ratio']:.2g}"
-        table.add_row(row["quantity"], row["unit"], paper, here, ratio, row["reading"])
+        quantity = f"{row['quantity']}\n  [dim]{row['reading']}[/dim]"
+        table.add_row(quantity, paper, f"{row['ours']:.3g}", row["unit"], f"{row['ratio']:.2g}")
     Console(highlight=False).print(table)
 
 

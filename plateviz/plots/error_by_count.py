@@ -48,11 +48,7 @@ def plot_error_by_count(
 
     Parameters
     ----------
-    table : a row per number of orbits: `n_orbits`; `n_sources`; `error_mas`, the rms over the
-        sources and both coordinates of the mean of all orbits minus the truth;
-        `error_low_mas` and `error_high_mas`, one sigma of that rms to both sides; `noise_mas`,
-        the noise of one orbit; `floor_mas`, what the reference sources' errors leave however
-        many orbits there are; `expected_mas` = sqrt(noise^2 / N + floor^2)
+    table : `survey_schema.ERRORS_BY_COUNT`
     measurement_mas : uncertainty of one measurement, for the paper's guide
         sigma / sqrt(36 N), section "Discussion"
     per_orbit : measurements of a source in one orbit, 36 in that guide
@@ -67,15 +63,12 @@ def plot_error_by_count(
     xlim, ylim = _limits(rows)
     span = np.array(xlim)
     law = measurement_mas / np.sqrt(per_orbit * span)
-    predicted = _to_edges(rows, xlim)
-    n = predicted["n_orbits"]
+    n = rows["n_orbits"]
     return framed(
         [
             _curve(span, law, guide, colours.muted, "dotted"),
-            _curve(
-                n, predicted["floor_mas"], "floor: references", CLASS_COLOURS[REFERENCE], "dashed"
-            ),
-            _curve(n, predicted["expected_mas"], "√(noise² / N + floor²)", colours.line, "solid"),
+            _curve(n, rows["floor_mas"], "floor: references", CLASS_COLOURS[REFERENCE], "dashed"),
+            _curve(n, rows["expected_mas"], "√(noise² / N + floor²)", colours.line, "solid"),
             *_errors(rows),
         ],
         title=_TITLE,
@@ -92,18 +85,6 @@ def plot_error_by_count(
         legend_columns=2,
         **_LABELS,
     )
-
-
-def _to_edges(rows: pd.DataFrame, xlim: Limits) -> pd.DataFrame:
-    """Return the prediction at each number of orbits and at the edges of the frame."""
-    low, high = rows.head(1).assign(n_orbits=xlim[0]), rows.tail(1).assign(n_orbits=xlim[1])
-    ends = [
-        end.assign(
-            expected_mas=np.hypot(end["noise_mas"] / end["n_orbits"] ** 0.5, end["floor_mas"])
-        )
-        for end in (low, high)
-    ]
-    return pd.concat([ends[0], rows.astype({"n_orbits": float}), ends[1]], ignore_index=True)
 
 
 def _curve(
@@ -147,12 +128,13 @@ def _limits(rows: pd.DataFrame) -> tuple[Limits, Limits]:
 
 
 def _words(rows: pd.DataFrame) -> str:
-    weights = rows["n_sources"]
-    noise, floor = (
-        angle_text(float(np.average(rows[name], weights=weights)))
-        for name in ("noise_mas", "floor_mas")
+    first, last = rows.iloc[0], rows.iloc[-1]
+    noise, floor = angle_text(float(first["noise_mas"])), angle_text(float(last["floor_mas"]))
+    orbits = f"{int(first['n_orbits'])} orbit{'s' if first['n_orbits'] > 1 else ''}"
+    return (
+        f"{int(rows['n_sources'].max()):,} sources; noise of {orbits} {noise}; "
+        f"floor at {int(last['n_orbits'])} orbits {floor}"
     )
-    return f"{int(weights.sum()):,} sources; noise of one orbit {noise}, floor {floor}"
 
 
 def _draw(tables: SurveyTables, theme: str) -> hv.Overlay:

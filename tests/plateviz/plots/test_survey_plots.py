@@ -29,7 +29,7 @@ def errors_by_count():
             "error_low_mas": 0.95 * expected,
             "error_high_mas": 1.15 * expected,
             "expected_mas": expected,
-            "noise_mas": 0.66,
+            "noise_mas": 0.66 / np.sqrt(n),
             "floor_mas": 0.055,
         }
     )

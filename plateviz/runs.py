@@ -5,6 +5,7 @@
     runs/NAME/failed/orbit=0000.json      why an orbit has no solution
     runs/NAME/history.parquet             all orbits in order of source (`plateviz.history`)
     runs/NAME/motions.parquet, ...        what follows from it
+    runs/NAME/gathered.json               the orbits that these tables hold; written after them
     runs/NAME/COMPLETE                    written last, when every orbit of the survey is there
 
 No user interface and no JAX. What is there is never edited: a run that was interrupted goes on
@@ -38,6 +39,7 @@ from solver.versions import versions_of
 DEFAULT_RUN = "default"
 _HEADER = "run.toml"
 _COMPLETE = "COMPLETE"
+_GATHERED = "gathered.json"
 _FAILED = "failed"
 _PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
@@ -101,6 +103,16 @@ class Run:
         with write_atomically(path) as temporary:
             content = json.dumps({"orbit": orbit, "message": message})
             temporary.write_text(content, encoding="utf-8")
+
+    def gathered_orbits(self) -> list[int]:
+        """Return the orbits whose history has been gathered, with all that follows from it."""
+        path = self.directory / _GATHERED
+        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
+
+    def mark_gathered(self, orbits: list[int]) -> None:
+        """Say which orbits have been gathered; written after all that follows from them."""
+        with write_atomically(self.directory / _GATHERED) as temporary:
+            temporary.write_text(json.dumps(orbits), encoding="utf-8")
 
     def mark_complete(self) -> None:
         """Say that nothing is missing; the run is not changed from then on."""

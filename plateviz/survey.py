@@ -98,7 +98,7 @@ def fit_survey(
                 if outcome.message:
                     failed[outcome.orbit] = outcome.message
                 progress(Progress(done, len(missing), outcome))
-    _gather(run, bool(set(missing) - set(failed)))
+    _gather(run)
     fitted = [orbit for orbit in missing if orbit not in failed]
     kept = [orbit for orbit in wanted if orbit in there]
     return Report(run, fitted, kept, failed, time.perf_counter() - start)
@@ -168,12 +168,19 @@ def _outcomes(client: Client, run: Run, orbits: list[int]) -> Iterator[Outcome]:
         yield Outcome(futures[future], float("nan"), message)
 
 
-def _gather(run: Run, has_changed: bool) -> None:
+def _gather(run: Run) -> None:
     """Write what the orbits say together, and that the run is complete where it is."""
-    gathered = (run.directory / MOTIONS_FILE).is_file() and (run.directory / ERRORS_FILE).is_file()
     complete = run.complete_orbits()
-    if run.is_complete or not complete or (gathered and not has_changed):
+    if run.is_complete or not complete:
         return
+    if run.gathered_orbits() != complete:
+        _write_tables(run)
+        run.mark_gathered(complete)
+    if complete == survey_orbits(run.survey):
+        run.mark_complete()
+
+
+def _write_tables(run: Run) -> None:
     history = parquet.ParquetFile(gather_history(run))
     epochs = np.unique(_column(history, "epoch"))
     epoch = float(julian_year(epochs).mean())
@@ -186,8 +193,6 @@ def _gather(run: Run, has_changed: bool) -> None:
     most = int(averaged.groupby("source_id").size().max()) if len(averaged) else 0
     errors = errors_by_count(averaged, list(range(1, most + 1)))
     _write(run.directory / ERRORS_FILE, errors[ERRORS_BY_COUNT.names])
-    if complete == survey_orbits(run.survey):
-        run.mark_complete()
 
 
 def _whole_sources(history: parquet.ParquetFile) -> Iterator[pd.DataFrame]:

@@ -1,6 +1,7 @@
 """A small survey fitted for real: by one worker and by two, interrupted, and with a fault."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -111,6 +112,15 @@ def test_killed_run_goes_on_with_what_is_missing(report, fitted_survey):
     assert resumed.kept == there
     assert there
     assert contents(killed) == contents(report.run)
+
+
+def test_run_killed_before_its_orbits_were_gathered_is_made_whole(report, fitted_survey):
+    late = fit_survey(fitted_survey, "late", SETTINGS, [0], 1).run
+    for orbit in (1, 2):
+        shutil.copytree(report.run.orbit_directory(orbit), late.orbit_directory(orbit))
+    assert fit_survey(fitted_survey, "late", SETTINGS).fitted == []
+    assert late.is_complete
+    assert contents(late) == contents(report.run)
 
 
 def test_orbits_table_is_that_of_the_schema(run):

@@ -27,8 +27,16 @@ from plateviz.tables.residuals import (
     residual_scatter,
     scatter_statistics,
 )
+from plateviz.tables.run_health import orbit_list, orbit_states, run_strip
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
+from plateviz.tables.source_profile import (
+    motion_table,
+    source_class,
+    source_list,
+    source_orbits,
+    source_strip,
+)
 from plateviz.tables.source_track import source_curves, source_track
 from plateviz.tables.sources import (
     ARTIFICIAL,
@@ -70,8 +78,11 @@ __all__ = [
     "mode_shifts",
     "mode_spectrum",
     "motion_pulls",
+    "motion_table",
     "orbit_counts",
     "orbit_health",
+    "orbit_list",
+    "orbit_states",
     "order_comparison",
     "order_verdict",
     "outlier_list",
@@ -83,12 +94,17 @@ __all__ = [
     "reference_scatter",
     "residual_map",
     "residual_scatter",
+    "run_strip",
     "scatter_cells",
     "scatter_statistics",
     "sky_density",
     "sky_distribution",
     "sky_track",
+    "source_class",
     "source_curves",
+    "source_list",
+    "source_orbits",
+    "source_strip",
     "source_track",
     "summary_strip",
     "time_series",

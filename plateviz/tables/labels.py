@@ -1,6 +1,9 @@
-"""Words for exposures and ids, the same in every plot and table."""
+"""Words for exposures, ids and dates, the same in every plot and table."""
 
 import pandas as pd
+
+_MJD_UNIX_EPOCH = 40587.0
+_MINUTE = "%Y-%m-%d %H:%M"
 
 
 def exposure_labels(table: pd.DataFrame) -> pd.Series:
@@ -12,3 +15,9 @@ def exposure_labels(table: pd.DataFrame) -> pd.Series:
 def id_strings(ids: pd.Series) -> pd.Series:
     """Return the ids as text: a browser keeps numbers exact up to 2**53 only."""
     return ids.astype("int64").astype(str)
+
+
+def dates(epochs: pd.Series) -> pd.Series:
+    """Return MJDs as "2028-03-01 12:40", which sorts as they do; empty where there is none."""
+    words = pd.to_datetime(epochs - _MJD_UNIX_EPOCH, unit="D", errors="coerce").dt.strftime(_MINUTE)
+    return words.fillna("").astype(object)

@@ -51,7 +51,8 @@ def _number(result: FitResult, key: str) -> float:
     return float(result.summary[key])  # type: ignore[arg-type]
 
 
-def _verdict(value: float, expected: float, scatter: float) -> State:
+def verdict(value: float, expected: float, scatter: float) -> State:
+    """Return how a number is, as `summary_strip` says; "neutral" where it cannot be judged."""
     if not (math.isfinite(value) and math.isfinite(expected) and scatter >= 0):
         return "neutral"
     departure = abs(value - expected)
@@ -88,7 +89,7 @@ def _chi2(result: FitResult) -> SummaryItem:
         "χ² per degree of freedom",
         f"{value:.3f}",
         _rule(1.0, scatter, because),
-        _verdict(value, 1.0, scatter),
+        verdict(value, 1.0, scatter),
     )
 
 
@@ -103,7 +104,7 @@ def _normalised_deviation(result: FitResult, coordinate: str, symbol: str) -> Su
         f"{value:.3f} (expected {expected:.3f})",
         "Rms of estimate minus catalogue over the catalogue's sigma. "
         + _rule(expected, scatter, because),
-        _verdict(value, expected, scatter),
+        verdict(value, expected, scatter),
     )
 
 

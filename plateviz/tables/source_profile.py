@@ -1,0 +1,149 @@
+"""Tables of one source of a run: its numbers, its motion, its orbits; and the list of sources."""
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.labels import dates, id_strings
+from plateviz.tables.sources import ordered_by_class
+from plateviz.tables.summary import SummaryItem
+from solver.survey_schema import MOTION_PARAMETERS
+
+_NAMES = {
+    "ra": ("Δα cos δ at {epoch:.2f}", "mas"),
+    "dec": ("Δδ at {epoch:.2f}", "mas"),
+    "parallax": ("parallax", "mas"),
+    "pmra": ("proper motion in α cos δ", "mas/yr"),
+    "pmdec": ("proper motion in δ", "mas/yr"),
+}
+_FIGURES = ("fit", "sigma_noise", "sigma_catalogue", "sigma", "true", "pull")
+_ORBIT_COLUMNS = [
+    "orbit_id",
+    "date",
+    "n_obs",
+    "offset_ra",
+    "offset_dec",
+    "deviation_ra",
+    "deviation_dec",
+    "sigma_ra_marginal",
+    "sigma_dec_marginal",
+    "chi2_per_dof",
+]
+_LIST_COLUMNS = ["id", "source_class", "n_orbits", "n_obs"]
+
+
+def source_class(history: pd.DataFrame) -> str:
+    """Return the class of a source from its rows of `survey_schema.HISTORY`."""
+    return str(ordered_by_class(history)["source_class"].iloc[0])
+
+
+def source_strip(history: pd.DataFrame, motion: pd.Series | None) -> list[SummaryItem]:
+    """Return the numbers of one source.
+
+    Parameters
+    ----------
+    history : `survey_schema.HISTORY` of the source, at least one row
+    motion : its row of `survey_schema.MOTIONS`, or None while nothing has been gathered
+    """
+    measurements = f"{history['n_obs'].sum():,}"
+    if motion is None:
+        return [_plain("Orbits", f"{len(history):,}"), _plain("Measurements", measurements)]
+    return [
+        _plain("Orbits", f"{len(history):,} (in {motion['span']:.2f} yr)"),
+        _plain("Measurements", measurements),
+        _separation(motion, "catalogue"),
+        *([] if math.isnan(motion["rms_truth_2d"]) else [_separation(motion, "truth")]),
+        *(_scatter(motion, axis, symbol) for axis, symbol in (("ra", "α"), ("dec", "δ"))),
+        _chi2(motion),
+    ]
+
+
+def _plain(label: str, value: str, hint: str = "of the source in this run") -> SummaryItem:
+    return SummaryItem(label, value, hint, "neutral")
+
+
+def _separation(motion: pd.Series, other: str) -> SummaryItem:
+    ra, dec = motion[f"rms_{other}_ra"], motion[f"rms_{other}_dec"]
+    hint = (
+        f"Rms separation of the orbits' positions from the {other} at their epochs; "
+        f"{ra:.3f} mas in α cos δ and {dec:.3f} mas in δ."
+    )
+    return _plain(f"Rms from the {other}", f"{motion[f'rms_{other}_2d']:.3f} mas", hint)
+
+
+def _scatter(motion: pd.Series, axis: str, symbol: str) -> SummaryItem:
+    found, expected = motion[f"scatter_{axis}"], motion[f"expected_scatter_{axis}"]
+    hint = (
+        "Standard deviation in mas of the orbits' positions about the fitted motion, and as "
+        "their noise predicts it."
+    )
+    words = "–" if math.isnan(found) else f"{found:.3f} (expected {expected:.3f})"
+    return _plain(f"Scatter in {symbol}, mas", words, hint)
+
+
+def _chi2(motion: pd.Series) -> SummaryItem:
+    dof, label = int(motion["dof"]), "χ² of the motion"
+    if dof <= 0 or math.isnan(motion["chi2"]):
+        hint = "Too few orbits: the motion passes through all its positions, or is not fitted."
+        return _plain(label, "–", hint)
+    hint = f"Weighted by the noise alone. Expected {dof} ± {math.sqrt(2.0 * dof):.1f}."
+    return _plain(label, f"{motion['chi2']:.1f} (dof {dof})", hint)
+
+
+def motion_table(motion: pd.Series) -> pd.DataFrame:
+    """Return the fitted motion of a source against its catalogue and its truth.
+
+    Parameters
+    ----------
+    motion : a row of `survey_schema.MOTIONS`
+
+    Returns
+    -------
+    A row per parameter: `parameter`, `unit`, `fit`, `sigma_noise`, `sigma_catalogue`, `sigma`,
+    `true` (both less the catalogue's) and `pull`; NaN where there is none
+    """
+    rows = []
+    for name in MOTION_PARAMETERS:
+        label, unit = _NAMES[name]
+        figures = {figure: float(motion[f"{figure}_{name}"]) for figure in _FIGURES}
+        rows.append({"parameter": label.format(epoch=motion["epoch"]), "unit": unit, **figures})
+    return pd.DataFrame(rows)
+
+
+def source_orbits(history: pd.DataFrame) -> pd.DataFrame:
+    """Return the orbits of one source for people, a row each.
+
+    Parameters
+    ----------
+    history : `survey_schema.HISTORY` of the source
+
+    Returns
+    -------
+    `orbit_id`, `date` as text, `n_obs`; offset from the catalogue, deviation from the truth
+    (NaN without one) and marginal sigma in both coordinates, mas; `chi2_per_dof`
+    """
+    dof = history["dof"].to_numpy()
+    return history.assign(
+        date=dates(history["epoch"]),
+        deviation_ra=history["offset_ra"] - history["true_offset_ra"],
+        deviation_dec=history["offset_dec"] - history["true_offset_dec"],
+        chi2_per_dof=history["chi2"] / np.where(dof > 0, dof, np.nan),
+    )[_ORBIT_COLUMNS]
+
+
+def source_list(counts: pd.DataFrame) -> pd.DataFrame:
+    """Return the sources of a run, those with the most orbits and measurements first.
+
+    Parameters
+    ----------
+    counts : `source_id`, `is_reference`, `is_artificial`, `n_orbits`, `n_obs`
+
+    Returns
+    -------
+    `id` as text, `source_class`, `n_orbits`, `n_obs`
+    """
+    table = ordered_by_class(counts).sort_values(
+        ["n_orbits", "n_obs"], ascending=False, kind="stable", ignore_index=True
+    )
+    return table.assign(id=id_strings(table["source_id"]))[_LIST_COLUMNS]

@@ -85,12 +85,28 @@ class Session(param.Parameterized):
         self.param.update(solutions=[], other=None)
         self._ask(settings)
 
+    def show_result(self, orbit: int | None, result: FitResult) -> None:
+        """Turn to an orbit whose solution is at hand."""
+        self._drop_job()
+        self.selection.orbit = orbit
+        solution = Solution(orbit, result.settings, result)
+        if self.shown is not None and self.shown._replace(result=result) == solution:
+            self.param.update(stage=Stage.READY, message="")
+            return
+        self.param.update(solutions=[], other=None)
+        self._take(solution)
+        self.choices.take(result.settings)
+
+    def refuse(self, message: str) -> None:
+        """Say why what was asked for cannot be had; the last solution stays."""
+        self.param.update(stage=Stage.FAILED, message=message)
+
     def refit(self) -> None:
         """Ask for the orbit with the choices made; what cannot be used is said at once."""
         try:
             settings = self.choices.settings()
         except InputError as error:
-            self.param.update(stage=Stage.FAILED, message=str(error))
+            self.refuse(str(error))
             return
         self._ask(settings)
 
@@ -106,7 +122,7 @@ class Session(param.Parameterized):
         try:
             settings = _on_trial(self.choices.settings(), fitted.settings)
         except InputError as error:
-            self.param.update(stage=Stage.FAILED, message=str(error))
+            self.refuse(str(error))
             return
         known = next((s for s in self.solutions if s.settings == settings), None)
         if self._job is not None:
@@ -147,7 +163,7 @@ class Session(param.Parameterized):
         elif status.is_over:
             reason = self._job.message or "The fit was cancelled; the last solution stays."
             self._job = None
-            self.param.update(stage=Stage.FAILED, message=reason)
+            self.refuse(reason)
         else:
             self.message = _words(self._job)
 
@@ -164,23 +180,30 @@ class Session(param.Parameterized):
             self.param.update(shown=solution, other=other, stage=Stage.READY, message="")
 
     def _ask(self, settings: FitSettings, on_trial: bool = False) -> None:
-        if self._job is not None:
-            self.workbench.cancel(self._job)
-        self._asked, self._asked_on_trial, self._next_trial = settings, on_trial, None
+        self._drop_job()
+        self._asked, self._asked_on_trial = settings, on_trial
         self._job = self.workbench.request(self.selection.orbit, settings, on_trial)
         stage = Stage.STALE if self.shown else Stage.LOADING
         self.param.update(stage=stage, message=_words(self._job))
         self.poll()
 
+    def _drop_job(self) -> None:
+        if self._job is not None:
+            self.workbench.cancel(self._job)
+        self._job, self._next_trial = None, None
+
     def _show(self, settings: FitSettings) -> None:
         orbit = self.selection.orbit
         result = self.workbench.result(orbit, settings, self._asked_on_trial)
         if result is None:
-            self.param.update(stage=Stage.FAILED, message="The result of the fit is gone.")
+            self.refuse("The result of the fit is gone.")
             return
+        self._take(Solution(orbit, settings, result, self._asked_on_trial))
+
+    def _take(self, solution: Solution) -> None:
         numbers = [d.detector_id for d in self.workbench.instrument.detectors]
-        self.selection.fit_to(result, numbers)
-        solution = Solution(orbit, settings, result, self._asked_on_trial)
+        self.selection.fit_to(solution.result, numbers)
+        orbit, settings = solution.orbit, solution.settings
         before = self.fitted if self.fitted and self.fitted.orbit == orbit else None
         kept = [s for s in self.solutions if s.settings != settings]
         self.param.update(

@@ -12,8 +12,9 @@ import threading
 from functools import lru_cache
 from pathlib import Path
 
+from plateviz.history import SurveyRun, survey_runs
 from plateviz.job import Job, JobStatus
-from plateviz.source import Source, source_to_dict
+from plateviz.source import Source, SurveyFolder, source_to_dict
 from plateviz.store import is_complete, read_run
 from plateviz.worker import Worker
 from solver.instrument import Instrument
@@ -39,6 +40,11 @@ class Workbench:
     def title(self) -> str:
         """What people call the source."""
         return self.source.title
+
+    def runs(self) -> list[SurveyRun]:
+        """Return the runs of the survey as they are now; none where the source is files."""
+        source = self.source
+        return survey_runs(Path(source.directory)) if isinstance(source, SurveyFolder) else []
 
     def request(self, orbit: int | None, settings: FitSettings, what_if: bool = False) -> Job:
         """Ask for an orbit fitted with `settings`; the same question gives the same job.

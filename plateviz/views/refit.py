@@ -150,7 +150,9 @@ class RefitView(pn.viewable.Viewer):
         if shown is not None and shown.is_trial:
             self._keep.visible = True
             solutions[shown.label] = shown
-        self._solutions.param.update(options=solutions, value=shown, visible=len(solutions) > 1)
+        # A value that is no option would be sent to the browser as it is.
+        chosen = next((s for s in solutions.values() if s is shown), None)
+        self._solutions.param.update(options=solutions, value=chosen, visible=len(solutions) > 1)
 
     def _bring_up(self, event: object) -> None:
         chosen = event.new  # type: ignore[attr-defined]

@@ -7,13 +7,9 @@ from bokeh.document import Document
 from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
 
-from plateviz.gallery import diagnostics
+from plateviz.navigation import Navigation, View
 from plateviz.session import Session
-from plateviz.views.calibration import CalibrationView
-from plateviz.views.figure import FigureGrid
-from plateviz.views.refit import RefitView
-from plateviz.views.selection import SelectionView
-from plateviz.views.summary import SummaryView
+from plateviz.views.pages import Pages
 from plateviz.workbench import Workbench
 
 _TICK_MILLISECONDS = 100
@@ -22,26 +18,14 @@ _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
 def build_app(workbench: Workbench) -> pmui.Page:
     """Return the page of one session over `workbench`."""
-    session = Session(workbench)
-    figures = FigureGrid(session, diagnostics())
+    navigation = Navigation(Session(workbench))
+    session = navigation.session
+    navigation.begin(_arguments())
+    pages = Pages(navigation)
     page = pmui.Page(
         title=f"plateviz · {workbench.title}",
-        sidebar=[
-            _heading("Shown"),
-            SelectionView(session),
-            _heading("Refit"),
-            RefitView(session),
-        ],
-        main=[
-            pn.Column(
-                SummaryView(session),
-                figures,
-                _heading("Calibration"),
-                CalibrationView(session),
-                sizing_mode="stretch_width",
-                margin=(4, 16, 24, 16),
-            )
-        ],
+        sidebar=[pages.sidebar],
+        main=[pages],
         sidebar_width=300,
         theme_config={"typography": {"fontSize": 13}},
     )
@@ -53,9 +37,8 @@ def build_app(workbench: Workbench) -> pmui.Page:
         page.busy = False
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     _set_theme(session, page.dark_theme)
-    _follow_address(session)
-    _keep_up(session, figures)
-    session.show_orbit(session.selection.orbit)
+    _write_address(navigation)
+    _keep_up(navigation, pages)
     return page
 
 
@@ -68,33 +51,38 @@ def _prepare(document: Document) -> None:
     document.template_variables["dist_url"] = get_dist_path()
 
 
-def _follow_address(session: Session) -> None:
-    """Take the selection from the page's address, and write it there when it changes."""
+def _arguments() -> dict[str, str]:
     # Nobody can type bytes that are no text; what is left of them is no selection either.
-    arguments = {k: v[0].decode("utf-8", "replace") for k, v in pn.state.session_args.items()}
-    session.selection.want(arguments)
+    return {k: v[0].decode("utf-8", "replace") for k, v in pn.state.session_args.items()}
+
+
+def _write_address(navigation: Navigation) -> None:
+    """Write what is on the screen into the page's address when it changes."""
     location = pn.state.location
     if location is None:
         return
 
     def write(*_: object) -> None:
-        if session.shown is not None:
+        if navigation.view is not View.ORBIT or navigation.session.shown is not None:
             # Panel declares each value as a mapping; it takes anything that has words.
-            location.update_query(**session.selection.address())  # type: ignore[arg-type]
+            location.update_query(**navigation.address())  # type: ignore[arg-type]
 
-    session.selection.param.watch(write, ["orbit", "field", "plates", "detector"])
+    navigation.param.watch(write, ["view", "run_name", "found"])
+    navigation.session.param.watch(write, "shown")
+    navigation.session.selection.param.watch(write, ["orbit", "field", "plates", "detector"])
 
 
-def _keep_up(session: Session, figures: FigureGrid) -> None:
+def _keep_up(navigation: Navigation, pages: Pages) -> None:
     """Ask for news of the job and draw what is due, for as long as there is any.
 
     The page asks, it is not told: a job belongs to the server and outlives the page.
     """
+    session = navigation.session
 
     def tick() -> None:
         session.poll()
-        figures.draw_due()
-        if session.job is None and not figures.is_due:
+        pages.draw_due()
+        if session.job is None and not pages.is_due:
             callback.stop()
 
     def wake(*_: object) -> None:
@@ -104,10 +92,9 @@ def _keep_up(session: Session, figures: FigureGrid) -> None:
     callback = pn.state.add_periodic_callback(tick, period=_TICK_MILLISECONDS, start=False)
     session.param.watch(wake, ["stage", "shown", "other", "theme"])
     session.selection.param.watch(wake, ["field", "plates", "detector"])
-
-
-def _heading(text: str) -> pmui.Typography:
-    return pmui.Typography(text, variant="subtitle1", margin=(10, 10, 4, 10))
+    navigation.param.watch(wake, ["view", "run_name", "found"])
+    # Drawing before the page is there would keep it from coming.
+    pn.state.onload(wake)
 
 
 def _set_theme(session: Session, is_dark: bool) -> None:

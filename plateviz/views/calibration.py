@@ -5,6 +5,7 @@ import panel_material_ui as pmui
 
 from plateviz.session import Session
 from plateviz.tables import calibration_tables, outlier_list
+from plateviz.views.table import TABLE_STYLE
 
 
 class CalibrationView(pn.viewable.Viewer):
@@ -39,6 +40,7 @@ class CalibrationView(pn.viewable.Viewer):
                     page_size=12,
                     layout="fit_data_fill",
                     sizing_mode="stretch_width",
+                    stylesheets=[TABLE_STYLE],
                 ),
             )
             for title, table in tables.items()

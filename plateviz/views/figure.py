@@ -1,35 +1,76 @@
-"""FigureView: one diagnostic on the screen, with its caption and the state it is in."""
+"""FigureView: one figure on the screen, with its caption and the state it is in."""
 
 import logging
+from collections.abc import Callable, Sequence
+from types import MappingProxyType
+from typing import Protocol
 
+import holoviews as hv
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.session import Session, Solution, Stage
+from plateviz.views.leads import Leads, follow_taps, rendered
 from plateviz.views.markup import markup_pane, paragraph
 from solver.errors import InputError
 
 _BATCH = 4
+_NOWHERE: Leads = MappingProxyType({})
 _LOG = logging.getLogger(__name__)
+
+Picture = Callable[[str], hv.core.Dimensioned | None]
+"""Gives what a figure shows in a theme; None while there is nothing to draw it from."""
+
+
+class Figure(Protocol):
+    """What a card says of its figure."""
+
+    @property
+    def name(self) -> str:
+        """Short and unique, used in class names."""
+        ...
+
+    @property
+    def caption(self) -> str:
+        """What it shows and what good looks like."""
+        ...
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether it takes the whole width of the page."""
+        ...
 
 
 class FigureView(pn.viewable.Viewer):
-    """A card with one diagnostic; due to be drawn when what it is drawn from changes."""
+    """A card with one figure; due to be drawn when what it is drawn from changes."""
 
-    def __init__(self, session: Session, diagnostic: Diagnostic, **params: object) -> None:
-        """Follow `session`, and its selection where the diagnostic depends on it."""
+    def __init__(
+        self,
+        figure: Figure,
+        picture: Picture,
+        *,
+        waiting: str = "",
+        leads: Leads = _NOWHERE,
+        **params: object,
+    ) -> None:
+        """Show `figure` as `picture` gives it.
+
+        Parameters
+        ----------
+        waiting : words for as long as there is nothing to draw
+        leads : where a tap on a point leads
+        """
         super().__init__(**params)
-        self._session, self._diagnostic = session, diagnostic
+        self._figure, self._picture, self._leads = figure, picture, leads
+        self._waiting, self._theme = waiting, "light"
         self.is_due = False
         self._caption = markup_pane()
-        self._figure = pn.Column(sizing_mode="stretch_width", margin=0)
+        self._body = pn.Column(sizing_mode="stretch_width", margin=0)
         self._card = pmui.Paper(
             self._caption,
-            self._figure,
-            css_classes=["figure", f"figure-{diagnostic.name}"],
+            self._body,
+            css_classes=["figure", f"figure-{figure.name}"],
             styles={
-                "flex": "1 1 100%" if diagnostic.is_wide else "1 1 520px",
+                "flex": "1 1 100%" if figure.is_wide else "1 1 520px",
                 "min-width": "0",
                 "align-self": "stretch",
                 "height": "auto",
@@ -40,67 +81,56 @@ class FigureView(pn.viewable.Viewer):
             elevation=0,
             variant="outlined",
         )
-        session.param.watch(self._change, ["shown", "other", "theme"])
-        session.param.watch(self._mark_stale, ["stage"])
-        if diagnostic.follows_selection:
-            session.selection.param.watch(self._change, ["field", "plates", "detector"])
-        self._change()
-        self._say("The first solution is being made.")
+        self.change(self._theme)
+        self._say(waiting)
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the card."""
         return self._card
 
+    def change(self, theme: str) -> None:
+        """Take note that the figure, or the theme it is drawn in, is another."""
+        self._theme, self.is_due = theme, True
+        self._caption.object = paragraph(self._figure.caption, "caption", theme)
+
     def draw(self) -> None:
-        """Draw the figure from the session as it is now."""
+        """Draw the figure as it is now."""
         self.is_due = False
-        shown = self._session.shown
-        if shown is None:
-            return
         try:
-            self._figure[:] = [self._picture(shown)]
+            element = self._picture(self._theme)
+            if element is None:
+                self._say(self._waiting)
+            else:
+                self._show(element)
         except (InputError, ValueError, KeyError, TypeError, ArithmeticError) as error:
             # One figure that cannot be drawn must not take the page with it.
-            _LOG.exception("%s cannot be drawn", self._diagnostic.name)
+            _LOG.exception("%s cannot be drawn", self._figure.name)
             self._say(f"This figure cannot be drawn: {error}")
 
-    def _change(self, *_: object) -> None:
-        self.is_due = True
-        caption = self._diagnostic.caption
-        self._caption.object = paragraph(caption, "caption", self._session.theme)
+    def mark_stale(self, is_stale: bool) -> None:
+        """Fade the figure while another is being made."""
+        self._body.styles = {"opacity": "0.45" if is_stale else "1"}
 
-    def _picture(self, shown: Solution) -> pn.viewable.Viewable:
-        session = self._session
-        chosen = Chosen(
-            result=shown.result,
-            instrument=session.workbench.instrument,
-            exposures=tuple(session.selection.exposures_of(shown.result)),
-            detector=session.selection.detector_id,
-            other=session.other.result if session.other else None,
-        )
-        element = self._diagnostic.draw(chosen, session.theme)
-        return pn.pane.HoloViews(
-            element, backend="bokeh", linked_axes=False, align="center", margin=0
-        )
-
-    def _mark_stale(self, *_: object) -> None:
-        self._figure.styles = {"opacity": "0.45" if self._session.stage is Stage.STALE else "1"}
+    def _show(self, element: hv.core.Dimensioned) -> None:
+        plot = rendered(element)
+        follow_taps(plot, self._leads)
+        self._body[:] = [
+            pn.pane.HoloViews(plot, backend="bokeh", linked_axes=False, align="center", margin=0)
+        ]
 
     def _say(self, words: str) -> None:
         pane = markup_pane()
-        pane.object = paragraph(words, "empty", self._session.theme)
-        self._figure[:] = [pane]
+        pane.object = paragraph(words, "empty", self._theme)
+        self._body[:] = [pane]
 
 
 class FigureGrid(pn.viewable.Viewer):
-    """The cards of several diagnostics, two in a row where there is room."""
+    """Several figures, two in a row where there is room."""
 
-    def __init__(
-        self, session: Session, diagnostics: tuple[Diagnostic, ...], **params: object
-    ) -> None:
-        """Make a card for each diagnostic, in order."""
+    def __init__(self, views: Sequence[FigureView], **params: object) -> None:
+        """Lay out the cards, in order."""
         super().__init__(**params)
-        self._views = [FigureView(session, diagnostic) for diagnostic in diagnostics]
+        self._views = list(views)
         self._box = pn.FlexBox(
             *self._views, align_items="stretch", sizing_mode="stretch_width", margin=(8, 0)
         )
@@ -113,6 +143,16 @@ class FigureGrid(pn.viewable.Viewer):
     def is_due(self) -> bool:
         """Whether some figure is to be drawn."""
         return any(view.is_due for view in self._views)
+
+    def change(self, theme: str) -> None:
+        """Take note that all figures are others."""
+        for view in self._views:
+            view.change(theme)
+
+    def mark_stale(self, is_stale: bool) -> None:
+        """Fade all figures while others are being made."""
+        for view in self._views:
+            view.mark_stale(is_stale)
 
     def draw_due(self) -> None:
         """Draw the first few figures that are due.

@@ -1,9 +1,15 @@
 """Small pieces of HTML in the project's style, readable in both themes."""
 
+import math
+from collections.abc import Iterable, Mapping
 from html import escape
 from pathlib import Path
 
+import pandas as pd
 import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.tables import SummaryItem
 
 _STYLE = (Path(__file__).parent / "style.css").read_text(encoding="utf-8")
 
@@ -15,4 +21,55 @@ def markup_pane() -> pn.pane.HTML:
 
 def paragraph(text: str, css_class: str, theme: str) -> str:
     """Return a paragraph of plain text."""
-    return f"<div class='{theme}'><p class='{css_class}'>{escape(text)}</p></div>"
+    return themed(f"<p class='{css_class}'>{escape(text)}</p>", theme)
+
+
+def themed(markup: str, theme: str) -> str:
+    """Return markup in the colours of a theme."""
+    return f"<div class='{theme}'>{markup}</div>"
+
+
+def titled(role: str, name: str) -> str:
+    """Return a line that says what is shown below it."""
+    return f"<p class='solution'><span class='muted'>{role}:</span> <b>{escape(name)}</b></p>"
+
+
+def heading(text: str) -> pmui.Typography:
+    """Return the heading of a part of the page or of its sidebar."""
+    return pmui.Typography(text, variant="subtitle1", margin=(10, 10, 4, 10))
+
+
+def strip(items: Iterable[SummaryItem]) -> str:
+    """Return numbers in a row of tiles, each with its name and how it is."""
+    return f"<div class='strip'>{''.join(map(_cell, items))}</div>"
+
+
+def numbers(table: pd.DataFrame, titles: Mapping[str, str]) -> str:
+    """Return a small table: words as they are, numbers to three decimals, nothing for NaN.
+
+    Parameters
+    ----------
+    titles : column -> title; others are not shown
+    """
+    head = "".join(f"<th>{escape(title)}</th>" for title in titles.values())
+    rows = "".join(
+        f"<tr>{''.join(map(_number, row))}</tr>"
+        for row in table[list(titles)].itertuples(index=False)
+    )
+    return f"<table class='numbers'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _number(value: object) -> str:
+    if not isinstance(value, float):
+        return f"<td class='words'>{escape(str(value))}</td>"
+    return f"<td>{'–' if math.isnan(value) else f'{value:.3f}'}</td>"
+
+
+def _cell(item: SummaryItem) -> str:
+    value, bracket, beside = item.value.partition(" (")
+    return (
+        f"<div class='cell {item.state}' title='{escape(item.hint, quote=True)}'>"
+        f"<span class='name'>{escape(item.label)}</span>"
+        f"<span class='value'>{escape(value)}"
+        f"<span class='beside'>{escape(bracket + beside)}</span></span></div>"
+    )

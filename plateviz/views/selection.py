@@ -3,15 +3,16 @@
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.session import Session
+from plateviz.navigation import Navigation
 
 
 class SelectionView(pn.viewable.Viewer):
     """Controls of the session's selection."""
 
-    def __init__(self, session: Session, **params: object) -> None:
-        """Follow `session`."""
+    def __init__(self, navigation: Navigation, **params: object) -> None:
+        """Follow the session of `navigation`."""
         super().__init__(**params)
+        session = navigation.session
         selection = session.selection
         wide = {"sizing_mode": "stretch_width", "size": "small", "description": ""}
         field = pmui.Select.from_param(selection.param.field, label="Field", **wide)
@@ -27,8 +28,16 @@ class SelectionView(pn.viewable.Viewer):
             orbit = pmui.Select(
                 label="Orbit", options=session.workbench.orbits, value=selection.orbit, **wide
             )
-            orbit.param.watch(lambda event: session.show_orbit(event.new), "value")
             self._column.insert(0, orbit)
+
+            def choose(event: object) -> None:
+                if event.new != selection.orbit:  # type: ignore[attr-defined]
+                    navigation.choose_orbit(event.new)  # type: ignore[attr-defined]
+                    # What cannot be read is not turned to.
+                    orbit.value = selection.orbit
+
+            orbit.param.watch(choose, "value")
+            selection.param.watch(lambda _: orbit.param.update(value=selection.orbit), "orbit")
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the controls."""

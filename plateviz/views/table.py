@@ -1,0 +1,112 @@
+"""DataTable: a table of numbers for people, whose rows can be opened."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import pandas as pd
+import panel as pn
+from bokeh.models.widgets.tables import NumberFormatter
+
+from plateviz.tables.summary import State
+
+# As `style.css` has them.
+_COLOURS: Mapping[str, Mapping[State, str]] = MappingProxyType(
+    {
+        "light": {"good": "#1a7f5a", "warn": "#b26a00", "bad": "#c0392b"},
+        "dark": {"good": "#4cc79a", "warn": "#f0b24a", "bad": "#ff8a7a"},
+    }
+)
+# A table says that it is visible, even on a view that is not on the screen.
+TABLE_STYLE = ":host .tabulator { font-size: 13px; visibility: inherit !important; }"
+_CLICKABLE = ".tabulator-row { cursor: pointer; }"
+
+
+class Heading(NamedTuple):
+    """How a column is shown: its title, the format of its numbers, and what stands above it."""
+
+    title: str
+    format: str = ""
+    group: str = ""
+
+
+class DataTable(pn.viewable.Viewer):
+    """A sortable table; a click on a row tells which."""
+
+    def __init__(
+        self,
+        headings: Mapping[str, Heading],
+        on_row: Callable[[pd.Series], object] | None = None,
+        *,
+        page_size: int = 12,
+        **params: object,
+    ) -> None:
+        """Show columns as `headings` say.
+
+        Parameters
+        ----------
+        headings : column -> how it is shown; others are not
+        on_row : called with the row of the table that was clicked on
+        """
+        super().__init__(**params)
+        self._headings, self._on_row = headings, on_row
+        self._states, self._theme = pd.DataFrame(), "light"
+        groups: dict[str, list[str]] = {}
+        for name, heading in headings.items():
+            if heading.group:
+                groups.setdefault(heading.group, []).append(name)
+        self._table = pn.widgets.Tabulator(
+            pd.DataFrame(columns=list(headings)),
+            titles={name: heading.title for name, heading in headings.items()},
+            formatters={
+                name: NumberFormatter(format=heading.format, nan_format="–")
+                for name, heading in headings.items()
+                if heading.format
+            },
+            text_align={name: "right" for name, heading in headings.items() if heading.format},
+            groups=groups,
+            disabled=True,
+            show_index=False,
+            selectable=False,
+            pagination="remote",
+            page_size=page_size,
+            layout="fit_data_table",
+            margin=(4, 2),
+            stylesheets=[TABLE_STYLE, *([_CLICKABLE] if on_row is not None else [])],
+        )
+        styler: Any = self._table.style
+        styler.apply(self._colours, axis=None)
+        self._table.on_click(self._open)
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the table."""
+        return self._table
+
+    def show(
+        self, table: pd.DataFrame, theme: str = "light", states: pd.DataFrame | None = None
+    ) -> None:
+        """Show other rows, in the colours of a theme; columns without any value are hidden.
+
+        Parameters
+        ----------
+        states : how the numbers of some columns are, row by row
+        """
+        self._theme = theme
+        self._states = pd.DataFrame() if states is None else states.reset_index(drop=True)
+        shown = table[list(self._headings)].reset_index(drop=True)
+        empty = [name for name in shown if (shown[name].isna() | (shown[name] == "")).all()]
+        self._table.param.update(value=shown, hidden_columns=empty)
+
+    def _colours(self, rows: pd.DataFrame) -> pd.DataFrame:
+        # Rows come as they are sorted; their index is that of the table.
+        states = self._states.reindex(index=rows.index, columns=rows.columns)
+        return states.map(lambda state: _css(state, self._theme))
+
+    def _open(self, event: object) -> None:
+        if self._on_row is not None:
+            self._on_row(self._table.value.iloc[event.row])  # type: ignore[attr-defined]
+
+
+def _css(state: object, theme: str) -> str:
+    colour = _COLOURS[theme].get(str(state))  # type: ignore[call-overload]
+    return f"color: {colour}" if colour else ""

@@ -1,0 +1,184 @@
+"""The three views of a fitted survey in a real Chromium: from an orbit to a source and back."""
+
+import subprocess
+import sys
+
+import pytest
+from playwright.sync_api import expect
+
+from plateviz.gallery import diagnostics, source_figures, survey_figures
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
+from tests.ui.conftest import serving
+from tests.ui.test_dashboard import until
+
+expect.set_options(timeout=60_000)
+pytestmark = [pytest.mark.ui, pytest.mark.slow]
+
+N_ORBITS = 4
+# They ask for more orbits of a source than a small survey has.
+EMPTY = {"reference-scatter", "motion-pulls"}
+
+_VIEWS = """
+  const views = [];
+  const walk = view => { views.push(view); (view.child_views ?? []).forEach(walk); };
+  for (const view of Bokeh.index) walk(view);
+  const card = view => {
+    for (let e = view.el; e; e = e.parentElement ?? e.getRootNode().host)
+      for (const name of e.classList ?? []) if (name.startsWith('figure-')) return name.slice(7);
+  };
+  const figures = views.filter(view => view.model.type === 'Figure');
+  const column = (source, name) => source.data[name] ?? source.data.get?.(name);
+"""
+# Rows of the longest data source of each figure that is drawn, words apart, by its name.
+ROWS = f"""() => {{ {_VIEWS}
+  const rows = {{}};
+  for (const figure of figures)
+    for (const renderer of figure.model.renderers.filter(r => r.glyph?.type !== 'Text'))
+      rows[card(figure)] = Math.max(rows[card(figure)] ?? 0,
+                                    renderer.data_source?.get_length() ?? 0);
+  return rows; }}"""
+# Where the first point of a figure that leads somewhere is on the screen, and its value.
+POINT = f"""([name, key]) => {{ {_VIEWS}
+  for (const figure of figures.filter(view => card(view) === name))
+    for (const renderer of figure.model.renderers) {{
+      const source = renderer.data_source, values = source && column(source, key);
+      if (!values) continue;
+      const box = figure.canvas_view.el.getBoundingClientRect();
+      const [x, y] = ['x', 'y'].map(axis => column(source, renderer.glyph[axis].field)[0]);
+      return {{value: String(values[0]), x: box.x + figure.frame.x_scale.compute(x),
+               y: box.y + figure.frame.y_scale.compute(y)}};
+    }} }}"""
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory, chromium_path):
+    directory = tmp_path_factory.mktemp("survey") / "sky"
+    simulate_survey(directory, SurveySettings(orbits=N_ORBITS, seed=5).scaled(9_000))
+    return directory
+
+
+@pytest.fixture(scope="module")
+def served(simulated):
+    command = [sys.executable, "-m", "plateviz.cli", "survey", str(simulated), "--workers", "1"]
+    subprocess.run(command, check=True, capture_output=True)
+    with serving("serve", str(simulated), "--port", "0") as address:
+        yield address
+
+
+@pytest.fixture
+def page(served, open_page):
+    return open_page(served)
+
+
+def turn_to(page, view):
+    page.get_by_role("button", name=view, exact=True).click()
+    page.wait_for_url(f"**view={view.lower()}**")
+
+
+def drawn(page, figures):
+    """Wait for the figures; give the rows of each."""
+    names = {figure.name for figure in figures}
+    until(page, lambda: names <= set(page.evaluate(ROWS)))
+    return {name: rows for name, rows in page.evaluate(ROWS).items() if name in names}
+
+
+def tap(page, name, key):
+    """Tap the first point of a figure; give the value of its column `key`."""
+    page.locator(f".figure-{name} canvas").first.scroll_into_view_if_needed()
+    page.wait_for_timeout(500)
+    point = page.evaluate(POINT, [name, key])
+    page.mouse.click(point["x"], point["y"])
+    return point["value"]
+
+
+def heading(page, text):
+    return page.locator(".solution").filter(has_text=text)
+
+
+def row(page, number):
+    return page.locator(".tabulator-row:visible").nth(number)
+
+
+def test_the_run_is_shown_first_with_every_orbit(page):
+    expect(heading(page, "Run: default")).to_be_visible()
+    expect(page.locator(".tabulator-row:visible")).to_have_count(N_ORBITS)
+    expect(row(page, 0)).to_contain_text("complete")
+    rows = drawn(page, survey_figures())
+    assert [name for name, n in rows.items() if n == 0 and name not in EMPTY] == []
+
+
+def test_from_the_survey_to_an_orbit_to_a_source_and_back(page):
+    row(page, 2).click()
+    expect(heading(page, "Solution of orbit 2")).to_be_visible()
+    expect(page.get_by_role("combobox", name="Orbit")).to_have_text("2")
+    rows = drawn(page, diagnostics())
+    assert rows["footprint"] > 0
+    source = tap(page, "deviation", "id")
+    expect(heading(page, f"source: {source}")).to_be_visible()
+    expect(page.get_by_label("Source id")).to_have_value(source)
+    assert 0 not in drawn(page, source_figures()).values()
+    row(page, 0).click()
+    expect(heading(page, "Solution of orbit")).to_be_visible()
+    turn_to(page, "Survey")
+    expect(heading(page, "Run: default")).to_be_visible()
+    expect(page.get_by_role("combobox", name="Run")).to_be_visible()
+
+
+def test_the_orbits_are_sorted_and_the_right_one_is_opened(page):
+    def column(name):
+        return page.locator(f".tabulator-cell[tabulator-field={name}]:visible").all_inner_texts()
+
+    expect(page.locator(".tabulator-row:visible")).to_have_count(N_ORBITS)
+    worst_first = sorted(column("chi2_per_dof"), reverse=True)
+    header = page.locator(".tabulator-col[tabulator-field=chi2_per_dof]").first
+    header.click()
+    until(page, lambda: column("chi2_per_dof") == worst_first[::-1])
+    header.click()
+    until(page, lambda: column("chi2_per_dof") == worst_first)
+    orbit = column("orbit_id")[0]
+    row(page, 0).click()
+    expect(heading(page, f"Solution of orbit {orbit}")).to_be_visible()
+
+
+def test_a_point_of_the_survey_leads_to_its_orbit(page):
+    drawn(page, survey_figures())
+    orbit = tap(page, "orbit-health", "orbit_id")
+    expect(heading(page, f"Solution of orbit {orbit}")).to_be_visible()
+
+
+def test_the_address_carries_the_source(page, open_page):
+    turn_to(page, "Source")
+    expect(page.locator("p.empty:visible")).to_contain_text("Write a source's id")
+    source = row(page, 0).locator(".tabulator-cell[tabulator-field=id]").inner_text()
+    row(page, 0).click()
+    page.wait_for_url(f"**source={source}**")
+    again = open_page(page.url)
+    expect(heading(again, f"source: {source}")).to_be_visible()
+    assert 0 not in drawn(again, source_figures()).values()
+
+
+def test_an_unknown_source_is_said_in_one_message(page):
+    turn_to(page, "Source")
+    entry = page.get_by_label("Source id")
+    entry.fill("17")
+    entry.press("Enter")
+    expect(page.locator("p.empty:visible")).to_have_text("Run 'default' has no source 17.")
+
+
+def test_the_dark_theme_reaches_the_views(page):
+    drawn(page, survey_figures())
+    page.get_by_label("Toggle theme").click()
+    dark = "() => Bokeh.documents.flatMap(d => [...d._all_models.values()])"
+    colour = f"{dark}.filter(m => m.type === 'Figure').map(m => m.background_fill_color)[0]"
+    until(page, lambda: page.evaluate(colour) == "#121212")
+
+
+def test_a_survey_without_a_run_says_what_to_do(tmp_path, open_page, chromium_path):
+    simulate_survey(tmp_path / "new", SurveySettings(orbits=1, seed=5).scaled(2_000))
+    with serving("serve", str(tmp_path / "new"), "--port", "0") as address:
+        page = open_page(f"{address}?view=survey")
+        expect(page.locator("p.empty:visible")).to_contain_text("plateviz survey")
+        turn_to(page, "Source")
+        expect(page.locator("p.empty:visible")).to_contain_text("plateviz survey")
+        expect(page.get_by_label("Source id")).to_be_disabled()

@@ -93,7 +93,7 @@ def test_the_numbers_of_a_source_say_what_is_known(survey):
     history, motion = survey.source("artificial")
     found = values(source_strip(history, motion))
     assert found["Orbits"] == f"{len(history)} (in {motion['span']:.2f} yr)"
-    assert found["Rms from the truth"] == f"{motion['rms_truth_2d']:.3f} mas"
+    assert found["Rms from the truth, 2-D"] == f"{motion['rms_truth_2d']:.3f} mas"
     assert set(values(source_strip(history, None))) == {"Orbits", "Measurements"}
 
 
@@ -103,7 +103,7 @@ def test_a_source_of_few_orbits_has_no_motion_to_judge(survey):
     few[["chi2", "dof", "scatter_ra", "rms_truth_2d"]] = [np.nan, 0, np.nan, np.nan]
     found = values(source_strip(history, few))
     assert (found["χ² of the motion"], found["Scatter in α, mas"]) == ("–", "–")
-    assert "Rms from the truth" not in found
+    assert "Rms from the truth, 2-D" not in found
 
 
 @pytest.mark.parametrize(

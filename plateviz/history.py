@@ -178,8 +178,12 @@ class SurveyRun:
         return {**figures, "epoch": summary["epoch_mjd"], "seconds": seconds}
 
     def _ask(self, question: str, *values: object) -> pd.DataFrame:
-        with duckdb.connect() as connection:
-            return connection.execute(question, list(values)).df()
+        try:
+            with duckdb.connect() as connection:
+                return connection.execute(question, list(values)).df()
+        except duckdb.Error as error:
+            message = f"{self.directory}: expected the tables of a run, found: {error}"
+            raise InputError(message) from error
 
 
 def survey_runs(survey: Path) -> list[SurveyRun]:

@@ -139,8 +139,10 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            # A page of its own would be one more port, and the limit of memory is the machine's.
-            dashboard_address=None,  # type: ignore[arg-type]
+            # Without a page of its own, and any port that is free for what it serves all the same.
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            # The limit of memory is the machine's.
             memory_limit=0,
             # A worker that is slow to end is no news.
             silence_logs=logging.ERROR,

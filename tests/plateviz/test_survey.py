@@ -190,6 +190,13 @@ def test_runs_are_found_by_name(run, fitted_survey):
         open_run(fitted_survey, "none")
 
 
+def test_table_that_cannot_be_read_is_told(fitted_survey):
+    torn = begin_run(fitted_survey, "torn", SETTINGS)
+    (torn.directory / "history.parquet").write_bytes(b"PAR1")
+    with pytest.raises(InputError, match="torn: expected the tables of a run, found"):
+        SurveyRun(torn).history(1)
+
+
 def test_run_that_has_nothing_yet_is_empty(fitted_survey):
     empty = SurveyRun(begin_run(fitted_survey, "empty", SETTINGS))
     assert empty.history(1).empty
@@ -207,7 +214,7 @@ def test_orbit_that_is_not_there_is_refused(fitted_survey):
 
 def test_workers_of_a_scheduler_make_the_same_run(report, fitted_survey):
     with LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=None, memory_limit=0
+        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0
     ) as cluster:
         address = cluster.scheduler_address
         other = fit_survey(fitted_survey, "cluster", SETTINGS, scheduler=address)

@@ -112,7 +112,9 @@ class SourcePage(pn.viewable.Viewer):
 
     def _figure_view(self, figure: SourceFigure) -> FigureView:
         leads = {"orbit_id": self._open_orbit}
-        return FigureView(figure, partial(self._picture, figure), leads=leads)
+        return FigureView(
+            figure, partial(self._picture, figure), waiting="Being drawn.", leads=leads
+        )
 
     def _picture(self, figure: SourceFigure, theme: str) -> hv.core.Dimensioned | None:
         found = self._navigation.found

@@ -65,7 +65,9 @@ class SurveyPage(pn.viewable.Viewer):
 
     def _figure_view(self, figure: SurveyFigure) -> FigureView:
         leads = {"id": self._navigation.open_source, "orbit_id": self._open_orbit}
-        return FigureView(figure, partial(self._picture, figure), leads=leads)
+        return FigureView(
+            figure, partial(self._picture, figure), waiting="Being drawn.", leads=leads
+        )
 
     def _picture(self, figure: SurveyFigure, theme: str) -> hv.core.Dimensioned | None:
         run = self._navigation.run

@@ -38,7 +38,9 @@ def stars():
 @pytest.fixture
 def service(stars, monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return Service(stars)
+    made = Service(stars)
+    yield made
+    made.database.close()
 
 
 @pytest.fixture

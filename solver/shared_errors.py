@@ -21,6 +21,7 @@ from solver.projection import tangent_frame
 from solver.schur import Reduced
 from solver.settings import FitSettings
 from solver.survey_schema import ERROR_BUDGET, N_DRAWS, SHARED_ERRORS
+from solver.tables import uncertainties
 
 # Part of the seed of each star's draws; the rest is its id.
 _SEED = 20290
@@ -34,8 +35,8 @@ def error_budget_table(problem: Problem, reduced: Reduced) -> pd.DataFrame:
     """
     budget = error_budget(reduced, problem.priors, covariances(reduced))
     columns = {"source_id": problem.sources["source_id"].to_numpy()}
-    columns |= _uncertainties("noise", budget.noise + budget.calibration)
-    columns |= _uncertainties("catalogue", budget.catalogue)
+    columns |= uncertainties("noise", budget.noise + budget.calibration)
+    columns |= uncertainties("catalogue", budget.catalogue)
     return pd.DataFrame(columns)[ERROR_BUDGET.names]
 
 
@@ -70,19 +71,3 @@ def _drawn_errors(references: pd.DataFrame, epoch: float) -> Float[np.ndarray, "
 
 def _normal(source_id: int) -> Float[np.ndarray, "draw 5"]:
     return np.random.default_rng([_SEED, source_id]).standard_normal((N_DRAWS, 5))
-
-
-def _uncertainties(
-    kind: str, covariance: Float[np.ndarray, "src 2 2"]
-) -> dict[str, Float[np.ndarray, " src"]]:
-    sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    product = sigma[:, 0] * sigma[:, 1]
-    # A part that is nothing at all is correlated with nothing.
-    correlation = np.divide(
-        covariance[:, 0, 1], product, out=np.zeros(len(product)), where=product > 0.0
-    )
-    return {
-        f"sigma_ra_{kind}": sigma[:, 0],
-        f"sigma_dec_{kind}": sigma[:, 1],
-        f"corr_{kind}": correlation,
-    }

@@ -87,8 +87,8 @@ def source_table(solution: Solution) -> pd.DataFrame:
         "n_obs": np.bincount(index, minlength=n_src),
         "ra": ra,
         "dec": dec,
-        **_uncertainties("conditional", solution.conditional),
-        **_uncertainties("marginal", solution.marginal),
+        **uncertainties("conditional", solution.conditional),
+        **uncertainties("marginal", solution.marginal),
         "prior_ra": prior_ra,
         "prior_dec": prior_dec,
         "prior_sigma_ra": prior_sigma[:, 0],
@@ -250,14 +250,20 @@ def _sigmas(covariance: Float[np.ndarray, "src 2 2"]) -> Float[np.ndarray, "src 
     return np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
 
 
-def _uncertainties(
+def uncertainties(
     kind: str, covariance: Float[np.ndarray, "src 2 2"]
 ) -> dict[str, Float[np.ndarray, " src"]]:
+    """Return sigmas and correlation of each source as columns named by the kind."""
     sigma = _sigmas(covariance)
+    product = sigma[:, 0] * sigma[:, 1]
+    # What has no variance is correlated with nothing.
+    correlation = np.divide(
+        covariance[:, 0, 1], product, out=np.zeros(len(product)), where=product > 0.0
+    )
     return {
         f"sigma_ra_{kind}": sigma[:, 0],
         f"sigma_dec_{kind}": sigma[:, 1],
-        f"corr_{kind}": covariance[:, 0, 1] / (sigma[:, 0] * sigma[:, 1]),
+        f"corr_{kind}": correlation,
     }
 
 

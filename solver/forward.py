@@ -81,6 +81,20 @@ class Prediction(NamedTuple):
     basis: list[Float[AnyArray, "*obs"]]
 
 
+class Directions(NamedTuple):
+    """Unit vectors to the sources, and the axes of each exposure's focal plane on the sky.
+
+    They are the same for all measurements, and computed before those.
+    """
+
+    source: tuple[Float[AnyArray, " src"], Float[AnyArray, " src"], Float[AnyArray, " src"]]
+    axes: Float[AnyArray, "exp 3 3"]
+
+
+# The groups of the exposures that `directions` takes.
+DIRECTING = ("pointing_ra", "pointing_dec", "position_angle")
+
+
 def predict(offsets: Offsets, geometry: Geometry, index: Index) -> Prediction:
     """Predict the measurements of `index`.
 
@@ -89,13 +103,27 @@ def predict(offsets: Offsets, geometry: Geometry, index: Index) -> Prediction:
     offsets : group name -> offsets in the group's unit; "sources" is (src, 2), the others
         have one value per element of their axis
     """
-    return image(ideal_position(offsets, geometry, index), offsets, geometry, index)
+    ideal = ideal_position(directions(offsets, geometry), offsets, geometry, index)
+    return image(ideal, offsets, geometry, index)
 
 
-def ideal_position(offsets: Offsets, geometry: Geometry, index: Index) -> Pair:
+def directions(offsets: Offsets, geometry: Geometry) -> Directions:
+    """Return where sources and exposures are on the sky."""
+    east, north = RAD_PER_MAS * offsets["sources"].T
+    x, y, z = displace(geometry.source_frame, east, north).T
+    centre = displace(
+        geometry.pointing_frame,
+        RAD_PER_ARCSEC * offsets["pointing_ra"],
+        RAD_PER_ARCSEC * offsets["pointing_dec"],
+    )
+    position_angle = RAD_PER_ARCSEC * geometry.value(offsets, "position_angle")
+    return Directions((x, y, z), focal_axes(centre, position_angle))
+
+
+def ideal_position(seen: Directions, offsets: Offsets, geometry: Geometry, index: Index) -> Pair:
     """Return positions on the undistorted focal plane, um."""
     focal_length = geometry.value(offsets, "focal_length")[index.exposure]
-    return project(_apparent(offsets, geometry, index), focal_length)
+    return project(_apparent(seen, geometry, index), focal_length)
 
 
 def image(
@@ -137,21 +165,15 @@ def _pair(
     return geometry.value(offsets, f"{name}_x"), geometry.value(offsets, f"{name}_y")
 
 
-def _apparent(offsets: Offsets, geometry: Geometry, index: Index) -> Components:
+def _apparent(seen: Directions, geometry: Geometry, index: Index) -> Components:
     """Return apparent source directions along the axes of each exposure."""
-    east, north = RAD_PER_MAS * offsets["sources"].T
-    source = _take(displace(geometry.source_frame, east, north), index.source)
-    centre = displace(
-        geometry.pointing_frame,
-        RAD_PER_ARCSEC * offsets["pointing_ra"],
-        RAD_PER_ARCSEC * offsets["pointing_dec"],
-    )
-    axes = focal_axes(centre, RAD_PER_ARCSEC * geometry.value(offsets, "position_angle"))
     m = index.exposure
-    x, y, z = (_dot(_take(axes[:, axis], m), source) for axis in range(3))
+    x, y, z = (jnp.asarray(component)[index.source] for component in seen.source)
+    source = x, y, z
+    x, y, z = (_dot(_take(seen.axes[:, axis], m), source) for axis in range(3))
     return aberrate(
         (x, y, z),
-        _take(jnp.sum(axes * geometry.velocity[:, None, :], axis=-1), m),
+        _take(jnp.sum(seen.axes * geometry.velocity[:, None, :], axis=-1), m),
         _dot(_take(geometry.velocity, m), source),
         lorentz_factor(geometry.velocity)[m],
         geometry.sun_distance[m],

@@ -14,12 +14,15 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from solver.forward import (
+    DIRECTING,
     AnyArray,
+    Directions,
     Geometry,
     Index,
     Offsets,
     Pair,
     Prediction,
+    directions,
     ideal_position,
     image,
 )
@@ -57,8 +60,42 @@ class Linearised(NamedTuple):
     products: Products
 
 
+class Turning(NamedTuple):
+    """The directions and how they turn, which is the same for all chunks.
+
+    Attributes
+    ----------
+    at : at the offsets
+    source : derivatives of `at.source` by a source's two offsets, mas^-1
+    axes : group name -> derivative of `at.axes`, per group unit
+    """
+
+    at: Directions
+    source: list[tuple[Float[AnyArray, " src"], ...]]
+    axes: dict[str, Float[AnyArray, "exp 3 3"]]
+
+
+@jax.jit
+def turning(offsets: Offsets, geometry: Geometry) -> Turning:
+    """Return the directions at `offsets`, and their derivatives."""
+
+    def by_group(name: str, tangent: Float[Array, "..."]) -> Directions:
+        def moved(values: Float[Array, "..."]) -> Directions:
+            return directions({**offsets, name: values}, geometry)
+
+        return jax.jvp(moved, (jnp.asarray(offsets[name]),), (tangent,))[1]
+
+    east = jnp.zeros_like(offsets[SOURCES.name]).at[:, 0].set(1.0)
+    return Turning(
+        directions(offsets, geometry),
+        [by_group(SOURCES.name, tangent).source for tangent in (east, 1.0 - east)],
+        {name: by_group(name, jnp.ones_like(offsets[name])).axes for name in DIRECTING},
+    )
+
+
 @jax.jit
 def linearise(
+    turn: Turning,
     offsets: Offsets,
     geometry: Geometry,
     index: Index,
@@ -69,30 +106,38 @@ def linearise(
 
     Parameters
     ----------
+    turn : as from `turning`, at the same offsets
     measured : pixels
     weight : 1/sigma, pixel^-1; zero removes a coordinate
     """
-    ideal = ideal_position(offsets, geometry, index)
+    ideal = ideal_position(turn.at, offsets, geometry, index)
     prediction = image(ideal, offsets, geometry, index)
-    by_ideal = _by_axes(lambda moved: image(moved, offsets, geometry, index).pixel, ideal)
+    along_x, along_y = _by_axes(lambda moved: image(moved, offsets, geometry, index).pixel, ideal)
 
-    def by_group(name: str, tangent: Float[Array, "..."]) -> Pair:
-        """Chain the derivative through the focal plane, where both stages are narrow."""
+    def of_plane(shift: Pair) -> Pair:
+        """Chain a derivative through the ideal plane, where both stages are narrow."""
+        return tuple(along_x[i] * shift[0] + along_y[i] * shift[1] for i in (0, 1))
 
-        def with_values(values: Float[Array, "..."]) -> Offsets:
-            return {**offsets, name: values}
+    def turned(part: str, tangent: AnyArray) -> Pair:
+        """Return the derivative by what turns a part of the directions."""
 
+        def moved(values: AnyArray) -> Pair:
+            return ideal_position(turn.at._replace(**{part: values}), offsets, geometry, index)
+
+        return of_plane(jax.jvp(moved, (getattr(turn.at, part),), (tangent,))[1])
+
+    def by_group(name: str) -> Pair:
+        if name in turn.axes:
+            return whiten(*turned("axes", turn.axes[name]))
+        values, one = jnp.asarray(offsets[name]), jnp.ones_like(offsets[name])
         on_plane, on_detector = (
-            jax.jvp(stage, (jnp.asarray(offsets[name]),), (tangent,))[1]
+            jax.jvp(stage, (values,), (one,))[1]
             for stage in (
-                lambda values: ideal_position(with_values(values), geometry, index),
-                lambda values: image(ideal, with_values(values), geometry, index).pixel,
+                lambda moved: ideal_position(turn.at, {**offsets, name: moved}, geometry, index),
+                lambda moved: image(ideal, {**offsets, name: moved}, geometry, index).pixel,
             )
         )
-        along_x, along_y = by_ideal
-        return whiten(
-            *(along_x[i] * on_plane[0] + along_y[i] * on_plane[1] + on_detector[i] for i in (0, 1))
-        )
+        return whiten(*jax.tree.map(jnp.add, of_plane(on_plane), on_detector))
 
     def whiten(x: Float[Array, "*#obs"], y: Float[Array, "*#obs"]) -> Pair:
         return weight[0] * x, weight[1] * y
@@ -102,9 +147,8 @@ def linearise(
 
     x, y = prediction.pixel
     residual = whiten(measured[0] - x, measured[1] - y)
-    east = jnp.zeros_like(offsets[SOURCES.name]).at[:, 0].set(1.0)
-    source = [by_group(SOURCES.name, tangent) for tangent in (east, 1.0 - east)]
-    local = [by_group(g.name, jnp.ones_like(offsets[g.name])) for g in LOCAL_GROUPS]
+    source = [whiten(*turned("source", tangent)) for tangent in turn.source]
+    local = [by_group(g.name) for g in LOCAL_GROUPS]
     displacement = [whiten(*by) for by in _by_axes(displaced, jax.tree.map(jnp.zeros_like, ideal))]
     with_residual = [*local, residual]
     products = Products(

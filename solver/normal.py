@@ -20,7 +20,7 @@ from threadpoolctl import ThreadpoolController
 
 from solver.forward import AnyArray, Index
 from solver.layout import LOCAL_GROUPS, PER_DETECTOR, PER_EXPOSURE, Layout
-from solver.linearise import Linearised, linearise
+from solver.linearise import Linearised, linearise, turning
 from solver.objective import Gradient
 from solver.problem import Problem
 
@@ -73,9 +73,10 @@ def chunks(
     n_chunks = len(problem.tiles.measured)
     # Once, and not with every chunk.
     offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
+    turn = turning(offsets, geometry)
 
     def start(i: int) -> Linearised:
-        return linearise(offsets, geometry, *problem.tiles.chunk(i))
+        return linearise(turn, offsets, geometry, *problem.tiles.chunk(i))
 
     ahead = start(0)
     for i in range(n_chunks):

@@ -1,5 +1,6 @@
 """The data's chi2 and its gradient, without the Hessian: one reverse pass of the model."""
 
+from collections import deque
 from typing import NamedTuple
 
 import jax
@@ -7,7 +8,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from solver.forward import AnyArray, Geometry, Index, Offsets, predict
+from solver.forward import (
+    AnyArray,
+    Directions,
+    Geometry,
+    Index,
+    Offsets,
+    directions,
+    ideal_position,
+    image,
+)
 from solver.problem import Problem
 
 
@@ -19,22 +29,31 @@ class Gradient(NamedTuple):
     by_source: Float[np.ndarray, "src 2"]
 
 
+# So many chunks are on their way at once: one by itself does not keep all cores busy, and all
+# of a large orbit would need memory at once.
+_IN_FLIGHT = 4
+
+
 def gradient(
     problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
 ) -> Gradient:
     """Return chi2 of the data and its gradient at one point."""
-    offsets = problem.offsets(theta, sources)
-    # NumPy's zeros: each of JAX's is a compilation, and a bare 0.0 would be one more of the sum.
-    total = jax.tree.map(np.zeros_like, (np.zeros(()), offsets))
-    offsets, geometry = jax.device_put((offsets, problem.geometry))
-    for i in range(len(problem.tiles.measured)):
-        total = _add_chunk(total, offsets, geometry, *problem.tiles.chunk(i))
-    half, by_group = jax.tree.map(np.asarray, total)
+    offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
+    seen = _directions(offsets, geometry)
+    n_chunks, parts, total = len(problem.tiles.measured), deque(), None
+    for i in range(n_chunks + _IN_FLIGHT):
+        if i < n_chunks:
+            parts.append(_of_chunk(seen, offsets, geometry, *problem.tiles.chunk(i)))
+        if i >= _IN_FLIGHT and parts:
+            part = jax.tree.map(np.asarray, parts.popleft())
+            total = part if total is None else jax.tree.map(np.add, total, part)
+    half, by_group = jax.tree.map(np.asarray, _to_offsets(total, offsets, geometry))
     by_theta, by_source = problem.gathered(by_group)
     return Gradient(2.0 * float(half), -by_theta, -by_source)
 
 
 def half_chi2(
+    seen: Directions,
     offsets: Offsets,
     geometry: Geometry,
     index: Index,
@@ -45,10 +64,12 @@ def half_chi2(
 
     Parameters
     ----------
+    seen : those of `offsets`
     measured : pixels
     weight : 1/sigma, pixel^-1
     """
-    x, y = predict(offsets, geometry, index).pixel
+    ideal = ideal_position(seen, offsets, geometry, index)
+    x, y = image(ideal, offsets, geometry, index).pixel
     whitened = (measured[0] - x) * weight[0], (measured[1] - y) * weight[1]
     return 0.5 * (jnp.sum(whitened[0] ** 2) + jnp.sum(whitened[1] ** 2))
 
@@ -72,11 +93,14 @@ def half_chi2_of_chunks(
 def _with_gradient(
     offsets: Offsets, geometry: Geometry, *chunks: AnyArray
 ) -> tuple[Float[Array, ""], Offsets]:
-    def add(total: tuple, chunk: tuple) -> tuple[tuple, None]:
-        return _add_chunk(total, offsets, geometry, *chunk), None
+    seen = directions(offsets, geometry)
 
-    start = jax.tree.map(jnp.zeros_like, (jnp.zeros(()), offsets))
-    return jax.lax.scan(add, start, chunks)[0]
+    def add(total: _Part, chunk: tuple) -> tuple[_Part, None]:
+        part = _of_chunk(seen, offsets, geometry, *chunk)
+        return jax.tree.map(jnp.add, total, part), None
+
+    start = jax.tree.map(jnp.zeros_like, (jnp.zeros(()), (seen, offsets)))
+    return _to_offsets(jax.lax.scan(add, start, chunks)[0], offsets, geometry)
 
 
 def _scaled_gradient(gradient: Offsets, scale: Float[Array, ""]) -> tuple:
@@ -86,8 +110,22 @@ def _scaled_gradient(gradient: Offsets, scale: Float[Array, ""]) -> tuple:
 half_chi2_of_chunks.defvjp(_with_gradient, _scaled_gradient)
 
 
+# Value and derivatives of `half_chi2`, those by directions and by offsets apart.
+_Part = tuple[Float[Array, ""], tuple[Directions, Offsets]]
+
+_directions = jax.jit(directions)
+
+
 @jax.jit
-def _add_chunk(
-    total: tuple[Float[Array, ""], Offsets], offsets: Offsets, *chunk: AnyArray
+def _of_chunk(seen: Directions, offsets: Offsets, *chunk: AnyArray) -> _Part:
+    return jax.value_and_grad(half_chi2, argnums=(0, 1))(seen, offsets, *chunk)
+
+
+@jax.jit
+def _to_offsets(
+    total: _Part, offsets: Offsets, geometry: Geometry
 ) -> tuple[Float[Array, ""], Offsets]:
-    return jax.tree.map(jnp.add, total, jax.value_and_grad(half_chi2)(offsets, *chunk))
+    """Return the derivatives by offsets alone, those through the directions among them."""
+    half, (by_directions, by_offsets) = total
+    _, back = jax.vjp(lambda moved: directions(moved, geometry), offsets)
+    return half, jax.tree.map(jnp.add, by_offsets, *back(by_directions))

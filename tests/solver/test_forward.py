@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solver.forward import Index, Prediction, ideal_position, image, predict
+from solver.forward import Index, Prediction, directions, ideal_position, image, predict
 from solver.parameters import CALIBRATION_GROUPS, PARAMETERS
 from solver.problem import build_problem
 from solver.settings import FitSettings
@@ -58,7 +58,7 @@ def test_prediction_gives_the_positions_between_sky_and_pixel(problem, expansion
 
 def test_displacement_is_added_on_the_focal_plane(problem, expansion_point):
     arguments = (problem.offsets(*expansion_point), problem.geometry, problem.index)
-    ideal = jax.jit(ideal_position)(*arguments)
+    ideal = jax.jit(ideal_position)(jax.jit(directions)(*arguments[:2]), *arguments)
     still, moved = (jax.jit(image)(ideal, *arguments, by) for by in ((0.0, 0.0), (2.0, -3.0)))
     for axis, shift in enumerate((2.0, -3.0)):
         np.testing.assert_allclose(moved.focal[axis] - still.focal[axis], shift, atol=1e-8)

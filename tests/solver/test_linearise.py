@@ -4,7 +4,7 @@ import pytest
 
 from solver.forward import predict
 from solver.layout import LOCAL_GROUPS
-from solver.linearise import linearise
+from solver.linearise import linearise, turning
 from tests.solver.small_orbit import observer_of, predict_pixels, true_offsets
 
 _predict = jax.jit(predict)
@@ -13,10 +13,10 @@ _predict = jax.jit(predict)
 def in_working_order(problem, weight, at):
     """Linearise all chunks; return what belongs to each measurement, in working order."""
     tiles, offsets = problem.tiles, problem.offsets(*at)
-    chunks = []
+    turn, chunks = turning(offsets, problem.geometry), []
     for i in range(len(tiles.measured)):
         index, measured, _ = tiles.chunk(i)
-        chunks.append(linearise(offsets, problem.geometry, index, measured, weight[i]))
+        chunks.append(linearise(turn, offsets, problem.geometry, index, measured, weight[i]))
     joined = jax.tree.map(lambda *parts: np.concatenate([np.ravel(p) for p in parts]), *chunks)
     return jax.tree.map(lambda values: values[tiles.place], joined)
 

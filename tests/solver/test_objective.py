@@ -14,9 +14,9 @@ def traces(monkeypatch):
         return half_chi2(*arguments)
 
     monkeypatch.setattr(objective, "half_chi2", counted)
-    objective._add_chunk.clear_cache()
+    objective._of_chunk.clear_cache()
     yield found
-    objective._add_chunk.clear_cache()
+    objective._of_chunk.clear_cache()
 
 
 def test_gradient_is_traced_once_for_all_chunks(problem, traces):

@@ -15,8 +15,9 @@ from jaxtyping import Float
 from solver.normal import NormalEquations
 from solver.priors import Priors
 
-# Directions with less than this share of the information that their parameters have alone.
-_WEAK = 1e-6
+# Directions with less than this share of the information that their parameters have alone are
+# held by the priors only; and those with less than that are held poorly.
+_WEAK, POORLY_HELD = 1e-6, 1e-3
 # At most so many of them are looked for.
 _BLOCK = 16
 
@@ -106,12 +107,16 @@ class Reduced:
         half = _upper_solve(self.source_factor, inner)
         return _upper_solve(self.source_factor, half.swapaxes(0, 1)).transpose(2, 1, 0).copy()
 
-    def weak_directions(self) -> Float[np.ndarray, "calib weak"]:
+    def weak_directions(self, below: float = _WEAK) -> Float[np.ndarray, "calib weak"]:
         """Return the directions of the calibration that only the priors hold.
 
         They are eigenvectors of the reduced system, each parameter in units of its
         conditional sigma, whose eigenvalue all but vanishes: what pointings, roll and focal
         lengths have in common with the places, rotations and pitches of the detectors.
+
+        Parameters
+        ----------
+        below : the eigenvalue; with more than the default, poorly held directions are among them
         """
         scale = 1.0 / np.sqrt(np.diag(self.theta))
         block = np.random.default_rng(0).standard_normal((len(scale), min(_BLOCK, len(scale))))
@@ -121,7 +126,7 @@ class Reduced:
             block = np.linalg.qr(block)[0]
         image = self.factor @ (scale[:, None] * block)
         values, vectors = np.linalg.eigh(image.T @ image)
-        return scale[:, None] * (block @ vectors[:, values < _WEAK])
+        return scale[:, None] * (block @ vectors[:, values < below])
 
     def theta_covariance(self) -> Float[np.ndarray, "calib calib"]:
         """Return the marginal covariance of the calibration."""

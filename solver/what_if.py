@@ -17,11 +17,13 @@ from solver.gauss_newton import Iteration, Mode, downhill, largest_step, objecti
 from solver.objective import gradient
 from solver.problem import Problem
 from solver.result import FitStatus
-from solver.schur import reduce
+from solver.schur import POORLY_HELD, reduce
 from solver.settings import FitSettings
 
 # Steps that are not small after so many are not those of a nearly linear model.
 _MAX_STEPS = 5
+# The one after the first, long one.
+_CAREFUL_STEP = 2
 
 
 def carried(
@@ -80,10 +82,15 @@ def re_solve(
         trace.append(Iteration(len(trace), total, at.chi2, largest, parameter, 0.0, elapsed))
         if largest < settings.tolerance:
             return Mode(theta, sources, reduced, FitStatus.RE_SOLVED, trace, start.equations)
-        step = reduced.solve(*downhill(changed, theta, sources, at), held)
+        right = downhill(changed, theta, sources, at)
+        step = reduced.solve(*right, held)
         largest, parameter = largest_step(changed, step, reduced)
         if largest > limit:
             return None
+        if len(trace) == _CAREFUL_STEP and largest >= settings.tolerance:
+            # What the Jacobians have changed by since is amplified most where the data tell
+            # least: so that stays, which the first step took to its place, until the rest is right.
+            step = reduced.solve(*right, reduced.weak_directions(POORLY_HELD))
         theta, sources = theta + step[0], sources + step[1]
         # The second step puts right what the first left behind, and is shorter.
         limit = 1.1 * largest

@@ -5,7 +5,7 @@ import pytest
 
 from solver.normal import accumulate
 from solver.problem import build_problem
-from solver.schur import reduce
+from solver.schur import POORLY_HELD, reduce
 from solver.settings import FitSettings
 
 # The agreement that the elimination is held to, relative to the uncertainties.
@@ -143,6 +143,19 @@ def test_weak_directions_are_those_that_pointings_and_detectors_share(small_orbi
     # A conditional sigma along them costs next to nothing, unlike one of any parameter alone.
     cost = np.sum((reduced.factor @ weak) ** 2, axis=0)
     assert cost.max() < 1e-6
+
+
+def test_poorly_held_directions_hold_the_weak_ones_among_them(small_orbit):
+    wide = build_problem(small_orbit.data, small_orbit.instrument, FitSettings())
+    origin = np.zeros(wide.layout.size), np.zeros((wide.n_src, 2))
+    reduced = reduce(accumulate(wide, *origin), wide.priors)
+    weak, poorly = reduced.weak_directions(), reduced.weak_directions(POORLY_HELD)
+    assert poorly.shape[1] > weak.shape[1]
+    cost = np.sum((reduced.factor @ poorly) ** 2, axis=0)
+    assert cost.max() < POORLY_HELD
+    # Both are orthonormal where each parameter is in units of its conditional sigma.
+    overlap = (poorly.T * np.diag(reduced.theta)) @ weak
+    np.testing.assert_allclose(overlap.T @ overlap, np.eye(weak.shape[1]), atol=1e-6)
 
 
 def test_held_directions_do_not_move(small_orbit):

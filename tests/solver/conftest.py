@@ -20,6 +20,7 @@ from solver.problem import build_problem
 from solver.schur import reduce
 from solver.settings import FitSettings
 from solver.tables import solution_of
+from solver.tiles import CHUNK as WHOLE_CHUNK
 from tests.solver.small_orbit import make_orbit, true_offsets
 
 # Tiles; one length for all, since each costs a compilation. A small orbit fills it twice.
@@ -228,6 +229,18 @@ def fit():
 
     def run(orbit, **settings):
         return fit_orbit(orbit.data, orbit.instrument, FitSettings(**settings))
+
+    return run
+
+
+@pytest.fixture(scope="package")
+def fit_whole():
+    """Return the function that fits an orbit of full size, in chunks as long as ever."""
+
+    def run(data, settings=None):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("solver.tiles.CHUNK", WHOLE_CHUNK)
+            return fit_orbit(data, settings=settings or FitSettings())
 
     return run
 

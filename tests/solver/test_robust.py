@@ -29,14 +29,20 @@ def disturbed(data, share, sigmas, seed=1):
 
 
 @pytest.fixture(scope="module")
-def clean(sample_orbit):
-    return fit_orbit(sample_orbit)
+def clean(sample_orbit, fit_whole):
+    return fit_whole(sample_orbit)
 
 
 @pytest.fixture(scope="module")
-def found(sample_orbit):
+def found(sample_orbit, fit_whole):
     data, bad = disturbed(sample_orbit, SHARE, SIGMAS)
-    return fit_orbit(data, settings=ROBUST), data, bad
+    return fit_whole(data, ROBUST), data, bad
+
+
+@pytest.fixture(scope="module")
+def plain(found, fit_whole):
+    """The disturbed orbit as if there were no outliers."""
+    return fit_whole(found[1])
 
 
 def shifts(found, clean, axis):
@@ -50,6 +56,7 @@ def shifts(found, clean, axis):
     return moved / both[f"sigma_{axis}_marginal_clean"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["ra", "dec"])
 def test_the_other_sources_are_not_biased(found, clean, axis):
     moved = shifts(found, clean, axis)
@@ -57,13 +64,14 @@ def test_the_other_sources_are_not_biased(found, clean, axis):
     assert np.sqrt((moved**2).mean()) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", ["ra", "dec"])
-def test_without_it_they_are_far_off(found, clean, axis):
-    plain = fit_orbit(found[1])
+def test_without_it_they_are_far_off(plain, found, clean, axis):
     moved = shifts((plain, *found[1:]), clean, axis)
     assert np.sqrt((moved**2).mean()) > 0.5
 
 
+@pytest.mark.slow
 def test_all_of_them_and_no_others_are_listed(found):
     result, data, bad = found
     expected = data.measurements.iloc[bad]
@@ -75,6 +83,7 @@ def test_all_of_them_and_no_others_are_listed(found):
     assert listed["distance"].between(SIGMAS - 6.0, SIGMAS + 6.0).all()
 
 
+@pytest.mark.slow
 def test_what_is_left_is_a_good_fit(found):
     result, data, bad = found
     assert result.summary["n_outliers"] == len(bad)
@@ -82,7 +91,8 @@ def test_what_is_left_is_a_good_fit(found):
     assert result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.02)
 
 
-def test_it_says_how_far_each_would_move_its_source(found, clean):
+@pytest.mark.slow
+def test_it_says_how_far_each_would_move_its_source(found, fit_whole):
     """As a fit of all the others and that one does."""
     result, data, _ = found
     worst = next(result.outliers.itertuples())
@@ -91,7 +101,7 @@ def test_it_says_how_far_each_would_move_its_source(found, clean):
     is_outlier = pd.MultiIndex.from_frame(rows[key]).isin(
         pd.MultiIndex.from_frame(result.outliers[key].iloc[1:])
     )
-    used = fit_orbit(replace(data, measurements=rows[~is_outlier]))
+    used = fit_whole(replace(data, measurements=rows[~is_outlier]))
     before, after = (r.sources.set_index("source_id").loc[worst.source_id] for r in (result, used))
     for axis in ("ra", "dec"):
         moved = (after[f"offset_{axis}"] - before[f"offset_{axis}"]) / before[
@@ -100,12 +110,14 @@ def test_it_says_how_far_each_would_move_its_source(found, clean):
         assert getattr(worst, f"shift_{axis}") == pytest.approx(moved, abs=0.3)
 
 
-def test_good_measurements_are_left_alone(sample_orbit, clean):
-    result = fit_orbit(sample_orbit, settings=ROBUST)
+@pytest.mark.slow
+def test_good_measurements_are_left_alone(sample_orbit, clean, fit_whole):
+    result = fit_whole(sample_orbit, ROBUST)
     assert result.summary["n_outliers"] == 0
     pd.testing.assert_frame_equal(result.sources, clean.sources)
 
 
+@pytest.mark.slow
 def test_nothing_is_looked_for_unless_asked(clean):
     assert clean.outliers is None
     assert "n_outliers" not in clean.summary

@@ -5,20 +5,18 @@ import pandas as pd
 import pytest
 from astropy.table import Table
 
-from solver.fit import fit_orbit
 from solver.settings import FitSettings
-from solver.tiles import CHUNK
 
 MIN_OBS = 10
 CLASSES = ["non-reference", "artificial"]
 AXES = ["ra", "dec"]
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
-def sample_result(sample_orbit):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.tiles.CHUNK", CHUNK)
-        return fit_orbit(sample_orbit)
+def sample_result(sample_orbit, fit_whole):
+    return fit_whole(sample_orbit)
 
 
 @pytest.fixture(scope="module")
@@ -111,10 +109,10 @@ def test_true_distortion_is_within_its_uncertainty(sample_result):
     assert (rows["sigma_marginal"] < 0.1).all()
 
 
-def test_aberration_left_out_hides_in_the_quadratic_distortion(sample_orbit, sample_result):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.tiles.CHUNK", CHUNK)
-        without = fit_orbit(sample_orbit, settings=FitSettings(aberration=False))
+def test_aberration_left_out_hides_in_the_quadratic_distortion(
+    sample_orbit, sample_result, fit_whole
+):
+    without = fit_whole(sample_orbit, FitSettings(aberration=False))
     moved = without.values_on("coef").to_numpy() - sample_result.values_on("coef").to_numpy()
     quadratic, others = np.abs(moved[:3]), np.abs(moved[3:])
     # The scale changes by 1e-4, and with it a true cubic term of 3 um by less than 1 nm.

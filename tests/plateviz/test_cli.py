@@ -50,6 +50,7 @@ def test_fit_prints_a_summary_for_people(run, sample, tmp_path):
     assert "36312 measurements of 814 sources (58 reference)" in out
 
 
+@pytest.mark.slow
 def test_svi_that_was_stopped_goes_on_from_its_file(run, sample, tmp_path):
     """At its limit of steps it is no solution, and says so; its file is gone all the same."""
     output, kept = tmp_path / "r.fits", tmp_path / "run.npz"

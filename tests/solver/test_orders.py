@@ -41,17 +41,20 @@ def orders():
     return compare_orders(build_problem(orbit.data, orbit.instrument, settings), settings)
 
 
+@pytest.mark.slow
 def test_every_order_is_there_and_has_converged(orders):
     assert orders["order"].tolist() == list(range(HIGHEST + 1))
     assert orders["n_terms"].tolist() == [2 * len(terms(n)) for n in range(HIGHEST + 1)]
     assert orders["converged"].all()
 
 
+@pytest.mark.slow
 def test_evidence_and_reserved_sources_choose_the_true_order(orders):
     assert int(orders["log_evidence"].argmax()) == TRUE_ORDER
     assert int(orders["held_out_log_density"].argmax()) == TRUE_ORDER
 
 
+@pytest.mark.slow
 def test_chi2_of_the_reserved_sources_falls_to_the_true_order_and_stays(orders):
     ratio = (orders["held_out_chi2"] / orders["held_out_dof"]).to_numpy()
     scatter = np.sqrt(2.0 / orders["held_out_dof"].iloc[0])
@@ -60,22 +63,26 @@ def test_chi2_of_the_reserved_sources_falls_to_the_true_order_and_stays(orders):
     np.testing.assert_allclose(ratio[TRUE_ORDER:], ratio[TRUE_ORDER], atol=2.0 * scatter)
 
 
+@pytest.mark.slow
 def test_chi2_of_all_can_only_fall_with_the_order(orders):
     """Nearly: what the priors of new terms add is no part of it."""
     assert (np.diff(orders["chi2"].to_numpy()) < 1.0).all()
 
 
+@pytest.mark.slow
 def test_effective_parameters_grow_with_the_terms_and_by_no_more(orders):
     grown = np.diff(orders["effective_parameters"].to_numpy())
     assert (grown[TRUE_ORDER:] > 0.0).all()
     assert (grown <= np.diff(orders["n_terms"]) + 1e-3).all()
 
 
+@pytest.mark.slow
 def test_orders_without_terms_are_the_same(orders):
     first, second = (orders.drop(columns="order").iloc[n] for n in (0, 1))
     assert first.equals(second)
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_a_fit_of_that_order(orders, result):
     """In which the terms above are not there, rather than held at zero."""
     row = orders.iloc[TRUE_ORDER]
@@ -199,10 +206,12 @@ def compared(fitter):
     return fitter.fit(COMPARED)
 
 
+@pytest.mark.slow
 def test_orders_that_the_data_cannot_hold_are_left_out(compared):
     assert compared.orders["order"].tolist() == list(range(HIGHEST + 1))
 
 
+@pytest.mark.slow
 def test_the_fit_itself_is_that_without_a_comparison(short_orbit, compared):
     alone = fit_orbit(short_orbit.data, short_orbit.instrument, FitSettings(order=HIGHEST))
     assert alone.orders is None
@@ -212,11 +221,13 @@ def test_the_fit_itself_is_that_without_a_comparison(short_orbit, compared):
     assert set(compared.summary["seconds"]) - set(alone.summary["seconds"]) == {"orders"}
 
 
+@pytest.mark.slow
 def test_a_change_of_the_order_alone_keeps_the_comparison(fitter, compared):
     changed = fitter.what_if(COMPARED.with_(order=5))
     assert changed.orders.equals(compared.orders)
 
 
+@pytest.mark.slow
 def test_any_other_change_has_no_comparison(fitter, compared):
     assert compared.orders is not None
     changed = fitter.what_if(COMPARED.with_(prior_widths={"distortion_x": 0.5}))

@@ -43,6 +43,7 @@ def sigmas(covariance):
     return np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
 
 
+@pytest.mark.slow
 def test_agrees_with_gauss_newton_from_a_cold_start(found, exact):
     estimate, states = found
     shift = estimate.mode.sources - exact.sources
@@ -51,11 +52,13 @@ def test_agrees_with_gauss_newton_from_a_cold_start(found, exact):
     assert states[0].trace[0].largest_step > 100.0
 
 
+@pytest.mark.slow
 def test_its_sigmas_are_the_conditional_ones(found, exact):
     expected = sigmas(exact.reduced.conditional_covariance())
     np.testing.assert_allclose(sigmas(found[0].conditional), expected, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_widths_are_found_and_not_only_kept(svi_problem, exact):
     """From widths three times too large at the mode it comes back to the right ones."""
     start = start_state(svi_problem, SETTINGS.svi)._replace(
@@ -69,6 +72,7 @@ def test_widths_are_found_and_not_only_kept(svi_problem, exact):
     np.testing.assert_allclose(sigmas(estimate.conditional), expected, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_loss_falls_and_comes_to_rest(found):
     """With the guide at its best, draws hardly matter: they would scatter the loss by eight."""
     losses = found[0].losses
@@ -76,7 +80,7 @@ def test_loss_falls_and_comes_to_rest(found):
     assert losses[-200:].std() < 0.5
 
 
-def test_same_seed_same_answer_and_another_one_another(svi_problem, found):
+def test_same_seed_same_answer_and_another_one_another(svi_problem):
     few = replace(SETTINGS, svi=SviSettings(steps=100, max_steps=100))
     first, again, other = (
         variational(svi_problem, replace(few, svi=replace(few.svi, seed=seed))).mode.sources
@@ -86,6 +90,7 @@ def test_same_seed_same_answer_and_another_one_another(svi_problem, found):
     assert np.abs(first - other).max() > 0.0
 
 
+@pytest.mark.slow
 def test_stopped_run_goes_on_as_if_it_had_not_been(svi_problem, found):
     """Block for block, in step, means, widths and losses."""
     _, states = found
@@ -126,6 +131,7 @@ def test_other_settings_start_anew(small_orbit):
     assert seen[0] == 50
 
 
+@pytest.mark.slow
 def test_published_coordinates_get_nowhere(svi_problem, exact):
     """Why the engine works in whitened ones."""
     options = replace(WARPFIELD, steps=3000, max_steps=3000, patience=100)
@@ -154,6 +160,7 @@ def test_rate_falls_over_seven_decades_and_stays():
     np.testing.assert_allclose(rates, [1e4, np.sqrt(1e4 * 1e-3), 1e-3, 1e-3], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_loss_at_rest_away_from_the_mode_starts_the_rate_again(svi_problem, exact):
     """As the paper's runs were restarted by hand, until the mode is reached."""
     options = SviSettings(first_rate=1.0, steps=300, patience=50)

@@ -5,7 +5,6 @@ import math
 import holoviews as hv
 import numpy as np
 import pandas as pd
-from bokeh.palettes import interp_palette
 
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.style import TICK_SIZE, AxisLabels, Limits, drawn, framed, message
@@ -81,7 +80,7 @@ def _cells(cells: pd.DataFrame, theme: str) -> hv.Rectangles:
     return drawn(
         rectangles,
         color="share",
-        cmap=list(interp_palette((colours.background, *colours.ramp[:4]), 256)),
+        cmap=colours.share_palette,
         clim=(0.0, 1.0),
         colorbar=True,
         clabel="share (0 to 1)",

@@ -1,11 +1,11 @@
 """Points by class of source, points in numbers that only a raster can show, histograms."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import holoviews as hv
 import numpy as np
 import pandas as pd
-from bokeh.palettes import interp_palette
+from bokeh.models import CustomJS
 from holoviews import dim
 
 from plateviz.plots.style import (
@@ -16,6 +16,8 @@ from plateviz.plots.style import (
 )
 from plateviz.plots.theme import theme_of
 
+# Images for who zooms in, each about so many times as fine as the one before.
+_LEVELS, _FINER = 3, 2
 Tooltips = Sequence[tuple[str, str]]
 
 
@@ -51,46 +53,86 @@ def class_points(
 
 
 def raster(
-    points: hv.Points,
-    *,
-    xlim: tuple[float, float],
-    ylim: tuple[float, float],
-    width: int,
-    height: int,
-    theme: str,
-    dynamic: bool,
-) -> hv.Element | hv.DynamicMap:
-    """Return the number of points per cell as an image.
+    points: hv.Points, *, half: float, width: int, theme: str, dynamic: bool
+) -> list[hv.Element | hv.DynamicMap]:
+    """Return the number of points per cell about zero as images, of which one is seen at a time.
 
     Parameters
     ----------
     points : to be counted
-    xlim, ylim : the range counted when `dynamic` is False
-    width, height : of the frame in screen pixels
+    half : the square from -half to half is counted
+    width : of the frame in screen pixels
     theme : "light" or "dark"
-    dynamic : True for a live plot that is counted anew at each zoom
+    dynamic : True for a live plot, one image that is counted anew at each zoom; else there is one
+        for the whole square, and finer ones about its centre for who zooms in there
     """
     # Datashader and Numba take seconds and 150 MB to load; few plots have that many rows.
     from holoviews.operation.datashader import rasterize
 
-    image = rasterize(
-        points,
-        aggregator="count",
-        x_range=xlim,
-        y_range=ylim,
-        width=width // 2,
-        height=height // 2,
-        dynamic=dynamic,
-    )
-    return drawn(
-        image,
-        cmap=list(interp_palette(theme_of(theme).ramp, 256)),
-        cnorm="log",
-        clipping_colors={"NaN": "transparent"},
-        colorbar=True,
-        clabel="measurements per cell",
-        colorbar_opts={"width": 10},
-    )
+    def counted(half: float) -> hv.Element | hv.DynamicMap:
+        limits = (-half, half)
+        return rasterize(
+            points,
+            aggregator="count",
+            x_range=limits,
+            y_range=limits,
+            width=width // 2,
+            height=width // 2,
+            dynamic=dynamic,
+        )
+
+    whole = counted(half)
+    if dynamic:
+        return [drawn(whole, **_cells(theme), colorbar=True)]
+    halves = [half / _FINER**level for level in range(_LEVELS)]
+    images = [whole, *map(counted, halves[1:])]
+    dense = float(np.nanmax(whole.dimension_values(2)))
+    return [
+        drawn(
+            # As if the cells were those of the whole, so that one scale of colours holds for all.
+            image.transform(
+                **{image.vdims[0].name: dim(image.vdims[0]) * float(_FINER ** (2 * i))}
+            ),
+            **_cells(theme),
+            clim=(1.0, max(dense, 2.0)),
+            colorbar=i == 0,
+            hooks=[_seen_between(halves[i + 1] if i + 1 < _LEVELS else 0.0, halves[i], i == 0)],
+        )
+        for i, image in enumerate(images)
+    ]
+
+
+def _cells(theme: str) -> dict[str, object]:
+    return {
+        "cmap": theme_of(theme).count_palette,
+        "cnorm": "log",
+        "clipping_colors": {"NaN": "transparent"},
+        "clabel": "measurements per cell",
+        "colorbar_opts": {"width": 10},
+    }
+
+
+def _seen_between(least: float, most: float, is_whole: bool) -> Callable:
+    """Return a hook that shows an image while the frame reaches so far from zero, no other time."""
+    code = """
+        const ends = [x.start, x.end, y.start, y.end].map(Math.abs);
+        const reach = Math.max(...ends);
+        image.visible = reach > least && (whole || reach <= most);
+    """
+
+    def apply(plot: object, element: hv.Element) -> None:
+        figure, image = plot.state, plot.handles["glyph_renderer"]  # type: ignore[attr-defined]
+        image.visible = is_whole
+        told = {"x": figure.x_range, "y": figure.y_range, "image": image}
+        # The frame's own edge is a little farther out than the data.
+        callback = CustomJS(
+            args={**told, "least": 1.01 * least, "most": 1.01 * most, "whole": is_whole}, code=code
+        )
+        for axis in (figure.x_range, figure.y_range):
+            axis.js_on_change("start", callback)
+            axis.js_on_change("end", callback)
+
+    return apply
 
 
 def steps(bins: pd.DataFrame, name: str, colour: str) -> hv.Curve:

@@ -3,7 +3,6 @@
 import holoviews as hv
 import numpy as np
 import pandas as pd
-from bokeh.palettes import interp_palette
 
 from plateviz.plots.points import steps, unit_normal
 from plateviz.plots.style import (
@@ -115,7 +114,7 @@ def _cells(rows: pd.DataFrame, theme: str) -> hv.Rectangles:
     return drawn(
         cells,
         color="n",
-        cmap=list(interp_palette(theme_of(theme).ramp, 256)),
+        cmap=theme_of(theme).count_palette,
         cnorm="log",
         line_color=None,
         tools=["hover"],

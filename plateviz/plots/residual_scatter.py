@@ -60,20 +60,12 @@ def plot_residual_scatter(
     limits = (-half, half)
     points = _points(table)
     if len(table) > ROW_LIMIT:
-        data = raster(
-            points,
-            xlim=limits,
-            ylim=limits,
-            width=width,
-            height=width,
-            theme=theme,
-            dynamic=dynamic,
-        )
+        data = raster(points, half=half, width=width, theme=theme, dynamic=dynamic)
         line = CLASS_COLOURS[REFERENCE]  # visible on the darkest and the lightest cell
     else:
-        data, line = points, theme_of(theme).line
+        data, line = [points], theme_of(theme).line
     return framed(
-        [data, *_expected(expected, line)],
+        [*data, *_expected(expected, line)],
         title=_TITLE,
         subtitle=_words(statistics),
         theme=theme,
@@ -131,17 +123,16 @@ def _words(statistics: ScatterStatistics) -> str:
 
 
 def _draw(chosen: Chosen, theme: str) -> hv.Overlay:
-    return plot_residual_scatter(
-        residual_scatter(chosen.result, exposures=chosen.exposures), theme=theme
-    )
+    table = residual_scatter(chosen.result, exposures=chosen.exposures, detector_id=chosen.detector)
+    return plot_residual_scatter(table, theme=theme)
 
 
 DIAGNOSTICS = (
     Diagnostic(
         "residual-scatter",
         "Residual scatter",
-        "Residuals of the exposures chosen, x against y. Good: a round cloud about zero, as wide "
-        "as the measurement errors allow.",
+        "Residuals of the exposures and the detector chosen, x against y. Good: a round cloud "
+        "about zero, as wide as the measurement errors allow.",
         30,
         _draw,
         follows_selection=True,

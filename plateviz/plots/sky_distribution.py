@@ -3,7 +3,6 @@
 import holoviews as hv
 import numpy as np
 import pandas as pd
-from bokeh.palettes import interp_palette
 
 from plateviz.plots.points import class_points
 from plateviz.plots.style import (
@@ -84,7 +83,7 @@ def _density(rows: pd.DataFrame, theme: str) -> hv.Image:
     image = hv.Image((l_deg, b_deg, cells.to_numpy()), [_X, _Y], "density")
     return drawn(
         image,
-        cmap=list(interp_palette(theme_of(theme).ramp, 256)),
+        cmap=theme_of(theme).count_palette,
         clim=(0.0, float(np.nanmax(cells.to_numpy()))),
         clipping_colors={"NaN": "transparent"},
         colorbar=True,

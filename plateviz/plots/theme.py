@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from bokeh.palettes import interp_palette
+
 
 @dataclass(frozen=True)
 class Theme:
@@ -24,6 +26,16 @@ class Theme:
     line: str
     mark: str
     ramp: tuple[str, ...]
+
+    @property
+    def count_palette(self) -> list[str]:
+        """256 colours of rising counts."""
+        return list(interp_palette(self.ramp, 256))
+
+    @property
+    def share_palette(self) -> list[str]:
+        """256 colours of shares from zero, which is the background, to one."""
+        return list(interp_palette((self.background, *self.ramp[:4]), 256))
 
 
 THEMES: Mapping[str, Theme] = MappingProxyType(

@@ -76,7 +76,10 @@ def residual_map(
 
 
 def residual_scatter(
-    result: FitResult, *, exposures: Iterable[ExposureKey] | None = None
+    result: FitResult,
+    *,
+    exposures: Iterable[ExposureKey] | None = None,
+    detector_id: int | None = None,
 ) -> pd.DataFrame:
     """Return residual x against y of chosen exposures, with the scatter expected of them.
 
@@ -84,6 +87,7 @@ def residual_scatter(
     ----------
     result : the fit
     exposures : (field_id, plate_id) of each exposure wanted; None for all
+    detector_id : the detector, or None for all
 
     Returns
     -------
@@ -91,7 +95,7 @@ def residual_scatter(
     and `expected_x_mpix`, `expected_y_mpix`: the measurement uncertainty less what the
     fit absorbs (half the leverage in each axis)
     """
-    rows = _chosen(result.residuals, exposures, None)
+    rows = _chosen(result.residuals, exposures, detector_id)
     kept = np.sqrt(np.clip(1.0 - 0.5 * rows["leverage"], 0.0, None))
     return pd.DataFrame(
         {

@@ -1,7 +1,6 @@
 """Small pieces of HTML in the project's style, readable in both themes."""
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
@@ -44,25 +43,14 @@ def strip(items: Iterable[SummaryItem]) -> str:
     return f"<div class='strip'>{''.join(map(_cell, items))}</div>"
 
 
-def numbers(table: pd.DataFrame, titles: Mapping[str, str]) -> str:
-    """Return a small table: words as they are, numbers to three decimals, nothing for NaN.
-
-    Parameters
-    ----------
-    titles : column -> title; others are not shown
-    """
-    head = "".join(f"<th>{escape(title)}</th>" for title in titles.values())
+def numbers(table: pd.DataFrame) -> str:
+    """Return a small table of text, as `tables.headings.in_words` gives it; a dash for nothing."""
+    head = "".join(f"<th>{escape(title)}</th>" for title in table.columns)
     rows = "".join(
-        f"<tr>{''.join(map(_number, row))}</tr>"
-        for row in table[list(titles)].itertuples(index=False)
+        f"<tr>{''.join(f'<td>{escape(words) or chr(0x2013)}</td>' for words in row)}</tr>"
+        for row in table.itertuples(index=False)
     )
     return f"<table class='numbers'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-
-
-def _number(value: object) -> str:
-    if not isinstance(value, float):
-        return f"<td class='words'>{escape(str(value))}</td>"
-    return f"<td>{'–' if math.isnan(value) else f'{value:.3f}'}</td>"
 
 
 def _cell(item: SummaryItem) -> str:

@@ -17,6 +17,7 @@ from plateviz.tables import (
     source_orbits,
     source_strip,
 )
+from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE, SOURCES_OF_RUN, in_words
 from plateviz.views.figure import FigureGrid, FigureView
 from plateviz.views.markup import (
     heading,
@@ -28,37 +29,8 @@ from plateviz.views.markup import (
     titled,
 )
 from plateviz.views.run import run_selector
-from plateviz.views.table import DataTable, Heading
+from plateviz.views.table import DataTable
 
-_MOTION_TITLES = {
-    "parameter": "parameter",
-    "unit": "unit",
-    "fit": "fitted − catalogue",
-    "sigma_noise": "σ noise",
-    "sigma_catalogue": "σ catalogue",
-    "sigma": "σ",
-    "true": "truth − catalogue",
-    "pull": "pull",
-}
-_CATALOGUE, _TRUTH, _SIGMA = "less catalogue, mas", "less truth, mas", "marginal σ, mas"
-_ORBIT_HEADINGS = {
-    "orbit_id": Heading("orbit", "0"),
-    "date": Heading("mean epoch (TCB)"),
-    "n_obs": Heading("measurements", "0"),
-    "offset_ra": Heading("Δα cos δ", "0.000", _CATALOGUE),
-    "offset_dec": Heading("Δδ", "0.000", _CATALOGUE),
-    "deviation_ra": Heading("Δα cos δ", "0.000", _TRUTH),
-    "deviation_dec": Heading("Δδ", "0.000", _TRUTH),
-    "sigma_ra_marginal": Heading("α cos δ", "0.000", _SIGMA),
-    "sigma_dec_marginal": Heading("δ", "0.000", _SIGMA),
-    "chi2_per_dof": Heading("χ²/dof", "0.000"),
-}
-_LIST_HEADINGS = {
-    "id": Heading("source"),
-    "source_class": Heading("class"),
-    "n_orbits": Heading("orbits", "0"),
-    "n_obs": Heading("measurements", "0,0"),
-}
 _INVITATION = (
     "Write a source's id on the left, choose one below, or tap a point of a figure of the "
     "Survey or the Orbit view."
@@ -73,8 +45,8 @@ class SourcePage(pn.viewable.Viewer):
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
         self._head, self._motion = markup_pane(), markup_pane()
-        self._orbits = DataTable(_ORBIT_HEADINGS, self._open_row)
-        self._list = DataTable(_LIST_HEADINGS, self._open_source, page_size=20)
+        self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row)
+        self._list = DataTable(SOURCES_OF_RUN, self._open_source, page_size=20)
         self.figures = FigureGrid([self._figure_view(figure) for figure in source_figures()])
         self._rest = pn.Column(
             heading("Motion"),
@@ -145,7 +117,7 @@ class SourcePage(pn.viewable.Viewer):
             self._motion.object = paragraph(words, "caption", theme)
         else:
             table = motion_table(found.motion)
-            self._motion.object = themed(numbers(table, _MOTION_TITLES), theme)
+            self._motion.object = themed(numbers(in_words(table, MOTION)), theme)
         self._orbits.show(source_orbits(found.history), theme)
         self.figures.change(theme)
 

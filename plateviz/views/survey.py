@@ -12,28 +12,11 @@ from plateviz.navigation import Navigation
 from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
 from plateviz.survey_tables import survey_tables
 from plateviz.tables import orbit_list, orbit_states, run_strip
+from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.views.figure import FigureGrid, FigureView
 from plateviz.views.markup import heading, markup_pane, paragraph, strip, themed, titled
 from plateviz.views.run import run_selector
-from plateviz.views.table import DataTable, Heading
-
-_ALPHA, _DELTA = "Reference stars, α", "Reference stars, δ"
-_HEADINGS = {
-    "orbit_id": Heading("orbit", "0"),
-    "date": Heading("mean epoch (TCB)"),
-    "status": Heading("status"),
-    "chi2_per_dof": Heading("χ²/dof", "0.000"),
-    "normalised_deviation_ra": Heading("deviation/σ", "0.000", _ALPHA),
-    "expected_normalised_deviation_ra": Heading("expected", "0.000", _ALPHA),
-    "normalised_deviation_dec": Heading("deviation/σ", "0.000", _DELTA),
-    "expected_normalised_deviation_dec": Heading("expected", "0.000", _DELTA),
-    "n_measurements": Heading("measurements", "0,0"),
-    "n_sources": Heading("sources", "0,0"),
-    "n_reference": Heading("reference", "0,0"),
-    "iterations": Heading("iterations", "0"),
-    "seconds": Heading("time (s)", "0.0"),
-    "message": Heading("message"),
-}
+from plateviz.views.table import DataTable
 
 
 class SurveyPage(pn.viewable.Viewer):
@@ -46,7 +29,7 @@ class SurveyPage(pn.viewable.Viewer):
         self._tables: SurveyTables | None = None
         self._orbits = self._motions = pd.DataFrame()
         self._head = markup_pane()
-        self._table = DataTable(_HEADINGS, self._open_row, page_size=15)
+        self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=15)
         self.figures = FigureGrid([self._figure_view(figure) for figure in survey_figures()])
         self._rest = pn.Column(
             heading("Orbits"), self._table, self.figures, sizing_mode="stretch_width"

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 import panel as pn
 from bokeh.models.widgets.tables import NumberFormatter
 
+from plateviz.tables.headings import Heading
 from plateviz.tables.summary import State
 
 # As `style.css` has them.
@@ -20,14 +21,6 @@ _COLOURS: Mapping[str, Mapping[State, str]] = MappingProxyType(
 # A table says that it is visible, even on a view that is not on the screen.
 TABLE_STYLE = ":host .tabulator { font-size: 13px; visibility: inherit !important; }"
 _CLICKABLE = ".tabulator-row { cursor: pointer; }"
-
-
-class Heading(NamedTuple):
-    """How a column is shown: its title, the format of its numbers, and what stands above it."""
-
-    title: str
-    format: str = ""
-    group: str = ""
 
 
 class DataTable(pn.viewable.Viewer):

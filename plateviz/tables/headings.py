@@ -1,0 +1,88 @@
+"""How the columns of tables are called, and their numbers written, on pages and in reports."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import pandas as pd
+
+_ALPHA, _DELTA = "Reference stars, α", "Reference stars, δ"
+_CATALOGUE, _TRUTH, _SIGMA = "less catalogue, mas", "less truth, mas", "marginal σ, mas"
+
+
+class Heading(NamedTuple):
+    """How a column is shown: its title, the format of its numbers, and what stands above it."""
+
+    title: str
+    format: str = ""
+    group: str = ""
+
+
+ORBITS_OF_RUN: Mapping[str, Heading] = {
+    "orbit_id": Heading("orbit", "0"),
+    "date": Heading("mean epoch (TCB)"),
+    "status": Heading("status"),
+    "chi2_per_dof": Heading("χ²/dof", "0.000"),
+    "normalised_deviation_ra": Heading("deviation/σ", "0.000", _ALPHA),
+    "expected_normalised_deviation_ra": Heading("expected", "0.000", _ALPHA),
+    "normalised_deviation_dec": Heading("deviation/σ", "0.000", _DELTA),
+    "expected_normalised_deviation_dec": Heading("expected", "0.000", _DELTA),
+    "n_measurements": Heading("measurements", "0,0"),
+    "n_sources": Heading("sources", "0,0"),
+    "n_reference": Heading("reference", "0,0"),
+    "iterations": Heading("iterations", "0"),
+    "seconds": Heading("time (s)", "0.0"),
+    "message": Heading("message"),
+}
+MOTION: Mapping[str, Heading] = {
+    "parameter": Heading("parameter"),
+    "unit": Heading("unit"),
+    "fit": Heading("fitted − catalogue", "0.000"),
+    "sigma_noise": Heading("σ noise", "0.000"),
+    "sigma_catalogue": Heading("σ catalogue", "0.000"),
+    "sigma": Heading("σ", "0.000"),
+    "true": Heading("truth − catalogue", "0.000"),
+    "pull": Heading("pull", "0.000"),
+}
+ORBITS_OF_SOURCE: Mapping[str, Heading] = {
+    "orbit_id": Heading("orbit", "0"),
+    "date": Heading("mean epoch (TCB)"),
+    "n_obs": Heading("measurements", "0"),
+    "offset_ra": Heading("Δα cos δ", "0.000", _CATALOGUE),
+    "offset_dec": Heading("Δδ", "0.000", _CATALOGUE),
+    "deviation_ra": Heading("Δα cos δ", "0.000", _TRUTH),
+    "deviation_dec": Heading("Δδ", "0.000", _TRUTH),
+    "sigma_ra_marginal": Heading("α cos δ", "0.000", _SIGMA),
+    "sigma_dec_marginal": Heading("δ", "0.000", _SIGMA),
+    "chi2_per_dof": Heading("χ²/dof", "0.000"),
+}
+SOURCES_OF_RUN: Mapping[str, Heading] = {
+    "id": Heading("source"),
+    "source_class": Heading("class"),
+    "n_orbits": Heading("orbits", "0"),
+    "n_obs": Heading("measurements", "0,0"),
+}
+
+
+def in_words(table: pd.DataFrame, headings: Mapping[str, Heading]) -> pd.DataFrame:
+    """Return a table as it is read: its columns by their titles, its numbers as text.
+
+    Parameters
+    ----------
+    headings : column -> how it is shown; others are left out, and so are those without any value
+    """
+    shown = {
+        f"{heading.group}: {heading.title}" if heading.group else heading.title: table[name].map(
+            lambda value, form=heading.format: _text(value, form)
+        )
+        for name, heading in headings.items()
+    }
+    return pd.DataFrame({title: values for title, values in shown.items() if (values != "").any()})
+
+
+def _text(value: Any, form: str) -> str:  # noqa: ANN401 what tables hold
+    if pd.isna(value):
+        return ""
+    if not form:
+        return str(value)
+    thousands, decimals = "," if "," in form else "", len(form.partition(".")[2])
+    return f"{float(value):{thousands}.{decimals}f}"

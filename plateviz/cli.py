@@ -1,4 +1,4 @@
-"""The command line: `plateviz simulate | gaia | inspect | fit | survey | serve | reproduce | demo`.
+"""The command line: `plateviz simulate | gaia | inspect | fit | survey | serve | report | ...`.
 
 A user's mistake ends with exit code 2 and one message; a fit that has no solution, or
 has not converged, with exit code 1. What takes long to import is imported by the
@@ -17,6 +17,7 @@ import typer
 from plateviz import cli_options as options
 from plateviz.cache import keep_compilations
 from plateviz.cli_gaia import gaia
+from plateviz.cli_report import report
 from plateviz.cli_reproduce import reproduce
 from plateviz.runs import DEFAULT_RUN
 from solver.errors import FitError, InputError
@@ -124,12 +125,12 @@ def inspect(
     from plateviz.cli_output import print_inspection, print_json
     from solver.io.inspect import inspect_files
 
-    reports = inspect_files(files)
+    found = inspect_files(files)
     if as_json:
-        print_json(reports)
+        print_json(found)
     else:
-        print_inspection(reports)
-    if any(report["problems"] for report in reports):
+        print_inspection(found)
+    if any(one["problems"] for one in found):
         raise typer.Exit(2)
 
 
@@ -266,6 +267,7 @@ def serve(
     _serve(Workbench(source, Worker()), port, address, open_browser)
 
 
+app.command()(report)
 app.command()(reproduce)
 
 
@@ -273,12 +275,9 @@ def main() -> None:
     """Run the command line; a user's mistake is one message and exit code 2."""
     try:
         app()
-    except InputError as error:
+    except (InputError, FitError) as error:
         typer.echo(f"plateviz: {error}", err=True)
-        sys.exit(2)
-    except FitError as error:
-        typer.echo(f"plateviz: {error}", err=True)
-        sys.exit(1)
+        sys.exit(2 if isinstance(error, InputError) else 1)
 
 
 def _serve(workbench: "Workbench", port: int, address: str, open_browser: bool) -> None:

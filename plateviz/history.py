@@ -74,6 +74,10 @@ class SurveyRun:
         """Whether every orbit of the survey is there."""
         return self._run.is_complete
 
+    def failures(self) -> dict[int, str]:
+        """Return why orbits have no solution, by orbit."""
+        return self._run.failures()
+
     def orbits(self) -> pd.DataFrame:
         """Return `survey_schema.RUN_ORBITS`, a row per orbit of the survey."""
         complete, failures = set(self._run.complete_orbits()), self._run.failures()

@@ -187,5 +187,6 @@ DIAGNOSTICS = (
         86,
         _draw,
         is_wide=True,
+        has_data=lambda chosen: chosen.other is not None,
     ),
 )

@@ -147,5 +147,6 @@ DIAGNOSTICS = (
         50,
         _draw,
         is_wide=True,
+        has_data=lambda chosen: chosen.result.true_places is not None,
     ),
 )

@@ -34,6 +34,10 @@ class Chosen:
     other: FitResult | None = None
 
 
+def _always(_: Chosen) -> bool:
+    return True
+
+
 @dataclass(frozen=True)
 class Diagnostic:
     """One picture of a solution.
@@ -47,6 +51,7 @@ class Diagnostic:
     draw : picture of what is chosen, in a theme
     follows_selection : whether exposures and detector change it
     is_wide : whether it takes the whole width of the page
+    has_data : whether there is anything to draw, such as a truth or another solution
     """
 
     name: str
@@ -56,3 +61,4 @@ class Diagnostic:
     draw: Callable[[Chosen, str], hv.core.Dimensioned]
     follows_selection: bool = False
     is_wide: bool = False
+    has_data: Callable[[Chosen], bool] = _always

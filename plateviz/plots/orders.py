@@ -209,5 +209,6 @@ DIAGNOSTICS = (
         82,
         _draw,
         is_wide=True,
+        has_data=lambda chosen: chosen.result.orders is not None,
     ),
 )

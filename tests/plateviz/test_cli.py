@@ -2,25 +2,11 @@
 
 import json
 import socket
-import sys
 
 import pytest
 
-from plateviz.cli import main
 from plateviz.source import SurveyFolder
 from solver.io.result import read_result
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["plateviz", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        return ended.value.code or 0, printed.out, printed.err
-
-    return call
 
 
 @pytest.fixture

@@ -1,0 +1,154 @@
+"""`plateviz report`: one HTML file of an orbit, a source or a survey."""
+
+import platform
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+from plateviz.runs import DEFAULT_RUN
+from solver.errors import InputError
+
+if TYPE_CHECKING:
+    from plateviz.reports.report import Facts, Report
+    from solver.result import FitResult
+
+_PACKAGES = ("plateviz", "jax", "numpy", "scipy", "holoviews", "bokeh")
+
+
+class ReportRequest(NamedTuple):
+    """What was asked for on the command line."""
+
+    path: Path
+    orbit: int | None
+    source: int | None
+    survey: bool
+    run: str
+    other: str | None
+    instrument: Path | None
+
+
+def report(
+    path: Annotated[
+        Path, typer.Argument(help="Survey directory, or a result of `fit`.", metavar="DIR|RESULT")
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="File to write (HTML).", metavar="REPORT")
+    ],
+    orbit: Annotated[int | None, typer.Option(help="Report one orbit of the survey.")] = None,
+    source: Annotated[int | None, typer.Option(help="Report one source, by its id.")] = None,
+    survey: Annotated[
+        bool, typer.Option("--survey", help="Report the survey as a whole: the default.")
+    ] = False,
+    run: Annotated[str, typer.Option(help="Name of the run.")] = DEFAULT_RUN,
+    other: Annotated[
+        str | None,
+        typer.Option(help="Solution to compare the orbit with: another run, or another result."),
+    ] = None,
+    instrument: Annotated[
+        Path | None, typer.Option(help="Instrument of a result; the mini-mock's by default.")
+    ] = None,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Print it with Chromium, too.")] = False,
+) -> None:
+    """Write a report that opens anywhere: one HTML file that needs no network."""
+    from plateviz.cli_output import reporting
+    from plateviz.reports.pdf import find_chromium, print_pdf
+    from solver.io.atomic import require_writable, write_atomically
+
+    printed = output.with_suffix(".pdf")
+    require_writable(output)
+    if pdf:
+        require_writable(printed)
+        find_chromium()
+    request = ReportRequest(path, orbit, source, survey, run, other, instrument)
+    with reporting("reading") as reporter:
+        content = _composed(request)
+        reporter.say("drawing")
+        from plateviz.reports.page import page_of
+
+        page = page_of(content, reporter.step)
+        with write_atomically(output) as temporary:
+            temporary.write_text(page, encoding="utf-8")
+        if pdf:
+            reporter.say("printing")
+            print_pdf(output, printed)
+    typer.echo(f"{output}: {content.title}, {output.stat().st_size / 1e6:.1f} MB")
+    if pdf:
+        typer.echo(f"{printed}: printed")
+
+
+def _composed(request: ReportRequest) -> "Report":
+    if not request.path.is_dir():
+        return _of_file(request)
+    chosen = [request.orbit is not None, request.source is not None, request.survey]
+    if sum(chosen) > 1:
+        raise InputError("report: expected one of --orbit, --source and --survey, found several")
+    if request.other is not None and request.orbit is None:
+        raise InputError("--other: expected with --orbit, or with a result of `plateviz fit`")
+    from plateviz.history import open_run
+    from plateviz.reports.survey import source_report, survey_report
+
+    run, facts = open_run(request.path, request.run), _facts(request.run)
+    if request.source is not None:
+        return source_report(run, request.source, facts)
+    if request.orbit is None:
+        return survey_report(run, facts)
+    return _of_survey_orbit(request, request.orbit, facts)
+
+
+def _of_file(request: ReportRequest) -> "Report":
+    if request.orbit is not None or request.source is not None or request.survey:
+        raise InputError(
+            f"{request.path}: expected a survey directory with --orbit, --source or --survey, "
+            "found no directory"
+        )
+    from plateviz.reports.orbit import orbit_report
+    from solver.instrument import MINI_MOCK, read_instrument
+    from solver.io.result import read_result
+
+    focal_plane = read_instrument(request.instrument) if request.instrument else MINI_MOCK
+    other = read_result(Path(request.other)) if request.other else None
+    return orbit_report(read_result(request.path), focal_plane, _facts(), other)
+
+
+def _of_survey_orbit(request: ReportRequest, orbit: int, facts: "Facts") -> "Report":
+    from plateviz.history import open_run
+    from plateviz.reports.orbit import failed_orbit_report, orbit_report
+    from plateviz.source import SurveyFolder
+
+    folder = SurveyFolder(str(request.path))
+    if orbit not in folder.orbits():
+        raise InputError(f"{request.path}: expected an orbit {orbit}, found none of that number")
+    run = open_run(request.path, request.run)
+    message = run.failures().get(orbit)
+    if message is not None:
+        return failed_orbit_report(folder.read(orbit), message, facts)
+    return orbit_report(run.result(orbit), folder.read_instrument(), facts, _other(request, orbit))
+
+
+def _other(request: ReportRequest, orbit: int) -> "FitResult | None":
+    """Return the solution to compare with: of another run, or of a result file."""
+    if request.other is None:
+        return None
+    from plateviz.history import open_run
+    from solver.io.result import read_result
+
+    path = Path(request.other)
+    return (
+        read_result(path) if path.is_file() else open_run(request.path, request.other).result(orbit)
+    )
+
+
+def _facts(run: str | None = None) -> "Facts":
+    """Return what made the report."""
+    from solver.versions import versions_of
+
+    made = {"Command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])}
+    if run is not None:
+        made["Run"] = run
+    return {
+        "Report": made,
+        "Versions": {**versions_of(_PACKAGES), "Python": platform.python_version()},
+    }

@@ -1,0 +1,114 @@
+"""The report of one fitted orbit."""
+
+import json
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from plateviz.gallery import diagnostics
+from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.reports.report import Facts, Picture, Report
+from plateviz.tables import calibration_tables, exposure_chi2, outlier_list, summary_strip
+from plateviz.tables.labels import dates
+from plateviz.tables.verdict import Verdict, orbit_verdict
+from solver.instrument import Instrument
+from solver.orbit import OrbitData
+from solver.result import FitResult
+
+# So many exposures can be chosen by themselves: those whose chi2 is farthest off.
+_FARTHEST = 3
+
+
+def orbit_report(
+    result: FitResult, instrument: Instrument, facts: Facts, other: FitResult | None = None
+) -> Report:
+    """Return the report of one orbit.
+
+    Parameters
+    ----------
+    result : the solution
+    instrument : that took the orbit
+    facts : what is known beside it; settings and inputs are added here
+    other : solution to compare with
+    """
+    date = dates(pd.Series([result.summary["epoch_mjd"]])).iloc[0]
+    whole = Chosen(result, instrument, _exposures(result.exposures), other=other)
+    tables = calibration_tables(result)
+    outliers = outlier_list(result)
+    if outliers is not None:
+        tables[f"Outliers ({len(outliers):,})"] = outliers
+    return Report(
+        title=f"Orbit {result.orbit_id}",
+        subtitle=f"Plate Analysis of one orbit, mean epoch {date} (TCB)",
+        verdict=orbit_verdict(result),
+        items=summary_strip(result),
+        pictures=[_picture(d, whole) for d in diagnostics() if d.has_data(whole)],
+        tables=tables,
+        facts={
+            **facts,
+            "Settings": {k: json.dumps(v) for k, v in result.settings.to_dict().items()},
+            "Inputs (SHA-256)": dict(result.provenance),
+        },
+    )
+
+
+def failed_orbit_report(data: OrbitData, message: str, facts: Facts) -> Report:
+    """Return the report of an orbit that has no solution.
+
+    Parameters
+    ----------
+    data : what was to be solved
+    message : why it was not
+    """
+    rows = data.measurements
+    counts = rows.groupby(["field_id", "plate_id", "detector_id"]).size().rename("n_obs")
+    tables = {"Measurements by exposure and detector": counts.reset_index()}
+    found = [
+        f"The orbit has {len(rows):,} measurements of {rows['source_id'].nunique():,} sources on "
+        f"{len(data.exposures):,} exposures."
+    ]
+    headline = "This orbit has no solution."
+    return Report(
+        title=f"Orbit {data.orbit_id}",
+        subtitle="Plate Analysis of one orbit, failed",
+        verdict=Verdict("bad", headline, [message], found),
+        items=[],
+        pictures=[],
+        tables=tables,
+        facts={**facts, "Inputs (SHA-256)": dict(data.provenance)},
+    )
+
+
+def _picture(diagnostic: Diagnostic, whole: Chosen) -> Picture:
+    chosen = _selections(whole) if diagnostic.follows_selection else {"All": whole}
+    return Picture(
+        diagnostic.name,
+        diagnostic.title,
+        diagnostic.caption,
+        {words: partial(diagnostic.draw, one) for words, one in chosen.items()},
+        diagnostic.is_wide,
+    )
+
+
+def _selections(whole: Chosen) -> dict[str, Chosen]:
+    """Return what a reader may choose of the figures that follow a selection."""
+    chi2 = exposure_chi2(whole.result)
+    farthest = chi2.sort_values("z", key=np.abs, ascending=False).head(_FARTHEST)
+    detectors = [detector.detector_id for detector in whole.instrument.detectors]
+    of_detector = {
+        f"All exposures, detector {number}": replace(whole, detector=number) for number in detectors
+    }
+    of_exposure = {
+        f"{row.exposure.capitalize()} (χ²/dof {row.chi2_per_dof:.3f})": replace(
+            whole, exposures=((row.field_id, row.plate_id),)
+        )
+        for row in farthest.itertuples()
+    }
+    return {"All exposures and detectors": whole, **of_detector, **of_exposure}
+
+
+def _exposures(table: pd.DataFrame) -> tuple[tuple[int, int], ...]:
+    pairs = table[["field_id", "plate_id"]].itertuples(index=False)
+    return tuple((int(field), int(plate)) for field, plate in pairs)

@@ -1,0 +1,92 @@
+"""The page of a report: one HTML file that fetches nothing."""
+
+import json
+import math
+from collections.abc import Callable
+from datetime import UTC, datetime
+from functools import cache
+from importlib.resources import files
+
+import pandas as pd
+from bokeh.resources import Resources
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from plateviz.reports.figure import dark_colours, packed_document
+from plateviz.reports.report import Picture, Report
+
+_DRAWN_IN = "light"
+_FOLDER = files("plateviz.reports")
+
+
+def page_of(
+    report: Report,
+    progress: Callable[[int, int], None] = lambda *_: None,
+    made: datetime | None = None,
+) -> str:
+    """Return a report as HTML.
+
+    Parameters
+    ----------
+    progress : called with the number of figures drawn, and of all
+    made : the time stamp; now by default. Two pages of the same report differ in nothing else
+    """
+    figures = []
+    for done, picture in enumerate(report.pictures, start=1):
+        figures.append(_figure(picture))
+        progress(done, len(report.pictures))
+    stamp = (made or datetime.now(UTC)).strftime("%Y-%m-%d %H:%M:%S UTC")
+    return (
+        _environment()
+        .get_template("page.html")
+        .render(
+            report=report,
+            made=stamp,
+            figures=figures,
+            tables={title: _rows(table) for title, table in report.tables.items()},
+            style=_text("page.css"),
+            script=_text("page.js"),
+            bokeh=Markup(_bokeh()),
+            colours=Markup(json.dumps(dark_colours())),
+        )
+    )
+
+
+def _figure(picture: Picture) -> dict[str, object]:
+    documents = {words: packed_document(draw(_DRAWN_IN)) for words, draw in picture.choices.items()}
+    return {"picture": picture, "documents": documents}
+
+
+def _rows(table: pd.DataFrame) -> list[list[str]]:
+    return [list(map(_cell, table.columns, row)) for row in table.itertuples(index=False)]
+
+
+def _cell(title: str, value: object) -> str:
+    """Return a value as people read it; nothing where there is none."""
+    if not isinstance(value, float):
+        return str(value)
+    # A coordinate needs ten decimals to tell microarcseconds apart, a size five digits.
+    return "" if math.isnan(value) else f"{value:.10f}" if "[deg]" in title else f"{value:.5g}"
+
+
+def _text(name: str) -> Markup:
+    return Markup((_FOLDER / name).read_text(encoding="utf-8"))
+
+
+@cache
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("plateviz.reports", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+@cache
+def _bokeh() -> str:
+    """Return the library that draws, without the parts for widgets, tables and formulas."""
+    script = Resources(mode="inline", components=["bokeh"], minified=True).js_raw[0]
+    # What a script in a page must not contain.
+    return script.replace("</script", "<\\/script")

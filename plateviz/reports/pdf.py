@@ -1,0 +1,63 @@
+"""Printing a report with the Chromium of this machine."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from solver.errors import InputError
+from solver.io.atomic import write_atomically
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+# Time of the page's own clock in which all figures are drawn; it runs as fast as they are.
+_BUDGET_MS = 60_000
+_PATIENCE_S = 180.0
+
+
+def find_chromium() -> Path:
+    """Return the Chromium of this machine.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    for name in _NAMES:
+        found = shutil.which(name)
+        if found is not None:
+            return Path(found)
+    raise InputError(f"--pdf: expected one of {', '.join(_NAMES)} on the path, found none")
+
+
+def print_pdf(page: Path, target: Path) -> None:
+    """Print a report as PDF.
+
+    Raises
+    ------
+    InputError
+        If there is no Chromium, it fails, or `target` cannot be written.
+    """
+    chromium = find_chromium()
+    with write_atomically(target) as temporary, TemporaryDirectory(prefix="plateviz-") as profile:
+        # As root, which containers run as, Chromium starts without its sandbox only.
+        as_root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+        command = [
+            str(chromium),
+            "--headless",
+            *as_root,
+            "--disable-gpu",
+            "--no-first-run",
+            "--disable-background-networking",
+            f"--user-data-dir={profile}",
+            f"--virtual-time-budget={_BUDGET_MS}",
+            "--no-pdf-header-footer",
+            f"--print-to-pdf={temporary.resolve()}",
+            page.resolve().as_uri(),
+        ]
+        try:
+            subprocess.run(command, check=True, capture_output=True, timeout=_PATIENCE_S)
+        except (OSError, subprocess.SubprocessError) as error:
+            raise InputError(f"{target}: expected {chromium} to print, found: {error}") from error
+        if not temporary.stat().st_size:
+            raise InputError(f"{target}: expected {chromium} to print, found an empty file")

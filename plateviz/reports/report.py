@@ -1,0 +1,59 @@
+"""Report: what one file says, before it is HTML."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import holoviews as hv
+import pandas as pd
+
+from plateviz.tables import SummaryItem
+from plateviz.tables.verdict import Verdict
+
+Facts = dict[str, dict[str, str]]
+"""What is known beside the solution: title -> name -> value."""
+
+Draw = Callable[[str], hv.core.Dimensioned]
+"""Gives a picture in a theme."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One figure of a report.
+
+    Attributes
+    ----------
+    name : short and unique in the report
+    title, caption : for people
+    choices : words -> what to draw; a reader chooses where there are several
+    is_wide : whether it takes the whole width of the page
+    """
+
+    name: str
+    title: str
+    caption: str
+    choices: dict[str, Draw]
+    is_wide: bool = False
+
+
+@dataclass(frozen=True)
+class Report:
+    """What one file says, in the order of the attributes.
+
+    Attributes
+    ----------
+    title : of what it is
+    subtitle : what it was made from, in words
+    verdict : whether to trust it
+    items : the numbers to judge it by
+    pictures : every figure
+    tables : title -> values
+    facts : settings, versions, hashes of the inputs, the command
+    """
+
+    title: str
+    subtitle: str
+    verdict: Verdict
+    items: list[SummaryItem]
+    pictures: list[Picture]
+    tables: dict[str, pd.DataFrame] = field(default_factory=dict)
+    facts: Facts = field(default_factory=dict)

@@ -1,0 +1,81 @@
+"""The reports of a fitted survey, and of one of its sources."""
+
+from functools import partial
+
+from plateviz.gallery import source_figures, survey_figures
+from plateviz.history import SurveyRun
+from plateviz.plots.survey_figure import SourceFigure, SourceTables, SurveyFigure, SurveyTables
+from plateviz.reports.report import Facts, Picture, Report
+from plateviz.survey_tables import survey_tables
+from plateviz.tables import (
+    motion_table,
+    orbit_list,
+    run_strip,
+    source_class,
+    source_orbits,
+    source_strip,
+)
+from plateviz.tables.headings import MOTION, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in_words
+from plateviz.tables.run_health import MISSING
+from plateviz.tables.verdict import run_verdict, source_verdict
+from solver.errors import InputError
+
+
+def survey_report(run: SurveyRun, facts: Facts) -> Report:
+    """Return the report of a run of a survey.
+
+    Parameters
+    ----------
+    facts : what is known beside it
+
+    Raises
+    ------
+    InputError
+        If orbits of the run are missing; those that failed are reported.
+    """
+    tables = survey_tables(run)
+    orbits, motions = tables.orbits, tables.motions
+    missing = int((orbits["status"] == MISSING).sum())
+    if missing:
+        raise InputError(
+            f"{run.directory}: expected a whole run, found {missing} of {len(orbits)} orbits "
+            "missing; `plateviz survey` goes on with them"
+        )
+    return Report(
+        title=f"Survey {run.survey.resolve().name}",
+        subtitle=f"Run {run.name} of {len(orbits):,} orbits",
+        verdict=run_verdict(orbits, motions),
+        items=run_strip(orbits, motions),
+        pictures=[_picture(figure, tables) for figure in survey_figures()],
+        tables={"Orbits": in_words(orbit_list(orbits), ORBITS_OF_RUN)},
+        facts=facts,
+    )
+
+
+def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
+    """Return the report of one source of a run.
+
+    Raises
+    ------
+    InputError
+        If the run has no such source.
+    """
+    history, motion = run.history(source_id), run.motion(source_id)
+    if history.empty:
+        raise InputError(f"{run.directory}: expected a source {source_id}, found none of that id")
+    found = SourceTables(history, motion)
+    tables = {} if motion is None else {"Motion": in_words(motion_table(motion), MOTION)}
+    return Report(
+        title=f"Source {source_id}",
+        subtitle=f"{source_class(history).capitalize()} source in run {run.name}",
+        verdict=source_verdict(history, motion),
+        items=source_strip(history, motion),
+        pictures=[_picture(figure, found) for figure in source_figures()],
+        tables=tables | {"Orbits": in_words(source_orbits(history), ORBITS_OF_SOURCE)},
+        facts=facts,
+    )
+
+
+def _picture(figure: SurveyFigure | SourceFigure, tables: SurveyTables | SourceTables) -> Picture:
+    draw = partial(figure.draw, tables)  # type: ignore[arg-type]
+    return Picture(figure.name, figure.title, figure.caption, {"All": draw}, figure.is_wide)

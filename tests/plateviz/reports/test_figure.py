@@ -1,0 +1,76 @@
+"""Figures of reports: light ones turn dark by their colours alone, and bytes repeat."""
+
+import gzip
+import json
+import re
+from base64 import b64decode
+from types import SimpleNamespace
+
+import holoviews as hv
+import pytest
+
+from plateviz.gallery import diagnostics, source_figures, survey_figures
+from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.survey_figure import SourceTables, SurveyTables
+from plateviz.reports.figure import dark_colours, packed_document
+
+DIAGNOSTICS = {d.name: d for d in diagnostics()}
+OF_SURVEY = {f.name: f for f in survey_figures()}
+OF_SOURCE = {f.name: f for f in source_figures()}
+
+
+@pytest.fixture(scope="module")
+def draw(compared, instrument, survey):
+    """Return the function that draws any figure in a theme, by its name."""
+    pairs = compared.exposures[["field_id", "plate_id"]].itertuples(index=False)
+    whole = Chosen(compared, instrument, tuple(map(tuple, pairs)), other=compared)
+    surveyed = SurveyTables(survey.orbits, survey.motions, survey.catalogue, survey.truth)
+    source = SourceTables(*survey.source("other"))
+
+    def drawn(name, theme):
+        if name in DIAGNOSTICS:
+            return DIAGNOSTICS[name].draw(whole, theme)
+        if name in OF_SURVEY:
+            return OF_SURVEY[name].draw(surveyed, theme)
+        return OF_SOURCE[name].draw(source, theme)
+
+    return drawn
+
+
+def unpacked(element):
+    return json.loads(gzip.decompress(b64decode(packed_document(element))))
+
+
+def darkened(part, table):
+    """Do in Python what the page does in the browser."""
+    if isinstance(part, str):
+        return table.colours.get(part, part)
+    if isinstance(part, list):
+        found = [dark for light, dark in table.palettes if part == light]
+        return found[0] if found else [darkened(value, table) for value in part]
+    if isinstance(part, dict):
+        return {key: darkened(value, table) for key, value in part.items()}
+    return part
+
+
+@pytest.mark.parametrize("name", [*DIAGNOSTICS, *OF_SURVEY, *OF_SOURCE])
+def test_light_figure_in_dark_colours_is_the_dark_figure(draw, name):
+    table = SimpleNamespace(**dark_colours())
+    expected = unpacked(draw(name, "dark"))
+    assert darkened(unpacked(draw(name, "light")), table) == darkened(expected, table)
+
+
+def test_figure_that_is_drawn_again_has_the_same_bytes(draw):
+    assert packed_document(draw("deviation", "light")) == packed_document(
+        draw("deviation", "light")
+    )
+
+
+def test_models_are_counted_from_one():
+    found = set(re.findall(r'"id": "(\w+)"', json.dumps(unpacked(hv.Points([(0.0, 1.0)])))))
+    assert found == {f"m{number + 1}" for number in range(len(found))}
+
+
+def test_background_is_said_though_it_is_white():
+    figure = unpacked(hv.Points([(0.0, 1.0)]))["roots"][0]
+    assert figure["attributes"]["border_fill_color"] == "#ffffff"

@@ -1,0 +1,107 @@
+"""Pages of reports: what they say, that they repeat, and that they fetch nothing."""
+
+import re
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import pandas as pd
+import pytest
+
+from plateviz.gallery import diagnostics
+from plateviz.reports.orbit import failed_orbit_report, orbit_report
+from plateviz.reports.page import page_of
+from plateviz.reports.report import Report
+from plateviz.tables.verdict import Verdict
+from solver.orbit import OrbitData
+
+FACTS = {"Report": {"Command": "plateviz report <b>here</b>"}}
+MADE = datetime(2030, 1, 2, 3, 4, 5, tzinfo=UTC)
+_ADDRESS = re.compile(r"""(?:src|href)=["']?(?!data:)[^"'\s>]+|@import|url\(""")
+
+
+@pytest.fixture(scope="module")
+def report(fit_result, instrument):
+    return orbit_report(fit_result, instrument, FACTS)
+
+
+@pytest.fixture(scope="module")
+def page(report):
+    return page_of(report, made=MADE)
+
+
+def shell_of(page):
+    """Return the page without what scripts and documents hold."""
+    return re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+
+
+def test_page_repeats_byte_for_byte_but_for_its_time(report, page):
+    later = page_of(report, made=MADE.replace(year=2031))
+    assert later != page
+    assert later.replace("2031-01-02", "2030-01-02") == page
+
+
+def test_page_names_nothing_to_fetch(page):
+    assert _ADDRESS.findall(shell_of(page)) == []
+
+
+def test_page_has_every_figure_with_data_and_its_caption(report, page, fit_result):
+    shell = shell_of(page)
+    for diagnostic in diagnostics():
+        there = f'id="figure-{diagnostic.name}"' in shell
+        assert there == (diagnostic.name not in ("comparison", "orders"))
+    assert all(picture.title in shell for picture in report.pictures)
+
+
+def test_page_tells_command_settings_and_hashes(fit_result, instrument):
+    hashed = replace(fit_result, provenance={"obs.fits": "0123abcd"})
+    shell = shell_of(page_of(orbit_report(hashed, instrument, FACTS)))
+    for words in ("plateviz report &lt;b&gt;here&lt;/b&gt;", "0123abcd", "gauss-newton"):
+        assert words in shell
+
+
+def test_words_of_people_stay_words():
+    verdict = Verdict("warn", "<script>alert(1)</script>", [], [])
+    report = Report("a & b", "", verdict, [], [], {"T": pd.DataFrame({"<i>": ["</table>"]})})
+    shell = page_of(report)
+    assert "<script>alert(1)" not in shell
+    assert "a &amp; b" in shell
+    assert "&lt;/table&gt;" in shell
+
+
+def test_coordinates_are_told_to_ten_decimals_and_nothing_for_nan():
+    table = pd.DataFrame({"RA [deg]": [266.12345678912], "σ": [float("nan")]})
+    shell = page_of(Report("t", "", Verdict("good", "", [], []), [], [], {"T": table}))
+    assert "<td>266.1234567891</td><td></td>" in shell
+
+
+def test_without_a_truth_its_figure_is_absent_and_the_report_says_so(fit_result, instrument):
+    summary = {k: v for k, v in fit_result.summary.items() if k != "truth"}
+    blind = replace(fit_result, true_places=None, summary=summary)
+    report = orbit_report(blind, instrument, {})
+    assert "deviation" not in [picture.name for picture in report.pictures]
+    assert any("no truth" in sentence for sentence in report.verdict.notable)
+
+
+def test_two_solutions_are_compared(fit_result, instrument):
+    report = orbit_report(fit_result, instrument, {}, other=fit_result)
+    assert "comparison" in [picture.name for picture in report.pictures]
+
+
+def test_selections_are_all_then_each_detector_then_the_farthest_exposures(report):
+    choices = next(p.choices for p in report.pictures if p.name == "residual-map")
+    words = list(choices)
+    assert words[0] == "All exposures and detectors"
+    assert words[1:5] == [f"All exposures, detector {number}" for number in (0, 1, 2, 3)]
+    assert all("χ²/dof" in chosen for chosen in words[5:])
+    assert len(words) == 8
+
+
+def test_failed_orbit_says_why_and_what_there_is(made_survey):
+    from plateviz.source import SurveyFolder
+
+    data: OrbitData = SurveyFolder(str(made_survey)).read(1)
+    report = failed_orbit_report(data, "orbit 1: singular", {})
+    page = page_of(report)
+    assert "This orbit has no solution." in page
+    assert "orbit 1: singular" in page
+    assert f"{len(data.measurements):,} measurements" in page

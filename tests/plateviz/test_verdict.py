@@ -1,0 +1,79 @@
+"""Verdicts in words, against solutions with a known flaw."""
+
+from dataclasses import replace
+
+import pytest
+
+from plateviz.tables.verdict import orbit_verdict, run_verdict, source_verdict, worst
+
+
+def with_summary(result, **values):
+    return replace(result, summary={**result.summary, **values})
+
+
+@pytest.mark.parametrize(
+    ("states", "expected"),
+    [
+        ([], "good"),
+        (["good", "neutral"], "good"),
+        (["warn", "good"], "warn"),
+        (["warn", "bad"], "bad"),
+    ],
+)
+def test_worst_state_decides(states, expected):
+    assert worst(states) == expected
+
+
+def test_solution_as_it_should_be_can_be_trusted(fit_result):
+    sound = with_summary(fit_result, chi2_per_dof=1.0)
+    verdict = orbit_verdict(sound)
+    assert verdict.state in ("good", "warn")
+    assert verdict.reasons[0].startswith("The fit converged after")
+
+
+def test_solution_that_has_not_converged_is_not_trusted(fit_result):
+    verdict = orbit_verdict(with_summary(fit_result, converged=False, reason="it ran out"))
+    assert verdict.state == "bad"
+    assert "not be trusted" in verdict.headline
+    assert verdict.reasons[0] == "The fit has not converged: it ran out."
+
+
+def test_chi2_far_off_is_told(fit_result):
+    verdict = orbit_verdict(with_summary(fit_result, chi2_per_dof=2.0))
+    assert verdict.state == "bad"
+    assert any("2.000, far from what is expected" in sentence for sentence in verdict.reasons)
+
+
+def test_exposure_and_source_that_stand_out_are_named(fit_result):
+    exposures, sources = fit_result.exposures.copy(), fit_result.sources.copy()
+    exposures.loc[3, "chi2"] *= 2.0
+    sources.loc[5, "chi2"] = sources.loc[5, "dof"] * 9.0
+    notable = orbit_verdict(replace(fit_result, exposures=exposures, sources=sources)).notable
+    plate = exposures.loc[3, ["field_id", "plate_id"]].astype(int).tolist()
+    assert any("field {}, exposure {}".format(*plate) in sentence for sentence in notable)
+    assert any(str(sources.loc[5, "source_id"]) in sentence for sentence in notable)
+
+
+def test_run_names_its_failed_orbits(survey):
+    verdict = run_verdict(survey.orbits, survey.motions)
+    assert verdict.state == "bad"
+    told = [sentence for sentence in verdict.notable if "has no solution" in sentence]
+    assert [sentence.split()[1] for sentence in told] == ["11", "12"]
+
+
+def test_run_without_an_orbit_fitted_says_so(survey):
+    none = survey.orbits.assign(status="missing")
+    assert "No orbit has a solution." in run_verdict(none, survey.motions.iloc[:0]).reasons
+
+
+@pytest.mark.parametrize(("chi2", "state"), [(100.0, "good"), (160.0, "bad"), (30.0, "warn")])
+def test_source_is_judged_by_the_scatter_about_its_motion(survey, chi2, state):
+    history, motion = survey.source("other")
+    motion = motion.copy()
+    motion["chi2"], motion["dof"] = chi2, 100
+    assert source_verdict(history, motion).state == state
+
+
+def test_source_without_a_motion_cannot_be_judged(survey):
+    history, _ = survey.source("other")
+    assert source_verdict(history, None).state == "warn"

@@ -9,15 +9,18 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from solver.forward import (
+    DIRECTING,
     AnyArray,
     Directions,
     Geometry,
     Index,
     Offsets,
+    Pair,
     directions,
     ideal_position,
     image,
 )
+from solver.layout import LOCAL_GROUPS, PER_COEFFICIENT
 from solver.problem import Problem
 
 
@@ -29,6 +32,8 @@ class Gradient(NamedTuple):
     by_source: Float[np.ndarray, "src 2"]
 
 
+_TOUCHED = tuple(g.name for g in LOCAL_GROUPS if g.name not in DIRECTING)
+_COEFFICIENTS = tuple(g.name for g in PER_COEFFICIENT)
 # So many chunks are on their way at once: one by itself does not keep all cores busy, and all
 # of a large orbit would need memory at once.
 _IN_FLIGHT = 4
@@ -55,23 +60,31 @@ def gradient(
 def half_chi2(
     seen: Directions,
     offsets: Offsets,
+    displacement: Pair,
     geometry: Geometry,
     index: Index,
     measured: Float[AnyArray, "2 ..."],
     weight: Float[AnyArray, "2 ..."],
-) -> Float[Array, ""]:
+) -> tuple[Float[Array, ""], list[Float[Array, "..."]]]:
     """Return half of the data's chi2: minus the logarithm of the likelihood, but a constant.
 
     Parameters
     ----------
     seen : those of `offsets`
+    displacement : um, added to the distorted positions
     measured : pixels
     weight : 1/sigma, pixel^-1
+
+    Returns
+    -------
+    It, and the basis of the distortion: the derivative by `displacement` times the basis is that
+    by the coefficients
     """
     ideal = ideal_position(seen, offsets, geometry, index)
-    x, y = image(ideal, offsets, geometry, index).pixel
+    prediction = image(ideal, offsets, geometry, index, displacement)
+    x, y = prediction.pixel
     whitened = (measured[0] - x) * weight[0], (measured[1] - y) * weight[1]
-    return 0.5 * (jnp.sum(whitened[0] ** 2) + jnp.sum(whitened[1] ** 2))
+    return 0.5 * (jnp.sum(whitened[0] ** 2) + jnp.sum(whitened[1] ** 2)), prediction.basis
 
 
 @jax.custom_vjp
@@ -99,7 +112,8 @@ def _with_gradient(
         part = _of_chunk(seen, offsets, geometry, *chunk)
         return jax.tree.map(jnp.add, total, part), None
 
-    start = jax.tree.map(jnp.zeros_like, (jnp.zeros(()), (seen, offsets)))
+    others = {name: offsets[name] for name in (*_TOUCHED, *_COEFFICIENTS)}
+    start = jax.tree.map(jnp.zeros_like, (jnp.zeros(()), seen, others))
     return _to_offsets(jax.lax.scan(add, start, chunks)[0], offsets, geometry)
 
 
@@ -110,22 +124,40 @@ def _scaled_gradient(gradient: Offsets, scale: Float[Array, ""]) -> tuple:
 half_chi2_of_chunks.defvjp(_with_gradient, _scaled_gradient)
 
 
-# Value and derivatives of `half_chi2`, those by directions and by offsets apart.
-_Part = tuple[Float[Array, ""], tuple[Directions, Offsets]]
+# Value and derivatives of `half_chi2`: by the directions, and by the offsets that are not in them.
+_Part = tuple[Float[Array, ""], Directions, Offsets]
 
 _directions = jax.jit(directions)
 
 
 @jax.jit
-def _of_chunk(seen: Directions, offsets: Offsets, *chunk: AnyArray) -> _Part:
-    return jax.value_and_grad(half_chi2, argnums=(0, 1))(seen, offsets, *chunk)
+def _of_chunk(
+    seen: Directions, offsets: Offsets, geometry: Geometry, index: Index, *values: AnyArray
+) -> _Part:
+    still = (jnp.zeros_like(values[0][0]),) * 2
+
+    def of(seen: Directions, touched: Offsets, displacement: Pair) -> tuple[Array, list[Array]]:
+        return half_chi2(seen, {**offsets, **touched}, displacement, geometry, index, *values)
+
+    touched = {name: offsets[name] for name in _TOUCHED}
+    (half, basis), (by_directions, by_touched, by_displacement) = jax.value_and_grad(
+        of, argnums=(0, 1, 2), has_aux=True
+    )(seen, touched, still)
+    # A product of matrices: term by term, XLA would make each sum by a loop of its own.
+    pair = jnp.stack(by_displacement).reshape(2, -1)
+    terms = jnp.stack(basis).reshape(-1, pair.shape[1]) if basis else jnp.zeros((0, pair.shape[1]))
+    return (
+        half,
+        by_directions,
+        {**by_touched, **dict(zip(_COEFFICIENTS, pair @ terms.T, strict=True))},
+    )
 
 
 @jax.jit
 def _to_offsets(
     total: _Part, offsets: Offsets, geometry: Geometry
 ) -> tuple[Float[Array, ""], Offsets]:
-    """Return the derivatives by offsets alone, those through the directions among them."""
-    half, (by_directions, by_offsets) = total
+    """Return the derivatives by all offsets."""
+    half, by_directions, by_others = total
     _, back = jax.vjp(lambda moved: directions(moved, geometry), offsets)
-    return half, jax.tree.map(jnp.add, by_offsets, *back(by_directions))
+    return half, {**back(by_directions)[0], **by_others}

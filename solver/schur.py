@@ -101,9 +101,9 @@ class Reduced:
     ) -> Float[np.ndarray, "src 2 2"]:
         """Return the covariance of each source with the calibration integrated out, mas^2."""
         inner = np.empty((2, 2, spread.shape[-1]))
-        for a in range(2):
-            for b in range(2):
-                inner[a, b] = np.einsum("ks,ks->s", spread[:, a], spread[:, b]) + (a == b)
+        for a, b in ((0, 0), (0, 1), (1, 1)):
+            inner[a, b] = np.einsum("ks,ks->s", spread[:, a], spread[:, b]) + (a == b)
+        inner[1, 0] = inner[0, 1]
         half = _upper_solve(self.source_factor, inner)
         return _upper_solve(self.source_factor, half.swapaxes(0, 1)).transpose(2, 1, 0).copy()
 

@@ -9,7 +9,7 @@ measurements runs along contiguous memory. Tiles are worked on a chunk at a time
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Shaped
 
 from solver.forward import Index
 
@@ -20,6 +20,10 @@ FEW_SLOTS = 16
 # Long enough to keep the cores busy, short enough to stay in their caches. One length means
 # one compilation, whatever the number of measurements.
 CHUNK = 256
+# One chunk of so many does for what a single exposure or source adds.
+FEW_TILES = 128
+# Bytes; what XLA asks of an array that it is to share.
+_ALIGNMENT = 64
 
 
 class Tiles(NamedTuple):
@@ -59,18 +63,28 @@ def lay_tiles(
     length = np.diff(first, append=n_obs)
     slots = SLOTS if length.mean() > 2 * FEW_SLOTS else FEW_SLOTS
     tiles = -(-length // slots)
-    n_chunks = -(-tiles.sum() // CHUNK)
+    chunk = min(CHUNK, FEW_TILES) if tiles.sum() <= FEW_TILES else CHUNK
+    n_chunks = -(-tiles.sum() // chunk)
     place = np.repeat(slots * (np.cumsum(tiles) - tiles) - first, length) + np.arange(n_obs)
     # Empty slots repeat the measurement before them.
-    row = np.zeros(n_chunks * CHUNK * slots, dtype=np.int64)
+    row = np.zeros(n_chunks * chunk * slots, dtype=np.int64)
     row[place] = np.arange(n_obs)
-    row = np.maximum.accumulate(row).reshape(n_chunks, CHUNK, slots)
+    row = np.maximum.accumulate(row).reshape(n_chunks, chunk, slots)
     weight = np.zeros((2, row.size))
     weight[:, place] = 1.0 / sigma.T
     head = row[:, :, :1]
     return Tiles(
-        Index(index.source[row], index.exposure[head], index.detector[head]),
-        np.ascontiguousarray(measured.T[:, row].swapaxes(0, 1)),
-        np.ascontiguousarray(weight.reshape(2, *row.shape).swapaxes(0, 1)),
+        Index(*map(_aligned, (index.source[row], index.exposure[head], index.detector[head]))),
+        _aligned(measured.T[:, row].swapaxes(0, 1)),
+        _aligned(weight.reshape(2, *row.shape).swapaxes(0, 1)),
         place,
     )
+
+
+def _aligned(values: Shaped[np.ndarray, "..."]) -> Shaped[np.ndarray, "..."]:
+    """Return a copy that JAX on a CPU takes as it is: from elsewhere it would copy each chunk."""
+    room = np.empty(values.nbytes + _ALIGNMENT, dtype=np.uint8)
+    first = -room.ctypes.data % _ALIGNMENT
+    copy = room[first : first + values.nbytes].view(values.dtype).reshape(values.shape)
+    copy[...] = values
+    return copy

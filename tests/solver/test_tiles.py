@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from solver.forward import Index
-from solver.tiles import SLOTS, lay_tiles
+from solver.tiles import FEW_TILES, SLOTS, lay_tiles
 
 
 def measurements(lengths, seed=0):
@@ -52,6 +52,20 @@ def test_a_tile_holds_one_exposure_and_one_detector(laid):
 def test_other_slots_have_no_weight(laid):
     _, measured, _, tiles = laid
     assert (tiles.weight != 0.0).sum() == measured.size
+
+
+def test_chunks_lie_where_jax_takes_them_without_a_copy(laid):
+    tiles = laid[-1]
+    for i in range(len(tiles.measured)):
+        index, *values = tiles.chunk(i)
+        assert all(part.ctypes.data % 64 == 0 for part in (*index, *values))
+
+
+def test_few_tiles_make_one_small_chunk(monkeypatch):
+    monkeypatch.setattr("solver.tiles.CHUNK", 256)
+    few, many = ({(m, 0): SLOTS for m in range(n)} for n in (FEW_TILES, FEW_TILES + 1))
+    assert lay_tiles(*measurements(few)).measured.shape == (1, 2, FEW_TILES, SLOTS)
+    assert lay_tiles(*measurements(many)).measured.shape == (1, 2, 256, SLOTS)
 
 
 def test_slots_by_source_hold_those_of_each_source(laid):

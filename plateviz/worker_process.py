@@ -15,7 +15,7 @@ import os
 import queue
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import TextIO
@@ -33,7 +33,7 @@ from solver.simulate.survey import simulate_survey
 Request = dict
 Send = Callable[[dict], None]
 # Work that makes the next request quicker, for when none waits.
-Later = Callable[[], None]
+Later = Iterable[None]
 
 
 class _Cancellations:
@@ -61,8 +61,10 @@ def main() -> None:
     send({"event": "ready"})
     while (request := requests.get()) is not None:
         later = _serve(request, send, cancellations)
-        if later is not None and requests.empty():
-            later()
+        for _ in later:
+            # What is not ready yet is made ready after the next answer.
+            if not requests.empty():
+                break
 
 
 def _sender() -> Send:
@@ -91,7 +93,7 @@ def _read(
     os._exit(0)
 
 
-def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later | None:
+def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later:
     job = request["job"]
     work = {"fit": _fit, "simulate": _simulate}[request["do"]]
 
@@ -108,7 +110,7 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later
         send({"event": "cancelled", "job": job})
     except (InputError, FitError) as error:
         send({"event": "failed", "job": job, "message": str(error)})
-    return None
+    return ()
 
 
 def _fit(request: Request, progress: Callable[..., None]) -> Later:
@@ -126,16 +128,17 @@ def _fit(request: Request, progress: Callable[..., None]) -> Later:
         result = fitter.fit(settings, on_iteration)
     progress(stage="writing the result")
     write_run(Path(request["directory"]), result)
-    return lambda: fitter.get_ready(settings.order)
+    return fitter.get_ready()
 
 
-def _simulate(request: Request, progress: Callable[..., None]) -> None:
+def _simulate(request: Request, progress: Callable[..., None]) -> Later:
     settings = SurveySettings.from_dict(request["settings"])
     simulate_survey(
         Path(request["directory"]),
         settings,
         progress=lambda done, total: progress(stage="simulating", done=done, total=total),
     )
+    return ()
 
 
 @lru_cache(maxsize=4)

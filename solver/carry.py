@@ -7,13 +7,11 @@ by the terms that are dropped, which neither the leverage of the measurements no
 priors alone hold would forgive: those are made anew, where the fit ended.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from solver.layout import PER_COEFFICIENT, PER_DETECTOR, PER_EXPOSURE
 from solver.normal import NormalEquations, accumulate
@@ -22,25 +20,9 @@ from solver.parameters import BY_NAME
 from solver.problem import Problem, of_rows
 from solver.units import RAD_PER_MAS
 
-# Beyond this, what each detector added is made anew when it is asked for.
-_MOST_KEPT_BYTES = 2**29
 
-
-class Part(NamedTuple):
-    """What some measurements, a boolean mask, added to the equations at the same point."""
-
-    rows: Bool[np.ndarray, " obs"]
-    equations: NormalEquations
-
-
-def carry_over(
-    equations: NormalEquations, old: Problem, new: Problem, parts: Sequence[Part] = ()
-) -> NormalEquations | None:
+def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> NormalEquations | None:
     """Return normal equations for `new`, made of those of `old`.
-
-    Parameters
-    ----------
-    parts : of measurements that `new` may not have; others are made anew
 
     Returns
     -------
@@ -57,23 +39,8 @@ def carry_over(
         return accumulate(new, *at)
     if not gone.any():
         return replace(equations, at=at)
-    part = next((p.equations for p in parts if np.array_equal(p.rows, gone)), None)
-    if part is None:
-        part = accumulate(of_rows(old, gone), *equations.at)
+    part = accumulate(of_rows(old, gone), *equations.at)
     return _without(equations, part, at, columns, sources)
-
-
-def parts_by_detector(equations: NormalEquations, problem: Problem) -> list[Part]:
-    """Return what the measurements of each detector added, where that is not too much to keep."""
-    n_det = problem.layout.n_det
-    if n_det * equations.cross.nbytes > _MOST_KEPT_BYTES:
-        return []
-    by_detector = [problem.index.detector == number for number in range(n_det)]
-    return [
-        Part(rows, accumulate(of_rows(problem, rows), *equations.at))
-        for rows in by_detector
-        if rows.any() and not rows.all()
-    ]
 
 
 def _same_model(old: Problem, new: Problem) -> bool:

@@ -14,6 +14,9 @@ from solver.leverage import Covariances
 from solver.priors import Priors
 from solver.schur import Reduced
 
+# Sources of which the covariances with the calibration fit into the caches.
+_AT_ONCE = 64
+
 
 class NormalisedDeviation(NamedTuple):
     """Root mean square of (estimate - prior) / prior sigma of the reference stars.
@@ -123,13 +126,39 @@ def error_budget(reduced: Reduced, priors: Priors, covariance: Covariances) -> E
     covariance H_data, and P times the error of the priors' centres, of covariance P. So H^-1
     is H^-1 H_data H^-1 plus H^-1 P H^-1, of which these are the sources' blocks.
     """
-    precision, response, cross = priors.precision, reduced.response(), covariance.cross
+    precision, response = priors.precision, reduced.response()
     conditional, n_calib = reduced.conditional_covariance(), len(reduced.theta)
-    pulled = np.einsum("sab,kbs->kas", precision, response)
+    pulled = np.empty(response.shape)
+    for a in range(2):
+        pulled[:, a] = precision[:, a, 0] * response[:, 0] + precision[:, a, 1] * response[:, 1]
     shared = pulled.reshape(n_calib, -1) @ response.reshape(n_calib, -1).T
-    by_others = (shared @ cross.reshape(n_calib, -1)).reshape(cross.shape)
     half = conditional @ precision @ (covariance.source - 0.5 * conditional)
-    catalogue = half + half.swapaxes(1, 2) + np.einsum("kas,kbs->sab", cross, by_others)
-    by_centres = priors.curvature(covariance.at[0])[:, None, None] * cross
-    calibration = np.einsum("kas,kbs->sab", cross, by_centres)
+    by_others, calibration = _between(
+        covariance.cross, shared, priors.curvature(covariance.at[0])[:, None]
+    )
+    catalogue = half + half.swapaxes(1, 2) + by_others
     return ErrorBudget(covariance.source - catalogue - calibration, catalogue, calibration)
+
+
+def _between(
+    cross: Float[np.ndarray, "calib 2 src"],
+    shared: Float[np.ndarray, "calib calib"],
+    curvature: Float[np.ndarray, "calib 1"],
+) -> tuple[Float[np.ndarray, "src 2 2"], Float[np.ndarray, "src 2 2"]]:
+    """Return C_i' M C_i of each source, for a symmetric matrix and for a diagonal one.
+
+    A few sources at a time, so that all of it stays in the caches.
+    """
+    n_calib, _, n_src = cross.shape
+    found = np.empty((2, 2, 2, n_src))
+    for first in range(0, n_src, _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        rows = cross[:, :, some].reshape(n_calib, -1)
+        part = rows.reshape(n_calib, 2, -1)
+        for kind, moved in enumerate((shared @ rows, curvature * rows)):
+            other = moved.reshape(part.shape)
+            for a, b in ((0, 0), (0, 1), (1, 1)):
+                found[kind, a, b, some] = np.einsum("ks,ks->s", part[:, a], other[:, b])
+    found[:, 1, 0] = found[:, 0, 1]
+    by_others, calibration = found.transpose(0, 3, 1, 2)
+    return by_others, calibration

@@ -1,13 +1,13 @@
 """fit_orbit: one orbit in, one result out; the engines' common front."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
-from solver.carry import Part, parts_by_detector
 from solver.device import require_device
 from solver.engines import Resumption, estimate
 from solver.errors import FitError, InputError
@@ -16,6 +16,7 @@ from solver.exclusions import of_rows, thinned_orbit
 from solver.gauss_newton import Iteration, Mode
 from solver.history import history_table
 from solver.instrument import MINI_MOCK, Instrument
+from solver.leverage import Covariances
 from solver.mode_tables import mode_tables
 from solver.orbit import OrbitData
 from solver.orders import compare_orders
@@ -23,8 +24,10 @@ from solver.problem import Problem, build_problem, orders_held
 from solver.result import FitResult
 from solver.robust import find_outliers, outlier_table
 from solver.settings import FitSettings
+from solver.starts import Start, likely, nearest
 from solver.summary import summarise, truth_summary
 from solver.tables import (
+    Solution,
     calibration_table,
     exposure_table,
     loss_table,
@@ -34,7 +37,7 @@ from solver.tables import (
     trace_table,
     true_places,
 )
-from solver.what_if import carried, re_solve
+from solver.what_if import linearised, re_solve
 
 
 def fit_orbit(
@@ -74,16 +77,9 @@ class _Fitted(NamedTuple):
     settings: FitSettings
     problem: Problem
     mode: Mode
+    covariance: Covariances
     outliers: pd.DataFrame | None
     orders: pd.DataFrame | None
-
-
-class _Start(NamedTuple):
-    """Where a change of settings can start from: a linearised problem and parts of it."""
-
-    problem: Problem
-    mode: Mode
-    parts: list[Part]
 
 
 class OrbitFitter:
@@ -95,7 +91,8 @@ class OrbitFitter:
         self._data = data
         self._instrument = instrument
         self._kept: _Fitted | None = None
-        self._starts: list[_Start] = []
+        self._starts: list[Start] = []
+        self._tried: list[FitSettings] = []
         self._stopped: tuple[FitSettings, object] | None = None
 
     def fit(
@@ -116,13 +113,17 @@ class OrbitFitter:
             data, problem = self._prepare(settings, outliers)
         prepared = time.perf_counter()
         found = estimate(problem, settings, progress, resumption or self._resumption(settings))
-        result = _result(data, self._instrument, settings, problem, found, (start, prepared))
+        result, solution = _result(
+            data, self._instrument, settings, problem, found, (start, prepared)
+        )
         self._stopped = None
         fitted = time.perf_counter()
         orders = self._compare_orders(data, problem, settings, progress)
         if found.mode.status.is_solution:
-            self._kept = _Fitted(settings, problem, found.mode, outliers, orders)
-            self._starts = [_Start(problem, found.mode, [])]
+            self._kept = _Fitted(
+                settings, problem, found.mode, solution.covariance, outliers, orders
+            )
+            self._starts, self._tried = [Start(settings, problem, found.mode)], [settings]
         result = _with_outliers(result, outliers)
         return _with_orders(result, orders, time.perf_counter() - fitted)
 
@@ -145,15 +146,12 @@ class OrbitFitter:
         start = time.perf_counter()
         data, problem = self._prepare(settings, kept.outliers)
         prepared = time.perf_counter()
-        # The one of the lowest order that still holds the one asked for.
-        near = [s for s in self._starts if s.problem.geometry.order >= settings.order]
-        if not near:
-            return None
-        mode = re_solve(near[-1].mode, near[-1].problem, problem, settings, near[-1].parts)
+        near = nearest(self._starts, settings)
+        mode = near and re_solve(near.mode, near.problem, problem, settings)
         if mode is None:
             return None
         found = Estimate(mode)
-        result = _result(data, self._instrument, settings, problem, found, (start, prepared))
+        result, _ = _result(data, self._instrument, settings, problem, found, (start, prepared))
         same_but_order = settings == kept.settings.with_(order=settings.order)
         orders = kept.orders if same_but_order else None
         return replace(_with_outliers(result, kept.outliers), orders=orders)
@@ -171,35 +169,36 @@ class OrbitFitter:
         kept = self._kept
         if kept is None or kept.settings != result.settings or kept.mode.reduced is None:
             raise FitError(f"orbit {self._data.orbit_id}: {result.summary['reason']}")
-        return history_table(kept.problem, kept.mode.reduced, result)
+        return history_table(kept.problem, kept.mode.reduced, kept.covariance, result)
 
-    def get_ready(self, order: int) -> None:
+    def get_ready(self) -> Iterator[None]:
         """Prepare, while nobody waits, for what may be asked of the last fit next.
 
-        A lower order than the given one needs Jacobians of its own, and to leave out a detector
-        a share of the linearised problem; with them both are as quick as other priors.
-        """
-        if self._kept is None:
-            return
-        fitted = self._starts[0]
-        if not fitted.parts:
-            self._starts[0] = fitted._replace(
-                parts=parts_by_detector(fitted.mode.equations, fitted.problem)
-            )
-        if all(start.problem.geometry.order != order - 1 for start in self._starts):
-            self._starts = [*self._starts[:1], *self._lowered(self._kept, order - 1)]
+        See `solver.starts.likely`; with that, it takes no longer than other priors do.
 
-    def _lowered(self, kept: _Fitted, order: int) -> list[_Start]:
-        """Return the last fit linearised with a lower order, where there can be one."""
-        if not 0 <= order < kept.settings.order:
-            return []
+        Yields
+        ------
+        Between steps of less than a second, so that a question need not wait for the rest.
+        """
+        kept = self._kept
+        if kept is None:
+            return
+        detectors = np.unique(self._data.measurements["detector_id"]).tolist()
+        for settings in likely(self._starts[0], detectors):
+            if settings not in self._tried:
+                self._tried.append(settings)
+                self._starts += self._started(kept, settings)
+                yield
+
+    def _started(self, kept: _Fitted, settings: FitSettings) -> list[Start]:
+        """Return the last fit changed and linearised there, where the change can be solved."""
         try:
-            _, problem = self._prepare(kept.settings.with_(order=order), kept.outliers)
+            _, problem = self._prepare(settings, kept.outliers)
         except InputError:
-            # A prior is shifted of a term that the lower order has not.
+            # A prior is shifted of a term that the lower order has not, or too little is left.
             return []
-        mode = carried(kept.mode, kept.problem, problem)
-        return [] if mode is None else [_Start(problem, mode, [])]
+        mode = re_solve(kept.mode, kept.problem, problem, settings)
+        return [] if mode is None else [Start(settings, problem, linearised(problem, mode))]
 
     def _prepare(
         self, settings: FitSettings, outliers: pd.DataFrame | None = None
@@ -253,7 +252,7 @@ def _result(
     problem: Problem,
     found: Estimate,
     times: tuple[float, float],
-) -> FitResult:
+) -> tuple[FitResult, Solution]:
     mode = found.mode
     if mode.reduced is None:
         raise FitError(f"orbit {data.orbit_id}: {mode.status.value}")
@@ -280,4 +279,7 @@ def _result(
     summary = {**summarise(solution, settings, seconds), **found.figures}
     if places is not None:
         summary["truth"] = truth_summary(sources, places)
-    return FitResult(**tables, summary=summary, settings=settings, provenance=dict(data.provenance))
+    result = FitResult(
+        **tables, summary=summary, settings=settings, provenance=dict(data.provenance)
+    )
+    return result, solution

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from solver.leverage import Covariances
 from solver.problem import Problem
 from solver.projection import tangent_frame
 from solver.result import FitResult
@@ -12,16 +13,19 @@ from solver.survey_schema import HISTORY
 from solver.tables import separation
 
 
-def history_table(problem: Problem, reduced: Reduced, result: FitResult) -> pd.DataFrame:
+def history_table(
+    problem: Problem, reduced: Reduced, covariance: Covariances, result: FitResult
+) -> pd.DataFrame:
     """Return `survey_schema.HISTORY` of one orbit, with `survey_schema.SHARED_ERRORS` beside it.
 
     Parameters
     ----------
     reduced : the problem linearised at the solution
+    covariance : what follows from it
     result : the solution
     """
     sources = result.sources.merge(
-        error_budget_table(problem, reduced), on="source_id", validate="one_to_one"
+        error_budget_table(problem, reduced, covariance), on="source_id", validate="one_to_one"
     )
     table = sources.assign(orbit_id=result.orbit_id, epoch=problem.epoch, **_true_offsets(result))[
         HISTORY.names

@@ -14,7 +14,7 @@ from solver.astrometry import catalogue_covariance, jacobian_at, years_since_epo
 from solver.correlation import square_roots
 from solver.diagnostics import error_budget, induced_shift
 from solver.ephemeris import observer_at
-from solver.leverage import covariances
+from solver.leverage import Covariances
 from solver.parameters import SOURCES
 from solver.problem import Problem
 from solver.projection import tangent_frame
@@ -27,13 +27,13 @@ from solver.tables import uncertainties
 _SEED = 20290
 
 
-def error_budget_table(problem: Problem, reduced: Reduced) -> pd.DataFrame:
+def error_budget_table(problem: Problem, reduced: Reduced, covariance: Covariances) -> pd.DataFrame:
     """Return `survey_schema.ERROR_BUDGET`: each source's covariance by what repeats.
 
     What the centres of the calibration's priors cause is counted with the noise: it is small,
     and most of those centres are another orbit's no more.
     """
-    budget = error_budget(reduced, problem.priors, covariances(reduced))
+    budget = error_budget(reduced, problem.priors, covariance)
     columns = {"source_id": problem.sources["source_id"].to_numpy()}
     columns |= uncertainties("noise", budget.noise + budget.calibration)
     columns |= uncertainties("catalogue", budget.catalogue)

@@ -8,12 +8,12 @@ gradient do that, and show whether the first was short enough for a linear model
 """
 
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
-from solver.carry import Part, carry_over
+from solver.carry import carry_over
 from solver.gauss_newton import Iteration, Mode, downhill, largest_step, objective
+from solver.normal import accumulate
 from solver.objective import gradient
 from solver.problem import Problem
 from solver.result import FitStatus
@@ -26,20 +26,20 @@ _MAX_STEPS = 5
 _CAREFUL_STEP = 2
 
 
-def carried(
-    mode: Mode, solved: Problem, changed: Problem, parts: Sequence[Part] = ()
-) -> Mode | None:
-    """Return the posterior of a changed problem, linearised where that of `solved` was.
+def linearised(problem: Problem, mode: Mode) -> Mode:
+    """Return a solution with normal equations of its own place: a start for further changes."""
+    equations = accumulate(problem, mode.theta, mode.sources)
+    return mode._replace(equations=equations, reduced=None)
 
-    Parameters
-    ----------
-    parts : of the equations of `mode`, as `solver.carry.carry_over` takes them
+
+def _carried(mode: Mode, solved: Problem, changed: Problem) -> Mode | None:
+    """Return the posterior of a changed problem, linearised where that of `solved` was.
 
     Returns
     -------
     None if `solved` does not hold what `changed` asks for, or that is singular.
     """
-    equations = carry_over(mode.equations, solved, changed, parts)
+    equations = carry_over(mode.equations, solved, changed)
     if equations is None:
         return None
     # None of the data's blocks is another where the priors alone have changed.
@@ -50,20 +50,13 @@ def carried(
     return Mode(*equations.at, reduced, FitStatus.RE_SOLVED, [], equations)
 
 
-def re_solve(
-    mode: Mode,
-    solved: Problem,
-    changed: Problem,
-    settings: FitSettings,
-    parts: Sequence[Part] = (),
-) -> Mode | None:
+def re_solve(mode: Mode, solved: Problem, changed: Problem, settings: FitSettings) -> Mode | None:
     """Return the mode of a changed problem, from that of one that was solved.
 
     Parameters
     ----------
-    mode : where the engine ended for `solved`
+    mode : the solution of `solved`; the model is linear about its equations' place
     settings : those of `changed`
-    parts : of the equations of `mode`, as `solver.carry.carry_over` takes them
 
     Returns
     -------
@@ -71,7 +64,7 @@ def re_solve(
     or is so different that the model is not linear on the way.
     """
     begin = time.perf_counter()
-    start = carried(mode, solved, changed, parts)
+    start = _carried(mode, solved, changed)
     if start is None or start.reduced is None:
         return None
     theta, sources, reduced, trace = start.theta, start.sources, start.reduced, start.trace

@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.carry import parts_by_detector
-from solver.gauss_newton import find_mode
+from solver.gauss_newton import Mode, find_mode
 from solver.instrument import MINI_MOCK
 from solver.orbit import OrbitData
 from solver.problem import Problem, build_problem
 from solver.schur import Reduced
 from solver.settings import FitSettings
-from solver.what_if import carried, re_solve
+from solver.what_if import linearised, re_solve
 
 UNIT_REPEATS = 5
 
@@ -31,27 +30,34 @@ def fit_with_sigmas(problem: Problem, settings: FitSettings) -> object:
     return None if reduced is None else marginal_sigmas(reduced)
 
 
-def what_if(data: OrbitData, before: FitSettings, after: FitSettings) -> Callable[[], object]:
-    """Return the re-solution of one change, from a fit made and a problem built beforehand."""
+def what_if(
+    data: OrbitData, before: FitSettings, after: FitSettings, made_ready: FitSettings | None = None
+) -> Callable[[], object]:
+    """Return the re-solution of one change, from a fit made and a problem built beforehand.
+
+    Parameters
+    ----------
+    made_ready : from which the worker starts instead, as it prepares it while nobody waits
+    """
     solved = build_problem(data, MINI_MOCK, before)
-    changed = build_problem(after.exclusions.without(data), MINI_MOCK, after)
     mode = find_mode(solved, before)
-    # What follows the worker makes while nobody waits: `OrbitFitter.get_ready`.
-    parts = parts_by_detector(mode.equations, solved) if after.exclusions.detectors else []
-    if after.order < before.order:
-        lower = build_problem(data, MINI_MOCK, before.with_(order=after.order))
-        lowered = carried(mode, solved, lower)
-        if lowered is None:
-            sys.exit(f"no lower order than that of {before}")
-        solved, mode = lower, lowered
+    if made_ready is not None:
+        near = build_problem(made_ready.exclusions.without(data), MINI_MOCK, made_ready)
+        mode, solved = linearised(near, _re_solved(mode, solved, near, made_ready)), near
+    changed = build_problem(after.exclusions.without(data), MINI_MOCK, after)
 
     def work() -> object:
-        found = re_solve(mode, solved, changed, after, parts)
-        if found is None or found.reduced is None:
-            sys.exit(f"no re-solution from {before} to {after}")
-        return marginal_sigmas(found.reduced)
+        reduced = _re_solved(mode, solved, changed, after).reduced
+        return None if reduced is None else marginal_sigmas(reduced)
 
     return work
+
+
+def _re_solved(mode: Mode, solved: Problem, changed: Problem, settings: FitSettings) -> Mode:
+    found = re_solve(mode, solved, changed, settings)
+    if found is None:
+        sys.exit(f"no re-solution for {settings}")
+    return found
 
 
 def marginal_sigmas(reduced: Reduced) -> object:

@@ -20,7 +20,7 @@ def equations_of(problem):
 
 @pytest.fixture
 def budget(problem, reduced):
-    return error_budget_table(problem, reduced)
+    return error_budget_table(problem, reduced, covariances(reduced))
 
 
 def test_budget_adds_up_to_the_marginal_variance(problem, reduced, budget):

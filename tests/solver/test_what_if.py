@@ -126,22 +126,32 @@ def test_what_was_made_ready_is_not_linearised_again(
     settings = FitSettings(**{"order": 6, **PREPARED[change](sample_orbit)})
     expected = sample_fitter.what_if(settings)
     ready = fitted(OrbitFitter(sample_orbit))
-    ready.get_ready(6)
+    assert len(list(ready.get_ready())) > 4
 
     def refuse(*_):
         raise AssertionError("linearised again")
 
     monkeypatch.setattr("solver.carry.accumulate", refuse)
     found = ready.what_if(settings)
-    for name in ("offset_ra", "sigma_dec_marginal", "chi2"):
-        np.testing.assert_allclose(found.sources[name], expected.sources[name], rtol=1e-6)
+    step = found.sources["offset_ra"] - expected.sources["offset_ra"]
+    assert np.abs(step / expected.sources["sigma_ra_marginal"]).max() < 1e-3
+    for name in ("sigma_dec_marginal", "chi2"):
+        np.testing.assert_allclose(found.sources[name], expected.sources[name], rtol=1e-3)
+
+
+def test_what_was_interrupted_is_made_ready_later_and_once(orbit):
+    ready = fitted(OrbitFitter(orbit.data, orbit.instrument))
+    next(ready.get_ready())
+    rest = len(list(ready.get_ready()))
+    assert rest > 0
+    assert list(ready.get_ready()) == []
 
 
 def test_lower_order_without_a_term_whose_prior_is_shifted_is_not_made_ready(orbit):
     fitter = OrbitFitter(orbit.data, orbit.instrument)
     settings = FitSettings(order=2, prior_shifts={"distortion_x[2/0]": 1.0})
     fitter.fit(settings)
-    fitter.get_ready(2)
+    list(fitter.get_ready())
     assert fitter.what_if(settings) is not None
 
 

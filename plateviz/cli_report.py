@@ -51,8 +51,43 @@ def report(
         Path | None, typer.Option(help="Instrument of a result; the mini-mock's by default.")
     ] = None,
     pdf: Annotated[bool, typer.Option("--pdf", help="Print it with Chromium, too.")] = False,
+    pages: Annotated[
+        bool,
+        typer.Option(
+            "--pages", help="Write a folder: the survey as its index, and a page for each orbit."
+        ),
+    ] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Processes for --pages; one for each core by default.", min=1),
+    ] = None,
 ) -> None:
     """Write a report that opens anywhere: one HTML file that needs no network."""
+    request = ReportRequest(path, orbit, source, survey, run, other, instrument)
+    if pages:
+        _write_pages(request, output, pdf, workers)
+    else:
+        _write_page(request, output, pdf)
+
+
+def _write_pages(request: ReportRequest, folder: Path, pdf: bool, workers: int | None) -> None:
+    chosen = (request.orbit, request.source, request.other, request.instrument)
+    if pdf or any(choice is not None for choice in chosen):
+        raise InputError(
+            "--pages: expected a survey directory and --run at most, found a choice for one page"
+        )
+    from plateviz.cli_output import reporting
+    from plateviz.history import open_run
+    from plateviz.reports.folder import write_folder
+
+    with reporting("reading") as reporter:
+        run = open_run(request.path, request.run)
+        made, kept = write_folder(run, folder, _facts(request.run), workers, reporter.step)
+    there = f", {kept} were there" if kept else ""
+    typer.echo(f"{folder / 'index.html'}: {made} pages of orbits made{there}")
+
+
+def _write_page(request: ReportRequest, output: Path, pdf: bool) -> None:
     from plateviz.cli_output import reporting
     from plateviz.reports.pdf import find_chromium, print_pdf
     from solver.io.atomic import require_writable, write_atomically
@@ -62,7 +97,6 @@ def report(
     if pdf:
         require_writable(printed)
         find_chromium()
-    request = ReportRequest(path, orbit, source, survey, run, other, instrument)
     with reporting("reading") as reporter:
         content = _composed(request)
         reporter.say("drawing")
@@ -88,14 +122,14 @@ def _composed(request: ReportRequest) -> "Report":
     if request.other is not None and request.orbit is None:
         raise InputError("--other: expected with --orbit, or with a result of `plateviz fit`")
     from plateviz.history import open_run
-    from plateviz.reports.survey import source_report, survey_report
+    from plateviz.reports.survey import source_report, survey_orbit_report, survey_report
 
     run, facts = open_run(request.path, request.run), _facts(request.run)
     if request.source is not None:
         return source_report(run, request.source, facts)
     if request.orbit is None:
         return survey_report(run, facts)
-    return _of_survey_orbit(request, request.orbit, facts)
+    return survey_orbit_report(run, request.orbit, facts, _other(request, request.orbit))
 
 
 def _of_file(request: ReportRequest) -> "Report":
@@ -111,21 +145,6 @@ def _of_file(request: ReportRequest) -> "Report":
     focal_plane = read_instrument(request.instrument) if request.instrument else MINI_MOCK
     other = read_result(Path(request.other)) if request.other else None
     return orbit_report(read_result(request.path), focal_plane, _facts(), other)
-
-
-def _of_survey_orbit(request: ReportRequest, orbit: int, facts: "Facts") -> "Report":
-    from plateviz.history import open_run
-    from plateviz.reports.orbit import failed_orbit_report, orbit_report
-    from plateviz.source import SurveyFolder
-
-    folder = SurveyFolder(str(request.path))
-    if orbit not in folder.orbits():
-        raise InputError(f"{request.path}: expected an orbit {orbit}, found none of that number")
-    run = open_run(request.path, request.run)
-    message = run.failures().get(orbit)
-    if message is not None:
-        return failed_orbit_report(folder.read(orbit), message, facts)
-    return orbit_report(run.result(orbit), folder.read_instrument(), facts, _other(request, orbit))
 
 
 def _other(request: ReportRequest, orbit: int) -> "FitResult | None":

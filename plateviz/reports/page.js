@@ -92,6 +92,23 @@
     URL.revokeObjectURL(link.href);
   }
 
+  function sort(heading) {
+    const body = heading.closest("table").tBodies[0];
+    const column = heading.cellIndex;
+    const ascending = heading.getAttribute("aria-sort") !== "ascending";
+    const words = (row) => row.cells[column].textContent.replaceAll(",", "");
+    const compare = (a, b) => {
+      const [first, second] = [words(a), words(b)];
+      const difference = Number(first) - Number(second);
+      return Number.isNaN(difference) ? first.localeCompare(second) : difference;
+    };
+    const rows = [...body.rows].sort((a, b) => (ascending ? compare(a, b) : compare(b, a)));
+    heading.parentElement.querySelectorAll("th").forEach((th) => th.removeAttribute("aria-sort"));
+    heading.setAttribute("aria-sort", ascending ? "ascending" : "descending");
+    body.append(...rows);
+  }
+
+  document.querySelectorAll("th").forEach((th) => th.addEventListener("click", () => sort(th)));
   for (const figure of figures) {
     figure.querySelector("select")?.addEventListener("change", () => draw(figure));
     figure.querySelector("button.values").addEventListener("click", () => save(figure));

@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from plateviz.reports.figure import dark_colours, packed_document
-from plateviz.reports.report import Picture, Report
+from plateviz.reports.report import Link, Picture, Report
 
 _DRAWN_IN = "light"
 _FOLDER = files("plateviz.reports")
@@ -57,14 +57,14 @@ def _figure(picture: Picture) -> dict[str, object]:
     return {"picture": picture, "documents": documents}
 
 
-def _rows(table: pd.DataFrame) -> list[list[str]]:
+def _rows(table: pd.DataFrame) -> list[list[str | Link]]:
     return [list(map(_cell, table.columns, row)) for row in table.itertuples(index=False)]
 
 
-def _cell(title: str, value: object) -> str:
+def _cell(title: str, value: object) -> str | Link:
     """Return a value as people read it; nothing where there is none."""
     if not isinstance(value, float):
-        return str(value)
+        return value if isinstance(value, Link) else str(value)
     # A coordinate needs ten decimals to tell microarcseconds apart, a size five digits.
     return "" if math.isnan(value) else f"{value:.10f}" if "[deg]" in title else f"{value:.5g}"
 

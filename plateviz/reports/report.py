@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import holoviews as hv
 import pandas as pd
@@ -14,6 +15,13 @@ Facts = dict[str, dict[str, str]]
 
 Draw = Callable[[str], hv.core.Dimensioned]
 """Gives a picture in a theme."""
+
+
+class Link(NamedTuple):
+    """Words that lead to another page; in a report or in a cell of its tables."""
+
+    words: str
+    target: str
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,7 @@ class Report:
     pictures : every figure
     tables : title -> values
     facts : settings, versions, hashes of the inputs, the command
+    links : to other pages of the same folder
     """
 
     title: str
@@ -57,3 +66,4 @@ class Report:
     pictures: list[Picture]
     tables: dict[str, pd.DataFrame] = field(default_factory=dict)
     facts: Facts = field(default_factory=dict)
+    links: list[Link] = field(default_factory=list)

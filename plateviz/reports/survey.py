@@ -1,11 +1,13 @@
-"""The reports of a fitted survey, and of one of its sources."""
+"""The reports of a fitted survey, of one of its orbits, and of one of its sources."""
 
 from functools import partial
 
 from plateviz.gallery import source_figures, survey_figures
 from plateviz.history import SurveyRun
 from plateviz.plots.survey_figure import SourceFigure, SourceTables, SurveyFigure, SurveyTables
+from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.report import Facts, Picture, Report
+from plateviz.source import SurveyFolder
 from plateviz.survey_tables import survey_tables
 from plateviz.tables import (
     motion_table,
@@ -19,6 +21,7 @@ from plateviz.tables.headings import MOTION, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in
 from plateviz.tables.run_health import MISSING
 from plateviz.tables.verdict import run_verdict, source_verdict
 from solver.errors import InputError
+from solver.result import FitResult
 
 
 def survey_report(run: SurveyRun, facts: Facts) -> Report:
@@ -50,6 +53,29 @@ def survey_report(run: SurveyRun, facts: Facts) -> Report:
         tables={"Orbits": in_words(orbit_list(orbits), ORBITS_OF_RUN)},
         facts=facts,
     )
+
+
+def survey_orbit_report(
+    run: SurveyRun, orbit: int, facts: Facts, other: FitResult | None = None
+) -> Report:
+    """Return the report of one orbit of a run, of one that failed, too.
+
+    Parameters
+    ----------
+    other : solution to compare with
+
+    Raises
+    ------
+    InputError
+        If the survey has no such orbit, or the run has not fitted it.
+    """
+    folder = SurveyFolder(str(run.survey))
+    if orbit not in folder.orbits():
+        raise InputError(f"{run.survey}: expected an orbit {orbit}, found none of that number")
+    message = run.failures().get(orbit)
+    if message is not None:
+        return failed_orbit_report(folder.read(orbit), message, facts)
+    return orbit_report(run.result(orbit), folder.read_instrument(), facts, other)
 
 
 def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:

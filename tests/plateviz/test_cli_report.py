@@ -93,3 +93,46 @@ def test_without_chromium_nothing_is_printed(run, run_dir, tmp_path, monkeypatch
     assert code == 2
     assert "--pdf: expected one of chromium" in err
     assert not (tmp_path / "r.html").exists()
+
+
+@pytest.fixture
+def whole_run(run_dir, fit_result):
+    """A run of which two orbits are there, and one has failed."""
+    write_run(Run(run_dir, "default").orbit_directory(2), fit_result)
+    return run_dir
+
+
+def test_folder_has_a_page_for_each_orbit_and_goes_on_where_it_was(run, whole_run, tmp_path):
+    folder = tmp_path / "pages"
+    code, out, _ = run("report", whole_run, "--pages", "-o", folder)
+    assert code == 0
+    assert "3 pages of orbits made" in out
+    names = sorted(path.name for path in folder.iterdir())
+    pages = [f"orbit-{number:04d}.html" for number in range(3)]
+    assert names == ["index.html", *pages, "report.json"]
+    index = (folder / "index.html").read_text(encoding="utf-8")
+    assert all(f'<a href="{page}">' in index for page in pages)
+    middle = (folder / pages[1]).read_text(encoding="utf-8")
+    assert all(f'<a href="{page}">' in middle for page in ("index.html", pages[0], pages[2]))
+    before = (folder / pages[2]).read_bytes()
+    (folder / pages[0]).unlink()
+    _, out, _ = run("report", whole_run, "--pages", "-o", folder)
+    assert "1 pages of orbits made, 2 were there" in out
+    assert (folder / pages[2]).read_bytes() == before
+
+
+def test_folder_of_something_else_is_left_as_it_is(run, whole_run, tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    code, _, err = run("report", whole_run, "--pages", "-o", tmp_path)
+    assert code == 2
+    assert "expected an empty folder" in err
+    assert [path.name for path in tmp_path.iterdir() if path.name != "survey"] == ["mine.txt"]
+
+
+def test_folder_of_another_run_is_left_as_it_is(run, whole_run, tmp_path):
+    folder = tmp_path / "pages"
+    folder.mkdir()
+    (folder / "report.json").write_text('{"run": "other"}')
+    code, _, err = run("report", whole_run, "--pages", "-o", folder)
+    assert code == 2
+    assert "expected pages of this run and version, found others" in err

@@ -1,0 +1,127 @@
+"""A folder of reports: a page for each orbit of a run, and the survey as their index."""
+
+import json
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+
+from plateviz.history import SurveyRun, open_run
+from plateviz.reports.page import page_of
+from plateviz.reports.report import Facts, Link, Report
+from plateviz.reports.survey import survey_orbit_report, survey_report
+from solver.errors import InputError
+from solver.io.atomic import sha256_of, write_atomically
+from solver.versions import versions_of
+
+_INDEX = "index.html"
+# Which run the pages are of; those of another are not mixed with them.
+_HEAD = "report.json"
+_PACKAGES = ("plateviz", "holoviews", "bokeh")
+
+
+def write_folder(
+    run: SurveyRun,
+    folder: Path,
+    facts: Facts,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] = lambda *_: None,
+) -> tuple[int, int]:
+    """Write the pages that are not there yet, and the index last.
+
+    Parameters
+    ----------
+    facts : what is known beside the run
+    workers : processes; None for one on each core
+    progress : called with the number of pages done, and of all
+
+    Returns
+    -------
+    How many pages of orbits were made, and how many were there.
+
+    Raises
+    ------
+    InputError
+        If orbits of the run are missing, or the folder cannot be written or holds something else.
+    """
+    index = survey_report(run, facts)
+    orbits = run.orbits()["orbit_id"].tolist()
+    _begin(run, folder)
+    missing = [orbit for orbit in orbits if not _page(folder, orbit).is_file()]
+    done = len(orbits) - len(missing)
+    progress(done, len(orbits))
+    if missing:
+        # Spawned: a copy of a process with threads may stop at a lock that one of them held.
+        count = min(workers or os.cpu_count() or 1, len(missing))
+        with ProcessPoolExecutor(count, get_context("spawn")) as pool:
+            tasks = [
+                pool.submit(
+                    _write, run.survey, run.name, orbit, folder, facts, _around(orbits, orbit)
+                )
+                for orbit in missing
+            ]
+            for number, task in enumerate(as_completed(tasks), start=1):
+                task.result()
+                progress(done + number, len(orbits))
+    _write_page(folder / _INDEX, _with_links(index, orbits))
+    return len(missing), done
+
+
+def _begin(run: SurveyRun, folder: Path) -> None:
+    """Make the folder, or see that it holds pages of the same run."""
+    head = {"run": sha256_of(run.directory / "run.toml"), "versions": versions_of(_PACKAGES)}
+    path = folder / _HEAD
+    if path.is_file():
+        if json.loads(path.read_text(encoding="utf-8")) != head:
+            raise InputError(f"{folder}: expected pages of this run and version, found others")
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        is_empty = not any(folder.iterdir())
+    except OSError as error:
+        raise InputError(f"{folder}: expected to write a folder, found: {error}") from error
+    if not is_empty:
+        raise InputError(
+            f"{folder}: expected an empty folder, or one of reports, found other files"
+        )
+    with write_atomically(path) as temporary:
+        temporary.write_text(json.dumps(head, indent=1), encoding="utf-8")
+
+
+def _write(
+    survey: Path, name: str, orbit: int, folder: Path, facts: Facts, links: list[Link]
+) -> None:
+    """Write the page of one orbit: the task of one of the processes."""
+    report = survey_orbit_report(open_run(survey, name), orbit, facts)
+    _write_page(_page(folder, orbit), replace(report, links=links))
+
+
+def _write_page(path: Path, report: Report) -> None:
+    with write_atomically(path) as temporary:
+        temporary.write_text(page_of(report), encoding="utf-8")
+
+
+def _page(folder: Path, orbit: int) -> Path:
+    return folder / f"orbit-{orbit:04d}.html"
+
+
+def _link(words: str, orbit: int) -> Link:
+    return Link(words, _page(Path(), orbit).name)
+
+
+def _around(orbits: list[int], orbit: int) -> list[Link]:
+    """Return the links of an orbit's page: to the index and to its neighbours."""
+    place = orbits.index(orbit)
+    links = [Link("Survey", _INDEX)]
+    links += [_link(f"← Orbit {number}", number) for number in orbits[:place][-1:]]
+    return links + [_link(f"Orbit {number} →", number) for number in orbits[place + 1 :][:1]]
+
+
+def _with_links(index: Report, orbits: list[int]) -> Report:
+    """Return the report of the survey with its table of orbits leading to their pages."""
+    table = index.tables["Orbits"]
+    first = table.columns[0]
+    linked = table.assign(**{first: [_link(str(orbit), orbit) for orbit in orbits]})
+    return replace(index, tables={**index.tables, "Orbits": linked})

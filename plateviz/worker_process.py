@@ -15,7 +15,7 @@ import os
 import queue
 import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import TextIO
@@ -33,7 +33,10 @@ from solver.simulate.survey import simulate_survey
 Request = dict
 Send = Callable[[dict], None]
 # Work that makes the next request quicker, for when none waits.
-Later = Iterable[None]
+Later = Iterator[None]
+# What is likely to be asked next is made ready, a step at a time, when nothing was for so long.
+_QUIET_S = 2.0
+_NOTHING = object()
 
 
 class _Cancellations:
@@ -59,12 +62,19 @@ def main() -> None:
     reader = threading.Thread(target=_read, args=(sys.stdin, requests, cancellations), daemon=True)
     reader.start()
     send({"event": "ready"})
-    while (request := requests.get()) is not None:
+    later: Later = iter(())
+    while True:
+        try:
+            # A page that is being drawn needs the cores, and may ask again at once.
+            request = requests.get(timeout=_QUIET_S)
+        except queue.Empty:
+            if next(later, _NOTHING) is _NOTHING:
+                request = requests.get()
+            else:
+                continue
+        if request is None:
+            return
         later = _serve(request, send, cancellations)
-        for _ in later:
-            # What is not ready yet is made ready after the next answer.
-            if not requests.empty():
-                break
 
 
 def _sender() -> Send:
@@ -110,7 +120,7 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later
         send({"event": "cancelled", "job": job})
     except (InputError, FitError) as error:
         send({"event": "failed", "job": job, "message": str(error)})
-    return ()
+    return iter(())
 
 
 def _fit(request: Request, progress: Callable[..., None]) -> Later:
@@ -128,7 +138,7 @@ def _fit(request: Request, progress: Callable[..., None]) -> Later:
         result = fitter.fit(settings, on_iteration)
     progress(stage="writing the result")
     write_run(Path(request["directory"]), result)
-    return fitter.get_ready()
+    return fitter.get_ready(settings.order)
 
 
 def _simulate(request: Request, progress: Callable[..., None]) -> Later:
@@ -138,7 +148,7 @@ def _simulate(request: Request, progress: Callable[..., None]) -> Later:
         settings,
         progress=lambda done, total: progress(stage="simulating", done=done, total=total),
     )
-    return ()
+    return iter(())
 
 
 @lru_cache(maxsize=4)

@@ -171,10 +171,14 @@ class OrbitFitter:
             raise FitError(f"orbit {self._data.orbit_id}: {result.summary['reason']}")
         return history_table(kept.problem, kept.mode.reduced, kept.covariance, result)
 
-    def get_ready(self) -> Iterator[None]:
+    def get_ready(self, order: int) -> Iterator[None]:
         """Prepare, while nobody waits, for what may be asked of the last fit next.
 
         See `solver.starts.likely`; with that, it takes no longer than other priors do.
+
+        Parameters
+        ----------
+        order : of the solution on the screen
 
         Yields
         ------
@@ -184,7 +188,11 @@ class OrbitFitter:
         if kept is None:
             return
         detectors = np.unique(self._data.measurements["detector_id"]).tolist()
-        for settings in likely(self._starts[0], detectors):
+        wanted = likely(self._starts[0], order, detectors)
+        # What was likely of another order is not kept.
+        self._tried = [kept.settings, *(tried for tried in self._tried if tried in wanted)]
+        self._starts = [start for start in self._starts if start.settings in self._tried]
+        for settings in wanted:
             if settings not in self._tried:
                 self._tried.append(settings)
                 self._starts += self._started(kept, settings)

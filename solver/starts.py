@@ -31,20 +31,20 @@ def nearest(starts: Iterable[Start], settings: FitSettings) -> Start | None:
     return min(holding, key=_beside, default=None)
 
 
-def likely(start: Start, detectors: Sequence[int]) -> list[FitSettings]:
+def likely(start: Start, order: int, detectors: Sequence[int]) -> list[FitSettings]:
     """Return what is likely to be asked of a solution next and takes longer than other priors.
 
-    Each lower order needs Jacobians of its own, and without a detector the model is linear only
+    A lower order needs Jacobians of its own, and without a detector the model is linear only
     near its solution.
 
     Parameters
     ----------
+    order : on the screen; the one below it is likely to be next
     detectors : detector_id of all that were measured with
 
     Returns
     -------
-    The next lower order, no detector one at a time, all other lower orders; as many of them as
-    there is memory for
+    That order, and no detector one at a time; as many of them as there is memory for
     """
     fitted, out = start.settings, start.settings.exclusions.detectors
     left = [detector for detector in detectors if detector not in out]
@@ -52,8 +52,8 @@ def likely(start: Start, detectors: Sequence[int]) -> list[FitSettings]:
         fitted.with_(exclusions=replace(fitted.exclusions, detectors=out | {detector}))
         for detector in (left if len(left) > 1 else [])
     ]
-    lower = [fitted.with_(order=order) for order in reversed(range(fitted.order))]
-    return [*lower[:1], *without, *lower[1:]][: _MOST_BYTES // start.mode.equations.cross.nbytes]
+    lower = [fitted.with_(order=order - 1)] if 0 < order <= fitted.order else []
+    return [*lower, *without][: _MOST_BYTES // start.mode.equations.cross.nbytes]
 
 
 def _beside(start: Start) -> tuple[int, int]:

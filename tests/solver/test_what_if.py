@@ -126,7 +126,7 @@ def test_what_was_made_ready_is_not_linearised_again(
     settings = FitSettings(**{"order": 6, **PREPARED[change](sample_orbit)})
     expected = sample_fitter.what_if(settings)
     ready = fitted(OrbitFitter(sample_orbit))
-    assert len(list(ready.get_ready())) > 4
+    assert len(list(ready.get_ready(6))) > 4
 
     def refuse(*_):
         raise AssertionError("linearised again")
@@ -141,17 +141,17 @@ def test_what_was_made_ready_is_not_linearised_again(
 
 def test_what_was_interrupted_is_made_ready_later_and_once(orbit):
     ready = fitted(OrbitFitter(orbit.data, orbit.instrument))
-    next(ready.get_ready())
-    rest = len(list(ready.get_ready()))
+    next(ready.get_ready(6))
+    rest = len(list(ready.get_ready(6)))
     assert rest > 0
-    assert list(ready.get_ready()) == []
+    assert list(ready.get_ready(6)) == []
 
 
 def test_lower_order_without_a_term_whose_prior_is_shifted_is_not_made_ready(orbit):
     fitter = OrbitFitter(orbit.data, orbit.instrument)
     settings = FitSettings(order=2, prior_shifts={"distortion_x[2/0]": 1.0})
     fitter.fit(settings)
-    list(fitter.get_ready())
+    list(fitter.get_ready(2))
     assert fitter.what_if(settings) is not None
 
 

@@ -10,7 +10,6 @@ from importlib.resources import files
 import pandas as pd
 from bokeh.resources import Resources
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
 
 from plateviz.reports.figure import dark_colours, packed_document
 from plateviz.reports.report import Link, Picture, Report
@@ -46,8 +45,8 @@ def page_of(
             tables={title: _rows(table) for title, table in report.tables.items()},
             style=_text("page.css"),
             script=_text("page.js"),
-            bokeh=Markup(_bokeh()),
-            colours=Markup(json.dumps(dark_colours())),
+            bokeh=_bokeh(),
+            colours=json.dumps(dark_colours()),
         )
     )
 
@@ -69,8 +68,8 @@ def _cell(title: str, value: object) -> str | Link:
     return "" if math.isnan(value) else f"{value:.10f}" if "[deg]" in title else f"{value:.5g}"
 
 
-def _text(name: str) -> Markup:
-    return Markup((_FOLDER / name).read_text(encoding="utf-8"))
+def _text(name: str) -> str:
+    return (_FOLDER / name).read_text(encoding="utf-8")
 
 
 @cache

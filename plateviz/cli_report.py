@@ -95,6 +95,10 @@ def _write_page(request: ReportRequest, output: Path, pdf: bool) -> None:
     printed = output.with_suffix(".pdf")
     require_writable(output)
     if pdf:
+        if printed == output:
+            raise InputError(
+                f"{output}: expected a page's name such as R.html, found that of a PDF"
+            )
         require_writable(printed)
         find_chromium()
     with reporting("reading") as reporter:
@@ -119,6 +123,8 @@ def _composed(request: ReportRequest) -> "Report":
     chosen = [request.orbit is not None, request.source is not None, request.survey]
     if sum(chosen) > 1:
         raise InputError("report: expected one of --orbit, --source and --survey, found several")
+    if request.instrument is not None:
+        raise InputError("--instrument: expected with a result of `plateviz fit`; a survey has one")
     if request.other is not None and request.orbit is None:
         raise InputError("--other: expected with --orbit, or with a result of `plateviz fit`")
     from plateviz.history import open_run
@@ -169,5 +175,8 @@ def _facts(run: str | None = None) -> "Facts":
         made["Run"] = run
     return {
         "Report": made,
-        "Versions": {**versions_of(_PACKAGES), "Python": platform.python_version()},
+        "Versions that made this report": {
+            **versions_of(_PACKAGES),
+            "Python": platform.python_version(),
+        },
     }

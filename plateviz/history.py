@@ -4,6 +4,7 @@ Each orbit's directory holds its part of the history. When orbits were added the
 gathered into one file in order of source, in which a source is found without reading the rest.
 """
 
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 
@@ -73,6 +74,10 @@ class SurveyRun:
     def is_complete(self) -> bool:
         """Whether every orbit of the survey is there."""
         return self._run.is_complete
+
+    def header(self) -> Mapping[str, object]:
+        """Return what the run was begun with: `settings`, `versions`, hashes of the `inputs`."""
+        return self._run.header()
 
     def failures(self) -> dict[int, str]:
         """Return why orbits have no solution, by orbit."""

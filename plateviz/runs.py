@@ -89,7 +89,11 @@ class Run:
 
     def settings(self) -> FitSettings:
         """Return the settings of all its fits."""
-        return FitSettings.from_dict(_mapping(read_header(self.directory, _HEADER)["settings"]))
+        return FitSettings.from_dict(_mapping(self.header()["settings"]))
+
+    def header(self) -> Mapping[str, object]:
+        """Return what the run was begun with: `settings`, `versions`, hashes of the `inputs`."""
+        return read_header(self.directory, _HEADER)
 
     def keep(self, orbit: int, result: FitResult, history: pd.DataFrame) -> None:
         """Write a fitted orbit, with what it adds to the history of its sources."""

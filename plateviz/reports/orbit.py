@@ -1,6 +1,5 @@
 """The report of one fitted orbit."""
 
-import json
 from dataclasses import replace
 from functools import partial
 
@@ -9,7 +8,7 @@ import pandas as pd
 
 from plateviz.gallery import diagnostics
 from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.reports.report import Facts, Picture, Report
+from plateviz.reports.report import Facts, Picture, Report, plain
 from plateviz.tables import calibration_tables, exposure_chi2, outlier_list, summary_strip
 from plateviz.tables.labels import dates
 from plateviz.tables.verdict import Verdict, orbit_verdict
@@ -48,7 +47,7 @@ def orbit_report(
         tables=tables,
         facts={
             **facts,
-            "Settings": {k: json.dumps(v) for k, v in result.settings.to_dict().items()},
+            "Settings": plain(result.settings.to_dict()),
             "Inputs (SHA-256)": dict(result.provenance),
         },
     )

@@ -1,6 +1,7 @@
 """Report: what one file says, before it is HTML."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -67,3 +68,11 @@ class Report:
     tables: dict[str, pd.DataFrame] = field(default_factory=dict)
     facts: Facts = field(default_factory=dict)
     links: list[Link] = field(default_factory=list)
+
+
+def plain(values: Mapping[str, object]) -> dict[str, str]:
+    """Return settings or other plain values as facts: text as it is, all else as JSON."""
+    return {
+        name: value if isinstance(value, str) else json.dumps(value)
+        for name, value in values.items()
+    }

@@ -6,7 +6,7 @@ from plateviz.gallery import source_figures, survey_figures
 from plateviz.history import SurveyRun
 from plateviz.plots.survey_figure import SourceFigure, SourceTables, SurveyFigure, SurveyTables
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
-from plateviz.reports.report import Facts, Picture, Report
+from plateviz.reports.report import Facts, Picture, Report, plain
 from plateviz.source import SurveyFolder
 from plateviz.survey_tables import survey_tables
 from plateviz.tables import (
@@ -22,6 +22,8 @@ from plateviz.tables.run_health import MISSING
 from plateviz.tables.verdict import run_verdict, source_verdict
 from solver.errors import InputError
 from solver.result import FitResult
+
+_SOLVED = "Versions that solved it"
 
 
 def survey_report(run: SurveyRun, facts: Facts) -> Report:
@@ -51,7 +53,7 @@ def survey_report(run: SurveyRun, facts: Facts) -> Report:
         items=run_strip(orbits, motions),
         pictures=[_picture(figure, tables) for figure in survey_figures()],
         tables={"Orbits": in_words(orbit_list(orbits), ORBITS_OF_RUN)},
-        facts=facts,
+        facts={**facts, **_of_run(run)},
     )
 
 
@@ -72,6 +74,7 @@ def survey_orbit_report(
     folder = SurveyFolder(str(run.survey))
     if orbit not in folder.orbits():
         raise InputError(f"{run.survey}: expected an orbit {orbit}, found none of that number")
+    facts = {**facts, _SOLVED: _of_run(run)[_SOLVED]}
     message = run.failures().get(orbit)
     if message is not None:
         return failed_orbit_report(folder.read(orbit), message, facts)
@@ -98,8 +101,15 @@ def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
         items=source_strip(history, motion),
         pictures=[_picture(figure, found) for figure in source_figures()],
         tables=tables | {"Orbits": in_words(source_orbits(history), ORBITS_OF_SOURCE)},
-        facts=facts,
+        facts={**facts, **_of_run(run)},
     )
+
+
+def _of_run(run: SurveyRun) -> Facts:
+    """Return what the run was begun with."""
+    header = run.header()
+    titles = {_SOLVED: "versions", "Settings": "settings", "Inputs (SHA-256)": "inputs"}
+    return {title: plain(header[name]) for title, name in titles.items()}  # type: ignore[arg-type]
 
 
 def _picture(figure: SurveyFigure | SourceFigure, tables: SurveyTables | SourceTables) -> Picture:

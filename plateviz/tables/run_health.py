@@ -6,6 +6,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
+from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.tables.labels import dates
 from plateviz.tables.summary import State, SummaryItem, verdict
 
@@ -13,22 +14,6 @@ COMPLETE, FAILED, MISSING = "complete", "failed", "missing"
 _OF_STATUS: Mapping[str, State] = MappingProxyType(
     {COMPLETE: "good", FAILED: "bad", MISSING: "warn"}
 )
-_HEALTH_COLUMNS = [
-    "orbit_id",
-    "date",
-    "status",
-    "chi2_per_dof",
-    "normalised_deviation_ra",
-    "expected_normalised_deviation_ra",
-    "normalised_deviation_dec",
-    "expected_normalised_deviation_dec",
-    "n_measurements",
-    "n_sources",
-    "n_reference",
-    "iterations",
-    "seconds",
-    "message",
-]
 
 
 def orbit_list(orbits: pd.DataFrame) -> pd.DataFrame:
@@ -42,7 +27,7 @@ def orbit_list(orbits: pd.DataFrame) -> pd.DataFrame:
     -------
     `orbit_id`, `date` (of the mean epoch, as text), and the figures that say how the fit is
     """
-    return orbits.assign(date=dates(orbits["epoch"]))[_HEALTH_COLUMNS]
+    return orbits.assign(date=dates(orbits["epoch"]))[list(ORBITS_OF_RUN)]
 
 
 def orbit_states(orbits: pd.DataFrame) -> pd.DataFrame:

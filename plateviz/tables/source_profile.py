@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 
+from plateviz.tables.headings import ORBITS_OF_SOURCE, SOURCES_OF_RUN
 from plateviz.tables.labels import dates, id_strings
 from plateviz.tables.sources import ordered_by_class
 from plateviz.tables.summary import SummaryItem
@@ -18,19 +19,6 @@ _NAMES = {
     "pmdec": ("proper motion in δ", "mas/yr"),
 }
 _FIGURES = ("fit", "sigma_noise", "sigma_catalogue", "sigma", "true", "pull")
-_ORBIT_COLUMNS = [
-    "orbit_id",
-    "date",
-    "n_obs",
-    "offset_ra",
-    "offset_dec",
-    "deviation_ra",
-    "deviation_dec",
-    "sigma_ra_marginal",
-    "sigma_dec_marginal",
-    "chi2_per_dof",
-]
-_LIST_COLUMNS = ["id", "source_class", "n_orbits", "n_obs"]
 
 
 def source_class(history: pd.DataFrame) -> str:
@@ -129,7 +117,7 @@ def source_orbits(history: pd.DataFrame) -> pd.DataFrame:
         deviation_ra=history["offset_ra"] - history["true_offset_ra"],
         deviation_dec=history["offset_dec"] - history["true_offset_dec"],
         chi2_per_dof=history["chi2"] / np.where(dof > 0, dof, np.nan),
-    )[_ORBIT_COLUMNS]
+    )[list(ORBITS_OF_SOURCE)]
 
 
 def source_list(counts: pd.DataFrame) -> pd.DataFrame:
@@ -146,4 +134,4 @@ def source_list(counts: pd.DataFrame) -> pd.DataFrame:
     table = ordered_by_class(counts).sort_values(
         ["n_orbits", "n_obs"], ascending=False, kind="stable", ignore_index=True
     )
-    return table.assign(id=id_strings(table["source_id"]))[_LIST_COLUMNS]
+    return table.assign(id=id_strings(table["source_id"]))[list(SOURCES_OF_RUN)]

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.special import chdtrc
 
 from plateviz.tables.labels import id_strings
 from plateviz.tables.pulls import exposure_chi2
@@ -13,9 +14,10 @@ from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
 from solver.result import FitResult
 
-# An exposure or source farther off than this would be one in some ten thousand.
-_FAR = 4.0
-_SIGMAS = 3.0
+# Among good exposures, or good sources, one so far off would be found in one orbit of a hundred.
+_BY_CHANCE = 0.01
+# Of a single chi2: three and four sigmas of a normal, one side.
+_UNLIKELY, _FAR_OFF = 1.35e-3, 3.2e-5
 _MOST_NAMED, _MOST_ORBITS = 3, 20
 _HEADLINES: dict[State, str] = {
     "good": "This solution can be trusted.",
@@ -45,8 +47,13 @@ def orbit_verdict(result: FitResult) -> Verdict:
     """Return the verdict on one fitted orbit, by the same rules as `summary_strip`."""
     items = summary_strip(result)
     state = worst(item.state for item in items)
-    reasons = [_converged(result), *map(_judged, items[1:4]), _common_error(result)]
+    reasons = [_converged(result), *map(_judged, _verdicts(items)), _common_error(result)]
     return Verdict(state, _HEADLINES[state], reasons, _notable(result))
+
+
+def _verdicts(items: list[SummaryItem]) -> list[SummaryItem]:
+    """Return the numbers that are judged, but for the convergence, of which the words say more."""
+    return [item for item in items[1:] if item.state != "neutral"]
 
 
 def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame) -> Verdict:
@@ -112,8 +119,10 @@ def source_verdict(history: pd.DataFrame, motion: pd.Series | None) -> Verdict:
     reasons = [f"{item.label}: {item.value}. {item.hint}" for item in items[2:]]
     if motion is None or not motion["dof"] > 0:
         return Verdict("warn", "There are too few orbits to judge the motion by.", reasons, [])
-    excess = (motion["chi2"] - motion["dof"]) / np.sqrt(2.0 * motion["dof"])
-    state: State = "good" if abs(excess) <= _SIGMAS else "warn" if excess < _FAR else "bad"
+    above = float(chdtrc(motion["dof"], motion["chi2"]))
+    state: State = "bad" if above < _FAR_OFF else "good"
+    if state == "good" and min(above, 1.0 - above) < _UNLIKELY:
+        state = "warn"
     headline = {
         "good": "The positions scatter about the fitted motion as their noise says.",
         "warn": "The positions scatter about the fitted motion by another amount than their noise.",
@@ -143,7 +152,7 @@ def _judged(item: SummaryItem) -> str:
         "good": "as it should be",
         "warn": "farther from what is expected than chance explains, though by little",
         "bad": "far from what is expected",
-        "neutral": "which cannot be judged here",
+        "neutral": "not judged",
     }[item.state]
     return f"{item.label}: {item.value}, {meaning}. {item.hint}"
 
@@ -170,7 +179,10 @@ def _notable(result: FitResult) -> list[str]:
 
 def _far_exposures(result: FitResult) -> list[str]:
     table = exposure_chi2(result)
-    far = table[table["z"].abs() > _FAR].sort_values("z", key=np.abs, ascending=False)
+    expected = result.exposures.reset_index(drop=True)
+    above = chdtrc(expected["dof"], expected["chi2"])
+    far = table[2.0 * np.minimum(above, 1.0 - above) < _BY_CHANCE / max(len(table), 1)]
+    far = far.sort_values("z", key=np.abs, ascending=False)
     if far.empty:
         return []
     named = "; ".join(
@@ -182,8 +194,9 @@ def _far_exposures(result: FitResult) -> list[str]:
 
 def _far_sources(result: FitResult) -> list[str]:
     sources = result.sources[result.sources["dof"] > 0]
-    excess = (sources["chi2"] - sources["dof"]) / np.sqrt(2.0 * sources["dof"])
-    far = sources.assign(excess=excess)[excess > _FAR].sort_values("excess", ascending=False)
+    above = chdtrc(sources["dof"], sources["chi2"])
+    far = sources.assign(above=above)[above < _BY_CHANCE / max(len(sources), 1)]
+    far = far.sort_values("above")
     if far.empty:
         return []
     worst_ids = id_strings(far["source_id"].head(_MOST_NAMED))

@@ -54,8 +54,9 @@ def test_two_results_are_compared(run, fit_result, tmp_path):
         (["--run", "other"], "expected a run 'other', found default"),
         (["--survey"], "found 1 of 3 orbits missing"),
         (["--other", "b"], "--other: expected with --orbit"),
+        (["--orbit", "0", "--instrument", "i.toml"], "--instrument: expected with a result"),
     ],
-    ids=["no-orbit", "missing", "several", "no-run", "incomplete", "other-of-survey"],
+    ids=["no-orbit", "missing", "several", "no-run", "incomplete", "other-of-survey", "instrument"],
 )
 def test_mistake_is_one_message_and_no_file(run, run_dir, tmp_path, options, message):
     code, _, err = run("report", run_dir, *options, "-o", tmp_path / "r.html")
@@ -63,6 +64,20 @@ def test_mistake_is_one_message_and_no_file(run, run_dir, tmp_path, options, mes
     assert message in err
     assert err.strip().count("\n") == 0
     assert not list(tmp_path.glob("r.html*"))
+
+
+def test_page_is_not_written_where_its_print_goes(run, run_dir, tmp_path):
+    code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.pdf", "--pdf")
+    assert code == 2
+    assert "expected a page's name such as R.html" in err
+    assert not (tmp_path / "r.pdf").exists()
+
+
+def test_page_of_an_orbit_tells_what_solved_it(run, run_dir, tmp_path):
+    run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html")
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    solved = page.index("Versions that solved it")
+    assert "<dt>jax</dt>" in page[solved:]
 
 
 def test_run_of_a_newer_version_is_refused(run, run_dir, tmp_path):

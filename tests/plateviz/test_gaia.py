@@ -11,7 +11,6 @@ from astropy.io import fits, votable
 from astropy.table import Table
 from astroquery.utils.tap import TapPlus
 
-from plateviz.cli import main
 from plateviz.gaia import ARCHIVE, Selection, cached_file, selection
 from solver.correlation import CORRELATIONS
 from solver.errors import InputError
@@ -47,18 +46,6 @@ def service(stars, monkeypatch, tmp_path):
 def url(service):
     with serving(service) as address:
         yield address
-
-
-@pytest.fixture
-def run(monkeypatch, capsys):
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["plateviz", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        return ended.value.code or 0, printed.out, printed.err
-
-    return call
 
 
 def read(path):

@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from scipy.special import chdtri
 
 from plateviz.tables.verdict import orbit_verdict, run_verdict, source_verdict, worst
 
@@ -66,7 +68,16 @@ def test_run_without_an_orbit_fitted_says_so(survey):
     assert "No orbit has a solution." in run_verdict(none, survey.motions.iloc[:0]).reasons
 
 
-@pytest.mark.parametrize(("chi2", "state"), [(100.0, "good"), (160.0, "bad"), (30.0, "warn")])
+def test_chance_alone_makes_no_source_stand_out(fit_result):
+    """chi2 of few measurements is skewed: so far above its mean one in a thousand lies."""
+    dof = np.full(len(fit_result.sources), 8.0)
+    quantiles = (np.arange(len(dof)) + 0.5) / len(dof)
+    by_chance = fit_result.sources.assign(dof=dof, chi2=chdtri(dof, 1.0 - quantiles))
+    notable = orbit_verdict(replace(fit_result, sources=by_chance)).notable
+    assert not any(sentence.startswith("Sources that scatter") for sentence in notable)
+
+
+@pytest.mark.parametrize(("chi2", "state"), [(100.0, "good"), (170.0, "bad"), (50.0, "warn")])
 def test_source_is_judged_by_the_scatter_about_its_motion(survey, chi2, state):
     history, motion = survey.source("other")
     motion = motion.copy()

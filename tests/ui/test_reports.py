@@ -92,8 +92,11 @@ def test_theme_of_the_reader_can_be_changed(open_report, orbit_page):
 def test_reader_chooses_among_the_exposures_and_detectors_embedded(open_report, orbit_page):
     page = open_report(orbit_page)
     figure = page.locator("#figure-residual-map")
+    titles = "() => Bokeh.documents.flatMap(d => [...d._all_models.values()]).map(m => m.text)"
+    assert "Residuals on detector 0, measured minus predicted" not in page.evaluate(titles)
     figure.locator("select").select_option(index=1)
     page.wait_for_selector("#figure-residual-map[data-drawn='1 light']")
+    assert "Residuals on detector 0, measured minus predicted" in page.evaluate(titles)
 
 
 def test_values_behind_a_figure_can_be_saved(open_report, survey_page, tmp_path, survey):

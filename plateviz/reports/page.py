@@ -13,6 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from plateviz.reports.figure import dark_colours, packed_document
 from plateviz.reports.report import Link, Picture, Report
+from plateviz.strip import STYLE, strip
 
 _DRAWN_IN = "light"
 _FOLDER = files("plateviz.reports")
@@ -43,7 +44,8 @@ def page_of(
             made=stamp,
             figures=figures,
             tables={title: _rows(table) for title, table in report.tables.items()},
-            style=_text("page.css"),
+            numbers=strip(report.items),
+            style=STYLE + _text("page.css"),
             script=_text("page.js"),
             bokeh=_bokeh(),
             colours=json.dumps(dark_colours()),

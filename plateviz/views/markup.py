@@ -1,6 +1,5 @@
 """Small pieces of HTML in the project's style, readable in both themes."""
 
-from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
@@ -8,14 +7,14 @@ import pandas as pd
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.tables import SummaryItem
+from plateviz.strip import STYLE
 
-_STYLE = (Path(__file__).parent / "style.css").read_text(encoding="utf-8")
+_STYLES = [STYLE, (Path(__file__).parent / "style.css").read_text(encoding="utf-8")]
 
 
 def markup_pane() -> pn.pane.HTML:
     """Return an empty pane that knows the classes of `style.css`."""
-    return pn.pane.HTML("", stylesheets=[_STYLE], sizing_mode="stretch_width", margin=0)
+    return pn.pane.HTML("", stylesheets=_STYLES, sizing_mode="stretch_width", margin=0)
 
 
 def paragraph(text: str, css_class: str, theme: str) -> str:
@@ -38,11 +37,6 @@ def heading(text: str) -> pmui.Typography:
     return pmui.Typography(text, variant="subtitle1", margin=(10, 10, 4, 10))
 
 
-def strip(items: Iterable[SummaryItem]) -> str:
-    """Return numbers in a row of tiles, each with its name and how it is."""
-    return f"<div class='strip'>{''.join(map(_cell, items))}</div>"
-
-
 def numbers(table: pd.DataFrame) -> str:
     """Return a small table of text, as `tables.headings.in_words` gives it; a dash for nothing."""
     head = "".join(f"<th>{escape(title)}</th>" for title in table.columns)
@@ -51,13 +45,3 @@ def numbers(table: pd.DataFrame) -> str:
         for row in table.itertuples(index=False)
     )
     return f"<table class='numbers'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-
-
-def _cell(item: SummaryItem) -> str:
-    value, bracket, beside = item.value.partition(" (")
-    return (
-        f"<div class='cell {item.state}' title='{escape(item.hint, quote=True)}'>"
-        f"<span class='name'>{escape(item.label)}</span>"
-        f"<span class='value'>{escape(value)}"
-        f"<span class='beside'>{escape(bracket + beside)}</span></span></div>"
-    )

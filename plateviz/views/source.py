@@ -10,6 +10,7 @@ import panel_material_ui as pmui
 from plateviz.gallery import source_figures
 from plateviz.navigation import Navigation
 from plateviz.plots.survey_figure import SourceFigure, SourceTables
+from plateviz.strip import strip
 from plateviz.tables import (
     motion_table,
     source_class,
@@ -24,7 +25,6 @@ from plateviz.views.markup import (
     markup_pane,
     numbers,
     paragraph,
-    strip,
     themed,
     titled,
 )

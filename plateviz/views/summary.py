@@ -3,8 +3,9 @@
 import panel as pn
 
 from plateviz.session import Session, Solution, Stage
+from plateviz.strip import strip
 from plateviz.tables import summary_strip
-from plateviz.views.markup import markup_pane, paragraph, strip, titled
+from plateviz.views.markup import markup_pane, paragraph, titled
 
 
 class SummaryView(pn.viewable.Viewer):

@@ -10,11 +10,12 @@ import panel_material_ui as pmui
 from plateviz.gallery import survey_figures
 from plateviz.navigation import Navigation
 from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.strip import strip
 from plateviz.survey_tables import survey_tables
 from plateviz.tables import orbit_list, orbit_states, run_strip
 from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.views.figure import FigureGrid, FigureView
-from plateviz.views.markup import heading, markup_pane, paragraph, strip, themed, titled
+from plateviz.views.markup import heading, markup_pane, paragraph, themed, titled
 from plateviz.views.run import run_selector
 from plateviz.views.table import DataTable
 

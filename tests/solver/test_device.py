@@ -30,7 +30,7 @@ def watched(compute):
     return work
 
 normal.linearise = watched(normal.linearise)
-objective._add_chunk = watched(objective._add_chunk)
+objective._of_chunk = watched(objective._of_chunk)
 jax.config.update("jax_default_device", jax.devices()[1])
 orbit = make_orbit()
 summary = fit_orbit(orbit.data, orbit.instrument).summary

@@ -13,7 +13,7 @@ from solver.engines import Resumption, estimate
 from solver.errors import FitError, InputError
 from solver.estimate import Estimate
 from solver.exclusions import of_rows, thinned_orbit
-from solver.gauss_newton import Iteration, Mode
+from solver.gauss_newton import Iteration, Mode, find_mode
 from solver.history import history_table
 from solver.instrument import MINI_MOCK, Instrument
 from solver.leverage import Covariances
@@ -182,7 +182,7 @@ class OrbitFitter:
 
         Yields
         ------
-        Between steps of less than a second, so that a question need not wait for the rest.
+        Between steps of about a second, so that a question need not wait for the rest.
         """
         kept = self._kept
         if kept is None:
@@ -199,14 +199,17 @@ class OrbitFitter:
                 yield
 
     def _started(self, kept: _Fitted, settings: FitSettings) -> list[Start]:
-        """Return the last fit changed and linearised there, where the change can be solved."""
+        """Return a change of the last fit, linearised at its own solution, where there is one."""
         try:
             _, problem = self._prepare(settings, kept.outliers)
         except InputError:
             # A prior is shifted of a term that the lower order has not, or too little is left.
             return []
         mode = re_solve(kept.mode, kept.problem, problem, settings)
-        return [] if mode is None else [Start(settings, problem, linearised(problem, mode))]
+        # So far may the stars have to move that only a fit can tell.
+        mode = mode or find_mode(problem, settings)
+        is_solved = mode.status.is_solution
+        return [Start(settings, problem, linearised(problem, mode))] if is_solved else []
 
     def _prepare(
         self, settings: FitSettings, outliers: pd.DataFrame | None = None

@@ -18,7 +18,7 @@ from jaxtyping import Array, Float, Int
 
 from solver.aberration import Components, aberrate, lorentz_factor
 from solver.detector import to_pixel
-from solver.distortion import basis
+from solver.distortion import basis, terms
 from solver.projection import displace, focal_axes, project
 from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
 
@@ -40,7 +40,7 @@ class Geometry(eqx.Module):
     velocity : of the observer, in c; zero switches aberration off
     sun_distance : of the observer, au
     distortion_scale : 1/s, um
-    order : highest degree of the distortion
+    order : highest degree of the distortion that is computed
     """
 
     source_frame: Float[AnyArray, "src 3 3"]
@@ -50,6 +50,15 @@ class Geometry(eqx.Module):
     sun_distance: Float[AnyArray, " exp"]
     distortion_scale: Float[AnyArray, ""]
     order: int = eqx.field(static=True)
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """The lengths of the axes that are padded."""
+        return {
+            "src": len(self.source_frame),
+            "exp": len(self.pointing_frame),
+            "coef": len(terms(self.order)),
+        }
 
     def value(self, offsets: Offsets, name: str) -> Float[Array, " _"]:
         """Return the whole value of a group, in its unit."""

@@ -59,6 +59,11 @@ class Linearised(NamedTuple):
     prediction: Prediction
     products: Products
 
+    def with_terms(self, n_coef: int) -> "Linearised":
+        """Return the same with that many distortion terms."""
+        kept = self.prediction._replace(basis=self.prediction.basis[:n_coef])
+        return self._replace(prediction=kept)
+
 
 class Turning(NamedTuple):
     """The directions and how they turn, which is the same for all chunks.

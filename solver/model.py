@@ -127,8 +127,7 @@ _FAMILIES: dict[str, Callable[[AnyArray, AnyArray], dist.Distribution]] = {
 
 def _padded(offsets: dict[str, AnyArray], geometry: Geometry) -> dict[str, AnyArray]:
     """Return the offsets as long as the geometry is; what is added belongs to nothing."""
-    sizes = {"exp": len(geometry.pointing_frame), "src": len(geometry.source_frame)}
-    lengths = {g.name: sizes.get(g.axis, len(offsets[g.name])) for g in PARAMETERS}
+    lengths = {g.name: geometry.sizes.get(g.axis, len(offsets[g.name])) for g in PARAMETERS}
     return {
         name: jnp.pad(values, [(0, lengths[name] - len(values)), *[(0, 0)] * (values.ndim - 1)])
         for name, values in offsets.items()

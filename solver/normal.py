@@ -83,7 +83,7 @@ def chunks(
         current = ahead
         if i + 1 < n_chunks:
             ahead = start(i + 1)
-        yield jax.tree.map(np.asarray, current)
+        yield jax.tree.map(np.asarray, current.with_terms(problem.layout.n_coef))
 
 
 def one_blas_thread() -> AbstractContextManager[object]:

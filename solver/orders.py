@@ -87,11 +87,11 @@ def compare_orders(
     reserved = reserved_sources(problem)
     rows: list[dict[str, object]] = []
     here, mode = problem, _evaluated(problem, find_mode(problem, settings, progress))
-    for order in range(problem.geometry.order, -1, -1):
+    for order in range(problem.order, -1, -1):
         if rows and len(terms(order)) == len(terms(order + 1)):
             rows.append({**rows[-1], "order": order})
             continue
-        if order < problem.geometry.order:
+        if order < problem.order:
             lower = at_order(problem, order)
             mode = _solve_from(mode, here, lower, settings, progress)
             here = lower

@@ -30,6 +30,8 @@ from solver.tiles import Tiles, lay_tiles
 from solver.units import ARCSEC_PER_DEG, RAD_PER_MAS
 
 _KEY = ["field_id", "plate_id"]
+# The terms of lower orders are computed with coefficients of zero: one compilation does for all.
+_LEAST_ORDER = 5
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Problem:
 
     Attributes
     ----------
-    geometry : origins of all parameters, padded along src and exp
+    order : highest degree of the distortion
+    geometry : origins of all parameters, padded along src, exp and coef
     index : source, exposure and detector of each measurement
     measured : pixels from the detector's centre
     sigma : pixels
@@ -51,6 +54,7 @@ class Problem:
     epoch : mean epoch, MJD in TCB
     """
 
+    order: int
     geometry: Geometry
     index: Index
     measured: Float[np.ndarray, "obs 2"]
@@ -87,17 +91,14 @@ class Problem:
         self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
     ) -> dict[str, Float[np.ndarray, "..."]]:
         """Return the parameters as `solver.forward.predict` takes them, padded."""
-        sizes = {"exp": len(self.geometry.pointing_frame), "src": len(self.geometry.source_frame)}
         values = {**self.layout.scatter(theta), SOURCES.name: sources}
-        return {
-            group.name: pad(values[group.name], sizes.get(group.axis, 0)) for group in PARAMETERS
-        }
+        return {g.name: pad(values[g.name], g.axis, self.geometry.sizes) for g in PARAMETERS}
 
     def gathered(
         self, offsets: Mapping[str, Float[np.ndarray, "..."]]
     ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
         """Return calibration and sources of what `offsets` gives: its inverse."""
-        sizes = {"exp": self.layout.n_exp}
+        sizes = {"exp": self.layout.n_exp, "coef": self.layout.n_coef}
         values = {g.name: offsets[g.name][: sizes.get(g.axis)] for g in CALIBRATION_GROUPS}
         return self.layout.gather(values), offsets[SOURCES.name][: self.n_src]
 
@@ -154,6 +155,7 @@ def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings
     frame = _shifted(places.frame, catalogue_shift(settings))
     table = data.measurements.iloc[row]
     return Problem(
+        order=settings.order,
         geometry=_geometry(frame, exposures, centres, instrument, settings),
         index=index,
         measured=table[["nx", "ny"]].to_numpy(),
@@ -235,19 +237,24 @@ def _geometry(
     pointing = tangent_frame(
         centres["pointing_ra"] / ARCSEC_PER_DEG, centres["pointing_dec"] / ARCSEC_PER_DEG
     )
-    sizes = {"exp": _rounded_up(len(exposures), 16)}
+    order = max(settings.order, _LEAST_ORDER)
+    sizes = {
+        "src": _rounded_up(len(source_frame), 1024),
+        "exp": _rounded_up(len(exposures), 16),
+        "coef": len(terms(order)),
+    }
     return Geometry(
-        source_frame=pad(source_frame, _rounded_up(len(source_frame), 1024)),
-        pointing_frame=pad(pointing, sizes["exp"]),
+        source_frame=pad(source_frame, "src", sizes),
+        pointing_frame=pad(pointing, "exp", sizes),
         origin={
-            group.name: pad(centres[group.name], sizes.get(group.axis, 0))
+            group.name: pad(centres[group.name], group.axis, sizes)
             for group in CALIBRATION_GROUPS
             if not group.name.startswith("pointing")
         },
-        velocity=pad(observer.velocity * settings.aberration, sizes["exp"]),
-        sun_distance=pad(observer.sun_distance, sizes["exp"]),
+        velocity=pad(observer.velocity * settings.aberration, "exp", sizes),
+        sun_distance=pad(observer.sun_distance, "exp", sizes),
         distortion_scale=np.array(instrument.distortion_scale_um),
-        order=settings.order,
+        order=order,
     )
 
 
@@ -271,10 +278,17 @@ def _priors(
     )
 
 
-def pad(values: Float[np.ndarray, "n ..."], length: int) -> Float[np.ndarray, "m ..."]:
-    """Return `values` lengthened to `length` by repeats of the last row."""
-    missing = max(length - len(values), 0)
-    return np.concatenate([values, np.repeat(values[-1:], missing, axis=0)])
+def pad(
+    values: Float[np.ndarray, "n ..."], axis: str, sizes: Mapping[str, int]
+) -> Float[np.ndarray, "m ..."]:
+    """Return `values` lengthened to the size of their axis, where that has one.
+
+    What is added belongs to no measurement, and repeats the last row; but a coefficient acts
+    on all measurements, and is zero.
+    """
+    missing = max(sizes.get(axis, 0) - len(values), 0)
+    more = np.zeros(missing) if axis == "coef" else np.repeat(values[-1:], missing, axis=0)
+    return np.concatenate([values, more])
 
 
 def _rounded_up(length: int, step: int) -> int:

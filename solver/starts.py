@@ -32,7 +32,7 @@ def nearest(starts: Iterable[Start], settings: FitSettings) -> Start | None:
 
 
 def likely(start: Start, order: int, detectors: Sequence[int]) -> list[FitSettings]:
-    """Return what is likely to be asked of a solution next and takes longer than other priors.
+    """Return what is likely to be asked of a solution and takes longer than other priors do.
 
     A lower order needs Jacobians of its own, and without a detector the model is linear only
     near its solution.
@@ -44,7 +44,8 @@ def likely(start: Start, order: int, detectors: Sequence[int]) -> list[FitSettin
 
     Returns
     -------
-    That order, and no detector one at a time; as many of them as there is memory for
+    That order, no detector one at a time, and the other lower orders from there; as many of
+    them as there is memory for
     """
     fitted, out = start.settings, start.settings.exclusions.detectors
     left = [detector for detector in detectors if detector not in out]
@@ -52,8 +53,9 @@ def likely(start: Start, order: int, detectors: Sequence[int]) -> list[FitSettin
         fitted.with_(exclusions=replace(fitted.exclusions, detectors=out | {detector}))
         for detector in (left if len(left) > 1 else [])
     ]
-    lower = [fitted.with_(order=order - 1)] if 0 < order <= fitted.order else []
-    return [*lower, *without][: _MOST_BYTES // start.mode.equations.cross.nbytes]
+    below = sorted(range(fitted.order), key=lambda lower: abs(lower - (order - 1)))
+    lower = [fitted.with_(order=lower) for lower in below]
+    return [*lower[:1], *without, *lower[1:]][: _MOST_BYTES // start.mode.equations.cross.nbytes]
 
 
 def _beside(start: Start) -> tuple[int, int]:

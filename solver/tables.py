@@ -243,7 +243,7 @@ def _labels(group: Group, problem: Problem, instrument: Instrument) -> list[str]
     if group.axis == "det":
         return [f"detector {d.detector_id}" for d in instrument.detectors]
     letter = group.symbol[0]
-    return [f"{letter}({k},{j})" for k, j in terms(problem.geometry.order)]
+    return [f"{letter}({k},{j})" for k, j in terms(problem.order)]
 
 
 def _sigmas(covariance: Float[np.ndarray, "src 2 2"]) -> Float[np.ndarray, "src 2"]:

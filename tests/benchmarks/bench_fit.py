@@ -128,6 +128,7 @@ def changes(problem: Problem) -> dict[str, tuple[FitSettings, ...]]:
         "order 6 to 5": (FitSettings(order=6), default),
         "no detector 1, made ready": (default, no_detector, no_detector),
         "order 6 to 5, made ready": (FitSettings(order=6), default, default),
+        "order 6 to 2, made ready": (FitSettings(order=6), *2 * (FitSettings(order=2),)),
     }
 
 

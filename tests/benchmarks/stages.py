@@ -43,7 +43,8 @@ def what_if(
     mode = find_mode(solved, before)
     if made_ready is not None:
         near = build_problem(made_ready.exclusions.without(data), MINI_MOCK, made_ready)
-        mode, solved = linearised(near, _re_solved(mode, solved, near, made_ready)), near
+        found = re_solve(mode, solved, near, made_ready) or find_mode(near, made_ready)
+        mode, solved = linearised(near, found), near
     changed = build_problem(after.exclusions.without(data), MINI_MOCK, after)
 
     def work() -> object:

@@ -365,7 +365,7 @@ def true_offsets(orbit, problem):
         exposures["dec_est"].to_numpy(),
         ARCSEC,
     )
-    degrees = [(n - j, j) for n in range(2, problem.geometry.order + 1) for j in range(n + 1)]
+    degrees = [(n - j, j) for n in range(2, problem.order + 1) for j in range(n + 1)]
 
     def moved(name, column):
         return getattr(truth, name) - np.array([getattr(d, column) for d in detectors])

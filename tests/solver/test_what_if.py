@@ -6,6 +6,7 @@ import pytest
 from solver.carry import carry_over
 from solver.exclusions import Exclusions
 from solver.fit import OrbitFitter, fit_orbit
+from solver.linearise import linearise
 from solver.normal import accumulate
 from solver.problem import build_problem
 from solver.result import FitStatus
@@ -153,6 +154,28 @@ def test_lower_order_without_a_term_whose_prior_is_shifted_is_not_made_ready(orb
     fitter.fit(settings)
     list(fitter.get_ready(2))
     assert fitter.what_if(settings) is not None
+
+
+def test_every_lower_order_is_made_ready(sample_orbit):
+    """That of which only a fit can tell, too."""
+    asked = [FitSettings(order=order) for order in (4, 1)]
+    ready = fitted(OrbitFitter(sample_orbit))
+    assert ready.what_if(asked[-1]) is None
+    list(ready.get_ready(6))
+    for settings in asked:
+        found, expected = ready.what_if(settings), fit_orbit(sample_orbit, settings=settings)
+        moved = found.sources["offset_ra"] - expected.sources["offset_ra"]
+        assert np.abs(moved / expected.sources["sigma_ra_marginal"]).max() < AGREEMENT
+        assert found.summary["chi2"] == pytest.approx(expected.summary["chi2"], rel=1e-6)
+
+
+def test_lower_order_compiles_nothing(orbit):
+    fitter = OrbitFitter(orbit.data, orbit.instrument)
+    fitter.fit(FitSettings(order=5))
+    compiled = linearise._cache_size()
+    for order in (3, 0):
+        fitter.fit(FitSettings(order=order))
+    assert linearise._cache_size() == compiled
 
 
 def test_orbit_that_was_not_fitted_needs_a_fit(orbit):

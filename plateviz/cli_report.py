@@ -145,12 +145,15 @@ def _of_file(request: ReportRequest) -> "Report":
             "found no directory"
         )
     from plateviz.reports.orbit import orbit_report
+    from plateviz.reports.report import SOLVED
     from solver.instrument import MINI_MOCK, read_instrument
-    from solver.io.result import read_result
+    from solver.io.result import read_result, read_versions
 
     focal_plane = read_instrument(request.instrument) if request.instrument else MINI_MOCK
+    result = read_result(request.path)
     other = read_result(Path(request.other)) if request.other else None
-    return orbit_report(read_result(request.path), focal_plane, _facts(), other)
+    facts = {**_facts(), SOLVED: read_versions(request.path)}
+    return orbit_report(result, focal_plane, facts, other)
 
 
 def _other(request: ReportRequest, orbit: int) -> "FitResult | None":

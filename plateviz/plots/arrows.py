@@ -77,7 +77,7 @@ def arrows(
     hover: Sequence[tuple[str, str]],
     extra: list[str],
 ) -> list[hv.Element]:
-    """Return the vectors as shafts, heads and hoverable tails.
+    """Return the vectors as strokes and hoverable tails.
 
     Parameters
     ----------
@@ -90,16 +90,14 @@ def arrows(
 
     Returns
     -------
-    Segments of the shafts (a row per row of `table`), segments of the heads, points
+    Segments (the shafts, a row per row of `table`, and after them two rows for each head), points
     """
     ends = table.assign(
         x_end=table["x"] + scale * table["u"], y_end=table["y"] + scale * table["v"]
     )
-    shafts = hv.Segments(ends, ["x", "y", "x_end", "y_end"], extra, label="arrows")
     tails = hv.Points(table, ["x", "y"], extra, label="tails")
     return [
-        drawn(shafts, color=colour, line_width=1.2),
-        drawn(_heads(ends, field), color=colour, line_width=1.2),
+        drawn(_strokes(ends, field, "arrows"), color=colour, line_width=1.2),
         drawn(
             tails,
             color=colour,
@@ -130,28 +128,26 @@ def key(length: float, text: str, *, scale: float, field: Field, theme: str) -> 
     arrow = pd.DataFrame(
         {"x": [x], "y": [y], "x_end": [x + direction * scale * length], "y_end": [y]}
     )
-    shaft = hv.Segments(arrow, ["x", "y", "x_end", "y_end"], label="key")
     words = hv.Text(x + direction * (scale * length + 0.015 * field.width), y, text, halign="left")
     return [
-        drawn(shaft, color=colours.text, line_width=2),
-        drawn(_heads(arrow, field), color=colours.text, line_width=2),
+        drawn(_strokes(arrow, field, "key"), color=colours.text, line_width=2),
         drawn(words, text_color=colours.text, text_font_size=TICK_SIZE),
     ]
 
 
-def _heads(ends: pd.DataFrame, field: Field) -> hv.Segments:
-    dx = (ends["x_end"] - ends["x"]).to_numpy(dtype=float)
-    dy = (ends["y_end"] - ends["y"]).to_numpy(dtype=float)
-    length = np.minimum(_HEAD_SHARE * np.hypot(dx, dy), _LARGEST_HEAD * field.width)
-    angle = np.arctan2(dy, dx)[:, None] + np.pi + np.array([-_HEAD_ANGLE, _HEAD_ANGLE])
-    tip_x, tip_y = ends["x_end"].to_numpy(dtype=float), ends["y_end"].to_numpy(dtype=float)
-    return hv.Segments(
-        (
-            np.repeat(tip_x, 2),
-            np.repeat(tip_y, 2),
-            (tip_x[:, None] + length[:, None] * np.cos(angle)).ravel(),
-            (tip_y[:, None] + length[:, None] * np.sin(angle)).ravel(),
-        ),
-        ["x", "y", "x_end", "y_end"],
-        label="heads",
+def _strokes(ends: pd.DataFrame, field: Field, label: str) -> hv.Segments:
+    # Shafts and heads are one element: a figure's time to be made is that of its elements.
+    x, y, tip_x, tip_y = (
+        ends[column].to_numpy(dtype=float) for column in ("x", "y", "x_end", "y_end")
     )
+    length = np.hypot(tip_x - x, tip_y - y)
+    length = np.minimum(_HEAD_SHARE * length, _LARGEST_HEAD * field.width)[:, None]
+    angle = np.arctan2(tip_y - y, tip_x - x)[:, None] + np.pi + np.array([-1, 1]) * _HEAD_ANGLE
+    heads = (
+        np.repeat(tip_x, 2),
+        np.repeat(tip_y, 2),
+        (tip_x[:, None] + length * np.cos(angle)).ravel(),
+        (tip_y[:, None] + length * np.sin(angle)).ravel(),
+    )
+    columns = map(np.concatenate, zip((x, y, tip_x, tip_y), heads, strict=True))
+    return hv.Segments(tuple(columns), ["x", "y", "x_end", "y_end"], label=label)

@@ -19,7 +19,7 @@ def packed_document(element: hv.core.Dimensioned) -> str:
     """Return the Bokeh document of a picture: JSON, compressed, as text."""
     document = Document()
     document.add_root(hv.render(element, backend="bokeh"))
-    content = _with_background(_renumbered(document.to_json(deferred=False)))
+    content = _settled(document.to_json(deferred=False))
     text = json.dumps(content, separators=(",", ":"))
     return b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode()
 
@@ -42,15 +42,20 @@ def dark_colours() -> dict[str, object]:
     }
 
 
-def _renumbered(content: object) -> object:
-    """Return the document with models counted from one: Bokeh counts all that a process draws."""
+def _settled(content: object) -> object:
+    """Return the document with what Bokeh leaves open.
+
+    Its models are counted from one, where Bokeh counts all that a process draws; and its plots
+    say their background, where Bokeh leaves out a white one.
+    """
     numbers: dict[str, str] = {}
 
     def walk(part: object) -> object:
         if isinstance(part, dict):
-            return {
+            walked = {
                 key: number(value) if key == "id" else walk(value) for key, value in part.items()
             }
+            return _with_background(walked) if walked.get("name") in _WITH_BACKGROUND else walked
         return [walk(value) for value in part] if isinstance(part, list | tuple) else part
 
     def number(value: object) -> object:
@@ -61,15 +66,9 @@ def _renumbered(content: object) -> object:
     return walk(content)
 
 
-def _with_background(content: object) -> object:
-    """Return the document with the background of its plots said: Bokeh leaves out a white one."""
-    if isinstance(content, list):
-        return [_with_background(value) for value in content]
-    if not isinstance(content, dict):
-        return content
-    walked = {key: _with_background(value) for key, value in content.items()}
-    attributes = walked.get("attributes")
-    if walked.get("name") in _WITH_BACKGROUND and isinstance(attributes, dict):
-        white = dict.fromkeys(_BACKGROUNDS, theme_of(THEME).background)
-        walked["attributes"] = {**white, **attributes}
-    return walked
+def _with_background(model: dict[str, object]) -> dict[str, object]:
+    attributes = model.get("attributes")
+    if not isinstance(attributes, dict):
+        return model
+    white = dict.fromkeys(_BACKGROUNDS, theme_of(THEME).background)
+    return {**model, "attributes": {**white, **attributes}}

@@ -94,7 +94,8 @@ def _write(
     survey: Path, name: str, orbit: int, folder: Path, facts: Facts, links: list[Link]
 ) -> None:
     """Write the page of one orbit: the task of one of the processes."""
-    report = survey_orbit_report(open_run(survey, name), orbit, facts)
+    # A hundred pages: one that lets a reader choose, `plateviz report --orbit` makes.
+    report = survey_orbit_report(open_run(survey, name), orbit, facts, has_choices=False)
     _write_page(_page(folder, orbit), replace(report, links=links))
 
 

@@ -21,7 +21,11 @@ _FARTHEST = 3
 
 
 def orbit_report(
-    result: FitResult, instrument: Instrument, facts: Facts, other: FitResult | None = None
+    result: FitResult,
+    instrument: Instrument,
+    facts: Facts,
+    other: FitResult | None = None,
+    has_choices: bool = True,
 ) -> Report:
     """Return the report of one orbit.
 
@@ -31,6 +35,7 @@ def orbit_report(
     instrument : that took the orbit
     facts : what is known beside it; settings and inputs are added here
     other : solution to compare with
+    has_choices : whether the figures that can be of one detector or exposure are drawn so, too
     """
     date = dates(pd.Series([result.summary["epoch_mjd"]])).iloc[0]
     whole = Chosen(result, instrument, _exposures(result.exposures), other=other)
@@ -43,7 +48,7 @@ def orbit_report(
         subtitle=f"Plate Analysis of one orbit, mean epoch {date} (TCB)",
         verdict=orbit_verdict(result),
         items=summary_strip(result),
-        pictures=[_picture(d, whole) for d in diagnostics() if d.has_data(whole)],
+        pictures=[_picture(d, whole, has_choices) for d in diagnostics() if d.has_data(whole)],
         tables=tables,
         facts={
             **facts,
@@ -80,8 +85,9 @@ def failed_orbit_report(data: OrbitData, message: str, facts: Facts) -> Report:
     )
 
 
-def _picture(diagnostic: Diagnostic, whole: Chosen) -> Picture:
-    chosen = _selections(whole) if diagnostic.follows_selection else {"All": whole}
+def _picture(diagnostic: Diagnostic, whole: Chosen, has_choices: bool) -> Picture:
+    has_choices = has_choices and diagnostic.follows_selection
+    chosen = _selections(whole) if has_choices else {"All": whole}
     return Picture(
         diagnostic.name,
         diagnostic.title,

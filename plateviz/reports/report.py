@@ -14,6 +14,9 @@ from plateviz.tables.verdict import Verdict
 Facts = dict[str, dict[str, str]]
 """What is known beside the solution: title -> name -> value."""
 
+SOLVED = "Versions that solved it"
+"""The title under which facts say that."""
+
 Draw = Callable[[str], hv.core.Dimensioned]
 """Gives a picture in a theme."""
 

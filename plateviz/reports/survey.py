@@ -6,7 +6,7 @@ from plateviz.gallery import source_figures, survey_figures
 from plateviz.history import SurveyRun
 from plateviz.plots.survey_figure import SourceFigure, SourceTables, SurveyFigure, SurveyTables
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
-from plateviz.reports.report import Facts, Picture, Report, plain
+from plateviz.reports.report import SOLVED, Facts, Picture, Report, plain
 from plateviz.source import SurveyFolder
 from plateviz.survey_tables import survey_tables
 from plateviz.tables import (
@@ -22,8 +22,6 @@ from plateviz.tables.run_health import MISSING
 from plateviz.tables.verdict import run_verdict, source_verdict
 from solver.errors import InputError
 from solver.result import FitResult
-
-_SOLVED = "Versions that solved it"
 
 
 def survey_report(run: SurveyRun, facts: Facts) -> Report:
@@ -58,13 +56,18 @@ def survey_report(run: SurveyRun, facts: Facts) -> Report:
 
 
 def survey_orbit_report(
-    run: SurveyRun, orbit: int, facts: Facts, other: FitResult | None = None
+    run: SurveyRun,
+    orbit: int,
+    facts: Facts,
+    other: FitResult | None = None,
+    has_choices: bool = True,
 ) -> Report:
     """Return the report of one orbit of a run, of one that failed, too.
 
     Parameters
     ----------
     other : solution to compare with
+    has_choices : as of `orbit_report`
 
     Raises
     ------
@@ -74,11 +77,11 @@ def survey_orbit_report(
     folder = SurveyFolder(str(run.survey))
     if orbit not in folder.orbits():
         raise InputError(f"{run.survey}: expected an orbit {orbit}, found none of that number")
-    facts = {**facts, _SOLVED: _of_run(run)[_SOLVED]}
+    facts = {**facts, SOLVED: _of_run(run)[SOLVED]}
     message = run.failures().get(orbit)
     if message is not None:
         return failed_orbit_report(folder.read(orbit), message, facts)
-    return orbit_report(run.result(orbit), folder.read_instrument(), facts, other)
+    return orbit_report(run.result(orbit), folder.read_instrument(), facts, other, has_choices)
 
 
 def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
@@ -108,7 +111,7 @@ def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
 def _of_run(run: SurveyRun) -> Facts:
     """Return what the run was begun with."""
     header = run.header()
-    titles = {_SOLVED: "versions", "Settings": "settings", "Inputs (SHA-256)": "inputs"}
+    titles = {SOLVED: "versions", "Settings": "settings", "Inputs (SHA-256)": "inputs"}
     return {title: plain(header[name]) for title, name in titles.items()}  # type: ignore[arg-type]
 
 

@@ -54,6 +54,11 @@ def primary_header(result: FitResult) -> fits.Header:
     return _header(cards)
 
 
+def versions_in(primary: fits.Header) -> dict[str, str]:
+    """Return the versions of the packages that made a result, from its primary header."""
+    return {package: primary[key] for key, package in _VERSIONS.items() if key in primary}
+
+
 def result_header(result: FitResult) -> fits.Header:
     """Return the header of RESULT, with the keywords of the published files."""
     references = result.sources[result.sources["is_reference"]]

@@ -15,7 +15,7 @@ from solver.io import layout
 from solver.io.atomic import write_atomically
 from solver.io.failure import reading
 from solver.io.fits import FitsFile, read_fits
-from solver.io.header import FORMAT, ORIGIN, primary_header, result_header
+from solver.io.header import FORMAT, ORIGIN, primary_header, result_header, versions_in
 from solver.io.layout import Derived, Layout
 from solver.result import FitResult
 from solver.settings import FitSettings
@@ -87,6 +87,14 @@ def read_result(path: Path) -> FitResult:
     if not path.is_file():
         raise InputError(f"{path}: expected a result file, found none")
     return to_result(path, read_fits(path))
+
+
+def read_versions(path: Path) -> dict[str, str]:
+    """Return the versions of the packages that made a result; raises as `read_result`."""
+    with reading(str(path), "a FITS file"):
+        primary = fits.getheader(path)
+    _check_format(path, primary)
+    return versions_in(primary)
 
 
 def to_result(path: Path, file: FitsFile) -> FitResult:

@@ -28,6 +28,7 @@ def test_result_file_becomes_a_page(run, fit_result, tmp_path):
     assert "Orbit 7" in out
     assert page.endswith("</html>") or page.endswith("</html>\n")
     assert "Values (CSV)" in page
+    assert "<dt>jax</dt>" in page[page.index("Versions that solved it") :]
 
 
 def test_failed_orbit_has_a_report(run, run_dir, tmp_path):

@@ -15,10 +15,11 @@ def vectors():
 
 
 def _drawn(vectors, scale):
-    shafts, heads, tails = arrows(
+    strokes, tails = arrows(
         vectors, scale=scale, field=FIELD, colour="#000000", hover=[("u", "@{u}")], extra=["u"]
     )
-    return shafts.dframe(), heads.dframe(), tails.dframe()
+    strokes = strokes.dframe()
+    return strokes[: len(vectors)], strokes[len(vectors) :], tails.dframe()
 
 
 def _lengths(segments):
@@ -74,8 +75,8 @@ def test_automatic_scale_of_vectors_without_length_is_one(vectors):
 @pytest.mark.parametrize("x", [(-10.0, 10.0), (10.0, -10.0)], ids=["upwards", "East to the left"])
 def test_key_arrow_has_its_true_length_and_stands_below_the_data(x):
     field = Field(x, FIELD.y)
-    shaft, _, words = key(2e-3, "2 milli", scale=1000.0, field=field, theme="dark")
-    segment = shaft.dframe()
+    strokes, words = key(2e-3, "2 milli", scale=1000.0, field=field, theme="dark")
+    segment = strokes.dframe()
     assert _lengths(segment).iloc[0] == pytest.approx(2.0)
     assert field.ylim[0] < segment["y"].iloc[0] < field.y[0]
     assert words.data[2] == "2 milli"

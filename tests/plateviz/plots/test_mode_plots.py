@@ -10,6 +10,7 @@ from plateviz import plots, tables
 from plateviz.gallery import diagnostics
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.mode_groups import _amount
+from tests.plateviz.plots.drawn_arrows import shafts_of
 
 NAMES = ["mode-spectrum", "weak-modes", "mode-groups", "mode-shifts", "prior-shares"]
 MAS_PER_ARCMIN = 60_000.0
@@ -84,7 +85,7 @@ def test_shifts_of_all_modes_are_drawn_to_one_scale(fit_result):
     table = tables.mode_shifts(fit_result)
     stretches = []
     for panel, mode in zip(plots.plot_mode_shifts(table), (1, 2, 3), strict=True):
-        shafts = next(e for e in panel if e.label == "arrows").dframe()
+        shafts = shafts_of(panel)
         rows = table[table["mode"] == mode]
         drawn = (shafts["x_end"] - shafts["x"]).mean()
         stretches.append(drawn * MAS_PER_ARCMIN / rows["shift_ra_mas"].mean())
@@ -93,20 +94,20 @@ def test_shifts_of_all_modes_are_drawn_to_one_scale(fit_result):
 
 def test_key_of_the_shifts_is_as_long_as_it_says(fit_result):
     panel = next(iter(plots.plot_mode_shifts(tables.mode_shifts(fit_result))))
-    key = next(e for e in panel if e.label == "key").dframe()
-    shafts = next(e for e in panel if e.label == "arrows").dframe()
+    key = next(e for e in panel if e.label == "key").dframe().iloc[0]
+    shafts = shafts_of(panel)
     (text,) = (e.data[2] for e in panel if isinstance(e, hv.Text))
     number, unit = text.split()
     scale = (shafts["x_end"] - shafts["x"]).mean() / 1e-4
-    drawn = abs(key["x_end"] - key["x"]).item() / abs(scale)
+    drawn = abs(key["x_end"] - key["x"]) / abs(scale)
     assert drawn == pytest.approx(float(number) * {"µas": 1e-3, "mas": 1.0}[unit], rel=1e-3)
 
 
 def test_few_sources_have_an_arrow_each(fit_result):
     table = tables.mode_shifts(fit_result).groupby("mode").head(50)
     panel = next(iter(plots.plot_mode_shifts(table)))
-    shafts = next(e for e in panel if e.label == "arrows")
-    assert shafts.dimension_values("id").tolist() == table["id"].head(50).tolist()
+    tails = next(e for e in panel if e.label == "tails")
+    assert tails.dimension_values("id").tolist() == table["id"].head(50).tolist()
 
 
 def test_every_parameter_has_a_point_of_its_prior_share(fit_result):

@@ -13,6 +13,7 @@ from bokeh.models import ColumnDataSource, GlyphRenderer, HoverTool, Plot, Title
 from plateviz import plots, tables
 from plateviz.plots.style import CLASS_COLOURS
 from plateviz.plots.theme import THEMES, theme_of
+from tests.plateviz.plots.drawn_arrows import shafts_of
 
 _LABELLED_UNIT = re.compile(
     r"\(.+\)|per bin|χ² / dof|expected scatter|iteration|in order|N$|σ of A$|"
@@ -230,7 +231,7 @@ def test_footprint_outlines_and_names_every_field(drawings):
 
 def test_distortion_arrows_are_drawn_to_the_stated_scale(drawings):
     draw, table = drawings["distortion"]
-    shafts = next(e for e in draw(table, arrow_scale=500.0) if e.label == "arrows").dframe()
+    shafts = shafts_of(draw(table, arrow_scale=500.0))
     drawn = np.hypot(shafts["x_end"] - shafts["x"], shafts["y_end"] - shafts["y"])
     assert np.allclose(drawn, 0.5 * np.hypot(table["dx_um"], table["dy_um"]))
 
@@ -238,7 +239,7 @@ def test_distortion_arrows_are_drawn_to_the_stated_scale(drawings):
 def test_comparison_arrows_are_drawn_to_the_stated_scale(drawings):
     _, table = drawings["comparison"]
     overlay = plots.plot_comparison_map(table, arrow_scale=60_000.0)
-    shafts = next(e for e in overlay if e.label == "arrows").dframe()
+    shafts = shafts_of(overlay)
     assert np.allclose(shafts["x_end"] - shafts["x"], table["difference_ra_mas"])
     assert np.allclose(shafts["y_end"] - shafts["y"], table["difference_dec_mas"])
 

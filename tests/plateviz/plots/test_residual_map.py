@@ -5,6 +5,7 @@ import pytest
 
 from plateviz import tables
 from plateviz.plots import plot_residual_map
+from tests.plateviz.plots.drawn_arrows import shafts_of
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +18,7 @@ def _named(overlay, name):
 
 
 def _lengths(overlay):
-    shafts = _named(overlay, "arrows").dframe()
+    shafts = shafts_of(overlay)
     return np.hypot(shafts["x_end"] - shafts["x"], shafts["y_end"] - shafts["y"]).to_numpy()
 
 
@@ -79,7 +80,7 @@ def test_above_two_thousand_arrows_the_mean_of_each_bin_is_drawn(on_detector, in
     table = pd.concat([on_detector] * 12, ignore_index=True)
     overlay = plot_residual_map(table, instrument.detectors[2])
     assert len(table) > 2000
-    assert 0 < len(_named(overlay, "arrows")) <= 256
+    assert 0 < len(_named(overlay, "tails")) <= 256
     assert f"{len(table):,} measurements: mean residual in" in _subtitle(overlay)
 
 

@@ -52,6 +52,13 @@ def test_page_has_every_figure_with_data_and_its_caption(report, page, fit_resul
     assert all(picture.title in shell for picture in report.pictures)
 
 
+def test_choices_can_be_left_out(fit_result, instrument, report):
+    plain = orbit_report(fit_result, instrument, FACTS, has_choices=False)
+    assert [p.name for p in plain.pictures] == [p.name for p in report.pictures]
+    assert all(len(picture.choices) == 1 for picture in plain.pictures)
+    assert any(len(picture.choices) > 1 for picture in report.pictures)
+
+
 def test_page_tells_command_settings_and_hashes(fit_result, instrument):
     hashed = replace(fit_result, provenance={"obs.fits": "0123abcd"})
     shell = shell_of(page_of(orbit_report(hashed, instrument, FACTS)))

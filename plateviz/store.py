@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow as pa
 
 from solver.errors import InputError
+from solver.io.parquet import write_parquet
 from solver.result import FitResult
 from solver.schema import RESULT_TABLES, TRACE
 from solver.settings import FitSettings
@@ -106,7 +108,8 @@ def _write_tables(directory: Path, result: FitResult, beside: Mapping[str, pd.Da
     tables["trace"] = result.trace.drop(columns="seconds")
     for name, frame in {**tables, **beside}.items():
         if frame is not None:
-            frame.to_parquet(directory / f"{name}.parquet", index=False, compression="zstd")
+            content = pa.Table.from_pandas(frame, preserve_index=False)
+            write_parquet(content, directory / f"{name}.parquet")
 
 
 def _write_head(directory: Path, result: FitResult) -> None:

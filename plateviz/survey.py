@@ -30,6 +30,7 @@ from plateviz.survey_worker import Outcome, fit_survey_orbit
 from solver.apparent_motion import julian_year
 from solver.errors import InputError
 from solver.io.atomic import write_atomically
+from solver.io.parquet import write_parquet
 from solver.io.survey import survey_orbits
 from solver.settings import FitSettings
 from solver.survey_schema import ERRORS_BY_COUNT, MOTIONS
@@ -216,4 +217,4 @@ def _column(history: parquet.ParquetFile, name: str) -> np.ndarray:
 
 def _write(path: Path, table: pd.DataFrame) -> None:
     with write_atomically(path) as temporary:
-        table.to_parquet(temporary, index=False, compression="zstd")
+        write_parquet(pa.Table.from_pandas(table, preserve_index=False), temporary)

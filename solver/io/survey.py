@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-from pyarrow import parquet
 
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
 from solver.io.check import conform, refuse
 from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
+from solver.io.parquet import write_parquet
 from solver.io.read import find_catalogue
 from solver.orbit import OrbitData
 from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
@@ -176,7 +176,7 @@ def write_survey_table(frame: pd.DataFrame, schema: Table, path: Path) -> None:
         for column in schema
     ]
     with write_atomically(path) as temporary:
-        parquet.write_table(content.cast(pa.schema(fields)), temporary, compression="zstd")
+        write_parquet(content.cast(pa.schema(fields)), temporary)
 
 
 def _measured(sources: pd.DataFrame, measurements: pd.DataFrame) -> pd.DataFrame:

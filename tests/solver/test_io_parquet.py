@@ -1,0 +1,40 @@
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+from solver.io.parquet import write_parquet
+
+
+@pytest.fixture
+def table():
+    random = np.random.default_rng(1)
+    return pd.DataFrame(
+        {
+            "source_id": np.repeat(np.arange(2000) + 2**53 + 1, 5),
+            "residual": np.append(random.normal(size=9_998), [np.nan, -0.0]),
+            "label": pd.Series(["α", ""] * 5_000, dtype="str"),
+            "is_reference": random.random(10_000) < 0.5,
+        }
+    )
+
+
+def test_table_comes_back_bit_for_bit(table, tmp_path):
+    write_parquet(pa.Table.from_pandas(table, preserve_index=False), tmp_path / "t.parquet")
+    back = pd.read_parquet(tmp_path / "t.parquet")
+    pd.testing.assert_frame_equal(back, table)
+    assert np.array_equal(np.signbit(back["residual"]), np.signbit(table["residual"]))
+
+
+def test_numbers_are_split_by_bytes_and_the_rest_has_a_dictionary(table, tmp_path):
+    write_parquet(pa.Table.from_pandas(table, preserve_index=False), tmp_path / "t.parquet")
+    group = parquet.ParquetFile(tmp_path / "t.parquet").metadata.row_group(0)
+    encodings = {group.column(i).path_in_schema: group.column(i).encodings for i in range(4)}
+    assert "BYTE_STREAM_SPLIT" in encodings["residual"]
+    assert "RLE_DICTIONARY" in encodings["source_id"]
+
+
+def test_table_without_columns_or_rows_is_written(tmp_path):
+    write_parquet(pa.table({"x": pa.array([], pa.float64())}), tmp_path / "t.parquet")
+    assert pd.read_parquet(tmp_path / "t.parquet").empty

@@ -7,10 +7,9 @@ command that needs it, so that `--help` and mistakes answer at once.
 
 import sys
 import time
-import webbrowser
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -19,12 +18,10 @@ from plateviz.cache import keep_compilations
 from plateviz.cli_gaia import gaia
 from plateviz.cli_report import report
 from plateviz.cli_reproduce import reproduce
+from plateviz.cli_serve import run_server, serve
 from plateviz.runs import DEFAULT_RUN
 from solver.errors import FitError, InputError
 from solver.settings import ENGINES, NutsSettings, svi_settings
-
-if TYPE_CHECKING:
-    from plateviz.workbench import Workbench
 
 app = typer.Typer(
     help="Plate Analysis of satellite orbits: fit, look, decide whether to trust the solution.",
@@ -33,36 +30,27 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-_PORT = typer.Option(help="TCP port to serve on; 0 takes a free one.", min=0, max=65535)
-_ADDRESS = typer.Option(help="Interface to serve on. Only this machine can reach the default.")
-_OPEN = typer.Option("--open/--no-open", help="Open the page in your browser.")
-_TRUTH = typer.Option(help="True catalogue of a simulation, to compare with.")
-_ORBIT = typer.Option(help="Orbit to take where the file holds several.")
-_INSTRUMENT = typer.Option(help="Instrument as a TOML file; the mini-mock's by default.")
 _JSON = typer.Option("--json", help="Print one JSON value for machines.")
 _OBS = typer.Argument(
     help="Measurements and exposures: a FITS or VOTable file, a folder with measurement.* "
     "and environment.*, or one of those files.",
     metavar="OBS",
 )
-_REF = typer.Argument(
-    help="Reference catalogue: FITS, VOTable, ECSV, CSV or Parquet.", metavar="REF"
-)
 
 
 @app.command()
 def demo(
-    port: Annotated[int, _PORT] = 5006,
-    address: Annotated[str, _ADDRESS] = "127.0.0.1",
-    open_browser: Annotated[bool, _OPEN] = True,
+    port: options.Port = 5006,
+    address: options.Address = "127.0.0.1",
+    open_browser: options.OpenBrowser = True,
 ) -> None:
     """Make a small survey once, fit it, and show it in the dashboard."""
     from plateviz.cli_output import reporting
     from plateviz.demo import demo_directory, open_survey, require_done, simulation
-    from plateviz.server import check_address
+    from plateviz.server import Place, check_address
     from plateviz.worker import Worker
 
-    port = check_address(address, port)
+    place = Place(check_address(address, port), address)
     directory = demo_directory()
     with ExitStack() as stack, reporting("starting the solver") as reporter:
         worker = Worker()
@@ -76,7 +64,7 @@ def demo(
         require_done(first)
         # From here the server closes it, with the workbench.
         stack.pop_all()
-    _serve(workbench, port, address, open_browser)
+    run_server(workbench, place, open_browser)
 
 
 @app.command()
@@ -137,12 +125,12 @@ def inspect(
 @app.command()
 def fit(
     observations: Annotated[Path, _OBS],
-    reference: Annotated[Path, _REF],
+    reference: Annotated[Path, options.REFERENCE],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Result file to write (FITS).", metavar="RESULT")
     ],
-    truth: Annotated[Path | None, _TRUTH] = None,
-    orbit: Annotated[int | None, _ORBIT] = None,
+    truth: options.Truth = None,
+    orbit: options.Orbit = None,
     order: options.Order = 5,
     engine: Annotated[
         str, typer.Option(help=f"One of: {', '.join(ENGINES)}; or all, to see whether they agree.")
@@ -166,7 +154,7 @@ def fit(
         Path | None,
         typer.Option(help="File to keep an svi run in; a run that was stopped goes on from it."),
     ] = None,
-    instrument: Annotated[Path | None, _INSTRUMENT] = None,
+    instrument: options.Instrument = None,
     as_json: Annotated[bool, _JSON] = False,
 ) -> None:
     """Solve one orbit and write the solution."""
@@ -237,36 +225,7 @@ def survey(
     run_survey(directory, run, settings, parse_orbits(orbits), workers, scheduler, as_json)
 
 
-@app.command()
-def serve(
-    path: Annotated[
-        Path, typer.Argument(help="Survey directory, or OBS as of `fit`.", metavar="DIR|OBS")
-    ],
-    reference: Annotated[Path | None, _REF] = None,
-    truth: Annotated[Path | None, _TRUTH] = None,
-    orbit: Annotated[int | None, _ORBIT] = None,
-    instrument: Annotated[Path | None, _INSTRUMENT] = None,
-    port: Annotated[int, _PORT] = 5006,
-    address: Annotated[str, _ADDRESS] = "127.0.0.1",
-    open_browser: Annotated[bool, _OPEN] = True,
-) -> None:
-    """Show a survey, or the orbit in some files, in the dashboard."""
-    from plateviz.server import check_address
-    from plateviz.source import OrbitFiles, SurveyFolder
-    from plateviz.workbench import Workbench
-    from plateviz.worker import Worker
-
-    port = check_address(address, port)
-    if reference is None:
-        source: OrbitFiles | SurveyFolder = SurveyFolder(str(path))
-        source.orbits()
-    else:
-        source = OrbitFiles(str(path), str(reference), _text(truth), orbit, _text(instrument))
-        # Read once here, so that what is wrong with the files is said before a page opens.
-        source.read(orbit)
-    _serve(Workbench(source, Worker()), port, address, open_browser)
-
-
+app.command()(serve)
 app.command()(report)
 app.command()(reproduce)
 
@@ -278,17 +237,6 @@ def main() -> None:
     except (InputError, FitError) as error:
         typer.echo(f"plateviz: {error}", err=True)
         sys.exit(2 if isinstance(error, InputError) else 1)
-
-
-def _serve(workbench: "Workbench", port: int, address: str, open_browser: bool) -> None:
-    from plateviz.server import serve as run
-
-    def ready(page: str) -> None:
-        typer.echo(f"plateviz serves on {page} until you press Ctrl-C")
-        if open_browser:
-            webbrowser.open(page)
-
-    run(workbench, port=port, address=address, ready=ready)
 
 
 def _text(path: Path | None) -> str | None:

@@ -1,5 +1,6 @@
 """Options of the command line that say how orbits are fitted, and the settings they make."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -52,6 +53,26 @@ Steps = Annotated[
 Compat = Annotated[
     str | None,
     typer.Option(help="warpfield: svi in the units and with the rates of the published code."),
+]
+
+REFERENCE = typer.Argument(
+    help="Reference catalogue: FITS, VOTable, ECSV, CSV or Parquet.", metavar="REF"
+)
+Truth = Annotated[
+    Path | None, typer.Option(help="True catalogue of a simulation, to compare with.")
+]
+Orbit = Annotated[int | None, typer.Option(help="Orbit to take where the file holds several.")]
+Instrument = Annotated[
+    Path | None, typer.Option(help="Instrument as a TOML file; the mini-mock's by default.")
+]
+Port = Annotated[
+    int, typer.Option(help="TCP port to serve on; 0 takes a free one.", min=0, max=65535)
+]
+Address = Annotated[
+    str, typer.Option(help="Interface to serve on. Only this machine can reach the default.")
+]
+OpenBrowser = Annotated[
+    bool, typer.Option("--open/--no-open", help="Open the page in your browser.")
 ]
 
 

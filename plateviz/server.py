@@ -1,9 +1,10 @@
 """The web server: one process without JAX, safe by default, over one workbench."""
 
 import contextlib
+import re
 import socket
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import panel as pn
 
@@ -13,26 +14,45 @@ from solver.errors import InputError
 
 # How long a page may take to load its scripts before its session is given up.
 _PATIENCE_MILLISECONDS = 120_000
+_HOST = re.compile(r"[a-z0-9]([a-z0-9.-]*[a-z0-9])?(:\d{1,5})?")
+_PATH = re.compile(r"[A-Za-z0-9._~-]+(/[A-Za-z0-9._~-]+)*")
 
 
-def serve(workbench: Workbench, *, port: int, address: str, ready: Callable[[str], None]) -> None:
-    """Serve the dashboard until it is interrupted; the workbench is closed at the end.
+class Place(NamedTuple):
+    """Where a page is served, and where browsers find it.
 
-    Parameters
+    Attributes
     ----------
     port : TCP port, as from `check_address`
     address : of the interface to listen on; other machines reach it only where it is not
         a loopback address
+    origins : hosts by which browsers reach a proxy before it, as from `check_origin`
+    prefix : path of the page, as from `check_prefix`
+    """
+
+    port: int
+    address: str
+    origins: tuple[str, ...] = ()
+    prefix: str = ""
+
+
+def serve(workbench: Workbench, place: Place, ready: Callable[[str], None]) -> None:
+    """Serve the dashboard until it is interrupted; the workbench is closed at the end.
+
+    Parameters
+    ----------
     ready : called with the page's address once it can be opened
     """
     pn.extension("tabulator")
-    hosts = sorted({address, "localhost", "127.0.0.1"})
+    hosts = sorted({place.address, "localhost", "127.0.0.1"})
     # A thread is what it gives only where it is asked to make one.
     server: Any = pn.serve(
         lambda: build_app(workbench),
-        port=port,
-        address=address,
-        websocket_origin=[f"{host}:{port}" for host in hosts],
+        port=place.port,
+        address=place.address,
+        # A websocket from a page of any other host is refused.
+        websocket_origin=[*(f"{host}:{place.port}" for host in hosts), *place.origins],
+        prefix=place.prefix,
         title=f"plateviz · {workbench.title}",
         show=False,
         start=False,
@@ -41,7 +61,8 @@ def serve(workbench: Workbench, *, port: int, address: str, ready: Callable[[str
     )
     try:
         server.start()
-        ready(f"http://{address}:{port}/")
+        path = f"{place.prefix}/" if place.prefix else ""
+        ready(f"http://{place.address}:{place.port}/{path}")
         # Ctrl-C is how a person ends it.
         with contextlib.suppress(KeyboardInterrupt):
             server.io_loop.start()
@@ -69,3 +90,34 @@ def check_address(address: str, port: int) -> int:
         raise InputError(
             f"expected an address and a port that are free, found {address}:{port}: {error}"
         ) from error
+
+
+def check_origin(text: str) -> str:
+    """Return a host that browsers may come from, as they send it.
+
+    Raises
+    ------
+    InputError
+        If it is no host, with a port or without.
+    """
+    host = text.strip().lower()
+    if not _HOST.fullmatch(host):
+        raise InputError(
+            "--allow-origin: expected a host such as astro.example.org or "
+            f"astro.example.org:8443, found {text!r}"
+        )
+    return host
+
+
+def check_prefix(text: str) -> str:
+    """Return the path under which a page is served, without slashes around it.
+
+    Raises
+    ------
+    InputError
+        If it cannot stand in an address.
+    """
+    path = text.strip("/")
+    if path and not _PATH.fullmatch(path):
+        raise InputError(f"--prefix: expected a path such as plateviz, found {text!r}")
+    return path

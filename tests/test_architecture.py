@@ -80,6 +80,7 @@ RUNGS = (
     ("plateviz.demo", "plateviz.cli_output", "plateviz.cli_options", "plateviz.tap"),
     ("plateviz.gaia",),
     ("plateviz.cli_fit", "plateviz.cli_survey", "plateviz.cli_gaia", "plateviz.cli_report"),
+    ("plateviz.cli_serve",),
     ("plateviz.reproduction",),
     ("plateviz.cli_reproduce",),
     ("plateviz.cli",),

@@ -106,7 +106,10 @@ class SurveyRun:
         path = self.directory / MOTIONS_FILE
         if not path.is_file():
             return None
-        found = self._ask("SELECT * FROM read_parquet(?) WHERE source_id = ?", str(path), source_id)
+        # An id of a table is a NumPy integer, which DuckDB does not take.
+        found = self._ask(
+            "SELECT * FROM read_parquet(?) WHERE source_id = ?", str(path), int(source_id)
+        )
         # Row by row pandas would turn ids into floating-point numbers.
         return None if found.empty else found.astype(object).iloc[0]
 
@@ -123,7 +126,7 @@ class SurveyRun:
             f"SELECT {', '.join(HISTORY.names)} FROM read_parquet(?) "
             "WHERE source_id = ? ORDER BY epoch",
             self._history_files,
-            source_id,
+            int(source_id),
         )
 
     def counts(self) -> pd.DataFrame:

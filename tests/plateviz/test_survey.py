@@ -143,6 +143,13 @@ def test_history_of_a_source_is_what_its_orbits_say(run):
     assert run.history(1).empty
 
 
+def test_a_source_is_found_by_the_id_that_a_table_has(run):
+    found = run.motions()["source_id"].iloc[0]
+    assert isinstance(found, np.integer)
+    assert set(run.history(found)["source_id"]) == {found}
+    assert run.motion(found)["source_id"] == found
+
+
 def test_motions_hold_every_source(run):
     motions, counts = run.motions(), run.counts()
     assert list(motions.columns) == MOTIONS.names

@@ -1,0 +1,178 @@
+"""Orbits for the pictures of the documentation: one as it should be, others with one defect each.
+
+Every defect is put into the measurements, the catalogue or the settings of the same simulated
+orbit, which is then fitted and drawn as any other.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pandas as pd
+
+from plateviz.plots.diagnostic import Chosen
+from solver.exclusions import Exclusions
+from solver.fit import fit_orbit
+from solver.instrument import MINI_MOCK
+from solver.io.survey import read_survey_orbit
+from solver.orbit import OrbitData
+from solver.result import FitResult
+from solver.settings import FitSettings, SviSettings
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
+
+_SKY = SurveySettings(orbits=1, seed=1).scaled(18_000)
+_VAGUE = {"ra_error": 1000.0, "dec_error": 1000.0, "pmra_error": 1.0, "pmdec_error": 1.0}
+_CALIBRATION = ("detector_x", "detector_y", "distortion_x", "distortion_y")
+# The exposures of which residuals are drawn.
+_FIELD = tuple((0, plate) for plate in range(24))
+_FIELDS = tuple((field, plate) for field in range(4) for plate in range(24))
+
+
+@cache
+def _orbit() -> OrbitData:
+    with TemporaryDirectory() as folder:
+        directory = Path(folder) / "survey"
+        simulate_survey(directory, _SKY)
+        return read_survey_orbit(directory, 0)
+
+
+@cache
+def _good() -> FitResult:
+    return fit_orbit(_orbit(), settings=FitSettings(compare_orders=True))
+
+
+def _fitted(data: OrbitData | None = None, **settings: object) -> FitResult:
+    return fit_orbit(data or _orbit(), settings=FitSettings(**settings))  # type: ignore[arg-type]
+
+
+@cache
+def _low_order() -> FitResult:
+    return _fitted(order=3, compare_orders=True)
+
+
+def _measured(change: Callable[[pd.DataFrame, np.random.Generator], None]) -> OrbitData:
+    """Return the orbit with its measurements changed in place."""
+    rows = _orbit().measurements.copy()
+    change(rows, np.random.default_rng(1))
+    return replace(_orbit(), measurements=rows)
+
+
+def _understated(rows: pd.DataFrame, random: np.random.Generator) -> None:
+    """Make the errors half as large again as stated, and one in a hundred an outlier."""
+    for axis in "xy":
+        scale = np.sqrt(1.5**2 - 1.0) * rows[f"s{axis}"]
+        rows[f"n{axis}"] += scale * random.standard_normal(len(rows))
+        wrong = random.random(len(rows)) < 0.01
+        rows.loc[wrong, f"n{axis}"] += 6.0 * rows[f"s{axis}"] * random.choice([-1, 1], len(rows))
+
+
+def _moved_detector(rows: pd.DataFrame, _: np.random.Generator) -> None:
+    """Move detector 1 by 0.1 pixels in x, half way through each field."""
+    late = (rows["detector_id"] == 1) & (rows["plate_id"] >= 12)
+    rows.loc[late, "nx"] += 0.1
+
+
+def _trailed(rows: pd.DataFrame, random: np.random.Generator) -> None:
+    """Smear two exposures along x."""
+    for field, plate in ((1, 9), (2, 20)):
+        smeared = (rows["field_id"] == field) & (rows["plate_id"] == plate)
+        rows.loc[smeared, "nx"] += 0.02 * random.standard_normal(int(smeared.sum()))
+
+
+@cache
+def _few_references() -> FitResult:
+    """Fit with five reference sources, all of them in the east of the orbit's fields."""
+    catalogue = _orbit().catalogue.copy()
+    known = catalogue[catalogue["is_reference"]].sort_values("ra", ascending=False)
+    dropped = known.index[5:]
+    catalogue.loc[dropped, "is_reference"] = False
+    random = np.random.default_rng(2)
+    for name, error in _VAGUE.items():
+        catalogue.loc[dropped, name] = error
+        if name in ("ra_error", "dec_error"):
+            shift = error / 3.6e6 * random.standard_normal(len(dropped))
+            catalogue.loc[dropped, name.removesuffix("_error")] += shift
+    return _fitted(replace(_orbit(), catalogue=catalogue))
+
+
+@cache
+def _proud_catalogue() -> FitResult:
+    """Fit by a catalogue whose reference sources err five times as much as it says."""
+    catalogue = _orbit().catalogue.copy()
+    references = catalogue["is_reference"]
+    for name in ("ra_error", "dec_error", "pmra_error", "pmdec_error"):
+        catalogue.loc[references, name] /= 5.0
+    return _fitted(replace(_orbit(), catalogue=catalogue))
+
+
+@cache
+def _one_field() -> FitResult:
+    """Fit five exposures of one field alone, which do not overlap any other."""
+    kept = {(0, plate) for plate in range(5)}
+    exposures = _orbit().exposures[["field_id", "plate_id"]].itertuples(index=False, name=None)
+    return _fitted(exclusions=Exclusions(exposures=frozenset(set(exposures) - kept)))
+
+
+def _sparse_distortion() -> FitResult:
+    flat = dict.fromkeys(("distortion_x", "distortion_y"), float("inf"))
+    return _fitted(order=9, thin=12, prior_widths=flat)
+
+
+def _assumed() -> FitResult:
+    tight = {"detector_x": 0.05, "detector_y": 0.05, "distortion_x": 0.005, "distortion_y": 0.005}
+    return _fitted(prior_widths=tight)
+
+
+def _by_svi(svi: SviSettings) -> FitResult:
+    return _fitted(thin=4, engine="svi", svi=svi)
+
+
+def _chosen(
+    result: FitResult,
+    other: FitResult | None = None,
+    detector: int | None = None,
+    plates: tuple[tuple[int, int], ...] = _FIELD,
+) -> Chosen:
+    return Chosen(result, MINI_MOCK, plates, detector, other)
+
+
+def _good_chosen() -> Chosen:
+    return _chosen(_good())
+
+
+Pair = tuple[Callable[[], Chosen], Callable[[], Chosen]]
+
+ORBITS: Mapping[str, Pair] = {
+    "footprint": (_good_chosen, lambda: _chosen(_few_references())),
+    "residual-map": (
+        lambda: _chosen(_good(), plates=_FIELDS),
+        lambda: _chosen(_fitted(order=2), plates=_FIELDS),
+    ),
+    "residual-scatter": (
+        lambda: _chosen(_good(), detector=1),
+        lambda: _chosen(_fitted(_measured(_moved_detector)), detector=1),
+    ),
+    "pulls": (_good_chosen, lambda: _chosen(_fitted(_measured(_understated)))),
+    "deviation": (_good_chosen, lambda: _chosen(_proud_catalogue())),
+    "uncertainty": (_good_chosen, lambda: _chosen(_few_references())),
+    "exposure-chi2": (_good_chosen, lambda: _chosen(_fitted(_measured(_trailed)))),
+    "distortion": (_good_chosen, lambda: _chosen(_sparse_distortion())),
+    "prior-shares": (_good_chosen, lambda: _chosen(_assumed())),
+    "mode-spectrum": (_good_chosen, lambda: _chosen(_one_field())),
+    "orders": (_good_chosen, lambda: _chosen(_low_order())),
+    "weak-modes": (_good_chosen, lambda: _chosen(_one_field())),
+    "mode-groups": (_good_chosen, lambda: _chosen(_one_field())),
+    "mode-shifts": (_good_chosen, lambda: _chosen(_few_references())),
+    "comparison": (
+        lambda: _chosen(_fitted(prior_widths=dict.fromkeys(_CALIBRATION[2:], 2.0)), _good()),
+        lambda: _chosen(_low_order(), _good()),
+    ),
+    "convergence": (
+        lambda: _chosen(_by_svi(SviSettings())),
+        lambda: _chosen(_by_svi(SviSettings(steps=500, max_steps=500))),
+    ),
+}

@@ -1,0 +1,138 @@
+"""Surveys for the pictures of the documentation: one as it should be, others with one defect."""
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pandas as pd
+
+from plateviz.history import SurveyRun, open_run
+from plateviz.plots.survey_figure import SourceTables, SurveyTables
+from plateviz.survey import fit_survey
+from plateviz.survey_tables import survey_tables
+from solver.io.survey import measurement_path, read_survey_table, write_survey_table
+from solver.schema import MEASUREMENT
+from solver.settings import FitSettings
+from solver.simulate.catalogue import reference_catalogue, truth_catalogue
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
+
+# The fields wander less than the paper's, so that many sources are seen in nearly every orbit.
+_SKY = replace(
+    SurveySettings(orbits=48, seed=5).scaled(5_000), n_artificial=60, pair_spread_deg=0.15
+)
+_WANDERING = replace(_SKY, pair_spread_deg=1.0)
+_FULL_SKY = SurveySettings(seed=5).scaled(30_000)
+_POSITION_ERRORS = ("ra_error", "dec_error", "pmra_error", "pmdec_error")
+
+
+@dataclass(frozen=True)
+class Surveys:
+    """The surveys in a folder, each simulated and fitted when it is first asked for."""
+
+    folder: Path
+
+    @cached_property
+    def good(self) -> SurveyRun:
+        """A survey fitted with the order that its distortion has."""
+        return _fitted(self._simulated("good", _SKY), "default", FitSettings())
+
+    @cached_property
+    def low_order(self) -> SurveyRun:
+        """The same survey fitted with too low an order."""
+        return _fitted(self.good.survey, "low", FitSettings(order=3))
+
+    @cached_property
+    def ageing(self) -> SurveyRun:
+        """The same survey, whose measurements get worse and do not say so."""
+        directory = self.folder / "ageing"
+        shutil.copytree(self.good.survey, directory, ignore=shutil.ignore_patterns("runs"))
+        random = np.random.default_rng(4)
+        for orbit in range(_SKY.orbits):
+            _make_noisy(measurement_path(directory, orbit), 0.01 * orbit, random)
+        return _fitted(directory, "default", FitSettings())
+
+    def counted(self, settings: SurveySettings) -> SurveyTables:
+        """Return a survey in which sources were counted and nothing was fitted."""
+        directory = self._simulated("counted", settings)
+        catalogue = reference_catalogue(truth_catalogue(settings), settings)
+        frames = [
+            pd.read_parquet(path, columns=["source_id", "orbit_id"]).drop_duplicates()
+            for path in sorted((directory / "measurements").iterdir())
+        ]
+        counts = pd.concat(frames).groupby("source_id").size().rename("n_orbits")
+        return SurveyTables(pd.DataFrame(), catalogue.merge(counts, on="source_id"), catalogue)
+
+    def _simulated(self, name: str, settings: SurveySettings) -> Path:
+        simulate_survey(self.folder / name, settings)
+        return self.folder / name
+
+
+@contextmanager
+def surveys() -> Iterator[Surveys]:
+    """Give the surveys, and remove their files at the end."""
+    with TemporaryDirectory() as folder:
+        yield Surveys(Path(folder))
+
+
+def _fitted(directory: Path, name: str, settings: FitSettings) -> SurveyRun:
+    fit_survey(directory, name, settings, workers=1)
+    return open_run(directory, name)
+
+
+def _make_noisy(path: Path, share: float, random: np.random.Generator) -> None:
+    rows = read_survey_table(path, MEASUREMENT)
+    for axis in "xy":
+        extra = np.sqrt((1.0 + share) ** 2 - 1.0) * rows[f"s{axis}"]
+        rows[f"n{axis}"] += extra * random.standard_normal(len(rows))
+    write_survey_table(rows, MEASUREMENT, path)
+
+
+def _sky(spoil: Callable[[pd.DataFrame], None] = lambda _: None) -> SurveyTables:
+    truth = truth_catalogue(_FULL_SKY)
+    catalogue = reference_catalogue(truth, _FULL_SKY)
+    spoil(catalogue)
+    area = _FULL_SKY.field_l_deg, _FULL_SKY.field_b_deg
+    nothing = pd.DataFrame()
+    return SurveyTables(nothing, nothing, catalogue, truth, None, area, _FULL_SKY.target_deg)
+
+
+def _half_the_references(catalogue: pd.DataFrame) -> None:
+    """Leave the reference sources out where a second catalogue was to have brought them."""
+    catalogue["is_reference"] &= catalogue["ra"] > catalogue["ra"].median()
+
+
+def _proud(catalogue: pd.DataFrame) -> None:
+    """State the errors of the reference sources three times too small."""
+    references = catalogue["is_reference"]
+    for name in _POSITION_ERRORS:
+        catalogue.loc[references, name] /= 3.0
+
+
+def _source(run: SurveyRun) -> SourceTables:
+    motions = run.motions()
+    often = motions[motions["is_artificial"]].nlargest(1, "n_orbits")
+    chosen = int(often["source_id"].iloc[0])
+    return SourceTables(run.history(chosen), run.motion(chosen))
+
+
+SurveyPair = tuple[Callable[[Surveys], SurveyTables], Callable[[Surveys], SurveyTables]]
+SourcePair = tuple[Callable[[Surveys], SourceTables], Callable[[Surveys], SourceTables]]
+_RUNS: SurveyPair = (lambda s: survey_tables(s.good), lambda s: survey_tables(s.low_order))
+_SOURCES: SourcePair = (lambda s: _source(s.good), lambda s: _source(s.low_order))
+
+SURVEYS: Mapping[str, SurveyPair] = {
+    "orbit-health": (_RUNS[0], lambda s: survey_tables(s.ageing)),
+    "sky-distribution": (lambda _: _sky(), lambda _: _sky(_half_the_references)),
+    "prior-separation": (lambda _: _sky(), lambda _: _sky(_proud)),
+    "orbit-counts": (_RUNS[0], lambda s: s.counted(_WANDERING)),
+    "error-by-count": _RUNS,
+    "reference-scatter": _RUNS,
+    "motion-pulls": _RUNS,
+}
+SOURCES: Mapping[str, SourcePair] = {"sky-track": _SOURCES, "time-series": _SOURCES}

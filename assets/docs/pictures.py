@@ -1,0 +1,102 @@
+"""Draw the pictures of the documentation: each diagnostic of a good solution and of a bad one.
+
+    python assets/docs/pictures.py [NAME]...
+
+simulates a small survey, puts one defect at a time into it, fits, and draws with the plots of the
+application in Chromium. The pictures are kept beside the pages, in `pictures`; some minutes.
+"""
+
+import argparse
+import io
+import itertools
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import holoviews as hv
+from bokeh.embed import file_html
+from bokeh.resources import INLINE
+from picture_orbits import ORBITS
+from picture_surveys import SOURCES, SURVEYS, Surveys, surveys
+from PIL import Image
+from playwright.sync_api import Page, sync_playwright
+
+from plateviz.gallery import diagnostics, source_figures, survey_figures
+
+FOLDER = Path(__file__).resolve().parent / "pictures"
+_FLAGS = ["--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
+_IS_DRAWN = "() => window.Bokeh && Bokeh.documents.length && Bokeh.documents[0].is_idle"
+_STYLE = "<style>body { margin: 0 } </style>"
+KINDS = ("good", "bad")
+MOST_BYTES = 60_000
+# Tried in turn: a figure of several panels may need all the points, and one of one panel has 550.
+_WIDTHS = (1000, 800, 600)
+_COLOURS = (128, 64, 32)
+
+
+Figure = Callable[[], hv.core.Dimensioned]
+
+
+def figures_drawn(made: Surveys) -> Iterator[tuple[str, str, Figure]]:
+    """Yield the name of every figure, whether it is the good or the bad one, and how to draw it."""
+    for found, cases in ((survey_figures(), SURVEYS), (source_figures(), SOURCES)):
+        for figure in found:
+            for kind, case in zip(KINDS, cases[figure.name], strict=True):
+                yield figure.name, kind, lambda f=figure, c=case: f.draw(c(made), "light")  # type: ignore[arg-type]
+    for figure in diagnostics():
+        for kind, chosen in zip(KINDS, ORBITS[figure.name], strict=True):
+            yield figure.name, kind, lambda f=figure, c=chosen: f.draw(c(), "light")
+
+
+def main() -> None:
+    """Draw the pictures asked for, or all of them."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="of figures; all by default")
+    names = parser.parse_args().names
+    with _chromium() as page, surveys() as made, TemporaryDirectory() as folder:
+        for name, kind, draw in figures_drawn(made):
+            if not names or name in names:
+                (FOLDER / f"{name}-{kind}.png").write_bytes(_shot(page, draw(), Path(folder)))
+
+
+@contextmanager
+def _chromium() -> Iterator[Page]:
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=_FLAGS)
+        yield browser.new_page(viewport={"width": 1600, "height": 1400})
+        browser.close()
+
+
+def _shot(page: Page, figure: hv.core.Dimensioned, folder: Path) -> bytes:
+    """Return a figure as a small PNG."""
+    html = file_html(hv.render(figure, backend="bokeh"), INLINE, "figure")
+    path = folder / "figure.html"
+    path.write_text(html.replace("</head>", f"{_STYLE}</head>"), encoding="utf-8")
+    page.goto(path.as_uri())
+    page.wait_for_function(_IS_DRAWN)
+    page.mouse.move(1599, 1399)
+    taken = Image.open(io.BytesIO(page.locator("[data-root-id] > div").first.screenshot())).convert(
+        "RGB"
+    )
+    return _small(taken)
+
+
+def _small(picture: Image.Image) -> bytes:
+    """Return a picture with as many points and colours as its bytes allow."""
+    for width, colours in itertools.product(_WIDTHS, _COLOURS):
+        scale = min(1.0, width / picture.width)
+        size = round(picture.width * scale), round(picture.height * scale)
+        scaled = picture.resize(size, Image.Resampling.LANCZOS)
+        content = io.BytesIO()
+        few = scaled.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        few.save(content, "PNG", optimize=True)
+        if content.tell() <= MOST_BYTES:
+            break
+    return content.getvalue()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,85 @@
+"""Every figure of the gallery has its section, and in it a picture of good and of bad."""
+
+import re
+import sys
+
+import pytest
+from PIL import Image
+
+from plateviz.gallery import diagnostics, source_figures, survey_figures
+from tests.docs.pages import DOCS, headings_of, section_of
+
+ORBIT, SURVEY = DOCS / "diagnostics.md", DOCS / "survey-diagnostics.md"
+PICTURES = DOCS / "pictures"
+PLACES = [
+    *((figure, ORBIT) for figure in diagnostics()),
+    *((figure, SURVEY) for figure in (*survey_figures(), *source_figures())),
+]
+MOST_BYTES, MOST_BYTES_IN_ALL = 60_000, 4_000_000
+
+of_every_figure = pytest.mark.parametrize(
+    ("figure", "page"), PLACES, ids=lambda value: getattr(value, "name", "")
+)
+
+
+@of_every_figure
+def test_figure_has_a_section_with_both_pictures_in_it(figure, page):
+    assert figure.title in headings_of(page)
+    shown = re.findall(r"!\[[^\]]+\]\(pictures/(.+?)\)", section_of(page, figure.title))
+    assert shown == [f"{figure.name}-good.png", f"{figure.name}-bad.png"]
+
+
+@of_every_figure
+def test_section_says_what_is_good_and_what_is_bad(figure, page):
+    section = section_of(page, figure.title)
+    in_a_table = "| good | bad |" in section
+    in_prose = "**Good.**" in section and "**Bad.**" in section
+    assert in_a_table or in_prose
+    words = re.sub(r"!\[.*?\]\(.*?\)", "", section)
+    assert len(words.split()) > 30
+
+
+@pytest.mark.parametrize(
+    ("page", "figures"),
+    [(ORBIT, diagnostics()), (SURVEY, (*survey_figures(), *source_figures()))],
+    ids=["orbit", "survey"],
+)
+def test_sections_stand_in_the_order_of_the_page(page, figures):
+    titles = [figure.title for figure in figures]
+    assert [heading for heading in headings_of(page) if heading in titles] == titles
+
+
+@pytest.mark.parametrize("kind", ["good", "bad"])
+@of_every_figure
+def test_picture_is_small_and_not_blank(figure, page, kind):
+    path = PICTURES / f"{figure.name}-{kind}.png"
+    # A frame with nothing but words in it has three thousand.
+    assert 5_000 < path.stat().st_size <= MOST_BYTES
+    picture = Image.open(path).convert("L")
+    assert min(picture.size) > 200
+    assert max(picture.size) <= 1400
+    drawn = sum(picture.histogram()[:200])
+    assert 0.01 < drawn / (picture.width * picture.height) < 0.5
+
+
+@of_every_figure
+def test_good_and_bad_differ(figure, page):
+    good, bad = (PICTURES / f"{figure.name}-{kind}.png" for kind in ("good", "bad"))
+    assert good.read_bytes() != bad.read_bytes()
+
+
+def test_folder_holds_these_pictures_alone():
+    wanted = {f"{figure.name}-{kind}.png" for figure, _ in PLACES for kind in ("good", "bad")}
+    found = list(PICTURES.iterdir())
+    assert {path.name for path in found} == wanted
+    assert sum(path.stat().st_size for path in found) < MOST_BYTES_IN_ALL
+
+
+def test_script_has_a_case_for_every_figure(monkeypatch):
+    monkeypatch.setattr(sys, "path", [str(DOCS), *sys.path])
+    import picture_orbits
+    import picture_surveys
+
+    assert set(picture_orbits.ORBITS) == {figure.name for figure in diagnostics()}
+    assert set(picture_surveys.SURVEYS) == {figure.name for figure in survey_figures()}
+    assert set(picture_surveys.SOURCES) == {figure.name for figure in source_figures()}

@@ -1,0 +1,197 @@
+"""Directives that write the file formats down from the code that reads and writes them.
+
+| directive            | shows                                                              |
+|----------------------|--------------------------------------------------------------------|
+| `columns MODULE:NAME`| the columns of a table, `solver.schema:MEASUREMENT`                |
+| `hdu NAME`           | the columns of an HDU of a result file                             |
+| `keywords NAME`      | the header keywords of an HDU                                      |
+| `parameters`         | the parameter groups with their priors                             |
+| `settings MODULE:NAME`| fields and defaults of a class of settings                        |
+| `fields MODULE:NAME` | plain fields of any class                                          |
+| `layout MODULE`      | the tree of files that a module's docstring draws                  |
+"""
+
+import dataclasses
+import importlib
+import inspect
+import math
+import textwrap
+from collections.abc import Callable
+from typing import Any, get_origin
+
+from docstrings import attributes
+from docutils import nodes
+from example_result import example_result
+from markup import code, table
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+from solver.columns import Column, Table
+from solver.io import header, layout
+from solver.io.layout import Derived, Layout
+from solver.parameters import PARAMETERS, Group
+from solver.prior_text import format_width
+
+_AXES = {"src": "source", "exp": "exposure", "coef": "distortion term", "det": "detector"}
+_DERIVED: dict[str, Callable] = {
+    "RESULT": lambda result: layout.source_sigmas(result.sources),
+    "TELESCOPE": layout.telescope,
+    "DETECTOR": layout.detector,
+    "DISTORTION": layout.distortion,
+}
+_HEADERS = {"PRIMARY": header.primary_header, "RESULT": header.result_header}
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register the directives."""
+    for name, make in (
+        ("columns", columns_of),
+        ("hdu", hdu),
+        ("keywords", keywords),
+        ("parameters", parameters),
+        ("settings", settings),
+        ("fields", fields),
+        ("layout", files),
+    ):
+        app.add_directive(name, _directive(make))
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _directive(make: Callable[..., nodes.Node]) -> type[SphinxDirective]:
+    class Reference(SphinxDirective):
+        """Write down what the argument names."""
+
+        optional_arguments = 1
+
+        def run(self) -> list[nodes.Node]:
+            """Return it as one node."""
+            # The page changes with the code, which Sphinx does not watch.
+            self.env.note_reread()
+            return [make(*self.arguments)]
+
+    return Reference
+
+
+def columns_of(where: str) -> nodes.table:
+    """Return the columns of a table with the names by which they are read as well."""
+    found: Table = _named(where)
+    rows = (
+        (f"`{c.name}`", c.dtype, _unit(c), _meaning(c), code(c.aliases), _absent(c)) for c in found
+    )
+    return table(("column", "type", "unit", "meaning", "also read as", "where absent"), rows)
+
+
+def hdu(name: str) -> nodes.table:
+    """Return the columns of an HDU in the order in which they are written."""
+    kept = next((k for k in vars(layout).values() if isinstance(k, Layout) and k.hdu == name), None)
+    rows = [] if kept is None else [_kept(kept, column) for column in kept.table]
+    rows += [_derived(column) for column in _DERIVED.get(name, lambda _: [])(example_result())]
+    if not rows:
+        raise ValueError(f"expected an HDU of a result, found {name!r}")
+    order = {name: rank for rank, name in enumerate(layout.PUBLISHED_ORDER.get(name, ()))}
+    rows.sort(key=lambda row: order.get(row[0].strip("`"), len(order)))
+    return table(("column", "unit", "meaning", "in the run directory"), rows)
+
+
+def keywords(name: str) -> nodes.table:
+    """Return the keywords of a header, as they stand in a result of one source."""
+    cards = _HEADERS[name](example_result()).cards
+    rows = ((f"`{card.keyword}`", str(card.value)[:40], card.comment) for card in cards)
+    return table(("keyword", "such as", "meaning"), rows)
+
+
+def parameters() -> nodes.table:
+    """Return the parameter groups."""
+    headings = ("group", "in the paper", "one per", "unit", "default prior", "its centre")
+    return table(
+        headings,
+        (
+            (f"`{g.name}`", g.symbol, _AXES[g.axis], _per_unit(g), _prior(g), _centre(g))
+            for g in PARAMETERS
+        ),
+    )
+
+
+def settings(where: str) -> nodes.table:
+    """Return the fields of a class of settings, with what its docstring says of them."""
+    kind = _named(where)
+    meanings = attributes(kind)
+    shown = kind()
+    rows = (
+        (f"`{f.name}`", _default(getattr(shown, f.name)), meanings.get(f.name, ""))
+        for f in dataclasses.fields(kind)
+    )
+    return table(("setting", "default", "meaning"), rows)
+
+
+def fields(where: str) -> nodes.table:
+    """Return the fields of a class that are plain values, with what its docstring says of them."""
+    kind = _named(where)
+    meanings = attributes(kind)
+    plain = [f.name for f in dataclasses.fields(kind) if get_origin(f.type) is not tuple]
+    return table(("name", "meaning"), ((f"`{name}`", meanings.get(name, "")) for name in plain))
+
+
+def files(module: str) -> nodes.literal_block:
+    """Return the indented part of a module's docstring."""
+    text = inspect.getdoc(importlib.import_module(module)) or ""
+    tree = textwrap.dedent("\n".join(line for line in text.splitlines() if line.startswith("    ")))
+    return nodes.literal_block(tree, tree, language="text")
+
+
+def _default(value: object) -> str:
+    # What has fields of its own is described by itself.
+    return "" if dataclasses.is_dataclass(value) else f"`{value!r}`"
+
+
+def _named(where: str) -> Any:  # noqa: ANN401 a table or a class
+    module, _, name = where.partition(":")
+    return getattr(importlib.import_module(module), name)
+
+
+def _unit(column: Column) -> str:
+    return column.unit and f"`{column.unit}`"
+
+
+def _meaning(column: Column) -> str:
+    limits = [
+        *(["above zero"] if column.positive else []),
+        *(["may be NaN"] if column.may_be_nan else []),
+    ]
+    return f"{column.meaning} ({', '.join(limits)})" if limits else column.meaning
+
+
+def _absent(column: Column) -> str:
+    if column.required:
+        return ""
+    return "may be left out" if column.default is None else f"`{column.default}`"
+
+
+def _kept(kept: Layout, column: Column) -> tuple[str, str, str, str]:
+    name = kept.name(column)
+    unit = "" if column.name in kept.unitless else _unit(column)
+    renamed = f"`{column.name}`" if name != column.name else ""
+    return f"`{name}`", unit, _meaning(column), renamed
+
+
+def _derived(column: Derived) -> tuple[str, str, str, str]:
+    meaning = column.meaning.removeprefix(f"[{column.unit}] ")
+    return f"`{column.name}`", column.unit and f"`{column.unit}`", meaning, ""
+
+
+def _per_unit(group: Group) -> str:
+    return f"`{group.unit}`"
+
+
+def _prior(group: Group) -> str:
+    if group.axis == "src":
+        return "normal, as wide as the catalogue says"
+    if math.isinf(group.width):
+        return "flat"
+    if group.relative:
+        return f"{group.family}, {100.0 * group.width:g} % of its centre"
+    return f"{group.family}, {format_width(group.name, group.width)}"
+
+
+def _centre(group: Group) -> str:
+    return f"{group.origin}, `{group.column}`" if group.column else group.origin

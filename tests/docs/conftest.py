@@ -1,0 +1,81 @@
+"""A folder with all that the pages' commands name: OBS.fits, REF.fits, RESULT.fits and a survey."""
+
+import shutil
+import sys
+from contextlib import contextmanager
+
+import pytest
+from astropy.io import fits
+from astropy.table import Table
+from distributed import Client
+
+from plateviz.cli import main
+from solver.fit import fit_orbit
+from solver.io.result import write_result
+from solver.io.survey import read_survey_orbit
+from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT
+from tests.docs.pages import build_site
+
+
+@pytest.fixture(scope="session")
+def stock(small_survey, tmp_path_factory):
+    """The files, made once."""
+    folder = tmp_path_factory.mktemp("stock")
+    shutil.copytree(small_survey, folder / "DIR")
+    data = read_survey_orbit(small_survey, 0)
+    tables = [
+        _hdu(data.measurements, MEASUREMENT),
+        _hdu(data.exposures, ENVIRONMENT),
+    ]
+    fits.HDUList([fits.PrimaryHDU(), *tables]).writeto(folder / "OBS.fits")
+    fits.HDUList([fits.PrimaryHDU(), _hdu(data.catalogue, CATALOGUE)]).writeto(folder / "REF.fits")
+    write_result(fit_orbit(data), folder / "RESULT.fits")
+    return folder
+
+
+@pytest.fixture
+def workplace(stock, tmp_path, monkeypatch):
+    """A copy of them in the folder from which commands are run."""
+    folder = tmp_path / "work"
+    shutil.copytree(stock, folder)
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@pytest.fixture
+def command(workplace, monkeypatch):
+    """Return the function that runs a command line of plateviz in this process: its exit code.
+
+    A survey is fitted by a worker in this process, too, and nothing is served or opened.
+    """
+    monkeypatch.setattr("plateviz.survey._client", _worker_here)
+    monkeypatch.setattr("plateviz.cli_serve.run_server", lambda workbench, *_: workbench.close())
+
+    def run(words):
+        monkeypatch.setattr(sys, "argv", words)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code or 0
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory):
+    """The site, built once."""
+    return build_site(tmp_path_factory.mktemp("site"))
+
+
+@contextmanager
+def _worker_here(*_):
+    with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None) as one:
+        yield one
+
+
+def _hdu(frame, table):
+    raw = Table.from_pandas(frame[table.names])
+    for column in table:
+        raw[column.name].unit = column.unit or None
+    hdu = fits.table_to_hdu(raw)
+    hdu.name = table.name
+    return hdu

@@ -6,6 +6,8 @@ import uuid
 from collections.abc import Mapping
 from enum import Enum
 
+from solver.errors import CancelledError, FitError, InputError
+
 
 class JobStatus(Enum):
     """Where a job stands; the value is the word for people."""
@@ -36,6 +38,7 @@ class Job:
         self._changed = threading.Condition()
         self._status = JobStatus.QUEUED
         self._message = ""
+        self._is_input_error = False
         self._progress: list[Mapping[str, object]] = []
         self._started = time.monotonic()
         self._ended: float | None = None
@@ -66,20 +69,35 @@ class Job:
         if kind == "progress":
             self._advance(JobStatus.RUNNING, event)
         elif kind == "failed":
-            self.fail(str(event["message"]))
+            self.fail(str(event["message"]), bool(event.get("is_input_error", False)))
         else:
             self._advance(JobStatus(kind))
 
-    def fail(self, message: str) -> None:
-        """Mark the job as failed."""
+    def fail(self, message: str, is_input_error: bool = False) -> None:
+        """Mark the job as failed, and say whether it was for what it was given."""
         with self._changed:
             if not self._status.is_over:
-                self._message = message
+                self._message, self._is_input_error = message, is_input_error
             self._advance(JobStatus.FAILED)
 
     def cancel(self) -> None:
         """Mark the job as cancelled."""
         self._advance(JobStatus.CANCELLED)
+
+    def require_done(self) -> None:
+        """Raise what ended a job that is over before its end.
+
+        Raises
+        ------
+        InputError, FitError
+            If it failed, for its input or otherwise.
+        CancelledError
+            If it was cancelled.
+        """
+        if self._status is JobStatus.FAILED:
+            raise (InputError if self._is_input_error else FitError)(self._message)
+        if self._status is not JobStatus.DONE:
+            raise CancelledError("the work was stopped; nothing was changed")
 
     def wait(self, timeout: float | None = None) -> JobStatus:
         """Wait until the job is over, or for `timeout` seconds."""

@@ -73,6 +73,8 @@ class Worker:
             stdout=subprocess.PIPE,
             stderr=errors,
             encoding="utf-8",
+            # Ctrl-C, or a notebook's interrupt, is for who waits for a job, who will cancel it.
+            start_new_session=True,
         )
         self._process = process
         threading.Thread(target=self._listen, args=(process, errors), daemon=True).start()

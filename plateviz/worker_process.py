@@ -6,7 +6,8 @@ ours ends it too, with a traceback on standard error: `plateviz.worker` reports 
 starts another.
 
 Requests: {"do": "fit", "job", "source", "orbit", "settings", "what_if", "directory"},
-{"do": "simulate", "job", "directory", "settings"}, {"do": "cancel", "job"}.
+{"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
+"directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -105,7 +106,7 @@ def _read(
 
 def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later:
     job = request["job"]
-    work = {"fit": _fit, "simulate": _simulate}[request["do"]]
+    work = {"fit": _fit, "simulate": _simulate, "survey": _survey}[request["do"]]
 
     def progress(**values: object) -> None:
         cancellations.check(job)
@@ -119,7 +120,8 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later
     except CancelledError:
         send({"event": "cancelled", "job": job})
     except (InputError, FitError) as error:
-        send({"event": "failed", "job": job, "message": str(error)})
+        is_input = isinstance(error, InputError)
+        send({"event": "failed", "job": job, "message": str(error), "is_input_error": is_input})
     return iter(())
 
 
@@ -143,10 +145,27 @@ def _fit(request: Request, progress: Callable[..., None]) -> Later:
 
 def _simulate(request: Request, progress: Callable[..., None]) -> Later:
     settings = SurveySettings.from_dict(request["settings"])
+    catalogue = request.get("catalogue")
     simulate_survey(
         Path(request["directory"]),
         settings,
+        catalogue=None if catalogue is None else Path(catalogue),
         progress=lambda done, total: progress(stage="simulating", done=done, total=total),
+    )
+    return iter(())
+
+
+def _survey(request: Request, progress: Callable[..., None]) -> Later:
+    # Dask, which no other work needs, takes half a second to import.
+    from plateviz.survey import fit_survey
+
+    fit_survey(
+        Path(request["directory"]),
+        request["run"],
+        FitSettings.from_dict(request["settings"]),
+        request["orbits"],
+        request["workers"],
+        progress=lambda now: progress(stage="fitting orbits", done=now.done, total=now.total),
     )
     return iter(())
 

@@ -5,6 +5,7 @@ import threading
 import pytest
 
 from plateviz.job import Job, JobStatus
+from solver.errors import CancelledError, FitError, InputError
 
 
 def test_a_job_keeps_what_it_reported():
@@ -55,3 +56,25 @@ def test_every_job_has_its_own_id_in_its_request():
     first, second = Job({"do": "fit"}), Job({"do": "fit"})
     assert first.id != second.id
     assert first.request == {"do": "fit", "job": first.id}
+
+
+@pytest.mark.parametrize(
+    ("event", "error", "words"),
+    [
+        ({"event": "failed", "message": "bad", "is_input_error": True}, InputError, "bad"),
+        ({"event": "failed", "message": "open", "is_input_error": False}, FitError, "open"),
+        ({"event": "cancelled"}, CancelledError, "stopped"),
+    ],
+    ids=["input", "fit", "cancelled"],
+)
+def test_a_job_that_was_not_done_raises_why(event, error, words):
+    job = Job({"do": "fit"})
+    job.take(event)
+    with pytest.raises(error, match=words):
+        job.require_done()
+
+
+def test_a_job_that_was_done_raises_nothing():
+    job = Job({"do": "fit"})
+    job.take({"event": "done"})
+    job.require_done()

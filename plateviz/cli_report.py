@@ -1,6 +1,5 @@
 """`plateviz report`: one HTML file of an orbit, a source or a survey."""
 
-import platform
 import shlex
 import sys
 from pathlib import Path
@@ -14,8 +13,6 @@ from solver.errors import InputError
 if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
     from solver.result import FitResult
-
-_PACKAGES = ("plateviz", "jax", "numpy", "scipy", "holoviews", "bokeh")
 
 
 class ReportRequest(NamedTuple):
@@ -171,15 +168,6 @@ def _other(request: ReportRequest, orbit: int) -> "FitResult | None":
 
 def _facts(run: str | None = None) -> "Facts":
     """Return what made the report."""
-    from solver.versions import versions_of
+    from plateviz.reports.facts import facts_of
 
-    made = {"Command": shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])}
-    if run is not None:
-        made["Run"] = run
-    return {
-        "Report": made,
-        "Versions that made this report": {
-            **versions_of(_PACKAGES),
-            "Python": platform.python_version(),
-        },
-    }
+    return facts_of(shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]), run)

@@ -13,20 +13,19 @@ from plateviz.views.pages import Pages
 from plateviz.workbench import Workbench
 
 _TICK_MILLISECONDS = 100
+_SIDEBAR_WIDTH = 300
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
 
 def build_app(workbench: Workbench) -> pmui.Page:
     """Return the page of one session over `workbench`."""
-    navigation = Navigation(Session(workbench))
+    navigation, pages = _pages(workbench)
     session = navigation.session
-    navigation.begin(_arguments())
-    pages = Pages(navigation)
     page = pmui.Page(
         title=f"plateviz · {workbench.title}",
         sidebar=[pages.sidebar],
         main=[pages],
-        sidebar_width=300,
+        sidebar_width=_SIDEBAR_WIDTH,
         theme_config={"typography": {"fontSize": 13}},
     )
     if pn.state.curdoc is not None:
@@ -40,6 +39,20 @@ def build_app(workbench: Workbench) -> pmui.Page:
     _write_address(navigation)
     _keep_up(navigation, pages)
     return page
+
+
+def build_part(workbench: Workbench) -> pn.Row:
+    """Return the same, light, as a part of another page."""
+    navigation, pages = _pages(workbench)
+    _keep_up(navigation, pages)
+    sidebar = pn.Column(pages.sidebar, width=_SIDEBAR_WIDTH)
+    return pn.Row(sidebar, pages, sizing_mode="stretch_width")
+
+
+def _pages(workbench: Workbench) -> tuple[Navigation, Pages]:
+    navigation = Navigation(Session(workbench))
+    navigation.begin(_arguments())
+    return navigation, Pages(navigation)
 
 
 def _prepare(document: Document) -> None:

@@ -44,9 +44,30 @@ def serve(workbench: Workbench, place: Place, ready: Callable[[str], None]) -> N
     ready : called with the page's address once it can be opened
     """
     pn.extension("tabulator")
+    server = _server(workbench, place)
+    try:
+        server.start()
+        path = f"{place.prefix}/" if place.prefix else ""
+        ready(f"http://{place.address}:{place.port}/{path}")
+        # Ctrl-C is how a person ends it.
+        with contextlib.suppress(KeyboardInterrupt):
+            server.io_loop.start()
+    finally:
+        server.stop()
+        workbench.close()
+
+
+def begin(workbench: Workbench, place: Place) -> Any:  # noqa: ANN401 of Bokeh
+    """Return a server that serves on the event loop of this thread, which somebody else runs."""
+    server = _server(workbench, place)
+    server.start()
+    return server
+
+
+def _server(workbench: Workbench, place: Place) -> Any:  # noqa: ANN401 of Bokeh
     hosts = sorted({place.address, "localhost", "127.0.0.1"})
     # A thread is what it gives only where it is asked to make one.
-    server: Any = pn.serve(
+    return pn.serve(
         lambda: build_app(workbench),
         port=place.port,
         address=place.address,
@@ -59,16 +80,6 @@ def serve(workbench: Workbench, place: Place, ready: Callable[[str], None]) -> N
         verbose=False,
         unused_session_lifetime_milliseconds=_PATIENCE_MILLISECONDS,
     )
-    try:
-        server.start()
-        path = f"{place.prefix}/" if place.prefix else ""
-        ready(f"http://{place.address}:{place.port}/{path}")
-        # Ctrl-C is how a person ends it.
-        with contextlib.suppress(KeyboardInterrupt):
-            server.io_loop.start()
-    finally:
-        server.stop()
-        workbench.close()
 
 
 def check_address(address: str, port: int) -> int:

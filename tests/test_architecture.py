@@ -78,6 +78,7 @@ RUNGS = (
     ("plateviz.app",),
     ("plateviz.server",),
     ("plateviz.demo", "plateviz.cli_output", "plateviz.cli_options", "plateviz.tap"),
+    ("plateviz.notebook",),
     ("plateviz.gaia",),
     ("plateviz.cli_fit", "plateviz.cli_survey", "plateviz.cli_gaia", "plateviz.cli_report"),
     ("plateviz.cli_serve",),

@@ -1,0 +1,41 @@
+"""Cards: the verdict and the numbers of an object as HTML that needs no script."""
+
+from collections.abc import Iterable
+from html import escape
+from importlib.resources import files
+
+from plateviz.strip import STYLE, strip
+from plateviz.tables import SummaryItem
+from plateviz.tables.verdict import Verdict
+
+CARD_STYLE = STYLE + (files("plateviz.notebook") / "card.css").read_text(encoding="utf-8")
+"""The colours of both themes, and the classes of cards and captions."""
+
+
+def card(title: str, subtitle: str, verdict: Verdict | None, items: Iterable[SummaryItem]) -> str:
+    """Return what an object is, what to think of it, and the numbers to judge it by.
+
+    Parameters
+    ----------
+    verdict : None where there is nothing to judge
+    items : in the order of the tiles
+    """
+    return (
+        f"<style>{CARD_STYLE}</style><div class='plateviz'>"
+        f"<p class='title'><b>{escape(title)}</b> <span>{escape(subtitle)}</span></p>"
+        f"{_judged(verdict)}{strip(items)}</div>"
+    )
+
+
+def in_words(title: str, subtitle: str, verdict: Verdict | None) -> str:
+    """Return the same in one line of text."""
+    judged = "" if verdict is None else f": {verdict.headline}"
+    return f"{title} ({subtitle}){judged}"
+
+
+def _judged(verdict: Verdict | None) -> str:
+    if verdict is None:
+        return ""
+    notable = "".join(f"<li>{escape(words)}</li>" for words in verdict.notable)
+    notable = f"<ul>{notable}</ul>" if notable else ""
+    return f"<p class='verdict {verdict.state}'>{escape(verdict.headline)}</p>{notable}"

@@ -1,0 +1,140 @@
+"""OpenSource: one source through the orbits of a run."""
+
+from functools import partial
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pandas as pd
+from astropy.table import QTable
+
+from plateviz.history import SurveyRun
+from plateviz.notebook.card import card, in_words
+from plateviz.notebook.drawing import Drawing, Figure, Illustrated, drawings
+from plateviz.notebook.named import Named
+from plateviz.notebook.report import write_report
+from plateviz.notebook.table import OpenTable
+from plateviz.tables import motion_table, source_class, source_strip, time_series
+from plateviz.tables.verdict import Verdict, source_verdict
+from solver.errors import InputError
+from solver.survey_schema import HISTORY
+
+if TYPE_CHECKING:
+    from plateviz.reports.report import Facts, Report
+
+_LARGEST_ID = 2**63 - 1
+
+
+class OpenSource(Illustrated):
+    """One source as a run has it, orbit by orbit.
+
+    Attributes
+    ----------
+    source_id : of the catalogue
+    kind : "reference", "non-reference" or "artificial"
+    """
+
+    def __init__(self, run: SurveyRun, source_id: int | str, call: str) -> None:
+        """Look for a source.
+
+        Parameters
+        ----------
+        call : what a person wrote to get it
+
+        Raises
+        ------
+        InputError
+            If the run has no source of that id.
+        """
+        self._run, self._call = run, call
+        self.source_id = id_of(source_id)
+        self._history, self._motion = run.history(self.source_id), run.motion(self.source_id)
+        if self._history.empty:
+            raise InputError(
+                f"run {run.name!r} of {run.survey.name}: expected a source {self.source_id}, "
+                "found none of that id; .sources lists them"
+            )
+        self.kind = source_class(self._history)
+
+    @property
+    def history(self) -> pd.DataFrame:
+        """Its positions, a row per orbit: `solver.survey_schema.HISTORY`."""
+        return self._history.copy(deep=False)
+
+    @property
+    def time_series(self) -> pd.DataFrame:
+        """Its offsets against time, as the figure `time-series` draws them."""
+        return time_series(self._history, self._motion)
+
+    @property
+    def motion(self) -> pd.DataFrame:
+        """Its fitted position, parallax and proper motion, less the catalogue's.
+
+        Raises
+        ------
+        InputError
+            If the run is not whole: motions are fitted when all orbits are there.
+        """
+        if self._motion is None:
+            raise InputError(
+                f"run {self._run.name!r}: expected motions, found that not all orbits are fitted"
+            )
+        return motion_table(self._motion)
+
+    def table(self) -> QTable:
+        """Return `history` with units, as astropy has it."""
+        return OpenTable(self._history, list(HISTORY)).to_astropy()
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether its orbits agree with its motion."""
+        return source_verdict(self._history, self._motion)
+
+    def report(self, path: str | PathLike[str]) -> Path:
+        """Write it as one HTML file that opens anywhere; InputError if that cannot be written."""
+        return write_report(self._report, path, self._call, self._run.name)
+
+    def __repr__(self) -> str:
+        """Return what it is and the verdict."""
+        return in_words(*self._titles(), self.verdict)
+
+    def _repr_html_(self) -> str:
+        return card(*self._titles(), self.verdict, source_strip(self._history, self._motion))
+
+    def _titles(self) -> tuple[str, str]:
+        where = f"{self._run.survey.resolve().name}, run {self._run.name}"
+        return f"{self.kind.capitalize()} source {self.source_id}", where
+
+    def _drawings(self, theme: str) -> Named[Drawing]:
+        # What draws takes seconds to import.
+        from plateviz.gallery import source_figures
+        from plateviz.plots.survey_figure import SourceTables
+
+        tables = SourceTables(self._history, self._motion)
+        figures = [
+            Figure(one.name, one.title, one.caption, partial(one.draw, tables))
+            for one in source_figures()
+        ]
+        return drawings(figures, theme)
+
+    def _report(self, facts: "Facts") -> "Report":
+        from plateviz.reports.survey import source_report
+
+        return source_report(self._run, self.source_id, facts)
+
+
+def id_of(given: object) -> int:
+    """Return the id of a source that a person gave as a number or as text.
+
+    Raises
+    ------
+    InputError
+        If it is no whole number of 64 bits.
+    """
+    try:
+        number = int(str(given))
+    except ValueError:
+        number = _LARGEST_ID + 1
+    if abs(number) > _LARGEST_ID:
+        raise InputError(f"expected the id of a source, a whole number, found {given!r}")
+    return number

@@ -1,0 +1,93 @@
+"""The choices of a fit as keywords: the words of the command line, and one message for mistakes."""
+
+import inspect
+import math
+
+import astropy.units as u
+import pytest
+
+from plateviz.notebook.choices import Choices, settings_with, takes_choices
+from solver.errors import InputError
+from solver.settings import FitSettings
+
+PAPER = FitSettings()
+
+
+def test_nothing_chosen_leaves_the_settings_as_they_are():
+    assert settings_with(PAPER, {}) == PAPER
+
+
+@pytest.mark.parametrize(
+    ("width", "expected"),
+    [
+        pytest.param("10um", 10.0, id="words"),
+        pytest.param(2.5, 2.5, id="number"),
+        pytest.param(3.0 * u.um, 3.0, id="quantity"),
+        pytest.param("flat", math.inf, id="flat"),
+        pytest.param(math.inf, math.inf, id="infinite"),
+    ],
+)
+def test_prior_is_a_word_a_number_or_a_quantity(width, expected):
+    settings = settings_with(PAPER, {"priors": {"distortion_x": width}})
+    assert settings.prior_widths == {"distortion_x": expected}
+
+
+def test_centre_is_of_a_group_or_of_an_element():
+    centres = {"focal_length": "100um", "detector_x[2]": -5}
+    assert settings_with(PAPER, {"centres": centres}).prior_shifts == {
+        "focal_length": 100.0,
+        "detector_x[2]": -5.0,
+    }
+
+
+@pytest.mark.parametrize("exclude", ["detector=2", ["detector=2"]], ids=["text", "list"])
+def test_what_is_excluded_is_said_as_on_the_command_line(exclude):
+    assert settings_with(PAPER, {"exclude": exclude}).exclusions.detectors == {2}
+
+
+def test_priors_change_by_name_and_other_choices_stay():
+    base = settings_with(PAPER, {"order": 3, "priors": {"pitch_x": 1.0, "pitch_y": 2.0}})
+    settings = settings_with(base, {"priors": {"pitch_y": 4.0}})
+    assert settings.order == 3
+    assert settings.prior_widths == {"pitch_x": 1.0, "pitch_y": 4.0}
+
+
+def test_steps_and_seed_are_of_the_engines():
+    settings = settings_with(PAPER, {"engine": "svi", "steps": 30, "seed": 5})
+    assert (settings.svi.steps, settings.svi.seed, settings.nuts.seed) == (30, 5, 5)
+
+
+@pytest.mark.parametrize(
+    ("choices", "message"),
+    [
+        ({"ordre": 3}, "found 'ordre'; did you mean order"),
+        ({"order": 12}, "order from 0 to 9, found 12"),
+        ({"order": "5"}, "order from 0 to 9, found '5'"),
+        ({"engine": "magic"}, "engine out of gauss-newton"),
+        ({"robust": "no"}, "robust: expected True or False, found 'no'"),
+        ({"thin": 0}, "thin to be 1 or more"),
+        ({"priors": ["distortion_x"]}, r"priors: expected names and values .* \['distortion_x'\]"),
+        ({"priors": {"distortion": "1um"}}, "parameter group out of .* found 'distortion'"),
+        ({"priors": {"distortion_x": "1 parsec"}}, "prior of distortion_x: .* found 'parsec'"),
+        ({"priors": {"distortion_x": -1}}, "positive prior width"),
+        ({"centres": {"detector_x[2]": "far"}}, "centre of a prior: expected .*found"),
+        ({"exclude": "detector 2"}, "exclusion: expected source=ID"),
+        ({"exclude": 2}, "exclude: expected texts such as 'detector=2', found 2"),
+        ({"steps": 2.5}, "steps: expected a number of 1 or more, found 2.5"),
+        ({"seed": -1}, "svi seed to be 0 or more"),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_mistake_is_one_message(choices, message):
+    with pytest.raises(InputError, match=message):
+        settings_with(PAPER, choices)
+
+
+def test_signature_names_the_choices():
+    @takes_choices
+    def fit(orbit, **choices):
+        return choices
+
+    names = list(inspect.signature(fit).parameters)
+    assert names == ["orbit", *Choices.__annotations__]
+    assert fit(1, order=3) == {"order": 3}

@@ -1,0 +1,182 @@
+"""A solution: its tables with and without units, its figures, its report, and mistakes."""
+
+import subprocess
+import sys
+
+import astropy.units as u
+import numpy as np
+import pytest
+
+import plateviz
+from plateviz.gallery import diagnostics
+from plateviz.notebook.solution import OpenSolution
+from plateviz.notebook.table import FITTED
+from solver.errors import InputError
+from solver.io.result import read_result
+from solver.schema import RESULT_TABLES
+
+OF_COMPARISON = {"comparison", "orders"}
+
+
+@pytest.fixture(scope="module")
+def solution(fit_result, instrument):
+    return OpenSolution(fit_result, instrument, "test", "plateviz.open('test')")
+
+
+def test_it_says_what_it_is_and_whether_to_trust_it(solution):
+    assert repr(solution).startswith(f"Orbit {solution.result.orbit_id}, order 5 (test): ")
+    assert repr(solution).endswith(solution.verdict.headline)
+    card = solution._repr_html_()
+    assert solution.verdict.headline in card
+    assert "χ² per degree of freedom" in card
+
+
+def test_card_does_not_restyle_the_cells_of_a_notebook(solution):
+    assert "\n.cell" not in solution._repr_html_()
+    assert ".strip .cell" in solution._repr_html_()
+
+
+def test_tables_are_those_of_the_solver_and_the_fitted_calibration(solution, fit_result):
+    there = [t.name for t in RESULT_TABLES if getattr(fit_result, t.name) is not None]
+    assert list(solution.tables) == [*FITTED, *there]
+    assert len(solution.detectors) == 4
+    assert len(solution.pointings) == len(solution.exposures) == len(fit_result.exposures)
+    assert list(solution.tables.residuals) == list(solution.residuals)
+
+
+def test_changing_a_table_changes_a_copy(solution, fit_result):
+    before = fit_result.sources["ra"].copy()
+    table = solution.sources
+    table["ra"] = 0.0
+    assert fit_result.sources["ra"].equals(before)
+    assert solution.sources["ra"].equals(before)
+
+
+def test_fitted_calibration_is_that_of_the_result(solution, fit_result):
+    fitted = fit_result.values_on("det", "sigma_marginal")["detector_x"]
+    assert np.array_equal(solution.detectors["detector_x_sigma"], fitted)
+    terms = solution.distortion["element"]
+    assert terms.is_unique
+
+
+@pytest.mark.parametrize(
+    ("table", "column", "unit"),
+    [
+        ("sources", "ra", u.deg),
+        ("residuals", "residual_x", u.pix),
+        ("detectors", "detector_x", u.um),
+        ("pointings", "pointing_ra_sigma", u.arcsec),
+    ],
+)
+def test_astropy_table_has_units(solution, table, column, unit):
+    found = solution.table(table)
+    assert found[column].unit == unit
+    assert found[column].info.description
+    assert np.array_equal(found[column].value, solution.tables[table][column], equal_nan=True)
+
+
+def test_every_table_has_an_astropy_table(solution):
+    for name in solution.tables:
+        assert len(solution.table(name)) == len(solution.tables[name])
+
+
+def test_source_ids_stay_exact(solution, fit_result):
+    ids = solution.table("sources")["source_id"]
+    assert ids.dtype == np.int64
+    assert np.array_equal(ids, fit_result.sources["source_id"])
+
+
+def test_figures_are_those_of_the_dashboard_that_have_data(solution):
+    names = [one.name for one in diagnostics() if one.name not in OF_COMPARISON]
+    assert list(solution.figures) == names
+    assert solution.figures.residual_map.title == solution.figure("residual-map").title
+
+
+def test_figure_draws_what_the_dashboard_draws(solution):
+    drawing = solution.figure("residual-map", detector=2, theme="dark")
+    assert "detector 2" in drawing.element.opts.get("plot").kwargs["title"]
+    assert drawing.__panel__().styles["background"] == "#121212"
+
+
+def test_exposures_are_chosen(solution):
+    one = solution.figure("residual-map", exposures=[(0, 1)], detector=1)
+    words = one.element.opts.get("plot").kwargs
+    assert words["title"] == "Residuals on detector 1, measured minus predicted"
+
+
+def test_sheet_has_every_figure(solution):
+    sheet = solution.show()
+    assert len(sheet.__panel__()[1]) == len(solution.figures)
+    assert f"{len(solution.figures)} figures" in repr(sheet)
+
+
+def test_terminal_is_given_words(solution):
+    assert solution.figures.pulls._repr_mimebundle_() == {
+        "text/plain": "figure 'pulls': Standardised residuals"
+    }
+
+
+def test_compared_solution_has_the_comparison(solution, make_fit_result, instrument):
+    other = OpenSolution(make_fit_result(2)[0], instrument, "other", "plateviz.open('other')")
+    both = solution.compared_with(other)
+    assert "comparison" in both.figures
+    assert "comparison" not in solution.figures
+    assert "compared with order 5" in repr(both)
+
+
+def test_report_is_a_file_that_tells_what_made_it(solution, tmp_path):
+    path = solution.report(tmp_path / "r.html")
+    page = path.read_text("utf-8")
+    assert "plateviz.open(&#39;test&#39;).report(" in page
+    assert solution.verdict.headline in page
+
+
+def test_saved_solution_opens_again(solution, tmp_path):
+    path = solution.save(tmp_path / "R.fits")
+    again = plateviz.open(path)
+    assert again.sources.equals(read_result(path).sources)
+    assert again.summary["chi2"] == solution.summary["chi2"]
+    assert repr(again).split("(")[0] == repr(solution).split("(")[0]
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda s: s.table("source"), "table out of .*'source'; did you mean sources"),
+        (lambda s: s.figure("residuals"), "figure out of footprint.*found 'residuals'"),
+        (lambda s: s.figure("comparison"), "found 'comparison'"),
+        (lambda s: s.figure("pulls", theme="blue"), "theme: expected one of light, dark"),
+        (lambda s: s.figure("residual-map", detector=9), r"detector: expected .*, found 9"),
+        (lambda s: s.figure("residual-map", exposures=[(9, 9)]), r"of the solution, .*\(9, 9\)"),
+        (lambda s: s.figure("residual-map", exposures=[]), "of the solution, .*found none"),
+        (lambda s: s.figure("residual-map", exposures=7), r"pairs \(field, plate\) .*found 7"),
+        (lambda s: s.compared_with("R.fits"), "a solution to compare with, found 'R.fits'"),
+        (lambda s: s.what_if(order=3), r"test: .* a solution alone; plateviz.open\(OBS, REF\)"),
+        (lambda s: s.report("no/such/folder/r.html"), "no folder"),
+        (lambda s: s.save("no/such/folder/R.fits"), "no folder"),
+        (lambda s: s.report(3), "path of a file or a folder, found 3"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_mistake_is_one_message(solution, ask, message):
+    with pytest.raises(InputError, match=message):
+        ask(solution)
+
+
+@pytest.mark.parametrize(
+    ("code", "absent"),
+    [
+        ("import plateviz", "numpy pandas astropy panel holoviews bokeh jax duckdb"),
+        ("import plateviz; plateviz.open", "panel holoviews bokeh jax"),
+    ],
+    ids=["import", "open"],
+)
+def test_import_is_light(code, absent):
+    check = f"import sys; {code}; found = set({absent.split()!r}) & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", f"{check}; assert not found, found"], check=True)
+
+
+def test_public_names_are_listed_and_no_others_found():
+    assert {"open", "simulate", "InputError"} <= set(dir(plateviz))
+    with pytest.raises(AttributeError, match="no attribute 'opened'"):
+        plateviz.opened  # noqa: B018

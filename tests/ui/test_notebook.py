@@ -1,0 +1,144 @@
+"""The tour in JupyterLab, in Notebook 7 and under `panel serve`, in a real Chromium."""
+
+import os
+import re
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import nbformat
+import pytest
+from playwright.sync_api import expect
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+TOUR = REPOSITORY / "assets" / "tour.ipynb"
+TOKEN = "of-this-test"
+PATIENCE_MS = 240_000
+# Every picture of the tour: figures of Bokeh have a canvas each, some pictures several figures.
+LEAST_CANVASES = 9
+
+pytestmark = [pytest.mark.ui, pytest.mark.slow, pytest.mark.timeout(600)]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with the tour, of a survey that takes less time, and that the next test finds."""
+    notebook = nbformat.read(TOUR, as_version=4)
+    for cell in notebook.cells:
+        cell.source = cell.source.replace("orbits=8, stars=12_000", "orbits=3, stars=6_000")
+    made = tmp_path_factory.mktemp("notebooks") / "tour"
+    made.mkdir()
+    nbformat.write(notebook, made / "tour.ipynb")
+    return made
+
+
+@pytest.fixture
+def open_jupyter(browser):
+    """Open a page of a Jupyter; errors fail the test from when its complaints are cleared."""
+    context, complaints = browser.new_context(viewport={"width": 1500, "height": 1000}), []
+
+    def complain(message):
+        if message.type == "error":
+            complaints.append(message.text)
+
+    def open_at(address):
+        page = context.new_page()
+        page.set_default_timeout(90_000)
+        page.on("console", complain)
+        page.on("pageerror", lambda error: complaints.append(f"page error: {error}"))
+        page.on("requestfailed", lambda request: complaints.append(f"not loaded: {request.url}"))
+        page.goto(address)
+        return page, complaints
+
+    yield open_at
+    context.close()
+    assert complaints == []
+
+
+@contextmanager
+def running(folder, *command):
+    """Run a server in a folder; gives the first address that it announces."""
+    places = ("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "IPYTHONDIR")
+    own = {name: str(folder.parent / name) for name in places}
+    environment = {**os.environ, **own, "PYTHONPATH": str(REPOSITORY)}
+    words = folder.parent / "words.txt"
+    with words.open("w") as stream:
+        process = subprocess.Popen(
+            [sys.executable, "-m", *command],
+            cwd=folder,
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            env=environment,
+        )
+    try:
+        yield _address(process, words)
+    finally:
+        process.terminate()
+        process.wait(30)
+
+
+def _address(process, words):
+    for _ in range(600):
+        if found := re.search(r"http://(?:127\.0\.0\.1|localhost):(\d+)/", words.read_text()):
+            return f"http://127.0.0.1:{found[1]}"
+        if process.poll() is not None:
+            break
+        time.sleep(0.1)
+    pytest.fail(f"the server did not start: {words.read_text()}")
+
+
+def jupyter(application, folder):
+    options = ("--no-browser", "--allow-root", "--port=0", f"--IdentityProvider.token={TOKEN}")
+    return running(folder, application, *options, "--ServerApp.ip=127.0.0.1")
+
+
+def wait_for_kernel(page, address):
+    """Wait until the notebook's kernel answers: who runs cells before is asked for a kernel."""
+    for _ in range(600):
+        kernels = page.request.get(f"{address}/api/kernels?token={TOKEN}").json()
+        if any(kernel["execution_state"] == "idle" for kernel in kernels):
+            # The page hears of it after the server.
+            page.wait_for_timeout(2000)
+            return
+        page.wait_for_timeout(100)
+    pytest.fail("the notebook's kernel did not start")
+
+
+@pytest.mark.parametrize(
+    ("application", "path"),
+    [("jupyterlab", "lab/tree"), ("notebook", "notebooks")],
+    ids=["lab", "classic"],
+)
+def test_tour_runs_and_every_figure_is_drawn(folder, open_jupyter, application, path):
+    with jupyter(application, folder) as address:
+        page, complaints = open_jupyter(f"{address}/{path}/tour.ipynb?token={TOKEN}")
+        page.locator(".jp-Notebook .jp-CodeCell").first.wait_for()
+        wait_for_kernel(page, address)
+        # Notebook 7 complains of itself while it starts, of an empty notebook too.
+        complaints.clear()
+        page.get_by_role("menuitem", name="Run", exact=True).click()
+        page.locator('[data-command="runmenu:run-all"]').click()
+        frame = page.locator("iframe[src^='http://127.0.0.1']")
+        frame.wait_for(state="attached", timeout=PATIENCE_MS)
+        dashboard = page.frame_locator("iframe[src^='http://127.0.0.1']")
+        expect(dashboard.locator(".strip")).to_have_count(1, timeout=PATIENCE_MS)
+        dashboard.locator(".figure canvas").first.wait_for(state="attached")
+        assert page.locator(".jp-OutputArea canvas").count() >= LEAST_CANVASES
+        assert page.locator(".jp-OutputArea .strip").count() >= 6
+        assert page.locator("[data-mime-type='application/vnd.jupyter.stderr']").count() == 0
+        # Before its server ends, of which it would complain.
+        page.close()
+
+
+def test_served_tour_is_the_dashboard_of_its_survey(folder, open_page):
+    (folder / "plateviz-tour-star.html").unlink(missing_ok=True)
+    with running(folder, "panel", "serve", "tour.ipynb", "--port", "0") as address:
+        page = open_page(f"{address}/tour")
+        expect(page.locator(".strip").first).to_contain_text("Orbits complete")
+        page.locator(".figure-orbit-health canvas").first.wait_for(state="attached")
+        page.get_by_role("button", name="Orbit", exact=True).click()
+        page.locator(".figure-residual-map canvas").first.wait_for(state="attached")
+        assert (folder / "plateviz-tour-star.html").is_file()
+        page.close()

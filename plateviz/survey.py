@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
+import dask
 import numpy as np
 import pandas as pd
 import pyarrow as pa
@@ -38,6 +39,13 @@ from solver.time_series import errors_by_count, motion_table
 
 # Rows of the history that are worked on at once: some 200 MB with all draws.
 _ROWS_AT_ONCE = 100_000
+# Dask watches its workers closely: a hundred times a second it looks where each of them is. With
+# as many workers as cores that was measured to take a twelfth of these.
+_QUIETLY = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
 # How long a scheduler may take to answer.
 _PATIENCE = "20s"
 
@@ -136,6 +144,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             yield client
         return
     with (
+        dask.config.set(_QUIETLY),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,

@@ -79,9 +79,15 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame) -> Verdict:
         f"Orbit {row.orbit_id} has no solution: {row.message}" for row in failed.itertuples()
     ]
     if len(bad):
-        named = ", ".join(map(str, bad["orbit_id"].head(_MOST_ORBITS)))
-        notable.append(f"Orbits whose numbers are far from what is expected: {len(bad)}. {named}.")
+        notable.append(f"Numbers far from what is expected: {_named(bad['orbit_id'])}.")
     return Verdict(state, headline, reasons, notable)
+
+
+def _named(orbits: pd.Series) -> str:
+    numbers = ", ".join(map(str, orbits.head(_MOST_ORBITS)))
+    if len(orbits) > _MOST_ORBITS:
+        return f"{len(orbits):,} orbits, among them {numbers}"
+    return f"{'orbit' if len(orbits) == 1 else 'orbits'} {numbers}"
 
 
 def _fitted(orbits: pd.DataFrame) -> list[str]:

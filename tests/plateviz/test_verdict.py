@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.special import chdtri
 
@@ -61,6 +62,18 @@ def test_run_names_its_failed_orbits(survey):
     assert verdict.state == "bad"
     told = [sentence for sentence in verdict.notable if "has no solution" in sentence]
     assert [sentence.split()[1] for sentence in told] == ["11", "12"]
+
+
+@pytest.mark.parametrize(
+    ("n_bad", "words"),
+    [(1, "expected: orbit 0."), (2, "expected: orbits 0, 1."), (30, "30 orbits, among them 0, 1,")],
+)
+def test_orbits_far_off_are_named(survey, n_bad, words):
+    orbits = pd.concat([survey.orbits[survey.orbits["status"] == "complete"].head(1)] * 40)
+    orbits = orbits.assign(orbit_id=range(40)).reset_index(drop=True)
+    orbits.loc[orbits["orbit_id"] < n_bad, "chi2_per_dof"] = 9.0
+    verdict = run_verdict(orbits, survey.motions)
+    assert any(words in sentence for sentence in verdict.notable)
 
 
 def test_run_without_an_orbit_fitted_says_so(survey):

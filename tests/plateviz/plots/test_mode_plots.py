@@ -10,7 +10,7 @@ from plateviz import plots, tables
 from plateviz.gallery import diagnostics
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.mode_groups import _amount
-from tests.plateviz.plots.drawn_arrows import shafts_of
+from tests.plateviz.plots.drawn import shafts_of
 
 NAMES = ["mode-spectrum", "weak-modes", "mode-groups", "mode-shifts", "prior-shares"]
 MAS_PER_ARCMIN = 60_000.0

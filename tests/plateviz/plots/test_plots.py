@@ -1,173 +1,16 @@
-"""What holds for every plot: titles, units, themes, exact ids, hovers that find their column."""
+"""Plots of an orbit: what each draws."""
 
-import functools
-import re
 from dataclasses import replace
 
 import holoviews as hv
 import numpy as np
 import pandas as pd
 import pytest
-from bokeh.models import ColumnDataSource, GlyphRenderer, HoverTool, Plot, Title
 
 from plateviz import plots, tables
 from plateviz.plots.style import CLASS_COLOURS
 from plateviz.plots.theme import THEMES, theme_of
-from tests.plateviz.plots.drawn_arrows import shafts_of
-
-_LABELLED_UNIT = re.compile(
-    r"\(.+\)|per bin|χ² / dof|expected scatter|iteration|in order|N$|σ of A$|"
-    r"order of the distortion$"
-)
-
-
-@pytest.fixture(scope="module")
-def drawings(fit_result, compared, make_fit_result, truth, instrument):
-    """Return name -> (draw, table): the plot as a function of table and theme."""
-    residuals = tables.residual_map(fit_result, instrument, detector_id=0)
-    fields = tables.footprint_fields(fit_result, instrument)
-    detector = instrument.detectors[0]
-    return {
-        "footprint": (
-            lambda t, **o: plots.plot_footprint(t, fields.head(20 * len(t)), **o),
-            tables.footprint_sources(fit_result),
-        ),
-        "residual_map": (lambda t, **o: plots.plot_residual_map(t, detector, **o), residuals),
-        "residual_scatter": (plots.plot_residual_scatter, tables.residual_scatter(fit_result)),
-        "deviation": (plots.plot_deviation, tables.deviation(fit_result, truth)),
-        "uncertainty": (plots.plot_uncertainty, tables.uncertainty(fit_result, instrument)),
-        "convergence": (plots.plot_convergence, tables.convergence(fit_result)),
-        "distortion": (plots.plot_distortion, tables.distortion(fit_result, instrument)),
-        "pulls": (plots.plot_pulls, tables.pull_histogram(fit_result)),
-        "exposure_chi2": (plots.plot_exposure_chi2, tables.exposure_chi2(fit_result)),
-        "orders": (plots.plot_orders, tables.order_comparison(compared)),
-        "comparison": (
-            plots.plot_comparison,
-            tables.comparison(fit_result, make_fit_result(2)[0]),
-        ),
-        "mode_spectrum": (plots.plot_mode_spectrum, tables.mode_spectrum(fit_result)),
-        "mode_deciders": (plots.plot_mode_deciders, tables.mode_deciders(fit_result)),
-        "mode_groups": (plots.plot_mode_groups, tables.mode_groups(fit_result)),
-        "mode_shifts": (plots.plot_mode_shifts, tables.mode_shifts(fit_result)),
-        "prior_shares": (plots.plot_prior_shares, tables.prior_shares(fit_result)),
-    }
-
-
-NAMES = [
-    "footprint",
-    "residual_map",
-    "residual_scatter",
-    "deviation",
-    "uncertainty",
-    "convergence",
-    "distortion",
-    "pulls",
-    "exposure_chi2",
-    "orders",
-    "comparison",
-    "mode_spectrum",
-    "mode_deciders",
-    "mode_groups",
-    "mode_shifts",
-    "prior_shares",
-]
-with_every_plot = pytest.mark.parametrize("name", NAMES)
-
-
-@pytest.fixture(scope="module")
-def figures(drawings):
-    """Return (name, theme) -> Bokeh figures of the plot; each is rendered once."""
-
-    @functools.cache
-    def rendered(name, theme):
-        draw, table = drawings[name]
-        return _figures(draw(table, theme=theme))
-
-    return lambda name, theme="light": rendered(name, theme)
-
-
-def _figures(drawing):
-    return list(hv.render(drawing, backend="bokeh").select({"type": Plot}))
-
-
-@with_every_plot
-def test_axes_are_labelled_with_units(figures, name):
-    for figure in figures(name):
-        for axis in (figure.xaxis, figure.yaxis):
-            assert _LABELLED_UNIT.search(axis.axis_label), axis.axis_label
-
-
-@with_every_plot
-def test_empty_table_gives_a_titled_figure_that_says_why(drawings, name):
-    draw, table = drawings[name]
-    for figure in _figures(draw(table.head(0))):
-        assert figure.title.text
-        assert figure.xaxis.axis_label
-        words = [r.data_source.data["text"][0] for r in figure.renderers if _is_text(r)]
-        assert len(words) == 1
-        assert words[0].startswith("No ")
-
-
-def _is_text(renderer):
-    return isinstance(renderer, GlyphRenderer) and "text" in renderer.data_source.data
-
-
-@with_every_plot
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_every_word_has_the_colours_of_the_theme(figures, name, theme):
-    colours = THEMES[theme]
-    for figure in figures(name, theme):
-        assert figure.background_fill_color == figure.border_fill_color == colours.background
-        titles = [figure.title, *(t for t in figure.above if isinstance(t, Title))]
-        assert {t.text_color for t in titles} <= {colours.text, colours.muted}
-        assert figure.xaxis.axis_label_text_color == colours.text
-        assert all(legend.label_text_color == colours.text for legend in figure.legend)
-
-
-@with_every_plot
-def test_fonts_are_11_to_13_pixels(figures, name):
-    for figure in figures(name):
-        sizes = [figure.title.text_font_size, figure.xaxis.axis_label_text_font_size]
-        sizes += [
-            figure.yaxis.major_label_text_font_size,
-            *(t.text_font_size for t in _texts(figure)),
-        ]
-        assert set(sizes) <= {"11px", "12px", "13px"}
-
-
-def _texts(figure):
-    return [title for title in figure.above if isinstance(title, Title)]
-
-
-@with_every_plot
-def test_no_figure_is_drawn_by_webgl(figures, name):
-    """Which loses the points of a figure that replaces another on a page that stays."""
-    assert {figure.output_backend for figure in figures(name)} == {"canvas"}
-
-
-@with_every_plot
-def test_no_legend_covers_the_data(figures, name):
-    for figure in figures(name):
-        assert all(legend in figure.below for legend in figure.legend if legend.items)
-
-
-@with_every_plot
-def test_every_hover_finds_its_columns(figures, name):
-    for figure in figures(name):
-        for hover in figure.select(HoverTool):
-            wanted = {c for _, text in hover.tooltips for c in re.findall(r"@\{(\w+)\}", text)}
-            assert wanted
-            for renderer in hover.renderers:
-                assert wanted <= set(renderer.data_source.data)
-
-
-@with_every_plot
-def test_ids_reach_the_browser_as_exact_text(figures, name, fit_result):
-    known = {str(i) for i in fit_result.sources["source_id"].tolist()}
-    for figure in figures(name):
-        for source in figure.select(ColumnDataSource):
-            assert set(source.data.get("id", [])) <= known
-            assert "source_id" not in source.data
+from tests.plateviz.plots.drawn import shafts_of, titles_of
 
 
 def test_live_update_replaces_the_subtitle(drawings):
@@ -176,7 +19,7 @@ def test_live_update_replaces_the_subtitle(drawings):
     live = hv.DynamicMap(lambda rows: draw(table.head(rows)), streams=[rows])
     plot = hv.renderer("bokeh").get_plot(live)
     rows.event(rows=70)
-    (subtitle,) = _texts(plot.state)
+    (subtitle,) = titles_of(plot.state)
     assert subtitle.text.startswith("n = 70 ")
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from plateviz import tables
 from plateviz.plots import plot_residual_map
-from tests.plateviz.plots.drawn_arrows import shafts_of
+from tests.plateviz.plots.drawn import shafts_of
 
 
 @pytest.fixture(scope="module")

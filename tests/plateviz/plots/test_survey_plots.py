@@ -1,183 +1,20 @@
-"""Figures of a survey and of its sources: what holds for all of them, and what each draws."""
-
-import functools
-import re
+"""Figures of a survey and of its sources: what each draws."""
 
 import holoviews as hv
 import numpy as np
 import pandas as pd
 import pytest
-from bokeh.models import ColumnDataSource, GlyphRenderer, HoverTool, Plot, Title
 
 from plateviz import plots, tables
 from plateviz.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.style import ROW_LIMIT
 from plateviz.plots.survey_figure import SourceTables, SurveyTables
-from plateviz.plots.theme import THEMES
-
-_LABELLED_UNIT = re.compile(r"\(.+\)|per bin|χ² / dof|over its expected σ|/ σ$|orbits N|dof\)$")
-
-
-def errors_by_count():
-    n = np.arange(31, 92, 4)
-    expected = np.sqrt(0.66**2 / n + 0.055**2)
-    return pd.DataFrame(
-        {
-            "n_orbits": n,
-            "n_sources": 20,
-            "error_mas": 1.05 * expected,
-            "error_low_mas": 0.95 * expected,
-            "error_high_mas": 1.15 * expected,
-            "expected_mas": expected,
-            "noise_mas": 0.66 / np.sqrt(n),
-            "floor_mas": 0.055,
-        }
-    )
-
-
-@pytest.fixture(scope="module")
-def drawings(survey):
-    """Return name -> (draw, table): the plot as a function of table and theme."""
-    return {
-        "sky_distribution": (
-            functools.partial(
-                plots.plot_sky_distribution, area=((-1.4, 0.7), (-0.6, 0.6)), target=(-0.3, 0.1)
-            ),
-            tables.sky_distribution(survey.catalogue, survey.truth),
-        ),
-        "prior_separation": (
-            plots.plot_prior_separation,
-            tables.prior_separation(survey.catalogue, survey.truth),
-        ),
-        "orbit_counts": (plots.plot_orbit_counts, tables.orbit_counts(survey.motions)),
-        "error_by_count": (plots.plot_error_by_count, errors_by_count()),
-        "reference_scatter": (
-            plots.plot_reference_scatter,
-            tables.reference_scatter(survey.motions),
-        ),
-        "motion_pulls": (plots.plot_motion_pulls, tables.motion_pulls(survey.motions)),
-        "orbit_health": (plots.plot_orbit_health, tables.orbit_health(survey.orbits)),
-        "sky_track": (plots.plot_sky_track, tables.sky_track(*survey.source("reference"))),
-        "time_series": (plots.plot_time_series, tables.time_series(*survey.source("reference"))),
-    }
-
-
-NAMES = [
-    "sky_distribution",
-    "prior_separation",
-    "orbit_counts",
-    "error_by_count",
-    "reference_scatter",
-    "motion_pulls",
-    "orbit_health",
-    "sky_track",
-    "time_series",
-]
-with_every_plot = pytest.mark.parametrize("name", NAMES)
-
-
-@pytest.fixture(scope="module")
-def figures(drawings):
-    """Return (name, theme) -> Bokeh figures of the plot; each is rendered once."""
-
-    @functools.cache
-    def rendered(name, theme):
-        draw, table = drawings[name]
-        return _figures(draw(table, theme=theme))
-
-    return lambda name, theme="light": rendered(name, theme)
-
-
-def _figures(drawing):
-    found = hv.render(drawing, backend="bokeh").select({"type": Plot})
-    return sorted(found, key=lambda figure: figure.title.text)
-
-
-def _subtitle(figure):
-    return " ".join(t.text for t in figure.above if isinstance(t, Title))
-
-
-def _texts(figure):
-    rendered = [r for r in figure.renderers if isinstance(r, GlyphRenderer)]
-    return [r.data_source.data["text"][0] for r in rendered if "text" in r.data_source.data]
-
-
-@with_every_plot
-def test_axes_are_labelled_with_units(figures, name):
-    for figure in figures(name):
-        for axis in (figure.xaxis, figure.yaxis):
-            assert _LABELLED_UNIT.search(axis.axis_label), axis.axis_label
-
-
-@with_every_plot
-def test_every_figure_has_a_title_and_a_subtitle(figures, name):
-    for figure in figures(name):
-        assert figure.title.text
-        assert _subtitle(figure)
-
-
-@with_every_plot
-def test_empty_table_gives_a_titled_figure_that_says_why(drawings, name):
-    draw, table = drawings[name]
-    for figure in _figures(draw(table.head(0))):
-        (words,) = _texts(figure)
-        assert figure.title.text
-        assert figure.xaxis.axis_label
-        assert words.startswith("No ")
-
-
-@with_every_plot
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_every_word_has_the_colours_of_the_theme(figures, name, theme):
-    colours = THEMES[theme]
-    for figure in figures(name, theme):
-        assert figure.background_fill_color == figure.border_fill_color == colours.background
-        titles = [figure.title, *(t for t in figure.above if isinstance(t, Title))]
-        assert {t.text_color for t in titles} <= {colours.text, colours.muted}
-        assert all(legend.label_text_color == colours.text for legend in figure.legend)
-
-
-@with_every_plot
-def test_no_legend_covers_the_data(figures, name):
-    for figure in figures(name):
-        assert all(legend in figure.below for legend in figure.legend if legend.items)
-
-
-@with_every_plot
-def test_every_hover_finds_its_columns(figures, name):
-    for figure in figures(name):
-        for hover in figure.select(HoverTool):
-            wanted = {c for _, text in hover.tooltips for c in re.findall(r"@\{(\w+)\}", text)}
-            assert wanted
-            for renderer in hover.renderers:
-                assert wanted <= set(renderer.data_source.data)
-
-
-@with_every_plot
-def test_ids_reach_the_browser_as_exact_text(figures, name, survey):
-    known = {str(i) for i in survey.catalogue["source_id"].tolist()}
-    for figure in figures(name):
-        for source in figure.select(ColumnDataSource):
-            assert set(source.data.get("id", [])) <= known
-            assert "source_id" not in source.data
-
-
-@with_every_plot
-def test_a_table_is_drawn_alike_twice(drawings, name):
-    draw, table = drawings[name]
-    first, second = (
-        [str(s.data) for f in _figures(draw(table)) for s in _sources(f)] for _ in range(2)
-    )
-    assert first == second
-
-
-def _sources(figure):
-    return [r.data_source for r in figure.renderers if isinstance(r, GlyphRenderer)]
+from tests.plateviz.plots.drawn import figures_of, sources_of, subtitle_of
 
 
 @pytest.mark.parametrize("name", ["reference_scatter", "sky_track", "time_series"])
 def test_points_of_a_source_carry_its_id(figures, name):
-    marked = [s for figure in figures(name) for s in _sources(figure) if "id" in s.data]
+    marked = [s for figure in figures(name) for s in sources_of(figure) if "id" in s.data]
     assert marked
 
 
@@ -204,7 +41,7 @@ def test_prior_separation_uses_the_unit_that_fits(figures):
     other, reference = figures("prior_separation")
     assert "(µas)" in reference.xaxis.axis_label
     assert "(mas)" in other.xaxis.axis_label
-    assert "12 of them artificial" in _subtitle(other)
+    assert "12 of them artificial" in subtitle_of(other)
 
 
 def test_orbit_counts_have_logarithmic_counts_from_below_one(figures):
@@ -260,7 +97,7 @@ def test_pulls_are_drawn_against_a_unit_normal_of_the_same_area(drawings):
 
 def test_pulls_state_their_standard_deviation(figures, drawings):
     _, table = drawings["motion_pulls"]
-    stated = {_subtitle(figure).split(",")[0] for figure in figures("motion_pulls")}
+    stated = {subtitle_of(figure).split(",")[0] for figure in figures("motion_pulls")}
     assert stated == {f"sd {sd:.3f}" for sd in table["sd"]}
 
 
@@ -295,11 +132,11 @@ def test_time_series_without_a_fit_has_no_residuals(survey):
 @pytest.mark.parametrize("kind", ["reference", "artificial", "other"])
 def test_sky_track_states_each_rms_by_name(survey, kind):
     history, motion = survey.source(kind)
-    (figure,) = _figures(plots.plot_sky_track(tables.sky_track(history, motion)))
+    (figure,) = figures_of(plots.plot_sky_track(tables.sky_track(history, motion)))
     assert str(motion["source_id"]) in figure.title.text
-    assert f"{motion['n_orbits']} orbits" in _subtitle(figure)
-    assert all(word in _subtitle(figure) for word in ("(α)", "(δ)", "(2-D)"))
-    assert ("catalogue left out" in _subtitle(figure)) == (kind != "reference")
+    assert f"{motion['n_orbits']} orbits" in subtitle_of(figure)
+    assert all(word in subtitle_of(figure) for word in ("(α)", "(δ)", "(2-D)"))
+    assert ("catalogue left out" in subtitle_of(figure)) == (kind != "reference")
 
 
 def test_sky_track_draws_error_bars_of_one_sigma(survey):
@@ -318,18 +155,18 @@ def test_sky_track_draws_error_bars_of_one_sigma(survey):
 def test_source_of_few_orbits_is_drawn(survey, number):
     source = survey.source("other", number)
     for figure in source_figures():
-        assert _figures(figure.draw(SourceTables(*source), "light"))
+        assert figures_of(figure.draw(SourceTables(*source), "light"))
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_gallery_draws_every_figure_of_a_survey(survey, theme):
+def test_gallery_draws_every_figure_of_a_survey(survey, errors_by_count, theme):
     full = SurveyTables(
-        survey.orbits, survey.motions, survey.catalogue, survey.truth, errors_by_count()
+        survey.orbits, survey.motions, survey.catalogue, survey.truth, errors_by_count
     )
     bare = SurveyTables(survey.orbits, survey.motions.head(0), survey.catalogue)
     for figure in survey_figures():
-        assert _figures(figure.draw(full, theme))
-        assert _figures(figure.draw(bare, theme))
+        assert figures_of(figure.draw(full, theme))
+        assert figures_of(figure.draw(bare, theme))
 
 
 def test_gallery_tells_the_pages_apart():

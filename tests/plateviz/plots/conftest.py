@@ -1,0 +1,105 @@
+"""Every plot with a table to draw, and its figures."""
+
+import functools
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from plateviz import plots, tables
+from tests.plateviz.plots.drawn import figures_of
+
+
+@pytest.fixture(scope="module")
+def orbit_drawings(fit_result, compared, make_fit_result, truth, instrument):
+    """Return name -> (draw, table): the plot as a function of table and theme."""
+    residuals = tables.residual_map(fit_result, instrument, detector_id=0)
+    fields = tables.footprint_fields(fit_result, instrument)
+    detector = instrument.detectors[0]
+    return {
+        "footprint": (
+            lambda t, **o: plots.plot_footprint(t, fields.head(20 * len(t)), **o),
+            tables.footprint_sources(fit_result),
+        ),
+        "residual_map": (lambda t, **o: plots.plot_residual_map(t, detector, **o), residuals),
+        "residual_scatter": (plots.plot_residual_scatter, tables.residual_scatter(fit_result)),
+        "deviation": (plots.plot_deviation, tables.deviation(fit_result, truth)),
+        "uncertainty": (plots.plot_uncertainty, tables.uncertainty(fit_result, instrument)),
+        "convergence": (plots.plot_convergence, tables.convergence(fit_result)),
+        "distortion": (plots.plot_distortion, tables.distortion(fit_result, instrument)),
+        "pulls": (plots.plot_pulls, tables.pull_histogram(fit_result)),
+        "exposure_chi2": (plots.plot_exposure_chi2, tables.exposure_chi2(fit_result)),
+        "orders": (plots.plot_orders, tables.order_comparison(compared)),
+        "comparison": (
+            plots.plot_comparison,
+            tables.comparison(fit_result, make_fit_result(2)[0]),
+        ),
+        "mode_spectrum": (plots.plot_mode_spectrum, tables.mode_spectrum(fit_result)),
+        "mode_deciders": (plots.plot_mode_deciders, tables.mode_deciders(fit_result)),
+        "mode_groups": (plots.plot_mode_groups, tables.mode_groups(fit_result)),
+        "mode_shifts": (plots.plot_mode_shifts, tables.mode_shifts(fit_result)),
+        "prior_shares": (plots.plot_prior_shares, tables.prior_shares(fit_result)),
+    }
+
+
+@pytest.fixture(scope="module")
+def errors_by_count():
+    n = np.arange(31, 92, 4)
+    expected = np.sqrt(0.66**2 / n + 0.055**2)
+    return pd.DataFrame(
+        {
+            "n_orbits": n,
+            "n_sources": 20,
+            "error_mas": 1.05 * expected,
+            "error_low_mas": 0.95 * expected,
+            "error_high_mas": 1.15 * expected,
+            "expected_mas": expected,
+            "noise_mas": 0.66 / np.sqrt(n),
+            "floor_mas": 0.055,
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def survey_drawings(survey, errors_by_count):
+    """Return name -> (draw, table): the plot as a function of table and theme."""
+    return {
+        "sky_distribution": (
+            functools.partial(
+                plots.plot_sky_distribution, area=((-1.4, 0.7), (-0.6, 0.6)), target=(-0.3, 0.1)
+            ),
+            tables.sky_distribution(survey.catalogue, survey.truth),
+        ),
+        "prior_separation": (
+            plots.plot_prior_separation,
+            tables.prior_separation(survey.catalogue, survey.truth),
+        ),
+        "orbit_counts": (plots.plot_orbit_counts, tables.orbit_counts(survey.motions)),
+        "error_by_count": (plots.plot_error_by_count, errors_by_count),
+        "reference_scatter": (
+            plots.plot_reference_scatter,
+            tables.reference_scatter(survey.motions),
+        ),
+        "motion_pulls": (plots.plot_motion_pulls, tables.motion_pulls(survey.motions)),
+        "orbit_health": (plots.plot_orbit_health, tables.orbit_health(survey.orbits)),
+        "sky_track": (plots.plot_sky_track, tables.sky_track(*survey.source("reference"))),
+        "time_series": (plots.plot_time_series, tables.time_series(*survey.source("reference"))),
+    }
+
+
+@pytest.fixture(scope="module")
+def drawings(orbit_drawings, survey_drawings):
+    """Return the same of all plots."""
+    return {**orbit_drawings, **survey_drawings}
+
+
+@pytest.fixture(scope="module")
+def figures(drawings):
+    """Return (name, theme) -> Bokeh figures of the plot; each is rendered once."""
+
+    @functools.cache
+    def rendered(name, theme):
+        draw, table = drawings[name]
+        return figures_of(draw(table, theme=theme))
+
+    return lambda name, theme="light": rendered(name, theme)

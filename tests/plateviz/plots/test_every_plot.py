@@ -1,0 +1,136 @@
+"""What holds for every plot: titles, units, themes, exact ids, hovers that find their column."""
+
+import re
+
+import pytest
+from bokeh.models import ColumnDataSource, HoverTool
+
+from plateviz.plots.theme import THEMES
+from tests.plateviz.plots.drawn import figures_of, sources_of, subtitle_of, titles_of, words_of
+
+_LABELLED_UNIT = re.compile(
+    r"\(.+\)|per bin|χ² / dof|expected scatter|iteration|in order|N$|σ of A$|"
+    r"order of the distortion$|over its expected σ|/ σ$|orbits N|dof\)$"
+)
+NAMES_OF_ORBIT = [
+    "footprint",
+    "residual_map",
+    "residual_scatter",
+    "deviation",
+    "uncertainty",
+    "convergence",
+    "distortion",
+    "pulls",
+    "exposure_chi2",
+    "orders",
+    "comparison",
+    "mode_spectrum",
+    "mode_deciders",
+    "mode_groups",
+    "mode_shifts",
+    "prior_shares",
+]
+NAMES_OF_SURVEY = [
+    "sky_distribution",
+    "prior_separation",
+    "orbit_counts",
+    "error_by_count",
+    "reference_scatter",
+    "motion_pulls",
+    "orbit_health",
+    "sky_track",
+    "time_series",
+]
+with_every_plot = pytest.mark.parametrize("name", [*NAMES_OF_ORBIT, *NAMES_OF_SURVEY])
+
+
+def test_no_plot_is_left_out(drawings):
+    assert list(drawings) == [*NAMES_OF_ORBIT, *NAMES_OF_SURVEY]
+
+
+@with_every_plot
+def test_axes_are_labelled_with_units(figures, name):
+    for figure in figures(name):
+        for axis in (figure.xaxis, figure.yaxis):
+            assert _LABELLED_UNIT.search(axis.axis_label), axis.axis_label
+
+
+@pytest.mark.parametrize("name", NAMES_OF_SURVEY)
+def test_every_figure_of_a_survey_has_a_title_and_a_subtitle(figures, name):
+    for figure in figures(name):
+        assert figure.title.text
+        assert subtitle_of(figure)
+
+
+@with_every_plot
+def test_empty_table_gives_a_titled_figure_that_says_why(drawings, name):
+    draw, table = drawings[name]
+    for figure in figures_of(draw(table.head(0))):
+        (words,) = words_of(figure)
+        assert figure.title.text
+        assert figure.xaxis.axis_label
+        assert words.startswith("No ")
+
+
+@with_every_plot
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_every_word_has_the_colours_of_the_theme(figures, name, theme):
+    colours = THEMES[theme]
+    for figure in figures(name, theme):
+        assert figure.background_fill_color == figure.border_fill_color == colours.background
+        titles = [figure.title, *titles_of(figure)]
+        assert {t.text_color for t in titles} <= {colours.text, colours.muted}
+        assert figure.xaxis.axis_label_text_color == colours.text
+        assert all(legend.label_text_color == colours.text for legend in figure.legend)
+
+
+@with_every_plot
+def test_fonts_are_11_to_13_pixels(figures, name):
+    for figure in figures(name):
+        sizes = [figure.title.text_font_size, figure.xaxis.axis_label_text_font_size]
+        sizes += [
+            figure.yaxis.major_label_text_font_size,
+            *(title.text_font_size for title in titles_of(figure)),
+        ]
+        assert set(sizes) <= {"11px", "12px", "13px"}
+
+
+@with_every_plot
+def test_no_figure_is_drawn_by_webgl(figures, name):
+    """Which loses the points of a figure that replaces another on a page that stays."""
+    assert {figure.output_backend for figure in figures(name)} == {"canvas"}
+
+
+@with_every_plot
+def test_no_legend_covers_the_data(figures, name):
+    for figure in figures(name):
+        assert all(legend in figure.below for legend in figure.legend if legend.items)
+
+
+@with_every_plot
+def test_every_hover_finds_its_columns(figures, name):
+    for figure in figures(name):
+        for hover in figure.select(HoverTool):
+            wanted = {c for _, text in hover.tooltips for c in re.findall(r"@\{(\w+)\}", text)}
+            assert wanted
+            for renderer in hover.renderers:
+                assert wanted <= set(renderer.data_source.data)
+
+
+@with_every_plot
+def test_ids_reach_the_browser_as_exact_text(figures, name, fit_result, survey):
+    measured, known = fit_result.sources["source_id"], survey.catalogue["source_id"]
+    ids = {str(i) for i in [*measured.tolist(), *known.tolist()]}
+    for figure in figures(name):
+        for source in figure.select(ColumnDataSource):
+            assert set(source.data.get("id", [])) <= ids
+            assert "source_id" not in source.data
+
+
+@pytest.mark.parametrize("name", NAMES_OF_SURVEY)
+def test_a_table_is_drawn_alike_twice(drawings, name):
+    draw, table = drawings[name]
+    first, second = (
+        [str(s.data) for f in figures_of(draw(table)) for s in sources_of(f)] for _ in range(2)
+    )
+    assert first == second

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-import dask
+import dask.config
 import numpy as np
 import pandas as pd
 import pyarrow as pa

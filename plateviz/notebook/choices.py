@@ -18,6 +18,8 @@ _PLAIN = ("order", "engine", "thin", *_SWITCHES)
 class Choices(TypedDict, total=False):
     """What a fit is to use; what is not named stays as it is.
 
+    Attributes
+    ----------
     order : of the distortion, 0 to 9
     engine : "gauss-newton", "svi" or "nuts"
     priors : group -> width of its prior, such as "10um", "flat", a number in the group's unit or a

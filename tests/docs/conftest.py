@@ -14,7 +14,7 @@ from solver.fit import fit_orbit
 from solver.io.result import write_result
 from solver.io.survey import read_survey_orbit
 from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT
-from tests.docs.pages import build_site
+from tests.docs.pages import REPOSITORY, build_site
 
 
 @pytest.fixture(scope="session")
@@ -39,6 +39,8 @@ def workplace(stock, tmp_path, monkeypatch):
     folder = tmp_path / "work"
     shutil.copytree(stock, folder)
     monkeypatch.chdir(folder)
+    # The solver's process takes the checkout, too, and not the copy that was installed.
+    monkeypatch.setenv("PYTHONPATH", str(REPOSITORY))
     return folder
 
 
@@ -68,7 +70,9 @@ def site(tmp_path_factory):
 
 @contextmanager
 def _worker_here(*_):
-    with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None) as one:
+    with Client(
+        processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0"
+    ) as one:
         yield one
 
 

@@ -62,7 +62,7 @@ def test_command_is_known(block):
         if program in known:
             known[program]()
         else:
-            assert program in {"pytest", "dask", "ssh", "."}, program
+            assert program in {"pytest", "dask", "ssh", ".", "jupyter", "panel"}, program
 
 
 def _known_extra(words):

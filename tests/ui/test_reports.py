@@ -16,6 +16,8 @@ from solver.instrument import MINI_MOCK
 from tests.plateviz.conftest import synthetic_fit
 from tests.plateviz.survey_tables import synthetic_survey
 
+pytestmark = [pytest.mark.ui, pytest.mark.slow]
+
 
 @pytest.fixture(scope="module")
 def orbit_page(tmp_path_factory):

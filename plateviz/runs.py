@@ -29,6 +29,7 @@ from solver.io.survey import (
     REFERENCE,
     TRUTH_FILE,
     read_header,
+    section,
     survey_orbits,
     write_header,
 )
@@ -89,7 +90,7 @@ class Run:
 
     def settings(self) -> FitSettings:
         """Return the settings of all its fits."""
-        return FitSettings.from_dict(_mapping(self.header()["settings"]))
+        return FitSettings.from_dict(section(self.header(), "settings"))
 
     def header(self) -> Mapping[str, object]:
         """Return what the run was begun with: `settings`, `versions`, hashes of the `inputs`."""
@@ -174,17 +175,13 @@ def _content(survey: Path, settings: FitSettings) -> dict[str, object]:
 
 def _check_same(path: Path, found: Mapping[str, object], wanted: Mapping[str, object]) -> None:
     different = [
-        f"{section} ({name})"
-        for section, values in wanted.items()
-        for name in sorted({**_mapping(values), **_mapping(found.get(section))})
-        if _mapping(values).get(name) != _mapping(found.get(section)).get(name)
+        f"{title} ({name})"
+        for title in wanted
+        for name in sorted({**section(wanted, title), **section(found, title)})
+        if section(wanted, title).get(name) != section(found, title).get(name)
     ]
     if different:
         raise InputError(
             f"{path}: expected the choices with which this run was begun, found other "
             f"{', '.join(different)}; another --run NAME keeps both"
         )
-
-
-def _mapping(value: object) -> Mapping[str, object]:
-    return value if isinstance(value, Mapping) else {}

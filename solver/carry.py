@@ -28,14 +28,14 @@ def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> Normal
     -------
     None if `new` has measurements or distortion terms that `old` had not, or another model.
     """
-    if new.order > old.order or not _same_model(old, new):
+    if new.layout.n_coef > old.layout.n_coef or not _same_model(old, new):
         return None
     gone = ~np.isin(old.label, new.label)
     if old.n_obs - gone.sum() != new.n_obs:
         return None
     columns, sources = _columns(old, new), _rows_of(new.sources, old.sources, ["source_id"])
     at = _same_point(equations, old, new, columns, sources)
-    if new.order < old.order:
+    if new.layout.n_coef < old.layout.n_coef:
         return accumulate(new, *at)
     if not gone.any():
         return replace(equations, at=at)

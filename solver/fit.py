@@ -189,7 +189,7 @@ class OrbitFitter:
             return
         detectors = np.unique(self._data.measurements["detector_id"]).tolist()
         wanted = likely(self._starts[0], order, detectors)
-        # What was likely of another order is not kept.
+        # Where there is not memory for all, what was likely of another order is not kept.
         self._tried = [kept.settings, *(tried for tried in self._tried if tried in wanted)]
         self._starts = [start for start in self._starts if start.settings in self._tried]
         for settings in wanted:

@@ -53,7 +53,8 @@ def likely(start: Start, order: int, detectors: Sequence[int]) -> list[FitSettin
         fitted.with_(exclusions=replace(fitted.exclusions, detectors=out | {detector}))
         for detector in (left if len(left) > 1 else [])
     ]
-    below = sorted(range(fitted.order), key=lambda lower: abs(lower - (order - 1)))
+    # Order 0 has no terms, as the first has none.
+    below = sorted(range(1, fitted.order), key=lambda lower: abs(lower - (order - 1)))
     lower = [fitted.with_(order=lower) for lower in below]
     return [*lower[:1], *without, *lower[1:]][: _MOST_BYTES // start.mode.equations.cross.nbytes]
 

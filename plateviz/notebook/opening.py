@@ -1,6 +1,5 @@
 """What a person gives, and the object that it opens."""
 
-from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from solver.errors import InputError
 from solver.instrument import MINI_MOCK, read_instrument
 from solver.io.atomic import sha256_of
 from solver.io.result import read_result
-from solver.io.survey import HEADER, read_header
+from solver.io.survey import HEADER, read_header, section
 from solver.simulate.settings import SurveySettings
 
 _Path = str | PathLike[str]
@@ -140,17 +139,13 @@ def _refuse(chosen: set[str], what: str) -> None:
 def _check_same(directory: Path, settings: SurveySettings, catalogue: Path | None) -> None:
     """Refuse a survey that was made with other choices."""
     header = read_header(directory)
-    found, wanted = _mapping(header.get("settings")), settings.to_dict()
+    found, wanted = section(header, "settings"), settings.to_dict()
     different = [name for name in {**wanted, **found} if wanted.get(name) != found.get(name)]
     table = None if catalogue is None else sha256_of(catalogue)
-    if _mapping(header.get("catalogue")).get("sha256") != table:
+    if section(header, "catalogue").get("sha256") != table:
         different.append("catalogue")
     if different:
         raise InputError(
             f"{directory}: expected a survey of these choices or none, found one of other "
             f"{', '.join(different)}; plateviz.open opens it"
         )
-
-
-def _mapping(value: object) -> Mapping[str, object]:
-    return value if isinstance(value, Mapping) else {}

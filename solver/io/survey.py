@@ -132,6 +132,12 @@ def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
     return content
 
 
+def section(header: Mapping[str, object], name: str) -> Mapping[str, object]:
+    """Return a section of a header; an empty one where there is none of that name."""
+    found = header.get(name)
+    return found if isinstance(found, Mapping) else {}
+
+
 def write_header(directory: Path, content: Mapping[str, object], name: str = HEADER) -> None:
     """Write a survey's header: text, numbers, lists, and mappings as tables of them.
 

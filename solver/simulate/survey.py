@@ -18,6 +18,7 @@ from solver.io.survey import (
     TRUTH_FILE,
     measurement_path,
     read_header,
+    section,
     write_header,
     write_survey_table,
 )
@@ -124,7 +125,7 @@ def _check_same(directory: Path, header: Mapping[str, object]) -> None:
     begun = read_header(directory, UNFINISHED)
     wanted, found = (
         {
-            **_mapping(content.get("settings")),
+            **section(content, "settings"),
             "instrument": content.get("instrument"),
             "catalogue": content.get("catalogue"),
         }
@@ -136,10 +137,6 @@ def _check_same(directory: Path, header: Mapping[str, object]) -> None:
             f"{directory / UNFINISHED}: expected the choices with which this survey was begun, "
             f"found other {', '.join(different)}"
         )
-
-
-def _mapping(value: object) -> Mapping[str, object]:
-    return value if isinstance(value, Mapping) else {}
 
 
 def _truth(settings: SurveySettings, catalogue: Path | None) -> pd.DataFrame:

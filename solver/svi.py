@@ -117,8 +117,8 @@ def start_state(problem: Problem, options: SviSettings) -> SviState:
 def blocks(problem: Problem, settings: FitSettings, state: SviState) -> Iterator[SviState]:
     """Go on from `state`, a block of steps at a time, until the loss is at rest.
 
-    If it rests away from the mode, the rate falls once more from where that is within reach,
-    as it was restarted by hand for the paper.
+    If the rate has fallen and the mode is still away, it falls once more from where that is within
+    reach, as it was restarted by hand for the paper.
     """
     options, spent = settings.svi, state.trace[-1].seconds if state.trace else 0.0
     begin = time.perf_counter() - spent
@@ -127,9 +127,11 @@ def blocks(problem: Problem, settings: FitSettings, state: SviState) -> Iterator
         view = _look_ahead(problem, state)
         if view.reduced is None:
             return
-        if _is_at_rest(state, options):
-            if view.distance < options.tolerance or not options.conditioned:
-                return
+        is_near = view.distance < options.tolerance or not options.conditioned
+        if is_near and _is_at_rest(state, options):
+            return
+        # With the lowest rate a loss may creep for ever: it need not rest to be too far away.
+        if not is_near and _has_fallen(state, options):
             state = state._replace(cycle=(state.step, min(options.first_rate, view.distance)))
         coordinates = _coordinates(problem, view.reduced, options)
         moved, losses = _run_block(
@@ -210,14 +212,20 @@ def _coordinates(problem: Problem, reduced: Reduced, options: SviSettings) -> Co
 
 def _is_at_rest(state: SviState, options: SviSettings) -> bool:
     """Return whether the rate has fallen and the loss not changed for as long as asked for."""
-    patience, (first, highest) = options.patience, state.cycle
-    # The share of the whole fall that is left from there.
-    share = np.log(highest / options.last_rate) / np.log(options.first_rate / options.last_rate)
-    if state.step < first + max(share * options.steps, 2 * patience):
+    if not _has_fallen(state, options):
         return False
+    patience = options.patience
     before, after = state.losses[-2 * patience : -patience], state.losses[-patience:]
     noise = np.hypot(before.std(), after.std()) / np.sqrt(patience)
     return bool(before.mean() - after.mean() < max(_UNCHANGED, 3.0 * noise))
+
+
+def _has_fallen(state: SviState, options: SviSettings) -> bool:
+    """Return whether the rate has fallen, over as many steps as a rest is looked for in."""
+    first, highest = state.cycle
+    # The share of the whole fall that is left from there.
+    share = np.log(highest / options.last_rate) / np.log(options.first_rate / options.last_rate)
+    return bool(state.step >= first + max(share * options.steps, 2 * options.patience))
 
 
 def _status(state: SviState, view: _View, options: SviSettings) -> FitStatus:

@@ -171,6 +171,21 @@ def test_loss_at_rest_away_from_the_mode_starts_the_rate_again(svi_problem, exac
     assert states[-1].trace[-1].largest_step < options.tolerance
 
 
+def test_loss_that_creeps_away_from_the_mode_starts_the_rate_again(svi_problem, exact):
+    """It would never come to rest: with the lowest rate the mode is out of reach."""
+    options = SviSettings(steps=100, patience=50, max_steps=200)
+    far = start_state(svi_problem, options)._replace(
+        step=100,
+        theta=exact.theta,
+        sources=exact.sources + 0.5,
+        losses=np.linspace(1e6, 0.0, 100),
+    )
+    after = next(blocks(svi_problem, replace(SETTINGS, svi=options), far))
+    begun, highest = after.cycle
+    assert begun == 100
+    assert highest == pytest.approx(min(options.first_rate, after.trace[-1].largest_step))
+
+
 def test_draws_have_the_moments_of_a_normal_in_every_four():
     values = np.asarray(draws(jax.random.key(3), 40, (2, 500))).reshape(10, 4, 2, 500)
     np.testing.assert_allclose(values.mean(axis=1), 0.0, atol=1e-15)

@@ -1,0 +1,83 @@
+"""Tell after how many steps the svi engine agrees with gauss-newton, on full-size orbits.
+
+    python tests/benchmarks/bench_svi.py [--orbits 3] [--sources 7000]
+
+Each orbit starts from the catalogue; a seed of the simulation makes each another one. The shift is
+the largest of any coordinate of a source from the mode, in its marginal sigma.
+"""
+
+import argparse
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+# The checkout is measured, wherever it is run from.
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+# Before NumPy, as in the program: it sets how long idle BLAS threads spin.
+import solver  # noqa: F401, I001
+
+import numpy as np
+
+from solver.gauss_newton import find_mode
+from solver.instrument import MINI_MOCK
+from solver.leverage import covariances
+from solver.memory import keep_memory
+from solver.problem import Problem, build_problem
+from solver.settings import FitSettings
+from solver.svi import SviState, variational
+from tests.benchmarks.machine import machine, write
+from tests.benchmarks.orbits import simulated_orbit, survey_of
+
+# What counts as agreement: of a marginal sigma.
+_AGREES = 0.05
+_EVERY = 500
+
+
+def main() -> None:
+    arguments = parse_arguments()
+    keep_memory()
+    write(machine())
+    survey, settings = survey_of(arguments.sources), FitSettings(engine="svi")
+    for seed in range(arguments.orbits):
+        data = simulated_orbit(replace(survey, seed=seed))
+        tell(build_problem(data, MINI_MOCK, settings), settings, seed)
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description="Count the steps of the svi engine.")
+    parser.add_argument("--orbits", type=int, default=3, help="how many are simulated and fitted")
+    parser.add_argument("--sources", type=int, default=7000, help="about as many in each")
+    return parser.parse_args()
+
+
+def tell(problem: Problem, settings: FitSettings, seed: int) -> None:
+    exact = find_mode(problem, settings)
+    if exact.reduced is None:
+        sys.exit(f"the simulated orbit {seed} has no solution")
+    marginal = sigmas(covariances(exact.reduced).source)
+    shifts: dict[int, float] = {}
+
+    def keep(state: SviState) -> None:
+        shifts[state.step] = float(np.abs((state.sources - exact.sources) / marginal).max())
+
+    start = time.perf_counter()
+    found = variational(problem, settings, keep=keep)
+    seconds = time.perf_counter() - start
+    last_apart = max((step for step, shift in shifts.items() if shift > _AGREES), default=0)
+    write(f"\norbit of seed {seed}: {problem.n_obs} measurements of {problem.n_src} sources")
+    write("  " + ", ".join(f"{n}: {shifts[n]:.3g}" for n in shifts if n % _EVERY == 0))
+    write(f"  means within {_AGREES} after step {last_apart}")
+    write(f"  {found.mode.status.value}: step {max(shifts)}, {seconds:.0f} s")
+    if found.conditional is not None:
+        change = sigmas(found.conditional) / sigmas(exact.reduced.conditional_covariance())
+        write(f"  largest change of a conditional sigma: {np.abs(change - 1.0).max():.2%}")
+
+
+def sigmas(covariance: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+
+
+if __name__ == "__main__":
+    main()

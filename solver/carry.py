@@ -10,14 +10,14 @@ priors alone hold would forgive: those are made anew, where the fit ended.
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 from jaxtyping import Float, Int
 
 from solver.layout import PER_COEFFICIENT, PER_DETECTOR, PER_EXPOSURE
 from solver.normal import NormalEquations, accumulate
 from solver.objective import Gradient
 from solver.parameters import BY_NAME
-from solver.problem import Problem, of_rows
+from solver.part import Part, part_of
+from solver.problem import Problem
 from solver.units import RAD_PER_MAS
 
 
@@ -33,14 +33,15 @@ def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> Normal
     gone = ~np.isin(old.label, new.label)
     if old.n_obs - gone.sum() != new.n_obs:
         return None
-    columns, sources = _columns(old, new), _rows_of(new.sources, old.sources, ["source_id"])
+    columns = _columns(old, new)
+    # Both in ascending order.
+    sources = np.searchsorted(old.sources["source_id"], new.sources["source_id"])
     at = _same_point(equations, old, new, columns, sources)
     if new.layout.n_coef < old.layout.n_coef:
         return accumulate(new, *at)
     if not gone.any():
         return replace(equations, at=at)
-    part = accumulate(of_rows(old, gone), *equations.at)
-    return _without(equations, part, at, columns, sources)
+    return _without(equations, part_of(equations, old, gone), at, columns, sources)
 
 
 def _same_model(old: Problem, new: Problem) -> bool:
@@ -68,7 +69,7 @@ def _same_point(
 
 def _without(
     equations: NormalEquations,
-    part: NormalEquations,
+    part: Part,
     at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
     columns: Int[np.ndarray, " calib"],
     sources: Int[np.ndarray, " src"],
@@ -76,11 +77,9 @@ def _without(
     """Return the equations less a part of them, for some of the parameters."""
     whole, less = equations.gradient, part.gradient
     cross = np.empty((len(columns), 2, len(sources)))
-    # Row by row and without fresh memory, of which the whole would be too much for the caches.
-    rest = np.empty(equations.cross.shape[1:])
-    for row, column in zip(cross, columns, strict=True):
-        np.subtract(equations.cross[column], part.cross[column], out=rest)
-        np.take(rest, sources, axis=1, out=row, mode="clip")
+    # Row by row, since the whole would be too much for the caches.
+    for row, column in zip(cross, columns.tolist(), strict=True):
+        np.take(part.left(column), sources, axis=1, out=row, mode="clip")
     return NormalEquations(
         at,
         Gradient(
@@ -91,12 +90,14 @@ def _without(
         (equations.theta - part.theta)[np.ix_(columns, columns)],
         (equations.source - part.source)[sources],
         cross,
+        None,
     )
 
 
 def _columns(old: Problem, new: Problem) -> Int[np.ndarray, " calib"]:
     """Return the column of `old` of each calibration parameter of `new`."""
-    exposures = _rows_of(new.exposures, old.exposures, ["field_id", "plate_id"])
+    among, wanted = (p.exposures[["field_id", "plate_id"]].to_numpy() for p in (old, new))
+    exposures = (among[:, None] == wanted).all(axis=2).argmax(axis=0)
     columns = np.empty(new.layout.size, dtype=np.int64)
     for groups, kept in (
         (PER_EXPOSURE, exposures),
@@ -106,8 +107,3 @@ def _columns(old: Problem, new: Problem) -> Int[np.ndarray, " calib"]:
         for group in groups:
             columns[new.layout.columns(group)] = old.layout.columns(group)[kept]
     return columns
-
-
-def _rows_of(new: pd.DataFrame, old: pd.DataFrame, key: list[str]) -> Int[np.ndarray, " kept"]:
-    """Return the row of `old` of each row of `new`, by their keys."""
-    return pd.MultiIndex.from_frame(old[key]).get_indexer(pd.MultiIndex.from_frame(new[key]))

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
 import pandas as pd
 
 from solver.device import require_device
@@ -187,8 +186,7 @@ class OrbitFitter:
         kept = self._kept
         if kept is None:
             return
-        detectors = np.unique(self._data.measurements["detector_id"]).tolist()
-        wanted = likely(self._starts[0], order, detectors)
+        wanted = likely(self._starts[0], order)
         # Where there is not memory for all, what was likely of another order is not kept.
         self._tried = [kept.settings, *(tried for tried in self._tried if tried in wanted)]
         self._starts = [start for start in self._starts if start.settings in self._tried]

@@ -28,6 +28,21 @@ N_LOCAL = len(LOCAL_GROUPS)
 
 
 @dataclass(frozen=True)
+class DetectorSums:
+    """What the measurements on each detector add to g, chi2_0 and the blocks.
+
+    Of W it is the rows of the distortion alone: the others are each of one detector.
+    """
+
+    chi2: Float[np.ndarray, " det"]
+    by_theta: Float[np.ndarray, "det calib"]
+    by_source: Float[np.ndarray, "det 2 src"]
+    theta: Float[np.ndarray, "det calib calib"]
+    source: Float[np.ndarray, "det 2 2 src"]
+    coefficients: Float[np.ndarray, "det two_coef 2 src"]
+
+
+@dataclass(frozen=True)
 class NormalEquations:
     """Half of chi2 = chi2_0 - 2 g.d + d.H.d in the blocks of its gradient and Hessian.
 
@@ -38,6 +53,7 @@ class NormalEquations:
     theta : U
     source : V
     cross : W
+    by_detector : of what they are the sums; None where some of it was taken out
     """
 
     at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
@@ -45,6 +61,7 @@ class NormalEquations:
     theta: Float[np.ndarray, "calib calib"]
     source: Float[np.ndarray, "src 2 2"]
     cross: Float[np.ndarray, "calib 2 src"]
+    by_detector: DetectorSums | None
 
 
 @dataclass(frozen=True)
@@ -105,22 +122,25 @@ def accumulate(
 ) -> NormalEquations:
     """Accumulate the normal equations of the data at one point."""
     layout, n_src, index = problem.layout, problem.n_src, problem.tiles.index
+    n_det, n_coef = layout.n_det, layout.n_coef
     cross = np.zeros((layout.size, 2, n_src))
-    source, by_source = np.zeros((2, 2, n_src)), np.zeros((2, n_src))
-    coefficients = np.zeros((2, layout.n_coef, 2, layout.n_coef))
-    sums = _empty_sums(index.source.shape, layout.n_coef)
+    source, by_source = np.zeros((n_det, 2, 2, n_src)), np.zeros((n_det, 2, n_src))
+    coefficients = np.zeros((n_det, 2, n_coef, 2, n_coef))
+    sums = _empty_sums(index.source.shape, n_coef)
     with one_blas_thread():
         for i, chunk in enumerate(chunks(problem, theta, sources)):
             here = Index(*(part[i] for part in index))
             _sum_tiles(chunk, i, sums)
-            _add_coefficients(chunk, sums.basis[i], coefficients)
-            _add_sources(here.source, chunk, source, by_source)
+            _add_coefficients(here.detector, chunk, sums.basis[i], coefficients)
+            _add_sources(here, chunk, source, by_source)
             _add_cross_local(here, chunk, layout, cross)
         hessian, by_theta, chi2 = _assemble(index, layout, sums, coefficients)
-    _add_cross_coefficients(problem, sums, cross)
-    gradient = Gradient(chi2, by_theta, by_source.T.copy())
-    at, of_sources = (theta, sources), source.transpose(2, 0, 1).copy()
-    return NormalEquations(at, gradient, hessian, of_sources, cross)
+    of_coefficients = _cross_coefficients(problem, sums)
+    np.sum(of_coefficients, axis=0, out=cross[layout.coefficients()])
+    own = DetectorSums(chi2, by_theta, by_source, hessian, source, of_coefficients)
+    gradient = Gradient(float(chi2.sum()), by_theta.sum(axis=0), by_source.sum(axis=0).T.copy())
+    of_sources = source.sum(axis=0).transpose(2, 0, 1).copy()
+    return NormalEquations((theta, sources), gradient, hessian.sum(axis=0), of_sources, cross, own)
 
 
 def _flatten(nested: Iterable[Iterable[AnyArray]]) -> list[AnyArray]:
@@ -154,85 +174,102 @@ def _sum_tiles(chunk: Linearised, i: int, sums: _TileSums) -> None:
 
 
 def _add_coefficients(
+    detector: Int[np.ndarray, "tile 1"],
     chunk: Linearised,
     basis: Float[np.ndarray, "tile slot coef"],
-    hessian: Float[np.ndarray, "2 coef 2 coef"],
+    hessian: Float[np.ndarray, "det 2 coef 2 coef"],
 ) -> None:
-    n_tiles, n_slots, n_coef = basis.shape
-    terms = basis.reshape(n_tiles * n_slots, n_coef)
+    n_det, n_coef = len(hessian), basis.shape[-1]
+    on_detector = (np.arange(n_det)[:, None] == detector.T).astype(np.float64)
+    weighted, of_tiles = np.empty(basis.shape), np.empty((len(basis), n_coef, n_coef))
     for i, j in ((0, 0), (0, 1), (1, 1)):
-        weight = chunk.products.displacement_displacement[i][j].reshape(-1, 1)
-        hessian[i, :, j] += (weight * terms).T @ terms
-    hessian[1, :, 0] = hessian[0, :, 1].T
+        weight = chunk.products.displacement_displacement[i][j]
+        np.multiply(weight[:, :, None], basis, out=weighted)
+        np.matmul(weighted.swapaxes(1, 2), basis, out=of_tiles)
+        sums = on_detector @ of_tiles.reshape(len(basis), n_coef * n_coef)
+        hessian[:, i, :, j] += sums.reshape(n_det, n_coef, n_coef)
+    hessian[:, 1, :, 0] = hessian[:, 0, :, 1].swapaxes(1, 2)
 
 
 def _add_sources(
-    index: Int[np.ndarray, "tile slot"],
+    index: Index,
     chunk: Linearised,
-    hessian: Float[np.ndarray, "2 2 src"],
-    gradient: Float[np.ndarray, "2 src"],
+    hessian: Float[np.ndarray, "det 2 2 src"],
+    gradient: Float[np.ndarray, "det 2 src"],
 ) -> None:
-    products, n_src, flat = chunk.products, gradient.shape[-1], index.ravel()
+    n_det, _, n_src = gradient.shape
+    pair = (index.detector * n_src + index.source).ravel()
+
+    def sums(values: Float[np.ndarray, "tile slot"]) -> Float[np.ndarray, "det src"]:
+        return np.bincount(pair, values.ravel(), n_det * n_src).reshape(n_det, n_src)
+
+    products = chunk.products
     for a in range(2):
-        gradient[a] += np.bincount(flat, products.local_source[-1][a].ravel(), n_src)
+        gradient[:, a] += sums(products.local_source[-1][a])
         for b in range(a + 1):
-            hessian[a, b] += np.bincount(flat, products.source_source[a][b].ravel(), n_src)
-    hessian[0, 1] = hessian[1, 0]
+            hessian[:, a, b] += sums(products.source_source[a][b])
+    hessian[:, 0, 1] = hessian[:, 1, 0]
 
 
 def _add_cross_local(
     index: Index, chunk: Linearised, layout: Layout, cross: Float[np.ndarray, "calib 2 src"]
 ) -> None:
     """Add the blocks between the sources and what each of their measurements touches."""
-    n_src = cross.shape[-1]
+    n_src, flat = cross.shape[-1], cross.reshape(-1)
     for number, groups in ((index.exposure, PER_EXPOSURE), (index.detector, PER_DETECTOR)):
-        first, count = number.min(), np.ptp(number) + 1
-        pair = ((number - first) * n_src + index.source).ravel()
         for group in groups:
-            columns = layout.columns(group)[first : first + count]
+            row = layout.columns(group)[number]
             products = chunk.products.local_source[LOCAL_GROUPS.index(group)]
             for a in range(2):
-                sums = np.bincount(pair, products[a].ravel(), count * n_src)
-                cross[columns, a] += sums.reshape(count, n_src)
+                place = (2 * row + a) * n_src + index.source
+                np.add.at(flat, place.ravel(), products[a].ravel())
 
 
-def _add_cross_coefficients(
-    problem: Problem, sums: _TileSums, cross: Float[np.ndarray, "calib 2 src"]
-) -> None:
-    """Add the blocks between sources and distortion, shared by all measurements.
+def _cross_coefficients(
+    problem: Problem, sums: _TileSums
+) -> Float[np.ndarray, "det two_coef 2 src"]:
+    """Return the blocks between sources and distortion, shared by all measurements.
 
     They are sums over the measurements of a source of a 2 x 2 matrix times the basis: a
     sparse matrix that gathers them, times the dense basis.
     """
-    n_src, n_coef = problem.n_src, problem.layout.n_coef
+    n_src, n_det, n_coef = problem.n_src, problem.layout.n_det, problem.layout.n_coef
     order, first = problem.slots_by_source
     basis = sums.basis.reshape(len(order), n_coef)
-    target = cross[problem.layout.coefficients()].reshape(2, n_coef, 2, n_src)
+    cross = np.empty((n_det, 2, n_coef, 2, n_src))
     for axis in range(2):
         for a in range(2):
             weight = sums.shared[axis, a].reshape(-1)[order]
-            gather = sp.csr_array((weight, order, first), shape=(n_src, len(basis)))
-            target[axis, :, a] = (gather @ basis).T
+            gather = sp.csr_array((weight, order, first), shape=(n_det * n_src, len(basis)))
+            cross[:, axis, :, a] = (gather @ basis).reshape(n_det, n_src, n_coef).swapaxes(1, 2)
+    return cross.reshape(n_det, 2 * n_coef, 2, n_src)
 
 
 def _assemble(
     index: Index,
     layout: Layout,
     sums: _TileSums,
-    coefficients: Float[np.ndarray, "2 coef 2 coef"],
-) -> tuple[Float[np.ndarray, "calib calib"], Float[np.ndarray, " calib"], float]:
-    """Return Hessian, gradient and chi2 of the calibration."""
-    size, shared, own = layout.size, layout.coefficients(), slice(N_LOCAL)
-    columns = layout.touched(index.exposure[..., 0], index.detector[..., 0])
-    row = size * columns[..., :, None]
-    hessian = _sum_at(row + columns[..., None, :], sums.local[..., own, own], size * size)
-    hessian += _sum_at(row + np.arange(size)[shared], sums.mixed[..., own, :], size * size)
-    hessian = hessian.reshape(size, size)
-    hessian[shared, :] = hessian[:, shared].T
-    hessian[shared, shared] = coefficients.reshape(2 * layout.n_coef, 2 * layout.n_coef)
-    gradient = _sum_at(columns, sums.local[..., -1, own], size)
-    gradient[shared] = sums.mixed[..., -1, :].sum(axis=(0, 1))
-    return hessian, gradient, float(sums.local[..., -1, -1].sum())
+    coefficients: Float[np.ndarray, "det 2 coef 2 coef"],
+) -> tuple[
+    Float[np.ndarray, "det calib calib"], Float[np.ndarray, "det calib"], Float[np.ndarray, " det"]
+]:
+    """Return Hessian, gradient and chi2 of the calibration, of each detector."""
+    size, n_det, shared, own = layout.size, layout.n_det, layout.coefficients(), slice(N_LOCAL)
+    detector = index.detector[..., 0]
+    columns = layout.touched(index.exposure[..., 0], detector)
+    # Where the vectors of the detectors stand one after the other.
+    first = size * detector[..., None]
+    rows = size * (first + columns)[..., :, None]
+    n_values = n_det * size * size
+    hessian = _sum_at(rows + columns[..., None, :], sums.local[..., own, own], n_values)
+    hessian += _sum_at(rows + np.arange(size)[shared], sums.mixed[..., own, :], n_values)
+    hessian = hessian.reshape(n_det, size, size)
+    hessian[:, shared, :] = hessian[:, :, shared].swapaxes(1, 2)
+    hessian[:, shared, shared] = coefficients.reshape(n_det, 2 * layout.n_coef, 2 * layout.n_coef)
+    gradient = _sum_at(first + columns, sums.local[..., -1, own], n_det * size)
+    gradient += _sum_at(first + np.arange(size)[shared], sums.mixed[..., -1, :], n_det * size)
+    chi2 = _sum_at(detector, sums.local[..., -1, -1], n_det)
+    return hessian, gradient.reshape(n_det, size), chi2
 
 
 def _sum_at(

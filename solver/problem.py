@@ -84,8 +84,8 @@ class Problem:
 
     @cached_property
     def slots_by_source(self) -> tuple[Int[np.ndarray, " slots"], Int[np.ndarray, " bounds"]]:
-        """The tiles' slots in order of their source, and where each source begins."""
-        return self.tiles.by_source(self.n_src)
+        """The tiles' slots in order of their detector and source, and where each pair begins."""
+        return self.tiles.by_source(self.n_src, self.layout.n_det)
 
     def offsets(
         self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]

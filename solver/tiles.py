@@ -46,11 +46,13 @@ class Tiles(NamedTuple):
         """Return index, measured and weight of one chunk."""
         return Index(*(part[i] for part in self.index)), self.measured[i], self.weight[i]
 
-    def by_source(self, n_src: int) -> tuple[Int[np.ndarray, " slots"], Int[np.ndarray, " bounds"]]:
-        """Return all slots in order of their source, and where each source begins."""
-        source = self.index.source.ravel()
-        count = np.bincount(source, minlength=n_src)
-        return np.argsort(source, kind="stable"), np.concatenate([[0], np.cumsum(count)])
+    def by_source(
+        self, n_src: int, n_det: int
+    ) -> tuple[Int[np.ndarray, " slots"], Int[np.ndarray, " bounds"]]:
+        """Return all slots in order of their detector and source, and where each pair begins."""
+        pair = (self.index.detector * n_src + self.index.source).ravel()
+        count = np.bincount(pair, minlength=n_det * n_src)
+        return np.argsort(pair, kind="stable"), np.concatenate([[0], np.cumsum(count)])
 
 
 def lay_tiles(

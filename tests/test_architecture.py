@@ -45,7 +45,7 @@ RUNGS = (
     ("solver.simulate",),
     ("solver.linearise", "solver.objective"),
     ("solver.normal",),
-    ("solver.schur",),
+    ("solver.schur", "solver.part"),
     ("solver.coordinates",),
     ("solver.gauss_newton", "solver.leverage", "solver.carry"),
     ("solver.spectrum",),

@@ -119,14 +119,12 @@ def changes(problem: Problem) -> dict[str, tuple[FitSettings, ...]]:
         "no detector 1": Exclusions(detectors=frozenset([1])),
     }
     default = FitSettings()
-    no_detector = FitSettings(exclusions=left_out["no detector 1"])
     return {
         "sources' priors": (default, FitSettings(prior_widths={"sources": 2.0})),
         "detectors' priors": (default, FitSettings(prior_widths={"detector_x": 10.0})),
         **{name: (default, FitSettings(exclusions=gone)) for name, gone in left_out.items()},
         # From one order more than the distortion has, so that the lower one fits as well.
         "order 6 to 5": (FitSettings(order=6), default),
-        "no detector 1, made ready": (default, no_detector, no_detector),
         "order 6 to 5, made ready": (FitSettings(order=6), default, default),
         "order 6 to 2, made ready": (FitSettings(order=6), *2 * (FitSettings(order=2),)),
     }

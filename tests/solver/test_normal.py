@@ -5,6 +5,7 @@ import pytest
 
 from solver.normal import accumulate, chunks
 from solver.objective import gradient
+from solver.problem import of_rows
 
 
 def close(found, expected, rtol=1e-9):
@@ -40,6 +41,29 @@ def test_block_is_that_of_the_dense_jacobian(equations, blocks, dense, name):
     found, expected = found / unit.get(name, 1.0), expected / unit.get(name, 1.0)
     # A residual is rounded to 1e-8 of its sigma.
     close(found, expected, rtol=1e-7 if name.startswith("by_") else 1e-9)
+
+
+def test_blocks_are_the_sums_over_the_detectors(equations, problem):
+    own, layout = equations.by_detector, problem.layout
+    close(own.theta.sum(axis=0), equations.theta)
+    close(own.source.sum(axis=0).transpose(2, 0, 1), equations.source)
+    close(own.coefficients.sum(axis=0), equations.cross[layout.coefficients()])
+    close(own.by_theta.sum(axis=0), equations.gradient.by_theta)
+    assert own.chi2.sum() == pytest.approx(equations.gradient.chi2)
+
+
+@pytest.mark.parametrize("detector", range(4))
+def test_sums_of_a_detector_are_those_of_its_measurements(
+    detector, equations, problem, expansion_point
+):
+    own, layout = equations.by_detector, problem.layout
+    alone = accumulate(of_rows(problem, problem.index.detector == detector), *expansion_point)
+    close(own.theta[detector], alone.theta)
+    close(own.source[detector].transpose(2, 0, 1), alone.source)
+    close(own.coefficients[detector], alone.cross[layout.coefficients()])
+    close(own.by_theta[detector], alone.gradient.by_theta, rtol=1e-7)
+    close(own.by_source[detector].T, alone.gradient.by_source, rtol=1e-7)
+    assert own.chi2[detector] == pytest.approx(alone.gradient.chi2, rel=1e-8)
 
 
 def test_sources_are_not_coupled(dense, problem):

@@ -68,10 +68,13 @@ def test_few_tiles_make_one_small_chunk(monkeypatch):
     assert lay_tiles(*measurements(many)).measured.shape == (1, 2, 256, SLOTS)
 
 
-def test_slots_by_source_hold_those_of_each_source(laid):
+def test_slots_by_source_hold_those_of_each_detector_and_source(laid):
     tiles = laid[-1]
-    order, first = tiles.by_source(50)
+    order, first = tiles.by_source(50, 4)
     source = tiles.index.source.ravel()
+    detector = np.broadcast_to(tiles.index.detector, tiles.index.source.shape).ravel()
     assert first[-1] == len(order) == source.size
-    for i in range(50):
-        assert (source[order[first[i] : first[i + 1]]] == i).all()
+    for pair in range(4 * 50):
+        of_pair = order[first[pair] : first[pair + 1]]
+        assert (source[of_pair] == pair % 50).all()
+        assert (detector[of_pair] == pair // 50).all()

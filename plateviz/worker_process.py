@@ -36,7 +36,7 @@ Send = Callable[[dict], None]
 # Work that makes the next request quicker, for when none waits.
 Later = Iterator[None]
 # What is likely to be asked next is made ready, a step at a time, when nothing was for so long.
-_QUIET_S = 2.0
+_QUIET_S = 1.0
 _NOTHING = object()
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import panel as pn
 
 from plateviz.app import build_app
+from plateviz.closed_pages import leave_unsaid
 from plateviz.workbench import Workbench
 from solver.errors import InputError
 
@@ -65,6 +66,7 @@ def begin(workbench: Workbench, place: Place) -> Any:  # noqa: ANN401 of Bokeh
 
 
 def _server(workbench: Workbench, place: Place) -> Any:  # noqa: ANN401 of Bokeh
+    leave_unsaid()
     hosts = sorted({place.address, "localhost", "127.0.0.1"})
     # A thread is what it gives only where it is asked to make one.
     return pn.serve(

@@ -75,7 +75,7 @@ RUNGS = (
     ("plateviz.workbench", "plateviz.session"),
     ("plateviz.navigation",),
     ("plateviz.views",),
-    ("plateviz.app",),
+    ("plateviz.app", "plateviz.closed_pages"),
     ("plateviz.server",),
     ("plateviz.demo", "plateviz.cli_output", "plateviz.cli_options", "plateviz.tap"),
     ("plateviz.notebook",),

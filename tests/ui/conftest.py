@@ -5,7 +5,10 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
+import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import sync_playwright
@@ -42,27 +45,32 @@ def browser(chromium_path):
 
 @contextmanager
 def serving(*arguments, env=None):
-    """Run a command of plateviz that serves; gives the address it announces."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "plateviz.cli", *arguments, "--no-open"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env={**os.environ, **(env or {}), "PYTHONUNBUFFERED": "1"},
-    )
-    said = []
-    try:
-        for line in process.stdout:
-            said.append(line)
-            if found := re.search(r"http://\S+", line):
-                yield found[0]
-                break
-        else:
-            pytest.fail(f"the server ended: {''.join(said)}")
-    finally:
-        process.terminate()
-        process.wait(30)
-        process.stdout.close()
+    """Run a command of plateviz that serves; gives the address it announces.
+
+    It says what it has to say into a file, since a pipe that nobody reads would fill up and hold
+    it; what it says may be no traceback.
+    """
+    with tempfile.NamedTemporaryFile("a") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "plateviz.cli", *arguments, "--no-open"],
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, **(env or {}), "PYTHONUNBUFFERED": "1"},
+        )
+        try:
+            yield _announced(process, Path(said.name))
+        finally:
+            process.terminate()
+            process.wait(30)
+        assert "Traceback" not in Path(said.name).read_text(encoding="utf-8")
+
+
+def _announced(process, said):
+    while process.poll() is None:
+        if found := re.search(r"http://\S+(?=\s)", said.read_text(encoding="utf-8")):
+            return found[0]
+        time.sleep(0.1)
+    pytest.fail(f"the server ended: {said.read_text(encoding='utf-8')}")
 
 
 @pytest.fixture

@@ -101,7 +101,9 @@ class Worker:
             self._process = None
             for stream in (process.stdin, process.stdout):
                 if stream is not None:
-                    stream.close()
+                    # A request may be left in it that the process died too soon to read.
+                    with contextlib.suppress(BrokenPipeError):
+                        stream.close()
             if self._jobs:
                 reason = f"the solver process ended (exit {process.returncode}): {last_words[0]}"
                 self._jobs[0].fail(reason)

@@ -77,6 +77,18 @@ def test_a_waiting_job_is_cancelled_without_being_begun(workbench):
     assert first.wait(LONG) is JobStatus.DONE
 
 
+def test_what_is_asked_of_a_process_that_has_just_died_is_reported(workbench):
+    worker = workbench._worker
+    # While the lock is held nobody can have taken note of it.
+    with worker._lock:
+        worker._process.kill()
+        worker._process.wait()
+        job = workbench.request(0, FitSettings(order=1))
+    assert job.wait(LONG) is JobStatus.FAILED
+    assert "the solver process ended" in job.message
+    assert workbench.request(0, FitSettings(order=1)).wait(LONG) is JobStatus.DONE
+
+
 def test_a_process_that_dies_is_reported_and_replaced(workbench):
     job = workbench.request(1, FitSettings(order=6))
     job.wait_for_news(0, timeout=LONG)

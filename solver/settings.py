@@ -35,10 +35,10 @@ class SviSettings:
     conditioned : whether to move in whitened coordinates
     """
 
-    steps: int = 2000
+    steps: int = 1500
     first_rate: float = 1e4
     last_rate: float = 1e-3
-    block: int = 50
+    block: int = 25
     patience: int = 200
     tolerance: float = 0.1
     max_steps: int = 10_000

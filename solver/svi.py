@@ -17,13 +17,13 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
-from numpyro.infer import SVI, Trace_ELBO
+from numpyro.infer import SVI
 
 from solver.coordinates import Coordinates, in_bare_units, whitened
 from solver.estimate import Estimate
 from solver.forward import AnyArray
 from solver.gauss_newton import Iteration, Mode, downhill, largest_step
-from solver.guide import SITES, Means, draws, guide
+from solver.guide import SITES, Means, MirroredElbo, draws, guide
 from solver.model import Evidence, evidence_of, in_coordinates
 from solver.normal import accumulate
 from solver.parameters import SOURCES
@@ -266,7 +266,7 @@ def _run_block(
         optax.scale_by_adam(_BETA_1, _BETA_2, _EPSILON),
         _bounded(lambda count: rates[count], limits),
     )
-    engine = SVI(model, guide_with, adam, Trace_ELBO())
+    engine = SVI(model, guide_with, adam, MirroredElbo())
     shape = means.scale.shape
     state = engine.init(key, jnp.zeros(shape))
 

@@ -36,7 +36,7 @@ from solver.settings import FitSettings, SviSettings
 _BETA_1, _BETA_2, _EPSILON = 0.99, 0.999, 1e-4
 # No step moves a parameter by more than this share of its prior's width: where the priors
 # alone hold a direction, one unit of whitened coordinates is as wide as they are.
-_LARGEST_SHARE = 0.5
+_LARGEST_SHARE = 0.25
 # No step changes the guide's widths by more than this share.
 _LARGEST_CHANGE = 0.05
 # A loss that has fallen by less than this has not changed: the same for all parameters together.

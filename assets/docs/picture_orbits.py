@@ -173,6 +173,6 @@ ORBITS: Mapping[str, Pair] = {
     ),
     "convergence": (
         lambda: _chosen(_by_svi(SviSettings())),
-        lambda: _chosen(_by_svi(SviSettings(steps=500, max_steps=500))),
+        lambda: _chosen(_by_svi(SviSettings(steps=150, max_steps=150))),
     ),
 }

@@ -153,7 +153,8 @@ def _last_step(rows: pd.DataFrame, tolerance: float) -> str:
         return "no step taken"
     last = rows.iloc[-1]
     verdict = "below" if last["largest_step"] < tolerance else "above"
-    return f"last: {last['largest_step']:.2g} σ ({last['largest_parameter']}), {verdict} tolerance"
+    # The end may be cut off: a source is named by nineteen digits.
+    return f"{verdict} tolerance: {last['largest_step']:.2g} σ ({last['largest_parameter']})"
 
 
 def _trace(rows: pd.DataFrame, column: str, theme: str) -> list[hv.Element]:

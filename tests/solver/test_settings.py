@@ -87,7 +87,7 @@ def test_widths_given_are_not_shared():
     [
         (lambda: SviSettings(steps=0), "svi steps to be 1 or more, found 0"),
         (lambda: SviSettings(patience=2.5), "svi patience to be 1 or more, found 2.5"),
-        (lambda: SviSettings(max_steps=100), r"not to be below steps \(2000\), found 100"),
+        (lambda: SviSettings(max_steps=100), r"not to be below steps \(1500\), found 100"),
         (lambda: SviSettings(last_rate=1e5), "rates that fall and are positive"),
         (lambda: SviSettings(last_rate=0.0), "rates that fall and are positive"),
         (lambda: SviSettings(tolerance=0.0), "positive svi tolerance, found 0.0"),

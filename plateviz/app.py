@@ -106,6 +106,7 @@ def _keep_up(navigation: Navigation, pages: Pages) -> None:
     session.param.watch(wake, ["stage", "shown", "other", "theme"])
     session.selection.param.watch(wake, ["field", "plates", "detector"])
     navigation.param.watch(wake, ["view", "run_name", "found"])
+    pages.on_sight(wake)
     # Drawing before the page is there would keep it from coming.
     pn.state.onload(wake)
 

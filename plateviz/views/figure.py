@@ -11,9 +11,12 @@ import panel_material_ui as pmui
 
 from plateviz.views.leads import Leads, follow_taps, rendered
 from plateviz.views.markup import markup_pane, paragraph
+from plateviz.views.sighting import Sighting
 from solver.errors import InputError
 
-_BATCH = 4
+_BATCH = 2
+# An empty card has about the height of a figure: if it had none, all cards would be near.
+_EMPTY_HEIGHT = 420
 _NOWHERE: Leads = MappingProxyType({})
 _LOG = logging.getLogger(__name__)
 
@@ -41,7 +44,10 @@ class Figure(Protocol):
 
 
 class FigureView(pn.viewable.Viewer):
-    """A card with one figure; due to be drawn when what it is drawn from changes."""
+    """A card with one figure; due to be drawn when what it is drawn from changes.
+
+    A figure that has still to be drawn anew is faded.
+    """
 
     def __init__(
         self,
@@ -62,10 +68,14 @@ class FigureView(pn.viewable.Viewer):
         super().__init__(**params)
         self._figure, self._picture, self._leads = figure, picture, leads
         self._waiting, self._theme = waiting, "light"
-        self.is_due = False
+        self._is_changed = self._is_stale = False
+        self.sighting = Sighting()
         self._caption = markup_pane()
+        # A plain column lays a new figure out as it takes it; others do so a moment later, in which
+        # the page may measure a figure that has no layout yet.
         self._body = pn.Column(sizing_mode="stretch_width", margin=0)
         self._card = pmui.Paper(
+            self.sighting,
             self._caption,
             self._body,
             css_classes=["figure", f"figure-{figure.name}"],
@@ -74,28 +84,35 @@ class FigureView(pn.viewable.Viewer):
                 "min-width": "0",
                 "align-self": "stretch",
                 "height": "auto",
+                "min-height": f"{_EMPTY_HEIGHT}px",
             },
             stylesheets=[".paper { height: 100%; }"],
             margin=6,
-            sx={"height": "100%"},
+            sx={"height": "100%", "position": "relative", "zIndex": 0},
             elevation=0,
             variant="outlined",
         )
         self.change(self._theme)
-        self._say(waiting)
+        self._say("Being drawn.")
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the card."""
         return self._card
 
+    @property
+    def is_due(self) -> bool:
+        """Whether it is to be drawn: it has changed, and somebody looks at it or soon will."""
+        return self._is_changed and self.sighting.is_near
+
     def change(self, theme: str) -> None:
         """Take note that the figure, or the theme it is drawn in, is another."""
-        self._theme, self.is_due = theme, True
+        self._theme, self._is_changed = theme, True
         self._caption.object = paragraph(self._figure.caption, "caption", theme)
+        self._fade()
 
     def draw(self) -> None:
         """Draw the figure as it is now."""
-        self.is_due = False
+        self._is_changed = False
         try:
             element = self._picture(self._theme)
             if element is None:
@@ -108,20 +125,28 @@ class FigureView(pn.viewable.Viewer):
             self._say(f"This figure cannot be drawn: {error}")
 
     def mark_stale(self, is_stale: bool) -> None:
-        """Fade the figure while another is being made."""
-        self._body.styles = {"opacity": "0.45" if is_stale else "1"}
+        """Take note that another is being made, or no longer is."""
+        self._is_stale = is_stale
+        self._fade()
 
     def _show(self, element: hv.core.Dimensioned) -> None:
         plot = rendered(element)
         follow_taps(plot, self._leads)
-        self._body[:] = [
+        self._put(
             pn.pane.HoloViews(plot, backend="bokeh", linked_axes=False, align="center", margin=0)
-        ]
+        )
 
     def _say(self, words: str) -> None:
         pane = markup_pane()
         pane.object = paragraph(words, "empty", self._theme)
-        self._body[:] = [pane]
+        self._put(pane)
+
+    def _put(self, body: pn.viewable.Viewable) -> None:
+        self._body[:] = [body]
+        self._fade()
+
+    def _fade(self) -> None:
+        self._body.styles = {"opacity": "0.45" if self._is_changed or self._is_stale else "1"}
 
 
 class FigureGrid(pn.viewable.Viewer):
@@ -131,7 +156,7 @@ class FigureGrid(pn.viewable.Viewer):
         """Lay out the cards, in order."""
         super().__init__(**params)
         self._views = list(views)
-        self._box = pn.FlexBox(
+        self._box = pmui.FlexBox(
             *self._views, align_items="stretch", sizing_mode="stretch_width", margin=(8, 0)
         )
 
@@ -143,6 +168,11 @@ class FigureGrid(pn.viewable.Viewer):
     def is_due(self) -> bool:
         """Whether some figure is to be drawn."""
         return any(view.is_due for view in self._views)
+
+    def on_sight(self, call: Callable[[object], object]) -> None:
+        """Have `call` called when somebody comes near a figure, or leaves it."""
+        for view in self._views:
+            view.sighting.param.watch(call, "is_near")
 
     def change(self, theme: str) -> None:
         """Take note that all figures are others."""

@@ -36,7 +36,7 @@ class OrbitPage(pn.viewable.Viewer):
             sizing_mode="stretch_width",
             margin=0,
         )
-        self._column = pn.Column(
+        self._column = pmui.Column(
             SummaryView(session),
             self.figures,
             heading("Calibration"),

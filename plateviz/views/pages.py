@@ -1,5 +1,7 @@
 """Pages: the views of one browser session behind one switch."""
 
+from collections.abc import Callable
+
 import panel as pn
 import panel_material_ui as pmui
 
@@ -42,10 +44,10 @@ class Pages(pn.viewable.Viewer):
             View.ORBIT: OrbitPage(navigation),
             View.SOURCE: SourcePage(navigation),
         }
-        # Each view has a place of a kind that keeps its changes to itself: in a plain column
-        # every change has all figures of all views laid out anew.
-        self._places = {view: _place(page) for view, page in self._pages.items()}
-        self._sides = {view: _place(page.sidebar) for view, page in self._pages.items()}
+        # All boxes around the figures are of a kind that keeps its changes to itself: within a
+        # plain column, every change has all figures of all views laid out anew.
+        self._places = {view: page.__panel__() for view, page in self._pages.items()}
+        self._sides = {view: page.sidebar for view, page in self._pages.items()}
         self._column = pmui.Column(
             self._switch(),
             *self._places.values(),
@@ -64,6 +66,11 @@ class Pages(pn.viewable.Viewer):
     def is_due(self) -> bool:
         """Whether some figure of the view on the screen is to be drawn."""
         return self._pages[self._navigation.view].figures.is_due
+
+    def on_sight(self, call: Callable[[object], object]) -> None:
+        """Have `call` called when somebody comes near a figure, or leaves it."""
+        for page in self._pages.values():
+            page.figures.on_sight(call)
 
     def draw_due(self) -> None:
         """Draw the first few figures that are due; what nobody looks at is not drawn."""
@@ -89,7 +96,3 @@ class Pages(pn.viewable.Viewer):
         for view in View:
             self._places[view].styles = _SHOWN if view is shown else _HIDDEN
             self._sides[view].visible = view is shown
-
-
-def _place(page: object) -> pmui.Column:
-    return pmui.Column(page, sizing_mode="stretch_width", margin=0)

@@ -48,7 +48,7 @@ class SourcePage(pn.viewable.Viewer):
         self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row)
         self._list = DataTable(SOURCES_OF_RUN, self._open_source, page_size=20)
         self.figures = FigureGrid([self._figure_view(figure) for figure in source_figures()])
-        self._rest = pn.Column(
+        self._rest = pmui.Column(
             heading("Motion"),
             self._motion,
             self.figures,
@@ -56,8 +56,10 @@ class SourcePage(pn.viewable.Viewer):
             self._orbits,
             sizing_mode="stretch_width",
         )
-        self._choice = pn.Column(self._list, sizing_mode="stretch_width")
-        self._column = pn.Column(self._head, self._rest, self._choice, sizing_mode="stretch_width")
+        self._choice = pmui.Column(self._list, sizing_mode="stretch_width")
+        self._column = pmui.Column(
+            self._head, self._rest, self._choice, sizing_mode="stretch_width"
+        )
         self._entry = pmui.TextInput(
             label="Source id",
             size="small",
@@ -84,9 +86,7 @@ class SourcePage(pn.viewable.Viewer):
 
     def _figure_view(self, figure: SourceFigure) -> FigureView:
         leads = {"orbit_id": self._open_orbit}
-        return FigureView(
-            figure, partial(self._picture, figure), waiting="Being drawn.", leads=leads
-        )
+        return FigureView(figure, partial(self._picture, figure), leads=leads)
 
     def _picture(self, figure: SourceFigure, theme: str) -> hv.core.Dimensioned | None:
         found = self._navigation.found

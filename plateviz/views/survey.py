@@ -32,10 +32,10 @@ class SurveyPage(pn.viewable.Viewer):
         self._head = markup_pane()
         self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=15)
         self.figures = FigureGrid([self._figure_view(figure) for figure in survey_figures()])
-        self._rest = pn.Column(
+        self._rest = pmui.Column(
             heading("Orbits"), self._table, self.figures, sizing_mode="stretch_width"
         )
-        self._column = pn.Column(self._head, self._rest, sizing_mode="stretch_width")
+        self._column = pmui.Column(self._head, self._rest, sizing_mode="stretch_width")
         self.sidebar = pmui.Column(
             heading("Shown"), *run_selector(navigation), sizing_mode="stretch_width", margin=0
         )
@@ -49,9 +49,7 @@ class SurveyPage(pn.viewable.Viewer):
 
     def _figure_view(self, figure: SurveyFigure) -> FigureView:
         leads = {"id": self._navigation.open_source, "orbit_id": self._open_orbit}
-        return FigureView(
-            figure, partial(self._picture, figure), waiting="Being drawn.", leads=leads
-        )
+        return FigureView(figure, partial(self._picture, figure), leads=leads)
 
     def _picture(self, figure: SurveyFigure, theme: str) -> hv.core.Dimensioned | None:
         run = self._navigation.run

@@ -73,6 +73,13 @@ def _announced(process, said):
     pytest.fail(f"the server ended: {said.read_text(encoding='utf-8')}")
 
 
+def see(page, name):
+    """Scroll to a figure, which is drawn for who comes near it, and wait for that."""
+    card = page.locator(f".figure-{name}")
+    card.scroll_into_view_if_needed()
+    card.locator("canvas").first.wait_for(state="attached")
+
+
 @pytest.fixture
 def open_page(browser):
     """Open a page of a size and colour scheme; what it complains of fails the test."""

@@ -4,7 +4,7 @@ import pytest
 from playwright.sync_api import expect
 
 from plateviz.gallery import diagnostics
-from tests.ui.conftest import serving
+from tests.ui.conftest import see, serving
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -27,8 +27,7 @@ def demo(tmp_path_factory, chromium_path):
 @pytest.fixture
 def page(demo, open_page):
     page = open_page(demo)
-    for diagnostic in diagnostics():
-        page.locator(f".figure-{diagnostic.name} canvas").first.wait_for(state="attached")
+    see(page, "residual-map")
     return page
 
 
@@ -56,6 +55,16 @@ def residual_arrows(page):
     )
 
 
+def is_faded(locator):
+    """Whether what is on the screen there is of a solution that is no longer shown."""
+    return locator.evaluate(
+        """element => {
+          for (let e = element; e; e = e.parentElement ?? e.getRootNode().host)
+            if (getComputedStyle(e).opacity !== '1') return true;
+          return false }"""
+    )
+
+
 def until(page, condition):
     """Wait for what only the models of the page can tell; figures are drawn in batches."""
     for _ in range(300):
@@ -66,10 +75,26 @@ def until(page, condition):
 
 
 def test_every_figure_is_drawn_with_data(page):
+    for diagnostic in diagnostics():
+        see(page, diagnostic.name)
     rows = page.evaluate(ROWS)
     assert len(rows) >= len(diagnostics())
     empty = [title for title, n in rows.items() if n == 0 and "Comparison" not in title]
     assert [t for t in empty if "Difference of positions" not in t] == []
+
+
+def test_a_figure_is_drawn_for_who_comes_near_it(page):
+    canvas = page.locator(".figure-convergence canvas").first
+    page.wait_for_timeout(1000)
+    assert canvas.count() == 0
+    see(page, "convergence")
+    assert not is_faded(canvas)
+    page.locator(".figure-footprint").scroll_into_view_if_needed()
+    set_order(page, 4)
+    expect(page.locator(".solution").first).to_contain_text("what if: order 4")
+    until(page, lambda: is_faded(canvas))
+    see(page, "convergence")
+    until(page, lambda: not is_faded(canvas))
 
 
 def test_the_summary_says_whether_to_trust_the_solution(page):
@@ -86,7 +111,7 @@ def test_another_order_changes_the_summary_and_the_residual_map(page):
     expect(page.locator(".solution").first).to_contain_text("order 3")
     assert value(page, "χ² per degree of freedom") != chi2
     until(page, lambda: residual_arrows(page) != arrows)
-    assert page.locator(".figure-comparison canvas").count() > 0
+    see(page, "comparison")
 
 
 def test_a_change_is_tried_out_at_once_and_can_be_kept(page):
@@ -133,10 +158,11 @@ def test_a_prior_that_makes_no_sense_is_refused_in_words(page):
 def test_the_dark_theme_reaches_the_figures(page):
     backgrounds = """() => [...new Set(Bokeh.documents.flatMap(d => [...d._all_models.values()])
         .filter(m => m.type === 'Figure').map(m => m.background_fill_color))]"""
-    light = page.evaluate(backgrounds)
+    assert page.evaluate(backgrounds) == ["#ffffff"]
     page.get_by_label("Toggle theme").click()
-    page.wait_for_function(f"() => ({backgrounds})()[0] !== '{light[0]}'")
-    assert len(page.evaluate(backgrounds)) == 1
+    for diagnostic in diagnostics():
+        see(page, diagnostic.name)
+    until(page, lambda: page.evaluate(backgrounds) == ["#121212"])
 
 
 def choose(page, label, option):

@@ -12,6 +12,8 @@ import nbformat
 import pytest
 from playwright.sync_api import expect
 
+from tests.ui.conftest import see
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 TOUR = REPOSITORY / "assets" / "tour.ipynb"
 TOKEN = "of-this-test"
@@ -124,6 +126,8 @@ def test_tour_runs_and_every_figure_is_drawn(folder, open_jupyter, application, 
         frame.wait_for(state="attached", timeout=PATIENCE_MS)
         dashboard = page.frame_locator("iframe[src^='http://127.0.0.1']")
         expect(dashboard.locator(".strip")).to_have_count(1, timeout=PATIENCE_MS)
+        frame.scroll_into_view_if_needed()
+        dashboard.locator(".figure").first.scroll_into_view_if_needed()
         dashboard.locator(".figure canvas").first.wait_for(state="attached")
         assert page.locator(".jp-OutputArea canvas").count() >= LEAST_CANVASES
         assert page.locator(".jp-OutputArea .strip").count() >= 6
@@ -137,8 +141,8 @@ def test_served_tour_is_the_dashboard_of_its_survey(folder, open_page):
     with running(folder, "panel", "serve", "tour.ipynb", "--port", "0") as address:
         page = open_page(f"{address}/tour")
         expect(page.locator(".strip").first).to_contain_text("Orbits complete")
-        page.locator(".figure-orbit-health canvas").first.wait_for(state="attached")
+        see(page, "orbit-health")
         page.get_by_role("button", name="Orbit", exact=True).click()
-        page.locator(".figure-residual-map canvas").first.wait_for(state="attached")
+        see(page, "residual-map")
         assert (folder / "plateviz-tour-star.html").is_file()
         page.close()

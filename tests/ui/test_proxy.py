@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
-from tests.ui.conftest import serving
+from tests.ui.conftest import see, serving
 from tests.ui.reverse_proxy import proxying
 
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -44,7 +44,7 @@ def test_page_lives_behind_a_proxy(proxy, survey, open_page):
         # What is asked for over the websocket is answered.
         expect(page.locator("p.empty:visible")).to_contain_text("plateviz survey", timeout=90_000)
         page.get_by_role("button", name="Orbit", exact=True).click()
-        page.locator(".figure-footprint canvas").first.wait_for(state="attached")
+        see(page, "footprint")
         # Before the server is gone, of which it would still ask for fonts.
         page.close()
         beyond = [url for url in asked if f":{proxy.port}/{PREFIX}/" not in url]

@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 from plateviz.gallery import diagnostics, source_figures, survey_figures
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
-from tests.ui.conftest import serving
+from tests.ui.conftest import see, serving
 from tests.ui.test_dashboard import until
 
 expect.set_options(timeout=60_000)
@@ -38,6 +38,10 @@ ROWS = f"""() => {{ {_VIEWS}
       rows[card(figure)] = Math.max(rows[card(figure)] ?? 0,
                                     renderer.data_source?.get_length() ?? 0);
   return rows; }}"""
+# Colour behind each figure that is drawn, by its name.
+BACKGROUNDS = f"""() => {{ {_VIEWS}
+  const colour = view => view.model.background_fill_color;
+  return Object.fromEntries(figures.map(view => [card(view), colour(view)])); }}"""
 # Where the first point of a figure that leads somewhere is on the screen, and its value.
 POINT = f"""([name, key]) => {{ {_VIEWS}
   for (const figure of figures.filter(view => card(view) === name))
@@ -77,15 +81,18 @@ def turn_to(page, view):
 
 
 def drawn(page, figures):
-    """Wait for the figures; give the rows of each."""
-    names = {figure.name for figure in figures}
-    until(page, lambda: names <= set(page.evaluate(ROWS)))
-    return {name: rows for name, rows in page.evaluate(ROWS).items() if name in names}
+    """Go to each figure and wait for it; give the rows of each."""
+    rows = {}
+    for figure in figures:
+        see(page, figure.name)
+        until(page, lambda name=figure.name: name in page.evaluate(ROWS))
+        rows[figure.name] = page.evaluate(ROWS)[figure.name]
+    return rows
 
 
 def tap(page, name, key):
     """Tap the first point of a figure; give the value of its column `key`."""
-    page.locator(f".figure-{name} canvas").first.scroll_into_view_if_needed()
+    see(page, name)
     page.wait_for_timeout(500)
     point = page.evaluate(POINT, [name, key])
     page.mouse.click(point["x"], point["y"])
@@ -167,13 +174,11 @@ def test_an_unknown_source_is_said_in_one_message(page):
 
 
 def test_the_dark_theme_reaches_the_views(page):
-    drawn(page, survey_figures())
-    models = "() => Bokeh.documents.flatMap(d => [...d._all_models.values()])"
-    colours = f"{models}.filter(m => m.type === 'Figure').map(m => m.background_fill_color)"
-    n_figures = len(page.evaluate(colours))
+    see(page, survey_figures()[0].name)
     page.get_by_label("Toggle theme").click()
-    # Of the light figures that these replace the page may still know.
-    until(page, lambda: page.evaluate(colours).count("#121212") >= n_figures)
+    for figure in survey_figures():
+        see(page, figure.name)
+        until(page, lambda name=figure.name: page.evaluate(BACKGROUNDS)[name] == "#121212")
 
 
 def test_a_survey_without_a_run_says_what_to_do(tmp_path, open_page, chromium_path):

@@ -15,7 +15,9 @@ class CalibrationView(pn.viewable.Viewer):
         """Follow `session`."""
         super().__init__(**params)
         self._session = session
-        self._tabs = pmui.Tabs(sizing_mode="stretch_width")
+        # A table of a tab that has not been opened would ask without end, in the browser, whether
+        # it can be laid out: one core of every reader.
+        self._tabs = pmui.Tabs(dynamic=True, sizing_mode="stretch_width")
         session.param.watch(self._fill, "shown")
         self._fill()
 

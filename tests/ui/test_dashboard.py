@@ -97,6 +97,23 @@ def test_a_figure_is_drawn_for_who_comes_near_it(page):
     until(page, lambda: not is_faded(canvas))
 
 
+def test_the_browser_rests_when_everything_is_drawn(page):
+    """A part that asks without end whether it can be laid out would take a core."""
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable")
+
+    def busy():
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        return next(m["value"] for m in metrics if m["name"] == "TaskDuration")
+
+    def rests():
+        before = busy()
+        page.wait_for_timeout(2000)
+        return busy() - before < 1.0
+
+    assert any(rests() for _ in range(15))
+
+
 def test_the_summary_says_whether_to_trust_the_solution(page):
     assert value(page, "Converged") == "yes"
     assert 0.9 < float(value(page, "χ² per degree of freedom").split()[0]) < 1.1

@@ -83,6 +83,10 @@ class SurveyRun:
         """Return why orbits have no solution, by orbit."""
         return self._run.failures()
 
+    def has_fitted(self, orbit: int) -> bool:
+        """Return whether the run has a solution of an orbit."""
+        return orbit in self._run.complete_orbits()
+
     def orbits(self) -> pd.DataFrame:
         """Return `survey_schema.RUN_ORBITS`, a row per orbit of the survey."""
         complete, failures = set(self._run.complete_orbits()), self._run.failures()

@@ -149,10 +149,9 @@ class Navigation(param.Parameterized):
 
     def _result(self, orbit: int | None) -> FitResult | None:
         """Return an orbit as the run has it, None where it has not."""
-        if self.run is None or orbit is None:
+        if self.run is None or orbit is None or not self.run.has_fitted(orbit):
             return None
-        status = self.run.orbits().set_index("orbit_id")["status"].get(orbit)
-        return self.run.result(orbit) if status == "complete" else None
+        return self.run.result(orbit)
 
     def _look(self) -> None:
         found, message = None, ""

@@ -6,8 +6,11 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.session import Session, Solution, Stage
-from plateviz.state import default_widths
+from plateviz.state import FitChoices, default_widths
 from solver.parameters import PARAMETERS, Group
+
+# Of a control that stands close to the next one.
+_TIGHT = (0, 10)
 
 
 class RefitView(pn.viewable.Viewer):
@@ -17,40 +20,6 @@ class RefitView(pn.viewable.Viewer):
         """Follow `session`."""
         super().__init__(**params)
         self._session = session
-        choices = session.choices
-        order = pmui.IntSlider.from_param(
-            choices.param.order, label="Distortion order", sizing_mode="stretch_width"
-        )
-        aberration = pmui.Switch.from_param(choices.param.aberration, label="Stellar aberration")
-        robust = pmui.Switch.from_param(
-            choices.param.robust, label="Leave out outliers", margin=(0, 10)
-        )
-        compare_orders = pmui.Switch.from_param(
-            choices.param.compare_orders, label="Compare all orders", margin=(0, 10)
-        )
-        live = pmui.Switch.from_param(
-            choices.param.live, label="Try every change at once", margin=(0, 10)
-        )
-        engine = pmui.Select.from_param(
-            choices.param.engine, label="Engine", size="small", sizing_mode="stretch_width"
-        )
-        exclusions = pmui.TextInput.from_param(
-            choices.param.exclusions,
-            label="Leave out",
-            placeholder="detector=1, exposure=0/3",
-            description="source=ID, exposure=FIELD/PLATE or detector=ID, as many as you like.",
-            size="small",
-            sizing_mode="stretch_width",
-        )
-        shifts = pmui.TextInput.from_param(
-            choices.param.shifts,
-            label="Shift of the centres",
-            placeholder="detector_x[2]=-5um",
-            description="GROUP=SHIFT or GROUP[ELEMENT]=SHIFT, as many as you like. An element is "
-            "FIELD/PLATE, a detector, K/L of a distortion term, or ra or dec of sources.",
-            size="small",
-            sizing_mode="stretch_width",
-        )
         self._widths = {group.name: self._width_input(group) for group in PARAMETERS}
         self._reset = pmui.Button(label="The paper's priors", variant="text", size="small")
         self._fit = pmui.Button(label="Fit", color="primary", sizing_mode="stretch_width")
@@ -63,25 +32,11 @@ class RefitView(pn.viewable.Viewer):
         self._bar = pmui.LinearProgress(variant="indeterminate", sizing_mode="stretch_width")
         self._news = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
-        entries: list[Any] = [*self._widths.values(), shifts, self._reset]
-        priors = pmui.Card(
-            *entries,
-            title="Priors",
-            collapsed=True,
-            sizing_mode="stretch_width",
-            margin=(8, 10),
-            elevation=0,
-            variant="outlined",
-        )
         self._column = pmui.Column(
-            live,
-            order,
-            aberration,
-            robust,
-            compare_orders,
-            priors,
-            exclusions,
-            engine,
+            *_model_inputs(session.choices),
+            self._priors_card(),
+            _exclusions_input(session.choices),
+            _engine_input(session.choices),
             pmui.Row(self._fit, self._stop, sizing_mode="stretch_width", margin=0),
             self._bar,
             self._news,
@@ -108,6 +63,22 @@ class RefitView(pn.viewable.Viewer):
         session.param.watch(self._show_solutions, ["solutions", "shown"])
         self._show_stage()
         self._show_solutions()
+
+    def _priors_card(self) -> pmui.Card:
+        entries: list[Any] = [
+            *self._widths.values(),
+            _shifts_input(self._session.choices),
+            self._reset,
+        ]
+        return pmui.Card(
+            *entries,
+            title="Priors",
+            collapsed=True,
+            sizing_mode="stretch_width",
+            margin=(8, 10),
+            elevation=0,
+            variant="outlined",
+        )
 
     def _width_input(self, group: Group) -> pmui.TextInput:
         entry = pmui.TextInput(
@@ -158,6 +129,47 @@ class RefitView(pn.viewable.Viewer):
         chosen = event.new  # type: ignore[attr-defined]
         if isinstance(chosen, Solution):
             self._session.bring_up(chosen)
+
+
+def _model_inputs(choices: FitChoices) -> list[pn.viewable.Viewable]:
+    """Return what the model is made of: the order of its distortion, and switches."""
+    of = choices.param
+    return [
+        pmui.Switch.from_param(of.live, label="Try every change at once", margin=_TIGHT),
+        pmui.IntSlider.from_param(of.order, label="Distortion order", sizing_mode="stretch_width"),
+        pmui.Switch.from_param(of.aberration, label="Stellar aberration"),
+        pmui.Switch.from_param(of.robust, label="Leave out outliers", margin=_TIGHT),
+        pmui.Switch.from_param(of.compare_orders, label="Compare all orders", margin=_TIGHT),
+    ]
+
+
+def _engine_input(choices: FitChoices) -> pmui.Select:
+    return pmui.Select.from_param(
+        choices.param.engine, label="Engine", size="small", sizing_mode="stretch_width"
+    )
+
+
+def _exclusions_input(choices: FitChoices) -> pmui.TextInput:
+    return pmui.TextInput.from_param(
+        choices.param.exclusions,
+        label="Leave out",
+        placeholder="detector=1, exposure=0/3",
+        description="source=ID, exposure=FIELD/PLATE or detector=ID, as many as you like.",
+        size="small",
+        sizing_mode="stretch_width",
+    )
+
+
+def _shifts_input(choices: FitChoices) -> pmui.TextInput:
+    return pmui.TextInput.from_param(
+        choices.param.shifts,
+        label="Shift of the centres",
+        placeholder="detector_x[2]=-5um",
+        description="GROUP=SHIFT or GROUP[ELEMENT]=SHIFT, as many as you like. An element is "
+        "FIELD/PLATE, a detector, K/L of a distortion term, or ra or dec of sources.",
+        size="small",
+        sizing_mode="stretch_width",
+    )
 
 
 def _explanation(group: Group) -> str:

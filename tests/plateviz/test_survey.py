@@ -90,6 +90,8 @@ def test_orbit_that_fails_stops_no_other(fitted_survey):
         assert not broken.run.is_complete
         table = SurveyRun(broken.run).orbits().set_index("orbit_id")
         assert table["status"].tolist() == ["complete", "failed", "complete"]
+        has_fitted = [SurveyRun(broken.run).has_fitted(orbit) for orbit in table.index]
+        assert has_fitted == [True, False, True]
         assert "orbit=0001.parquet" in table.loc[1, "message"]
     finally:
         path.write_bytes(whole)

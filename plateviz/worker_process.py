@@ -35,9 +35,8 @@ Request = dict
 Send = Callable[[dict], None]
 # Work that makes the next request quicker, for when none waits.
 Later = Iterator[None]
-# What is likely to be asked next is made ready, a step at a time, when nothing was for so long.
-_QUIET_S = 1.0
-_NOTHING = object()
+# What is likely to be asked next is made ready when nothing was for so long.
+_QUIET_S = 0.3
 
 
 class _Cancellations:
@@ -64,18 +63,21 @@ def main() -> None:
     reader.start()
     send({"event": "ready"})
     later: Later = iter(())
-    while True:
-        try:
-            # A page that is being drawn needs the cores, and may ask again at once.
-            request = requests.get(timeout=_QUIET_S)
-        except queue.Empty:
-            if next(later, _NOTHING) is _NOTHING:
-                request = requests.get()
-            else:
-                continue
-        if request is None:
-            return
+    while (request := _next(requests, later)) is not None:
         later = _serve(request, send, cancellations)
+
+
+def _next(requests: queue.Queue[Request | None], later: Later) -> Request | None:
+    """Wait for a request, and make ready meanwhile what may be asked of the last one."""
+    try:
+        # A page that hears of a solution needs the cores, and may ask again at once.
+        return requests.get(timeout=_QUIET_S)
+    except queue.Empty:
+        pass
+    for _ in later:
+        if not requests.empty():
+            break
+    return requests.get()
 
 
 def _sender() -> Send:

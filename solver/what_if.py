@@ -83,10 +83,12 @@ def re_solve(mode: Mode, solved: Problem, changed: Problem, settings: FitSetting
         if len(trace) == _CAREFUL_STEP and largest >= settings.tolerance:
             # What the Jacobians have changed by since is amplified most where the data tell
             # least: so that stays, which the first step took to its place, until the rest is right.
+            # It follows then, by more than this step perhaps, but by less than the first.
             step = reduced.solve(*right, reduced.weak_directions(POORLY_HELD))
+        else:
+            # The second step puts right what the first left behind, and is shorter.
+            limit = 1.1 * largest
         theta, sources = theta + step[0], sources + step[1]
-        # The second step puts right what the first left behind, and is shorter.
-        limit = 1.1 * largest
         if largest >= settings.tolerance:
             at = gradient(changed, theta, sources)
         held = reduced.weak_directions() if held is None else held

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from solver import what_if
 from solver.carry import carry_over
 from solver.exclusions import Exclusions
 from solver.fit import OrbitFitter, fit_orbit
@@ -185,6 +186,27 @@ def test_orbit_that_was_not_fitted_needs_a_fit(orbit):
 def test_change_too_large_for_a_linear_model_needs_a_refit(orbit, fitter):
     """A distortion of the fifth order that is to be of the fourth: the stars would have to move."""
     assert fitter.what_if(FitSettings(order=4)) is None
+
+
+@pytest.mark.parametrize(
+    ("steps", "is_solved"),
+    [
+        ((0.7, 1e-4), True),
+        # What is held in the second step follows in the third.
+        ((0.7, 1.5e-3, 8e-3, 1e-5), True),
+        ((0.7, 0.1, 0.05, 1e-4), True),
+        ((0.7, 0.8), False),
+        ((0.7, 1.5e-3, 0.8), False),
+        ((0.7, 1.5e-3, 8e-3, 9e-3), False),
+        ((0.7, 0.6, 0.5, 0.4, 0.3, 1e-4), False),
+    ],
+)
+def test_steps_of_a_nearly_linear_model_become_shorter(orbit, monkeypatch, steps, is_solved):
+    """Of the solution that is given, the last step is below the tolerance."""
+    fitter, taken = fitted(OrbitFitter(orbit.data, orbit.instrument)), iter(steps)
+    monkeypatch.setattr(what_if, "largest_step", lambda *_: (next(taken), "detector x [0]"))
+    found = fitter.what_if(FitSettings(order=6, prior_widths={"sources": 3.0}))
+    assert (found is not None) == is_solved
 
 
 def test_what_if_starts_from_the_fit_and_not_from_another(fitter):

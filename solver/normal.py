@@ -8,6 +8,7 @@ outlive a change of the priors.
 """
 
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
@@ -127,15 +128,23 @@ def accumulate(
     source, by_source = np.zeros((n_det, 2, 2, n_src)), np.zeros((n_det, 2, n_src))
     coefficients = np.zeros((n_det, 2, n_coef, 2, n_coef))
     sums = _empty_sums(index.source.shape, n_coef)
-    with one_blas_thread():
+    with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
+        under_way = helper.submit(lambda: None)
         for i, chunk in enumerate(chunks(problem, theta, sources)):
             here = Index(*(part[i] for part in index))
+            _keep_slots(chunk, i, sums)
+            # One chunk at a time: they are large.
+            under_way.result()
+            under_way = helper.submit(
+                _add_coefficients, here.detector, chunk, sums.basis[i], coefficients
+            )
             _sum_tiles(chunk, i, sums)
-            _add_coefficients(here.detector, chunk, sums.basis[i], coefficients)
             _add_sources(here, chunk, source, by_source)
             _add_cross_local(here, chunk, layout, cross)
+        under_way.result()
+        under_way = helper.submit(_cross_coefficients, problem, sums)
         hessian, by_theta, chi2 = _assemble(index, layout, sums, coefficients)
-    of_coefficients = _cross_coefficients(problem, sums)
+        of_coefficients = under_way.result()
     np.sum(of_coefficients, axis=0, out=cross[layout.coefficients()])
     own = DetectorSums(chi2, by_theta, by_source, hessian, source, of_coefficients)
     gradient = Gradient(float(chi2.sum()), by_theta.sum(axis=0), by_source.sum(axis=0).T.copy())
@@ -158,18 +167,21 @@ def _empty_sums(shape: tuple[int, ...], n_coef: int) -> _TileSums:
     )
 
 
-def _sum_tiles(chunk: Linearised, i: int, sums: _TileSums) -> None:
-    """Fill the sums of the tiles of chunk `i`, and what is kept of each slot."""
-    products, basis = chunk.products, sums.basis[i]
+def _keep_slots(chunk: Linearised, i: int, sums: _TileSums) -> None:
+    """Fill in what is kept of each slot of chunk `i`."""
     for term, values in enumerate(chunk.prediction.basis):
-        basis[:, :, term] = values
+        sums.basis[i, :, :, term] = values
     for axis in range(2):
         for a in range(2):
-            sums.shared[axis, a, i] = products.displacement_source[axis][a]
+            sums.shared[axis, a, i] = chunk.products.displacement_source[axis][a]
+
+
+def _sum_tiles(chunk: Linearised, i: int, sums: _TileSums) -> None:
+    """Fill in the sums of the tiles of chunk `i`, whose slots are filled in."""
     rows = np.stack(_flatten([*chunk.local, chunk.residual]), axis=1)
     rows = rows.reshape(len(rows), N_LOCAL + 1, -1)
     np.matmul(rows, rows.swapaxes(1, 2), out=sums.local[i])
-    mixed = np.stack(_flatten(products.local_displacement), axis=1) @ basis
+    mixed = np.stack(_flatten(chunk.products.local_displacement), axis=1) @ sums.basis[i]
     sums.mixed[i] = mixed.reshape(sums.mixed[i].shape)
 
 
@@ -234,14 +246,12 @@ def _cross_coefficients(
     sparse matrix that gathers them, times the dense basis.
     """
     n_src, n_det, n_coef = problem.n_src, problem.layout.n_det, problem.layout.n_coef
-    order, first = problem.slots_by_source
-    basis = sums.basis.reshape(len(order), n_coef)
-    cross = np.empty((n_det, 2, n_coef, 2, n_src))
-    for axis in range(2):
-        for a in range(2):
-            weight = sums.shared[axis, a].reshape(-1)[order]
-            gather = sp.csr_array((weight, order, first), shape=(n_det * n_src, len(basis)))
-            cross[:, axis, :, a] = (gather @ basis).reshape(n_det, n_src, n_coef).swapaxes(1, 2)
+    places = problem.by_source
+    weight = np.take(sums.shared.reshape(-1), places.value)
+    basis = sums.basis.reshape(sums.shared[0, 0].size, n_coef)
+    shape = (len(places.first) - 1, len(basis))
+    summed = sp.csr_array((weight, places.slot, places.first), shape=shape) @ basis
+    cross = summed.reshape(n_det, n_src, 2, 2, n_coef).transpose(0, 2, 4, 3, 1)
     return cross.reshape(n_det, 2 * n_coef, 2, n_src)
 
 

@@ -26,7 +26,7 @@ from solver.parameters import CALIBRATION_GROUPS, PARAMETERS, SOURCES
 from solver.priors import Priors, group_widths
 from solver.projection import displace, tangent_frame
 from solver.settings import MAX_ORDER, FitSettings
-from solver.tiles import Tiles, lay_tiles
+from solver.tiles import Gathering, Tiles, lay_tiles
 from solver.units import ARCSEC_PER_DEG, RAD_PER_MAS
 
 _KEY = ["field_id", "plate_id"]
@@ -83,9 +83,9 @@ class Problem:
         return lay_tiles(self.index, self.measured, self.sigma)
 
     @cached_property
-    def slots_by_source(self) -> tuple[Int[np.ndarray, " slots"], Int[np.ndarray, " bounds"]]:
-        """The tiles' slots in order of their detector and source, and where each pair begins."""
-        return self.tiles.by_source(self.n_src, self.layout.n_det)
+    def by_source(self) -> Gathering:
+        """How a 2 x 2 matrix of each slot is gathered by its detector and source."""
+        return self.tiles.by_source(self.n_src, self.layout.n_det, 4)
 
     def offsets(
         self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]

@@ -46,13 +46,36 @@ class Tiles(NamedTuple):
         """Return index, measured and weight of one chunk."""
         return Index(*(part[i] for part in self.index)), self.measured[i], self.weight[i]
 
-    def by_source(
-        self, n_src: int, n_det: int
-    ) -> tuple[Int[np.ndarray, " slots"], Int[np.ndarray, " bounds"]]:
-        """Return all slots in order of their detector and source, and where each pair begins."""
+    def by_source(self, n_src: int, n_det: int, n_values: int) -> "Gathering":
+        """Return how to gather so many values of each slot by its detector and source."""
         pair = (self.index.detector * n_src + self.index.source).ravel()
+        order = np.argsort(pair, kind="stable")
         count = np.bincount(pair, minlength=n_det * n_src)
-        return np.argsort(pair, kind="stable"), np.concatenate([[0], np.cumsum(count)])
+        first = np.cumsum(count) - count
+        begin = n_values * first + np.arange(n_values)[:, None] * count
+        place = np.repeat(begin - first, count, axis=1) + np.arange(len(order))
+        slot, value = np.empty(place.size, dtype=np.int32), np.empty(place.size, dtype=np.int64)
+        slot[place] = order
+        value[place] = order + len(order) * np.arange(n_values)[:, None]
+        return Gathering(value, slot, np.append(begin.T, place.size).astype(np.int32))
+
+
+class Gathering(NamedTuple):
+    """Several values of each slot, as rows of a sparse matrix that sums them by their source.
+
+    The rows of one detector and source, one for each value, stand one after the other, so
+    that what they are multiplied with is fetched from memory once for all of them.
+
+    Attributes
+    ----------
+    value : place of each entry in an array (value, slot)
+    slot : its column
+    first : where each row begins, and where the last one ends
+    """
+
+    value: Int[np.ndarray, " entries"]
+    slot: Int[np.ndarray, " entries"]
+    first: Int[np.ndarray, " bounds"]
 
 
 def lay_tiles(

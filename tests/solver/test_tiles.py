@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from solver.forward import Index
 from solver.tiles import FEW_TILES, SLOTS, lay_tiles
@@ -68,13 +69,17 @@ def test_few_tiles_make_one_small_chunk(monkeypatch):
     assert lay_tiles(*measurements(many)).measured.shape == (1, 2, 256, SLOTS)
 
 
-def test_slots_by_source_hold_those_of_each_detector_and_source(laid):
-    tiles = laid[-1]
-    order, first = tiles.by_source(50, 4)
-    source = tiles.index.source.ravel()
+def test_values_are_gathered_by_detector_and_source(laid):
+    tiles, n_values = laid[-1], 3
+    n_slots = tiles.index.source.size
+    values = np.random.default_rng(0).standard_normal((n_values, n_slots))
+    seen = np.random.default_rng(1).standard_normal((n_slots, 2))
+    places = tiles.by_source(50, 4, n_values)
+    gather = sp.csr_array((values.ravel()[places.value], places.slot, places.first))
+    found = (gather @ seen).reshape(4, 50, n_values, 2)
     detector = np.broadcast_to(tiles.index.detector, tiles.index.source.shape).ravel()
-    assert first[-1] == len(order) == source.size
-    for pair in range(4 * 50):
-        of_pair = order[first[pair] : first[pair + 1]]
-        assert (source[of_pair] == pair % 50).all()
-        assert (detector[of_pair] == pair // 50).all()
+    expected = np.zeros_like(found)
+    for value in range(n_values):
+        pairs = (detector, tiles.index.source.ravel(), value)
+        np.add.at(expected, pairs, values[value][:, None] * seen)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)

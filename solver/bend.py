@@ -41,7 +41,7 @@ def bend_at(problem: Problem, mode: Mode, reduced: Reduced) -> Bend:
     def settled(*numbers: int, sign: float = 1.0) -> _Point:
         """Return how far all else settles from there after a sigma along some directions."""
         way = sign * ways[list(numbers)].sum(axis=0)
-        follow = -np.einsum("kas,k->sa", reduced.response(), way)
+        follow = -reduced.of_whitened(reduced.onto_sources(way[None]))[0].T
         theta, sources = mode.theta + way, mode.sources + follow
         for _ in range(_SETTLING_STEPS):
             right = downhill(problem, theta, sources, gradient(problem, theta, sources))

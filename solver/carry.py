@@ -17,6 +17,7 @@ from solver.normal import NormalEquations, accumulate
 from solver.objective import Gradient
 from solver.parameters import BY_NAME
 from solver.part import Part, part_of
+from solver.patches import Patches
 from solver.problem import Problem
 from solver.units import RAD_PER_MAS
 
@@ -41,7 +42,8 @@ def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> Normal
         return accumulate(new, *at)
     if not gone.any():
         return replace(equations, at=at)
-    return _without(equations, part_of(equations, old, gone), at, columns, sources)
+    part = part_of(equations, old, gone)
+    return _without(equations, part, at, columns, sources, new.patches)
 
 
 def _same_model(old: Problem, new: Problem) -> bool:
@@ -73,13 +75,15 @@ def _without(
     at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
     columns: Int[np.ndarray, " calib"],
     sources: Int[np.ndarray, " src"],
+    patches: Patches,
 ) -> NormalEquations:
     """Return the equations less a part of them, for some of the parameters."""
     whole, less = equations.gradient, part.gradient
     cross = np.empty((len(columns), 2, len(sources)))
+    places = equations.patches.position[sources][patches.order]
     # Row by row, since the whole would be too much for the caches.
     for row, column in zip(cross, columns.tolist(), strict=True):
-        np.take(part.left(column), sources, axis=1, out=row, mode="clip")
+        np.take(part.left(column), places, axis=1, out=row, mode="clip")
     return NormalEquations(
         at,
         Gradient(
@@ -89,6 +93,7 @@ def _without(
         ),
         (equations.theta - part.theta)[np.ix_(columns, columns)],
         (equations.source - part.source)[sources],
+        patches,
         cross,
         None,
     )

@@ -91,7 +91,7 @@ def whitened(reduced: Reduced) -> Coordinates:
     return Coordinates(
         reduced.at,
         sl.solve_triangular(reduced.factor, np.eye(len(reduced.factor))),
-        reduced.spread(),
+        reduced.spread()[:, :, reduced.patches.position],
         inverse,
         np.array(-0.5 * reduced.log_determinant()),
     )

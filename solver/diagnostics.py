@@ -13,6 +13,7 @@ from solver.gauss_newton import Mode
 from solver.leverage import Covariances
 from solver.priors import Priors
 from solver.schur import Reduced
+from solver.triangles import lower_solve
 
 # Sources of which the covariances with the calibration fit into the caches.
 _AT_ONCE = 64
@@ -84,8 +85,10 @@ def mean_covariance(
     """
     count = max(int(members.sum()), 1)
     conditional = reduced.conditional_covariance()[members].sum(axis=0) / count**2
-    shared = reduced.response()[:, :, members].sum(axis=-1) / count
-    return conditional + shared.T @ reduced.theta_covariance() @ shared
+    # Of a shift of all members together by one mas, along each axis.
+    together = np.eye(2)[:, :, None] * (members / count)
+    shared = reduced.onto_calibration(lower_solve(reduced.source_factor, together))
+    return conditional + shared @ reduced.theta_covariance() @ shared.T
 
 
 def induced_shift(
@@ -130,11 +133,13 @@ def error_budget(reduced: Reduced, priors: Priors, covariance: Covariances) -> E
     conditional, n_calib = reduced.conditional_covariance(), len(reduced.theta)
     pulled = np.empty(response.shape)
     for a in range(2):
-        pulled[:, a] = precision[:, a, 0] * response[:, 0] + precision[:, a, 1] * response[:, 1]
+        by_first, by_second = precision[covariance.patches.order, a].T
+        pulled[:, a] = by_first * response[:, 0] + by_second * response[:, 1]
     shared = pulled.reshape(n_calib, -1) @ response.reshape(n_calib, -1).T
     half = conditional @ precision @ (covariance.source - 0.5 * conditional)
-    by_others, calibration = _between(
-        covariance.cross, shared, priors.curvature(covariance.at[0])[:, None]
+    by_others, calibration = (
+        part[covariance.patches.position]
+        for part in _between(covariance.cross, shared, priors.curvature(covariance.at[0])[:, None])
     )
     catalogue = half + half.swapaxes(1, 2) + by_others
     return ErrorBudget(covariance.source - catalogue - calibration, catalogue, calibration)

@@ -18,6 +18,7 @@ from solver.forward import Index, Pair
 from solver.layout import Layout
 from solver.linearise import Linearised
 from solver.normal import chunks, one_blas_thread
+from solver.patches import Patches
 from solver.problem import Problem
 from solver.schur import Reduced
 
@@ -41,13 +42,15 @@ class Residuals(NamedTuple):
 class Covariances(NamedTuple):
     """Marginal covariances of sources, calibration, and between the two.
 
-    `at` is where the model was linearised, calibration and sources.
+    `at` is where the model was linearised, calibration and sources. The sources of `cross` are in
+    the order of `patches`.
     """
 
     at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
     source: Float[np.ndarray, "src 2 2"]
     theta: Float[np.ndarray, "calib calib"]
     cross: Float[np.ndarray, "calib 2 src"]
+    patches: Patches
 
 
 def covariances(reduced: Reduced) -> Covariances:
@@ -58,6 +61,7 @@ def covariances(reduced: Reduced) -> Covariances:
         reduced.marginal_covariance(spread),
         reduced.theta_covariance(),
         reduced.cross_covariance(spread),
+        reduced.patches,
     )
 
 
@@ -102,7 +106,10 @@ def _leverage(
         index, chunk.prediction.basis, layout, covariance.theta
     )
     source_local, source_displacement = _source_covariance(
-        index, chunk.prediction.basis, layout, covariance.cross
+        index._replace(source=covariance.patches.position[index.source]),
+        chunk.prediction.basis,
+        layout,
+        covariance.cross,
     )
     spread = (of_local @ local.reshape(*local.shape[:2], -1)).reshape(local.shape)
     leverage = np.einsum("tips,tiqs->tspq", local, spread)

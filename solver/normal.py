@@ -23,6 +23,7 @@ from solver.forward import AnyArray, Index
 from solver.layout import LOCAL_GROUPS, PER_DETECTOR, PER_EXPOSURE, Layout
 from solver.linearise import Linearised, linearise, turning
 from solver.objective import Gradient
+from solver.patches import Patches
 from solver.problem import Problem
 
 N_LOCAL = len(LOCAL_GROUPS)
@@ -32,7 +33,8 @@ N_LOCAL = len(LOCAL_GROUPS)
 class DetectorSums:
     """What the measurements on each detector add to g, chi2_0 and the blocks.
 
-    Of W it is the rows of the distortion alone: the others are each of one detector.
+    Of W it is the rows of the distortion alone: the others are each of one detector. Its sources
+    are in the order of the patches here, too.
     """
 
     chi2: Float[np.ndarray, " det"]
@@ -53,6 +55,7 @@ class NormalEquations:
     gradient : g, with chi2_0
     theta : U
     source : V
+    patches : in whose order the sources of W stand
     cross : W
     by_detector : of what they are the sums; None where some of it was taken out
     """
@@ -61,6 +64,7 @@ class NormalEquations:
     gradient: Gradient
     theta: Float[np.ndarray, "calib calib"]
     source: Float[np.ndarray, "src 2 2"]
+    patches: Patches
     cross: Float[np.ndarray, "calib 2 src"]
     by_detector: DetectorSums | None
 
@@ -140,7 +144,9 @@ def accumulate(
             )
             _sum_tiles(chunk, i, sums)
             _add_sources(here, chunk, source, by_source)
-            _add_cross_local(here, chunk, layout, cross)
+            _add_cross_local(
+                here._replace(source=problem.patches.position[here.source]), chunk, layout, cross
+            )
         under_way.result()
         under_way = helper.submit(_cross_coefficients, problem, sums)
         hessian, by_theta, chi2 = _assemble(index, layout, sums, coefficients)
@@ -149,7 +155,15 @@ def accumulate(
     own = DetectorSums(chi2, by_theta, by_source, hessian, source, of_coefficients)
     gradient = Gradient(float(chi2.sum()), by_theta.sum(axis=0), by_source.sum(axis=0).T.copy())
     of_sources = source.sum(axis=0).transpose(2, 0, 1).copy()
-    return NormalEquations((theta, sources), gradient, hessian.sum(axis=0), of_sources, cross, own)
+    return NormalEquations(
+        (theta, sources),
+        gradient,
+        hessian.sum(axis=0),
+        of_sources,
+        problem.patches,
+        cross,
+        own,
+    )
 
 
 def _flatten(nested: Iterable[Iterable[AnyArray]]) -> list[AnyArray]:

@@ -17,7 +17,10 @@ from solver.problem import Problem, of_rows
 
 
 class Part(NamedTuple):
-    """Blocks as of `solver.normal.NormalEquations`, but for W what is left of a row without it."""
+    """Blocks as of `solver.normal.NormalEquations`, but for W what is left of a row without it.
+
+    Its sources stand in the same order as there.
+    """
 
     gradient: Gradient
     theta: Float[np.ndarray, "calib calib"]
@@ -35,7 +38,9 @@ def part_of(equations: NormalEquations, problem: Problem, gone: Bool[np.ndarray,
         share[seen[gone]] = 0.0
         # Where detectors overlap, an exposure's row is not of one detector for each source.
         if share[seen[~gone]].all():
+            share = share.reshape(problem.layout.n_exp, -1)[:, equations.patches.order]
             return _of_detectors(equations, own, problem.layout, detectors, share)
+    # With the patches of the whole, so that the sources stand in their order.
     part = accumulate(of_rows(problem, gone), *equations.at)
 
     def left(column: int) -> Float[np.ndarray, "2 src"]:
@@ -49,20 +54,19 @@ def _of_detectors(
     own: DetectorSums,
     layout: Layout,
     detectors: Bool[np.ndarray, " det"],
-    share: Float[np.ndarray, " exp_src"],
+    share: Float[np.ndarray, "exp src"],
 ) -> Part:
     """Return the part of some detectors; the others have a share in what exposures have seen."""
     whose = np.empty(layout.size, dtype=np.int64)
     for groups, count in ((PER_EXPOSURE, layout.n_exp), (PER_DETECTOR, layout.n_det)):
         for group in groups:
             whose[layout.columns(group)] = np.arange(count)
-    by_exposure = share.reshape(layout.n_exp, -1)
     coefficients = own.coefficients[detectors].sum(axis=0)
 
     def left(column: int) -> Float[np.ndarray, "2 src"]:
         row = equations.cross[column]
         if column < layout.first_coefficient:
-            return row * by_exposure[whose[column]]
+            return row * share[whose[column]]
         if column < layout.first_detector:
             return row - coefficients[column - layout.first_coefficient]
         return row * (not detectors[whose[column]])

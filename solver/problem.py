@@ -23,6 +23,7 @@ from solver.instrument import Instrument
 from solver.layout import Layout
 from solver.orbit import OrbitData
 from solver.parameters import CALIBRATION_GROUPS, PARAMETERS, SOURCES
+from solver.patches import Patches, patches_of
 from solver.priors import Priors, group_widths
 from solver.projection import displace, tangent_frame
 from solver.settings import MAX_ORDER, FitSettings
@@ -51,6 +52,7 @@ class Problem:
     exposures : environment rows, in order of (field_id, plate_id)
     priors : in offsets from the origins
     layout : columns of the calibration parameters
+    patches : the sources by the fields that have seen them
     epoch : mean epoch, MJD in TCB
     """
 
@@ -65,6 +67,7 @@ class Problem:
     exposures: pd.DataFrame
     priors: Priors
     layout: Layout
+    patches: Patches
     epoch: float
 
     @property
@@ -84,8 +87,8 @@ class Problem:
 
     @cached_property
     def by_source(self) -> Gathering:
-        """How a 2 x 2 matrix of each slot is gathered by its detector and source."""
-        return self.tiles.by_source(self.n_src, self.layout.n_det, 4)
+        """How a 2 x 2 matrix of each slot is gathered by its detector and place in a patch."""
+        return self.tiles.by_source(self.patches.position, self.layout.n_det, 4)
 
     def offsets(
         self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
@@ -122,12 +125,14 @@ def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
     """
     part = of_rows(problem, keep[problem.index.source])
     number = np.cumsum(keep) - 1
+    index = part.index._replace(source=number[part.index.source])
     frames = problem.geometry.source_frame
     kept_first = np.argsort(~np.pad(keep, (0, len(frames) - len(keep))), kind="stable")
     return replace(
         part,
         geometry=replace(problem.geometry, source_frame=frames[kept_first]),
-        index=part.index._replace(source=number[part.index.source]),
+        index=index,
+        patches=_patches(index, problem.exposures, problem.layout, int(keep.sum())),
         sources=problem.sources[keep].reset_index(drop=True),
         priors=problem.priors._replace(precision=problem.priors.precision[keep]),
     )
@@ -166,6 +171,7 @@ def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings
         exposures=exposures,
         priors=_priors(places.covariance, centres, settings, layout),
         layout=layout,
+        patches=_patches(index, exposures, layout, len(sources)),
         epoch=epoch,
     )
 
@@ -190,6 +196,11 @@ def _index(
         )
     row = np.lexsort((source, detector, exposure))
     return Index(source[row], exposure[row], detector[row]), row
+
+
+def _patches(index: Index, exposures: pd.DataFrame, layout: Layout, n_src: int) -> Patches:
+    field = np.unique(exposures["field_id"].to_numpy(), return_inverse=True)[1]
+    return patches_of(index, field, layout, n_src)
 
 
 def _check_freedom(n_obs: int, n_src: int, layout: Layout, order: int) -> None:

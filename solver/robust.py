@@ -15,7 +15,7 @@ import pandas as pd
 from jaxtyping import Bool, Float
 
 from solver.gauss_newton import Iteration, Mode, find_mode
-from solver.leverage import covariances, side_by_side
+from solver.leverage import side_by_side
 from solver.normal import chunks
 from solver.orbit import OrbitData
 from solver.problem import Problem, of_rows
@@ -115,7 +115,7 @@ def _described(problem: Problem, mode: Mode, found: Bool[np.ndarray, " obs"]) ->
         whitened.append(side_by_side(chunk.residual))
         jacobian.append(np.stack([side_by_side(pair) for pair in chunk.source], axis=-1))
     residual, by_source = np.concatenate(whitened)[place], np.concatenate(jacobian)[place]
-    covariance = covariances(mode.reduced).source[few.index.source]
+    covariance = mode.reduced.marginal_covariance()[few.index.source]
     # As one more measurement of the source moves it: gain times residual.
     spread = by_source @ covariance @ by_source.swapaxes(1, 2) + np.eye(2)
     gain = covariance @ by_source.swapaxes(1, 2) @ np.linalg.inv(spread)

@@ -2,18 +2,22 @@
 
 With priors added, V_i = L_i L_i' and Z = W L'^-1, the calibration alone obeys
 S = U - Z Z' (the Schur complement); its inverse is the marginal covariance of the
-calibration, and that of source i is V_i^-1 + V_i^-1 W_i' S^-1 W_i V_i^-1.
+calibration, and that of source i is V_i^-1 + V_i^-1 W_i' S^-1 W_i V_i^-1. Z is kept in blocks,
+each of a patch of sources and the columns that they touch (`solver.patches`).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sl
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from solver.normal import NormalEquations
+from solver.patches import Patch, Patches
 from solver.priors import Priors
+from solver.triangles import lower_solve, rows_solved, upper_solve
 
 # Directions with less than this share of the information that their parameters have alone are
 # held by the priors only; and those with less than that are held poorly.
@@ -31,16 +35,20 @@ class Reduced:
     at : where the model was linearised, calibration and sources
     theta : U with priors
     source_factor : lower Cholesky factor of V with priors
-    whitened : Z
+    patches : of the sources
+    whitened : Z, the block of each patch
     of_data : S without the calibration's priors
+    matrix : S
     factor : upper Cholesky factor R of S = R'R
     """
 
     at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
     theta: Float[np.ndarray, "calib calib"]
     source_factor: Float[np.ndarray, "src 2 2"]
-    whitened: Float[np.ndarray, "calib 2 src"]
+    patches: Patches
+    whitened: tuple[Float[np.ndarray, "_ 2 _"], ...]
     of_data: Float[np.ndarray, "calib calib"]
+    matrix: Float[np.ndarray, "calib calib"]
     factor: Float[np.ndarray, "calib calib"]
 
     def solve(
@@ -55,21 +63,42 @@ class Reduced:
         ----------
         held : directions, as from `weak_directions`, in which the calibration does not move
         """
-        whitened = _lower_solve(self.source_factor, by_source.T)
-        rows = self.whitened.reshape(len(by_theta), -1)
-        theta = sl.cho_solve((self.factor, False), by_theta - rows @ whitened.ravel())
+        whitened = lower_solve(self.source_factor, by_source.T)
+        pull = self.onto_calibration(whitened[None])[0]
+        theta = sl.cho_solve((self.factor, False), by_theta - pull)
         if held is not None:
             theta = theta - held @ (held.T @ (np.diag(self.theta) * theta))
-        remainder = whitened - (theta @ rows).reshape(whitened.shape)
-        return theta, _upper_solve(self.source_factor, remainder).T.copy()
+        remainder = whitened - self.onto_sources(theta[None])[0]
+        return theta, upper_solve(self.source_factor, remainder).T.copy()
 
     def pulled(self, by_source: Float[np.ndarray, "k src 2"]) -> Float[np.ndarray, "k src 2"]:
         """Return the shifts of the sources that pulls on them alone cause, for k sets of pulls."""
-        whitened = _lower_solve(self.source_factor, by_source.swapaxes(1, 2))
-        rows, n_sets = self.whitened.reshape(len(self.factor), -1), len(by_source)
-        theta = sl.cho_solve((self.factor, False), -rows @ whitened.reshape(n_sets, -1).T)
-        remainder = whitened - (theta.T @ rows).reshape(whitened.shape)
-        return _upper_solve(self.source_factor, remainder).swapaxes(1, 2)
+        whitened = lower_solve(self.source_factor, by_source.swapaxes(1, 2))
+        theta = sl.cho_solve((self.factor, False), -self.onto_calibration(whitened).T)
+        remainder = whitened - self.onto_sources(theta.T)
+        return upper_solve(self.source_factor, remainder).swapaxes(1, 2)
+
+    def onto_calibration(
+        self, whitened: Float[np.ndarray, "k 2 src"]
+    ) -> Float[np.ndarray, "k calib"]:
+        """Return Z x for k vectors over the sources."""
+        ordered = whitened[:, :, self.patches.order]
+        found = np.zeros((len(whitened), len(self.factor)))
+        for patch, block in self._blocks():
+            part = ordered[:, :, patch.places].reshape(len(whitened), -1)
+            found[:, patch.columns] += part @ block.reshape(len(block), -1).T
+        return found
+
+    def onto_sources(self, theta: Float[np.ndarray, "k calib"]) -> Float[np.ndarray, "k 2 src"]:
+        """Return Z' x for k vectors over the calibration."""
+        found = np.empty((len(theta), 2, len(self.source_factor)))
+        for patch, block in self._blocks():
+            part = theta[:, patch.columns] @ block.reshape(len(block), -1)
+            found[:, :, patch.places] = part.reshape(len(theta), *block.shape[1:])
+        return found[:, :, self.patches.position]
+
+    def _blocks(self) -> Iterator[tuple[Patch, Float[np.ndarray, "_ 2 _"]]]:
+        return zip(self.patches.parts, self.whitened, strict=True)
 
     @cached_property
     def sigmas(self) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
@@ -81,31 +110,68 @@ class Reduced:
     def conditional_covariance(self) -> Float[np.ndarray, "src 2 2"]:
         """Return the covariance of each source with the calibration held fixed, mas^2."""
         unit = np.broadcast_to(np.eye(2)[:, :, None], (2, 2, len(self.source_factor)))
-        inverse = _lower_solve(self.source_factor, unit)
+        inverse = lower_solve(self.source_factor, unit)
         return np.einsum("ias,ibs->sab", inverse.swapaxes(0, 1), inverse.swapaxes(0, 1))
 
     def response(self) -> Float[np.ndarray, "calib 2 src"]:
-        """Return W V^-1, minus the shift of each source per unit of the calibration."""
-        return _upper_solve(self.source_factor, self.whitened)
+        """Return W V^-1, minus the shift of each source per unit of the calibration.
+
+        The sources are in the order of the patches.
+        """
+        return upper_solve(self.source_factor[self.patches.order], self._dense())
 
     def of_whitened(self, whitened: Float[np.ndarray, "*k 2 src"]) -> Float[np.ndarray, "*k 2 src"]:
         """Return L_i'^-1 x_i: what stands in units of the sources' own sigmas, in mas."""
-        return _upper_solve(self.source_factor, whitened)
+        return upper_solve(self.source_factor, whitened)
 
     def spread(self) -> Float[np.ndarray, "calib 2 src"]:
-        """Return T = R'^-1 Z; I + T_i' T_i is the whitened marginal covariance of source i."""
-        return self._solved(self.whitened, trans=True)
+        """Return T = R'^-1 Z, its sources in the order of the patches.
+
+        I + T_i' T_i is the whitened marginal covariance of source i.
+        """
+        return rows_solved(self.factor, self._dense(), trans=True)
+
+    def _dense(self) -> Float[np.ndarray, "calib 2 src"]:
+        """Return Z, its sources in the order of the patches."""
+        dense = np.zeros((len(self.factor), 2, len(self.source_factor)))
+        for patch, block in self._blocks():
+            dense[patch.columns, :, patch.places] = block
+        return dense
 
     def marginal_covariance(
-        self, spread: Float[np.ndarray, "calib 2 src"]
+        self, spread: Float[np.ndarray, "calib 2 src"] | None = None
     ) -> Float[np.ndarray, "src 2 2"]:
-        """Return the covariance of each source with the calibration integrated out, mas^2."""
-        inner = np.empty((2, 2, spread.shape[-1]))
-        for a, b in ((0, 0), (0, 1), (1, 1)):
-            inner[a, b] = np.einsum("ks,ks->s", spread[:, a], spread[:, b]) + (a == b)
+        """Return the covariance of each source with the calibration integrated out, mas^2.
+
+        Parameters
+        ----------
+        spread : T, where it is at hand; all of it is more than this needs
+        """
+        inner = np.empty((2, 2, len(self.source_factor)))
+        for places, rows in self._spreads() if spread is None else [(slice(None), spread)]:
+            for a, b in ((0, 0), (0, 1), (1, 1)):
+                inner[a, b, places] = np.einsum("ks,ks->s", rows[:, a], rows[:, b]) + (a == b)
         inner[1, 0] = inner[0, 1]
-        half = _upper_solve(self.source_factor, inner)
-        return _upper_solve(self.source_factor, half.swapaxes(0, 1)).transpose(2, 1, 0).copy()
+        half = upper_solve(self.source_factor, inner[:, :, self.patches.position])
+        return upper_solve(self.source_factor, half.swapaxes(0, 1)).transpose(2, 1, 0).copy()
+
+    def _spreads(self) -> Iterator[tuple[slice, Float[np.ndarray, "_ 2 _"]]]:
+        """Return T of each patch, as it is where the columns of the patch stand last.
+
+        Its other rows are zero then, and the last of R are a factor by themselves.
+        """
+        factors = [self._last_of_factor(patch.columns) for patch in self.patches.parts]
+        for factor, (patch, block) in zip(factors, self._blocks(), strict=True):
+            yield patch.places, rows_solved(factor, block.copy(), trans=True)
+
+    def _last_of_factor(self, columns: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k k"]:
+        """Return the last rows of R where some columns stand last."""
+        others = np.setdiff1d(np.arange(len(self.factor)), columns)
+        if not len(others):
+            return self.factor
+        order = np.concatenate([others, columns])
+        lower = np.linalg.cholesky(self.matrix[np.ix_(order, order)])
+        return lower[len(others) :, len(others) :].T
 
     def weak_directions(self, below: float = _WEAK) -> Float[np.ndarray, "calib weak"]:
         """Return the directions of the calibration that only the priors hold.
@@ -135,17 +201,12 @@ class Reduced:
     def cross_covariance(
         self, spread: Float[np.ndarray, "calib 2 src"]
     ) -> Float[np.ndarray, "calib 2 src"]:
-        """Return the covariance of the calibration with each source, -S^-1 W V^-1."""
-        return _upper_solve(self.source_factor, self._solved(spread, trans=False, scale=-1.0))
+        """Return the covariance of the calibration with each source, -S^-1 W V^-1.
 
-    def _solved(
-        self, right: Float[np.ndarray, "calib 2 src"], trans: bool, scale: float = 1.0
-    ) -> Float[np.ndarray, "calib 2 src"]:
-        """Return scale R^-1 (or R'^-1) times the rows."""
-        rows = right.reshape(len(self.factor), -1)
-        # Solved from the right, in place of its transpose: so BLAS has them in its own order.
-        solved = sl.blas.dtrsm(scale, self.factor, rows.T, trans_a=not trans, side=1)
-        return solved.T.reshape(right.shape)
+        The sources are in the order of the patches, as those of `spread` are.
+        """
+        solved = rows_solved(self.factor, spread.copy(), trans=False, scale=-1.0)
+        return upper_solve(self.source_factor[self.patches.order], solved)
 
     def log_determinant(self) -> float:
         """Return the logarithm of the determinant of the whole Hessian."""
@@ -174,12 +235,15 @@ def reduce(
         if before is not None and np.array_equal(before.source_factor, source_factor):
             whitened, of_data = before.whitened, before.of_data
         else:
-            whitened = _lower_solve(source_factor, equations.cross)
-            rows = whitened.reshape(len(curvature), -1)
-            of_data = equations.theta - rows @ rows.T
+            whitened = tuple(_whitened(equations, source_factor))
+            of_data = equations.theta.copy()
+            for patch, block in zip(equations.patches.parts, whitened, strict=True):
+                rows = block.reshape(len(block), -1)
+                of_data[np.ix_(patch.columns, patch.columns)] -= rows @ rows.T
         # NumPy's, like the product before it: SciPy has a BLAS of its own, whose threads would
         # wait for those of NumPy's, which go on spinning for a while.
-        factor = np.linalg.cholesky(_with_diagonal(of_data, curvature)).T
+        matrix = _with_diagonal(of_data, curvature)
+        factor = np.linalg.cholesky(matrix).T
     except np.linalg.LinAlgError:
         return None
     hessian = _with_diagonal(equations.theta, curvature)
@@ -187,7 +251,26 @@ def reduce(
     smallest = len(hessian) * np.finfo(float).eps * np.diag(hessian)
     if not (np.diag(factor) ** 2 >= smallest).all():
         return None
-    return Reduced(equations.at, hessian, source_factor, whitened, of_data, factor)
+    return Reduced(
+        equations.at,
+        hessian,
+        source_factor,
+        equations.patches,
+        whitened,
+        of_data,
+        matrix,
+        factor,
+    )
+
+
+def _whitened(
+    equations: NormalEquations, source_factor: Float[np.ndarray, "src 2 2"]
+) -> Iterator[Float[np.ndarray, "_ 2 _"]]:
+    """Return the block of Z of each patch."""
+    ordered = source_factor[equations.patches.order]
+    for patch in equations.patches.parts:
+        block = equations.cross[patch.columns, :, patch.places]
+        yield lower_solve(ordered[patch.places], block)
 
 
 def _with_diagonal(
@@ -197,32 +280,3 @@ def _with_diagonal(
     total = matrix.copy()
     total[np.diag_indices(len(added))] += added
     return total
-
-
-def _lower_solve(
-    factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "*k 2 src"]
-) -> Float[np.ndarray, "*k 2 src"]:
-    """Solve L x = right for 2 x 2 lower triangles."""
-    solved, (first, below, second) = np.empty(right.shape), _triangle(factor)
-    np.divide(right[..., 0, :], first, out=solved[..., 0, :])
-    np.multiply(solved[..., 0, :], -below, out=solved[..., 1, :])
-    solved[..., 1, :] += right[..., 1, :]
-    solved[..., 1, :] /= second
-    return solved
-
-
-def _upper_solve(
-    factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "*k 2 src"]
-) -> Float[np.ndarray, "*k 2 src"]:
-    """Solve L' x = right for 2 x 2 lower triangles L."""
-    solved, (first, below, second) = np.empty(right.shape), _triangle(factor)
-    np.divide(right[..., 1, :], second, out=solved[..., 1, :])
-    np.multiply(solved[..., 1, :], -below, out=solved[..., 0, :])
-    solved[..., 0, :] += right[..., 0, :]
-    solved[..., 0, :] /= first
-    return solved
-
-
-def _triangle(factor: Float[np.ndarray, "src 2 2"]) -> Float[np.ndarray, "3 src"]:
-    """Return the triangles' entries, each contiguous: loops over rows are then twice as fast."""
-    return np.stack([factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1]])

@@ -99,16 +99,15 @@ def source_shifts(
     reduced: Reduced, vectors: Float[np.ndarray, "calib k"]
 ) -> Float[np.ndarray, "k 2 src"]:
     """Return -V_i^-1 W_i' v, the shift of every source in (alpha*, delta) with each mode, mas."""
-    rows = reduced.whitened.reshape(len(vectors), -1)
-    whitened = (vectors.T @ rows).reshape(vectors.shape[1], *reduced.whitened.shape[1:])
-    return -reduced.of_whitened(whitened)
+    return -reduced.of_whitened(reduced.onto_sources(vectors.T))
 
 
 def _prior_parts(
     reduced: Reduced, priors: Priors, is_reference: Bool[np.ndarray, " src"]
 ) -> _Parts:
-    rows = reduced.spread()
-    weighted = _weighted(rows, _prior_root(reduced, priors))
+    rows, order = reduced.spread(), reduced.patches.order
+    weighted = _weighted(rows, _prior_root(reduced, priors)[order])
+    is_reference = is_reference[order]
     of_references = _gram(weighted[:, :, is_reference])
     weighted[:, :, is_reference] = 0.0
     root = sl.solve_triangular(reduced.factor, np.eye(len(rows)))

@@ -46,11 +46,18 @@ class Tiles(NamedTuple):
         """Return index, measured and weight of one chunk."""
         return Index(*(part[i] for part in self.index)), self.measured[i], self.weight[i]
 
-    def by_source(self, n_src: int, n_det: int, n_values: int) -> "Gathering":
-        """Return how to gather so many values of each slot by its detector and source."""
-        pair = (self.index.detector * n_src + self.index.source).ravel()
+    def by_source(
+        self, position: Int[np.ndarray, " src"], n_det: int, n_values: int
+    ) -> "Gathering":
+        """Return how to gather so many values of each slot by its detector and source.
+
+        Parameters
+        ----------
+        position : of each source among the rows
+        """
+        pair = (self.index.detector * len(position) + position[self.index.source]).ravel()
         order = np.argsort(pair, kind="stable")
-        count = np.bincount(pair, minlength=n_det * n_src)
+        count = np.bincount(pair, minlength=n_det * len(position))
         first = np.cumsum(count) - count
         begin = n_values * first + np.arange(n_values)[:, None] * count
         place = np.repeat(begin - first, count, axis=1) + np.arange(len(order))

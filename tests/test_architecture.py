@@ -40,7 +40,7 @@ RUNGS = (
     ("solver.apparent_motion",),
     ("solver.simple_structure", "solver.mode_names"),
     ("solver.forward", "solver.centres"),
-    ("solver.tiles",),
+    ("solver.tiles", "solver.patches", "solver.triangles"),
     ("solver.problem", "solver.priors"),
     ("solver.simulate",),
     ("solver.linearise", "solver.objective"),

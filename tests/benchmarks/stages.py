@@ -62,4 +62,4 @@ def _re_solved(mode: Mode, solved: Problem, changed: Problem, settings: FitSetti
 
 
 def marginal_sigmas(reduced: Reduced) -> object:
-    return reduced.marginal_covariance(reduced.spread())
+    return reduced.marginal_covariance()

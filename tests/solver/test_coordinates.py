@@ -64,7 +64,7 @@ def test_posterior_is_followed_where_it_bends(small_orbit):
 
     lowest = above_the_mode(mode.theta, mode.sources)
     way = reduced.theta_covariance() @ bend.weak.T
-    follow = -np.einsum("kas,kw->wsa", reduced.response(), way)
+    follow = -np.einsum("kas,kw->wsa", reduced.response(), way)[:, reduced.patches.position]
     for i in range(len(bend.weak)):
         straight = mode.theta + way[:, i], mode.sources + follow[i]
         added = bend.at(way[:, i])

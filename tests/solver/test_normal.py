@@ -22,7 +22,7 @@ def blocks(dense, problem):
     of_sources = hessian[n:, n:].reshape(n_src, 2, n_src, 2)
     return {
         "theta": hessian[:n, :n],
-        "cross": hessian[:n, n:].reshape(n, n_src, 2).swapaxes(1, 2),
+        "cross": hessian[:n, n:].reshape(n, n_src, 2).swapaxes(1, 2)[:, :, problem.patches.order],
         "source": of_sources[np.arange(n_src), :, np.arange(n_src), :],
         "by_theta": gradient[:n],
         "by_source": gradient[n:].reshape(n_src, 2),

@@ -74,12 +74,13 @@ def test_values_are_gathered_by_detector_and_source(laid):
     n_slots = tiles.index.source.size
     values = np.random.default_rng(0).standard_normal((n_values, n_slots))
     seen = np.random.default_rng(1).standard_normal((n_slots, 2))
-    places = tiles.by_source(50, 4, n_values)
+    position = np.random.default_rng(2).permutation(50)
+    places = tiles.by_source(position, 4, n_values)
     gather = sp.csr_array((values.ravel()[places.value], places.slot, places.first))
     found = (gather @ seen).reshape(4, 50, n_values, 2)
     detector = np.broadcast_to(tiles.index.detector, tiles.index.source.shape).ravel()
     expected = np.zeros_like(found)
     for value in range(n_values):
-        pairs = (detector, tiles.index.source.ravel(), value)
+        pairs = (detector, position[tiles.index.source].ravel(), value)
         np.add.at(expected, pairs, values[value][:, None] * seen)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)

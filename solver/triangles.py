@@ -1,0 +1,47 @@
+"""Triangular systems: those of each source, 2 x 2, and those of the whole calibration."""
+
+import numpy as np
+import scipy.linalg as sl
+from jaxtyping import Float
+
+
+def lower_solve(
+    factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "*k 2 src"]
+) -> Float[np.ndarray, "*k 2 src"]:
+    """Solve L x = right for 2 x 2 lower triangles."""
+    solved, (first, below, second) = np.empty(right.shape), _triangle(factor)
+    np.divide(right[..., 0, :], first, out=solved[..., 0, :])
+    np.multiply(solved[..., 0, :], -below, out=solved[..., 1, :])
+    solved[..., 1, :] += right[..., 1, :]
+    solved[..., 1, :] /= second
+    return solved
+
+
+def upper_solve(
+    factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "*k 2 src"]
+) -> Float[np.ndarray, "*k 2 src"]:
+    """Solve L' x = right for 2 x 2 lower triangles L."""
+    solved, (first, below, second) = np.empty(right.shape), _triangle(factor)
+    np.divide(right[..., 1, :], second, out=solved[..., 1, :])
+    np.multiply(solved[..., 1, :], -below, out=solved[..., 0, :])
+    solved[..., 0, :] += right[..., 0, :]
+    solved[..., 0, :] /= first
+    return solved
+
+
+def _triangle(factor: Float[np.ndarray, "src 2 2"]) -> Float[np.ndarray, "3 src"]:
+    """Return the triangles' entries, each contiguous: loops over rows are then twice as fast."""
+    return np.stack([factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1]])
+
+
+def rows_solved(
+    factor: Float[np.ndarray, "k k"],
+    right: Float[np.ndarray, "k 2 n"],
+    trans: bool,
+    scale: float = 1.0,
+) -> Float[np.ndarray, "k 2 n"]:
+    """Return scale R^-1 (or R'^-1) times the rows of `right`, in its place."""
+    rows = right.reshape(len(factor), -1)
+    # Solved from the right, in place of its transpose: so BLAS has them in its own order.
+    solved = sl.blas.dtrsm(scale, factor, rows.T, trans_a=not trans, side=1, overwrite_b=True)
+    return solved.T.reshape(right.shape)

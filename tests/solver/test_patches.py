@@ -1,0 +1,96 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.forward import Index
+from solver.layout import PER_EXPOSURE, Layout
+from solver.normal import accumulate
+from solver.patches import MOST, patches_of
+from solver.schur import reduce
+
+N_SRC = 60
+# Of each exposure; they need not be in order.
+FIELD = np.array([0, 0, 1, 2, 1, 2, 2, 0])
+LAYOUT = Layout(n_exp=len(FIELD), n_coef=3, n_det=2)
+
+
+@pytest.fixture
+def index():
+    """Every source is seen by a few exposures, on any detector."""
+    rng = np.random.default_rng(0)
+    seen = rng.random((N_SRC, len(FIELD))) < 0.2
+    seen[np.arange(N_SRC), rng.integers(0, len(FIELD), N_SRC)] = True
+    source, exposure = np.nonzero(seen)
+    return Index(source, exposure, rng.integers(0, 2, len(source)))
+
+
+def touched(index, source):
+    """Return the columns in which a source has anything, or may have."""
+    exposures = np.flatnonzero(np.isin(FIELD, FIELD[index.exposure[index.source == source]]))
+    of_exposures = [LAYOUT.columns(group)[exposures] for group in PER_EXPOSURE]
+    shared = np.arange(LAYOUT.first_coefficient, LAYOUT.size)
+    return {*np.concatenate([*of_exposures, shared]).tolist()}
+
+
+def check(patches, index):
+    """Every source has one place, in a patch with all columns that it touches."""
+    np.testing.assert_array_equal(patches.order[patches.position], np.arange(N_SRC))
+    places = np.concatenate([np.arange(N_SRC)[patch.places] for patch in patches.parts])
+    np.testing.assert_array_equal(places, np.arange(N_SRC))
+    for patch in patches.parts:
+        for source in patches.order[patch.places]:
+            assert touched(index, source) <= {*patch.columns.tolist()}
+
+
+def test_patch_is_of_sources_seen_by_the_same_fields(index):
+    patches = patches_of(index, FIELD, LAYOUT, N_SRC)
+    check(patches, index)
+    assert len(patches.parts) > 3
+    for patch in patches.parts:
+        for source in patches.order[patch.places]:
+            assert touched(index, source) == {*patch.columns.tolist()}
+
+
+def test_patches_that_save_nothing_are_joined(index, monkeypatch):
+    alone = len(patches_of(index, FIELD, LAYOUT, N_SRC).parts)
+    monkeypatch.setattr("solver.patches.OF_ONE_BLOCK", 2.0 * LAYOUT.size**2)
+    some = patches_of(index, FIELD, LAYOUT, N_SRC)
+    check(some, index)
+    assert 1 < len(some.parts) < alone
+    monkeypatch.setattr("solver.patches.OF_ONE_BLOCK", 1e300)
+    (patch,) = patches_of(index, FIELD, LAYOUT, N_SRC).parts
+    np.testing.assert_array_equal(patch.columns, np.arange(LAYOUT.size))
+
+
+def test_rare_sets_of_fields_share_a_patch(index, monkeypatch):
+    monkeypatch.setattr("solver.patches.MOST", 3)
+    patches = patches_of(index, FIELD, LAYOUT, N_SRC)
+    check(patches, index)
+    assert len(patches.parts) == 3 < MOST
+
+
+def test_no_measurement_makes_one_patch():
+    nothing = np.zeros(0, dtype=np.int64)
+    (patch,) = patches_of(Index(*3 * [nothing]), FIELD, LAYOUT, N_SRC).parts
+    assert patch.places == slice(0, N_SRC)
+
+
+def test_nothing_lies_outside_the_blocks(equations):
+    outside = equations.cross.copy()
+    for patch in equations.patches.parts:
+        outside[patch.columns, :, patch.places] = 0.0
+    assert len(equations.patches.parts) == 3
+    assert not outside.any()
+
+
+def test_solution_does_not_depend_on_the_patches(reduced, problem, expansion_point):
+    together = np.zeros(problem.layout.n_exp, dtype=np.int64)
+    joined = replace(
+        problem, patches=patches_of(problem.index, together, problem.layout, problem.n_src)
+    )
+    assert len(joined.patches.parts) == 1 < len(reduced.patches.parts)
+    other = reduce(accumulate(joined, *expansion_point), joined.priors)
+    for name in ("theta_covariance", "marginal_covariance", "log_determinant"):
+        found, expected = getattr(reduced, name)(), getattr(other, name)()
+        np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())

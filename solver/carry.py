@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from solver.layout import PER_COEFFICIENT, PER_DETECTOR, PER_EXPOSURE
+from solver.layout import PER_COEFFICIENT, PER_DETECTOR, PER_EXPOSURE, Layout
 from solver.normal import NormalEquations, accumulate
 from solver.objective import Gradient
 from solver.parameters import BY_NAME
@@ -31,7 +31,9 @@ def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> Normal
     """
     if new.layout.n_coef > old.layout.n_coef or not _same_model(old, new):
         return None
-    gone = ~np.isin(old.label, new.label)
+    gone = np.zeros(old.n_obs, dtype=bool)
+    if not np.array_equal(old.label, new.label):
+        gone = ~np.isin(old.label, new.label)
     if old.n_obs - gone.sum() != new.n_obs:
         return None
     columns = _columns(old, new)
@@ -39,11 +41,26 @@ def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> Normal
     sources = np.searchsorted(old.sources["source_id"], new.sources["source_id"])
     at = _same_point(equations, old, new, columns, sources)
     if new.layout.n_coef < old.layout.n_coef:
-        return accumulate(new, *at)
+        known = None if gone.any() else _of_lower_terms(equations, old.layout, new.layout.n_coef)
+        return accumulate(new, *at, known)
     if not gone.any():
         return replace(equations, at=at)
     part = part_of(equations, old, gone)
     return _without(equations, part, at, columns, sources, new.patches)
+
+
+def _of_lower_terms(
+    equations: NormalEquations, layout: Layout, n_coef: int
+) -> Float[np.ndarray, "det 2 coef 2 coef"] | None:
+    """Return the blocks between the lower terms of the distortion, of each detector.
+
+    They are the same with and without the higher ones, at the same point.
+    """
+    own, shared = equations.by_detector, layout.coefficients()
+    if own is None:
+        return None
+    of_terms = own.theta[:, shared, shared].reshape(layout.n_det, *2 * (2, layout.n_coef))
+    return of_terms[:, :, :n_coef, :, :n_coef].copy()
 
 
 def _same_model(old: Problem, new: Problem) -> bool:

@@ -7,7 +7,7 @@ sources cheap to eliminate (`solver.schur`). Priors are added there, so that the
 outlive a change of the priors.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -19,14 +19,13 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 from threadpoolctl import ThreadpoolController
 
-from solver.forward import AnyArray, Index
+from solver.forward import Index
 from solver.layout import LOCAL_GROUPS, PER_DETECTOR, PER_EXPOSURE, Layout
 from solver.linearise import Linearised, linearise, turning
 from solver.objective import Gradient
 from solver.patches import Patches
 from solver.problem import Problem
-
-N_LOCAL = len(LOCAL_GROUPS)
+from solver.tile_sums import N_LOCAL, TileSums
 
 
 @dataclass(frozen=True)
@@ -69,22 +68,6 @@ class NormalEquations:
     by_detector: DetectorSums | None
 
 
-@dataclass(frozen=True)
-class _TileSums:
-    """What is summed within each tile, before it is known where it belongs.
-
-    `local` holds the products of the derivatives by `LOCAL_GROUPS` and, last, the
-    residual; `mixed` those with the distortion's two directions. `basis` and `shared`
-    belong to each slot: the distortion terms, and the products of a displacement with the
-    source.
-    """
-
-    local: Float[np.ndarray, "chunk tile local local"]
-    mixed: Float[np.ndarray, "chunk tile local two_coef"]
-    basis: Float[np.ndarray, "chunk tile slot coef"]
-    shared: Float[np.ndarray, "2 2 chunk tile slot"]
-
-
 def chunks(
     problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
 ) -> Iterator[Linearised]:
@@ -123,34 +106,45 @@ def _thread_pools() -> ThreadpoolController:
 
 
 def accumulate(
-    problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
+    problem: Problem,
+    theta: Float[np.ndarray, " calib"],
+    sources: Float[np.ndarray, "src 2"],
+    coefficients: Float[np.ndarray, "det 2 coef 2 coef"] | None = None,
 ) -> NormalEquations:
-    """Accumulate the normal equations of the data at one point."""
+    """Accumulate the normal equations of the data at one point.
+
+    Parameters
+    ----------
+    coefficients : the blocks between the distortion's own terms, of each detector, where they are
+        known: they depend on where the sources are seen, and not on how far each is displaced
+    """
     layout, n_src, index = problem.layout, problem.n_src, problem.tiles.index
     n_det, n_coef = layout.n_det, layout.n_coef
     cross = np.zeros((layout.size, 2, n_src))
     source, by_source = np.zeros((n_det, 2, 2, n_src)), np.zeros((n_det, 2, n_src))
-    coefficients = np.zeros((n_det, 2, n_coef, 2, n_coef))
-    sums = _empty_sums(index.source.shape, n_coef)
+    is_known = coefficients is not None
+    of_terms = coefficients if is_known else np.zeros((n_det, 2, n_coef, 2, n_coef))
+    sums = TileSums.empty(index.source.shape, n_coef)
     with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
         under_way = helper.submit(lambda: None)
         for i, chunk in enumerate(chunks(problem, theta, sources)):
             here = Index(*(part[i] for part in index))
-            _keep_slots(chunk, i, sums)
+            sums.keep_slots(chunk, i)
             # One chunk at a time: they are large.
             under_way.result()
-            under_way = helper.submit(
-                _add_coefficients, here.detector, chunk, sums.basis[i], coefficients
-            )
-            _sum_tiles(chunk, i, sums)
+            summed = None if is_known else of_terms
+            under_way = helper.submit(_sum_with_terms, chunk, i, here.detector, sums, summed)
+            sums.sum_local(chunk, i)
             _add_sources(here, chunk, source, by_source)
-            _add_cross_local(
-                here._replace(source=problem.patches.position[here.source]), chunk, layout, cross
-            )
+            places = here._replace(source=problem.patches.position[here.source])
+            _add_cross_local(places, chunk, layout, cross)
         under_way.result()
-        under_way = helper.submit(_cross_coefficients, problem, sums)
-        hessian, by_theta, chi2 = _assemble(index, layout, sums, coefficients)
-        of_coefficients = under_way.result()
+        of_coefficients = np.empty((n_det, 2 * n_coef, 2, n_src))
+        some, others = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)
+        under_way = helper.submit(_cross_coefficients, problem, sums, some, of_coefficients)
+        hessian, by_theta, chi2 = _assemble(index, layout, sums, of_terms)
+        _cross_coefficients(problem, sums, others, of_coefficients)
+        under_way.result()
     np.sum(of_coefficients, axis=0, out=cross[layout.coefficients()])
     own = DetectorSums(chi2, by_theta, by_source, hessian, source, of_coefficients)
     gradient = Gradient(float(chi2.sum()), by_theta.sum(axis=0), by_source.sum(axis=0).T.copy())
@@ -166,37 +160,17 @@ def accumulate(
     )
 
 
-def _flatten(nested: Iterable[Iterable[AnyArray]]) -> list[AnyArray]:
-    """Return the arrays of a list of rows, row after row."""
-    return [values for row in nested for values in row]
-
-
-def _empty_sums(shape: tuple[int, ...], n_coef: int) -> _TileSums:
-    tiles, rows = shape[:2], N_LOCAL + 1
-    return _TileSums(
-        np.empty((*tiles, rows, rows)),
-        np.empty((*tiles, rows, 2 * n_coef)),
-        np.empty((*shape, n_coef)),
-        np.empty((2, 2, *shape)),
-    )
-
-
-def _keep_slots(chunk: Linearised, i: int, sums: _TileSums) -> None:
-    """Fill in what is kept of each slot of chunk `i`."""
-    for term, values in enumerate(chunk.prediction.basis):
-        sums.basis[i, :, :, term] = values
-    for axis in range(2):
-        for a in range(2):
-            sums.shared[axis, a, i] = chunk.products.displacement_source[axis][a]
-
-
-def _sum_tiles(chunk: Linearised, i: int, sums: _TileSums) -> None:
-    """Fill in the sums of the tiles of chunk `i`, whose slots are filled in."""
-    rows = np.stack(_flatten([*chunk.local, chunk.residual]), axis=1)
-    rows = rows.reshape(len(rows), N_LOCAL + 1, -1)
-    np.matmul(rows, rows.swapaxes(1, 2), out=sums.local[i])
-    mixed = np.stack(_flatten(chunk.products.local_displacement), axis=1) @ sums.basis[i]
-    sums.mixed[i] = mixed.reshape(sums.mixed[i].shape)
+def _sum_with_terms(
+    chunk: Linearised,
+    i: int,
+    detector: Int[np.ndarray, "tile 1"],
+    sums: TileSums,
+    coefficients: Float[np.ndarray, "det 2 coef 2 coef"] | None,
+) -> None:
+    """Sum the products of chunk `i` with the distortion's terms, and add those between them."""
+    sums.sum_mixed(chunk, i)
+    if coefficients is not None:
+        _add_coefficients(detector, chunk, sums.basis[i], coefficients)
 
 
 def _add_coefficients(
@@ -252,27 +226,35 @@ def _add_cross_local(
 
 
 def _cross_coefficients(
-    problem: Problem, sums: _TileSums
-) -> Float[np.ndarray, "det two_coef 2 src"]:
-    """Return the blocks between sources and distortion, shared by all measurements.
+    problem: Problem,
+    sums: TileSums,
+    detectors: slice,
+    cross: Float[np.ndarray, "det two_coef 2 src"],
+) -> None:
+    """Fill in the blocks between sources and distortion, shared by all measurements.
 
     They are sums over the measurements of a source of a 2 x 2 matrix times the basis: a
     sparse matrix that gathers them, times the dense basis.
     """
-    n_src, n_det, n_coef = problem.n_src, problem.layout.n_det, problem.layout.n_coef
-    places = problem.by_source
-    weight = np.take(sums.shared.reshape(-1), places.value)
+    n_src, n_coef = problem.n_src, problem.layout.n_coef
+    places, found = problem.by_source, cross[detectors]
+    # Its rows are the values of each source, detector after detector.
+    begin = 4 * n_src * detectors.indices(len(cross))[0]
+    first = places.first[begin : begin + 4 * n_src * len(found) + 1]
+    entries = slice(first[0], first[-1])
+    weight = np.take(sums.shared.reshape(-1), places.value[entries])
     basis = sums.basis.reshape(sums.shared[0, 0].size, n_coef)
-    shape = (len(places.first) - 1, len(basis))
-    summed = sp.csr_array((weight, places.slot, places.first), shape=shape) @ basis
-    cross = summed.reshape(n_det, n_src, 2, 2, n_coef).transpose(0, 2, 4, 3, 1)
-    return cross.reshape(n_det, 2 * n_coef, 2, n_src)
+    gather = sp.csr_array(
+        (weight, places.slot[entries], first - first[0]), shape=(len(first) - 1, len(basis))
+    )
+    summed = (gather @ basis).reshape(len(found), n_src, 2, 2, n_coef)
+    found.reshape(len(found), 2, n_coef, 2, n_src)[...] = summed.transpose(0, 2, 4, 3, 1)
 
 
 def _assemble(
     index: Index,
     layout: Layout,
-    sums: _TileSums,
+    sums: TileSums,
     coefficients: Float[np.ndarray, "det 2 coef 2 coef"],
 ) -> tuple[
     Float[np.ndarray, "det calib calib"], Float[np.ndarray, "det calib"], Float[np.ndarray, " det"]

@@ -16,7 +16,7 @@ from solver.forward import Index
 from solver.layout import PER_EXPOSURE, Layout
 
 # As many multiplications as take the time of handling one more block.
-OF_ONE_BLOCK = 1e7
+OF_ONE_BLOCK = 3e7
 # Only so many sets of fields are told apart, the commonest.
 MOST = 64
 

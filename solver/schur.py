@@ -170,7 +170,7 @@ class Reduced:
         if not len(others):
             return self.factor
         order = np.concatenate([others, columns])
-        lower = np.linalg.cholesky(self.matrix[np.ix_(order, order)])
+        lower = np.linalg.cholesky(self.matrix[order][:, order])
         return lower[len(others) :, len(others) :].T
 
     def weak_directions(self, below: float = _WEAK) -> Float[np.ndarray, "calib weak"]:
@@ -239,7 +239,9 @@ def reduce(
             of_data = equations.theta.copy()
             for patch, block in zip(equations.patches.parts, whitened, strict=True):
                 rows = block.reshape(len(block), -1)
-                of_data[np.ix_(patch.columns, patch.columns)] -= rows @ rows.T
+                touched = of_data[patch.columns]
+                touched[:, patch.columns] -= rows @ rows.T
+                of_data[patch.columns] = touched
         # NumPy's, like the product before it: SciPy has a BLAS of its own, whose threads would
         # wait for those of NumPy's, which go on spinning for a while.
         matrix = _with_diagonal(of_data, curvature)

@@ -44,6 +44,7 @@ RUNGS = (
     ("solver.problem", "solver.priors"),
     ("solver.simulate",),
     ("solver.linearise", "solver.objective"),
+    ("solver.tile_sums",),
     ("solver.normal",),
     ("solver.schur", "solver.part"),
     ("solver.coordinates",),

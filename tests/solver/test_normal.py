@@ -85,6 +85,16 @@ def test_length_of_chunks_changes_nothing(problem, equations, expansion_point, m
         close(part_of(other, name), part_of(equations, name), rtol=1e-7)
 
 
+def test_known_blocks_between_terms_are_taken_as_they_are(problem, equations, expansion_point):
+    shape = (problem.layout.n_det, *2 * (2, problem.layout.n_coef))
+    shared = problem.layout.coefficients()
+    known = equations.by_detector.theta[:, shared, shared].reshape(shape)
+    doubled = accumulate(problem, *expansion_point, 2.0 * known)
+    close(doubled.theta[shared, shared], 2.0 * equations.theta[shared, shared])
+    close(doubled.theta[:, : shared.start], equations.theta[:, : shared.start])
+    close(doubled.cross, equations.cross)
+
+
 def test_chunks_are_those_of_the_tiles(problem, expansion_point):
     found = list(chunks(problem, *expansion_point))
     assert len(found) == len(problem.tiles.measured) > 1

@@ -267,8 +267,19 @@ def test_blocks_without_a_detector_that_saw_what_another_did(orbit):
     compare_blocks(carry_over(equations, problem, fewer), fewer)
 
 
-def without(exclusions, orbit):
-    return build_problem(exclusions.without(orbit.data), orbit.instrument, FitSettings())
+@pytest.mark.parametrize("left_out", [None, "a-detector"])
+def test_blocks_of_a_lower_order_are_those_made_anew(left_out, orbit, problem, expansion_point):
+    """Those between its own terms too, which are taken from the higher order."""
+    settings = FitSettings(order=problem.order - 1, prior_shifts={"detector_x": 1.0})
+    exclusions = LEFT_OUT[left_out](orbit.data) if left_out else Exclusions()
+    lower = without(exclusions, orbit, settings)
+    compare_blocks(carry_over(accumulate(problem, *expansion_point), problem, lower), lower)
+
+
+def without(exclusions, orbit, settings=None):
+    return build_problem(
+        exclusions.without(orbit.data), orbit.instrument, settings or FitSettings()
+    )
 
 
 def compare_blocks(found, problem):

@@ -33,8 +33,7 @@ from solver.parameters import SOURCES
 class Products(NamedTuple):
     """Sums over a measurement's two coordinates of products of the parts of `Linearised`.
 
-    They are made here because they are many and tiny. The last entries of those with
-    `local` are the products with the residual.
+    The last entries of those with `local` are the products with the residual.
     """
 
     source_source: list[list[Float[AnyArray, "tile slot"]]]
@@ -57,7 +56,6 @@ class Linearised(NamedTuple):
     local: list[Pair]
     displacement: list[Pair]
     prediction: Prediction
-    products: Products
 
     def with_terms(self, n_coef: int) -> "Linearised":
         """Return the same with that many distortion terms."""
@@ -127,7 +125,29 @@ def linearise(
     # Compiled apart: within one program XLA would make these anew for each of the twenty
     # derivatives that are chained to them, which was measured to double its work.
     at = _imaged(turn, offsets, geometry, index)
-    return _linearised(turn, offsets, geometry, index, measured, weight, at)
+    residual, source, local, displacement = _derivatives(
+        turn, offsets, geometry, index, measured, weight, at
+    )
+    return Linearised(residual, source, local, displacement, at.prediction)
+
+
+def products(chunk: Linearised) -> Products:
+    """Return the products of the parts of a chunk: many and tiny, and so not for NumPy."""
+    return _products(chunk.residual, chunk.source, chunk.local, chunk.displacement)
+
+
+@jax.jit
+def _products(
+    residual: Pair, source: list[Pair], local: list[Pair], displacement: list[Pair]
+) -> Products:
+    with_residual = [*local, residual]
+    return Products(
+        _dots(source, source),
+        _dots(with_residual, source),
+        _dots(with_residual, displacement),
+        _dots(displacement, source),
+        _dots(displacement, displacement),
+    )
 
 
 @jax.jit
@@ -138,7 +158,7 @@ def _imaged(turn: Turning, offsets: Offsets, geometry: Geometry, index: Index) -
 
 
 @jax.jit
-def _linearised(
+def _derivatives(
     turn: Turning,
     offsets: Offsets,
     geometry: Geometry,
@@ -146,7 +166,8 @@ def _linearised(
     measured: Float[AnyArray, "2 tile slot"],
     weight: Float[AnyArray, "2 tile slot"],
     imaged: Imaged,
-) -> Linearised:
+) -> tuple[Pair, list[Pair], list[Pair], list[Pair]]:
+    """Return all of `Linearised` but the prediction, of which this would make a copy."""
     prediction, (along_x, along_y) = imaged
     ideal = prediction.ideal
 
@@ -186,15 +207,7 @@ def _linearised(
     source = [whiten(*turned("source", tangent)) for tangent in turn.source]
     local = [by_group(g.name) for g in LOCAL_GROUPS]
     displacement = [whiten(*by) for by in _by_axes(displaced, jax.tree.map(jnp.zeros_like, ideal))]
-    with_residual = [*local, residual]
-    products = Products(
-        _dots(source, source),
-        _dots(with_residual, source),
-        _dots(with_residual, displacement),
-        _dots(displacement, source),
-        _dots(displacement, displacement),
-    )
-    return Linearised(residual, source, local, displacement, prediction, products)
+    return residual, source, local, displacement
 
 
 def _by_axes(of: Callable[[Pair], Pair], at: Pair) -> list[Pair]:

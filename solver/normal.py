@@ -7,11 +7,12 @@ sources cheap to eliminate (`solver.schur`). Priors are added there, so that the
 outlive a change of the priors.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
+from typing import TypeVar
 
 import jax
 import numpy as np
@@ -21,11 +22,13 @@ from threadpoolctl import ThreadpoolController
 
 from solver.forward import Index
 from solver.layout import LOCAL_GROUPS, PER_DETECTOR, PER_EXPOSURE, Layout
-from solver.linearise import Linearised, linearise, turning
+from solver.linearise import Linearised, Products, linearise, products, turning
 from solver.objective import Gradient
 from solver.patches import Patches
 from solver.problem import Problem
 from solver.tile_sums import N_LOCAL, TileSums
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -75,20 +78,31 @@ def chunks(
 
     The next chunk is under way in JAX while the caller works on this one.
     """
+    return _chunks(problem, theta, sources, lambda chunk: chunk)
+
+
+def _chunks(
+    problem: Problem,
+    theta: Float[np.ndarray, " calib"],
+    sources: Float[np.ndarray, "src 2"],
+    made: Callable[[Linearised], Made],
+) -> Iterator[Made]:
+    """Return what is made of each chunk."""
     n_chunks = len(problem.tiles.measured)
     # Once, and not with every chunk.
     offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
     turn = turning(offsets, geometry)
 
-    def start(i: int) -> Linearised:
-        return linearise(turn, offsets, geometry, *problem.tiles.chunk(i))
+    def start(i: int) -> Made:
+        chunk = linearise(turn, offsets, geometry, *problem.tiles.chunk(i))
+        return made(chunk.with_terms(problem.layout.n_coef))
 
     ahead = start(0)
     for i in range(n_chunks):
         current = ahead
         if i + 1 < n_chunks:
             ahead = start(i + 1)
-        yield jax.tree.map(np.asarray, current.with_terms(problem.layout.n_coef))
+        yield jax.tree.map(np.asarray, current)
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
@@ -127,17 +141,18 @@ def accumulate(
     sums = TileSums.empty(index.source.shape, n_coef)
     with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
         under_way = helper.submit(lambda: None)
-        for i, chunk in enumerate(chunks(problem, theta, sources)):
+        both = _chunks(problem, theta, sources, lambda chunk: (chunk, products(chunk)))
+        for i, (chunk, multiplied) in enumerate(both):
             here = Index(*(part[i] for part in index))
-            sums.keep_slots(chunk, i)
+            sums.keep_slots(chunk, multiplied, i)
             # One chunk at a time: they are large.
             under_way.result()
             summed = None if is_known else of_terms
-            under_way = helper.submit(_sum_with_terms, chunk, i, here.detector, sums, summed)
+            under_way = helper.submit(_sum_with_terms, multiplied, i, here.detector, sums, summed)
             sums.sum_local(chunk, i)
-            _add_sources(here, chunk, source, by_source)
+            _add_sources(here, multiplied, source, by_source)
             places = here._replace(source=problem.patches.position[here.source])
-            _add_cross_local(places, chunk, layout, cross)
+            _add_cross_local(places, multiplied, layout, cross)
         under_way.result()
         of_coefficients = np.empty((n_det, 2 * n_coef, 2, n_src))
         some, others = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)
@@ -161,21 +176,21 @@ def accumulate(
 
 
 def _sum_with_terms(
-    chunk: Linearised,
+    products: Products,
     i: int,
     detector: Int[np.ndarray, "tile 1"],
     sums: TileSums,
     coefficients: Float[np.ndarray, "det 2 coef 2 coef"] | None,
 ) -> None:
     """Sum the products of chunk `i` with the distortion's terms, and add those between them."""
-    sums.sum_mixed(chunk, i)
+    sums.sum_mixed(products, i)
     if coefficients is not None:
-        _add_coefficients(detector, chunk, sums.basis[i], coefficients)
+        _add_coefficients(detector, products, sums.basis[i], coefficients)
 
 
 def _add_coefficients(
     detector: Int[np.ndarray, "tile 1"],
-    chunk: Linearised,
+    products: Products,
     basis: Float[np.ndarray, "tile slot coef"],
     hessian: Float[np.ndarray, "det 2 coef 2 coef"],
 ) -> None:
@@ -183,7 +198,7 @@ def _add_coefficients(
     on_detector = (np.arange(n_det)[:, None] == detector.T).astype(np.float64)
     weighted, of_tiles = np.empty(basis.shape), np.empty((len(basis), n_coef, n_coef))
     for i, j in ((0, 0), (0, 1), (1, 1)):
-        weight = chunk.products.displacement_displacement[i][j]
+        weight = products.displacement_displacement[i][j]
         np.multiply(weight[:, :, None], basis, out=weighted)
         np.matmul(weighted.swapaxes(1, 2), basis, out=of_tiles)
         sums = on_detector @ of_tiles.reshape(len(basis), n_coef * n_coef)
@@ -193,7 +208,7 @@ def _add_coefficients(
 
 def _add_sources(
     index: Index,
-    chunk: Linearised,
+    products: Products,
     hessian: Float[np.ndarray, "det 2 2 src"],
     gradient: Float[np.ndarray, "det 2 src"],
 ) -> None:
@@ -203,7 +218,6 @@ def _add_sources(
     def sums(values: Float[np.ndarray, "tile slot"]) -> Float[np.ndarray, "det src"]:
         return np.bincount(pair, values.ravel(), n_det * n_src).reshape(n_det, n_src)
 
-    products = chunk.products
     for a in range(2):
         gradient[:, a] += sums(products.local_source[-1][a])
         for b in range(a + 1):
@@ -212,17 +226,17 @@ def _add_sources(
 
 
 def _add_cross_local(
-    index: Index, chunk: Linearised, layout: Layout, cross: Float[np.ndarray, "calib 2 src"]
+    index: Index, products: Products, layout: Layout, cross: Float[np.ndarray, "calib 2 src"]
 ) -> None:
     """Add the blocks between the sources and what each of their measurements touches."""
     n_src, flat = cross.shape[-1], cross.reshape(-1)
     for number, groups in ((index.exposure, PER_EXPOSURE), (index.detector, PER_DETECTOR)):
         for group in groups:
             row = layout.columns(group)[number]
-            products = chunk.products.local_source[LOCAL_GROUPS.index(group)]
+            by_source = products.local_source[LOCAL_GROUPS.index(group)]
             for a in range(2):
                 place = (2 * row + a) * n_src + index.source
-                np.add.at(flat, place.ravel(), products[a].ravel())
+                np.add.at(flat, place.ravel(), by_source[a].ravel())
 
 
 def _cross_coefficients(

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from solver.forward import AnyArray
 from solver.layout import LOCAL_GROUPS
-from solver.linearise import Linearised
+from solver.linearise import Linearised, Products
 
 N_LOCAL = len(LOCAL_GROUPS)
 
@@ -41,13 +41,13 @@ class TileSums:
             np.empty((2, 2, *shape)),
         )
 
-    def keep_slots(self, chunk: Linearised, i: int) -> None:
+    def keep_slots(self, chunk: Linearised, products: Products, i: int) -> None:
         """Fill in what is kept of each slot of chunk `i`."""
         for term, values in enumerate(chunk.prediction.basis):
             self.basis[i, :, :, term] = values
         for axis in range(2):
             for a in range(2):
-                self.shared[axis, a, i] = chunk.products.displacement_source[axis][a]
+                self.shared[axis, a, i] = products.displacement_source[axis][a]
 
     def sum_local(self, chunk: Linearised, i: int) -> None:
         """Fill in `local` of chunk `i`."""
@@ -55,9 +55,9 @@ class TileSums:
         rows = rows.reshape(len(rows), N_LOCAL + 1, -1)
         np.matmul(rows, rows.swapaxes(1, 2), out=self.local[i])
 
-    def sum_mixed(self, chunk: Linearised, i: int) -> None:
+    def sum_mixed(self, products: Products, i: int) -> None:
         """Fill in `mixed` of chunk `i`, whose slots are kept."""
-        mixed = np.stack(_flatten(chunk.products.local_displacement), axis=1) @ self.basis[i]
+        mixed = np.stack(_flatten(products.local_displacement), axis=1) @ self.basis[i]
         self.mixed[i] = mixed.reshape(self.mixed[i].shape)
 
 

@@ -179,7 +179,7 @@ def test_lower_order_compiles_nothing(orbit, caplog):
 
     fitter = OrbitFitter(orbit.data, orbit.instrument)
     jax.clear_caches()
-    assert any("linearised" in name for name in compiled(5))
+    assert any("derivatives" in name for name in compiled(5))
     assert compiled(3) == compiled(0) == []
 
 

@@ -9,6 +9,8 @@ through the displacement that they add at its place; so C is first brought down 
 covariance of the source, the touched parameters and that displacement.
 """
 
+from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -73,18 +75,26 @@ def residuals(
 ) -> Residuals:
     """Return the residuals at a point, with their leverage."""
     tiles = problem.tiles
-    parts = []
-    with one_blas_thread():
+
+    def of_chunk(
+        i: int, chunk: Linearised, jacobians: Linearised
+    ) -> list[Float[np.ndarray, "..."]]:
+        index = Index(*(part[i] for part in tiles.index))
+        leverage = _leverage(index, jacobians, problem.layout, covariance)
+        at = chunk.prediction
+        return [leverage, *map(side_by_side, (chunk.residual, at.pixel, at.ideal, at.focal))]
+
+    parts, under_way = [], deque()
+    with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as helpers:
         # Large variances cancel in what the priors alone hold, and do so only with the very
         # Jacobians from which the covariances were made.
-        jacobians = chunks(problem, *covariance.at)
-        for i, chunk in enumerate(chunks(problem, theta, sources)):
-            index = Index(*(part[i] for part in tiles.index))
-            leverage = _leverage(index, next(jacobians), problem.layout, covariance)
-            at = chunk.prediction
-            parts.append(
-                [leverage, *map(side_by_side, (chunk.residual, at.pixel, at.ideal, at.focal))]
-            )
+        both = zip(chunks(problem, theta, sources), chunks(problem, *covariance.at), strict=True)
+        for i, (chunk, jacobians) in enumerate(both):
+            under_way.append(helpers.submit(of_chunk, i, chunk, jacobians))
+            # Only so many at a time: they are large.
+            if len(under_way) > 2:
+                parts.append(under_way.popleft().result())
+        parts += [work.result() for work in under_way]
     leverage, residual, pixel, ideal, focal = (
         np.concatenate(columns)[tiles.place] for columns in zip(*parts, strict=True)
     )
@@ -112,7 +122,7 @@ def _leverage(
         covariance.cross,
     )
     spread = (of_local @ local.reshape(*local.shape[:2], -1)).reshape(local.shape)
-    leverage = np.einsum("tips,tiqs->tspq", local, spread)
+    leverage = np.einsum("tips,tiqs->tpqs", local, spread)
     for rows, between, columns in (
         (source, covariance.source[index.source].transpose(0, 2, 3, 1), source),
         (displacement, of_displacement, displacement),
@@ -124,8 +134,8 @@ def _leverage(
         (local, with_displacement, displacement),
     ):
         half = _between(rows, between, columns)
-        leverage += half + half.swapaxes(2, 3)
-    return leverage.reshape(-1, 2, 2)
+        leverage += half + half.swapaxes(1, 2)
+    return leverage.transpose(0, 3, 1, 2).reshape(-1, 2, 2)
 
 
 def _rows(part: list[Pair]) -> Float[np.ndarray, "tile row 2 slot"]:
@@ -136,9 +146,10 @@ def _between(
     rows: Float[np.ndarray, "tile i 2 slot"],
     covariance: Float[np.ndarray, "tile i j slot"],
     columns: Float[np.ndarray, "tile j 2 slot"],
-) -> Float[np.ndarray, "tile slot 2 2"]:
+) -> Float[np.ndarray, "tile 2 2 slot"]:
+    # The slots last, along which all loops run.
     spread = np.einsum("tijs,tjqs->tiqs", covariance, columns)
-    return np.einsum("tips,tiqs->tspq", rows, spread)
+    return np.einsum("tips,tiqs->tpqs", rows, spread)
 
 
 def _calibration_covariance(

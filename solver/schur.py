@@ -170,8 +170,12 @@ class Reduced:
         if not len(others):
             return self.factor
         order = np.concatenate([others, columns])
-        lower = np.linalg.cholesky(self.matrix[order][:, order])
-        return lower[len(others) :, len(others) :].T
+        try:
+            last = np.linalg.cholesky(self.matrix[order][:, order]).T
+        except np.linalg.LinAlgError:
+            # Slower, but R can be turned where S is as good as singular.
+            last = np.asarray(np.linalg.qr(self.factor[:, order], mode="r"))
+        return last[len(others) :, len(others) :]
 
     def weak_directions(self, below: float = _WEAK) -> Float[np.ndarray, "calib weak"]:
         """Return the directions of the calibration that only the priors hold.

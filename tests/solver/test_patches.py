@@ -94,3 +94,9 @@ def test_solution_does_not_depend_on_the_patches(reduced, problem, expansion_poi
     for name in ("theta_covariance", "marginal_covariance", "log_determinant"):
         found, expected = getattr(reduced, name)(), getattr(other, name)()
         np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())
+
+
+def test_marginal_covariance_is_had_where_rounding_leaves_no_cholesky_factor(reduced):
+    expected = reduced.marginal_covariance()
+    rounded = replace(reduced, matrix=-reduced.matrix)
+    np.testing.assert_allclose(rounded.marginal_covariance(), expected, rtol=1e-9)

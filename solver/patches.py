@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Bool, Float, Int
 
 from solver.forward import Index
@@ -44,15 +45,16 @@ class Patches:
     parts: tuple[Patch, ...]
 
 
-def patches_of(index: Index, field: Int[np.ndarray, " exp"], layout: Layout, n_src: int) -> Patches:
+def patches_of(index: Index, exposures: pd.DataFrame, layout: Layout, n_src: int) -> Patches:
     """Put the sources in patches.
 
     Parameters
     ----------
     index : of the measurements, one after the other
-    field : number of each exposure's field
+    exposures : with the `field_id` of each
     """
-    n_fields = int(field.max(initial=-1)) + 1
+    field_ids, field = np.unique(exposures["field_id"].to_numpy(), return_inverse=True)
+    n_fields = len(field_ids)
     seen = np.zeros((n_src, n_fields), dtype=bool)
     seen[index.source, field[index.exposure]] = True
     of_fields = len(PER_EXPOSURE) * np.bincount(field, minlength=n_fields)

@@ -124,15 +124,14 @@ def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
     Its arrays in JAX have the shapes of the whole problem's, so that nothing is compiled anew.
     """
     part = of_rows(problem, keep[problem.index.source])
-    number = np.cumsum(keep) - 1
-    index = part.index._replace(source=number[part.index.source])
+    index = part.index._replace(source=(np.cumsum(keep) - 1)[part.index.source])
     frames = problem.geometry.source_frame
     kept_first = np.argsort(~np.pad(keep, (0, len(frames) - len(keep))), kind="stable")
     return replace(
         part,
         geometry=replace(problem.geometry, source_frame=frames[kept_first]),
         index=index,
-        patches=_patches(index, problem.exposures, problem.layout, int(keep.sum())),
+        patches=patches_of(index, problem.exposures, problem.layout, int(keep.sum())),
         sources=problem.sources[keep].reset_index(drop=True),
         priors=problem.priors._replace(precision=problem.priors.precision[keep]),
     )
@@ -171,7 +170,7 @@ def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings
         exposures=exposures,
         priors=_priors(places.covariance, centres, settings, layout),
         layout=layout,
-        patches=_patches(index, exposures, layout, len(sources)),
+        patches=patches_of(index, exposures, layout, len(sources)),
         epoch=epoch,
     )
 
@@ -196,11 +195,6 @@ def _index(
         )
     row = np.lexsort((source, detector, exposure))
     return Index(source[row], exposure[row], detector[row]), row
-
-
-def _patches(index: Index, exposures: pd.DataFrame, layout: Layout, n_src: int) -> Patches:
-    field = np.unique(exposures["field_id"].to_numpy(), return_inverse=True)[1]
-    return patches_of(index, field, layout, n_src)
 
 
 def _check_freedom(n_obs: int, n_src: int, layout: Layout, order: int) -> None:

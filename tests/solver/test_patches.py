@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from solver.forward import Index
@@ -12,6 +13,7 @@ from solver.schur import reduce
 N_SRC = 60
 # Of each exposure; they need not be in order.
 FIELD = np.array([0, 0, 1, 2, 1, 2, 2, 0])
+EXPOSURES = pd.DataFrame({"field_id": 7 + FIELD})
 LAYOUT = Layout(n_exp=len(FIELD), n_coef=3, n_det=2)
 
 
@@ -44,7 +46,7 @@ def check(patches, index):
 
 
 def test_patch_is_of_sources_seen_by_the_same_fields(index):
-    patches = patches_of(index, FIELD, LAYOUT, N_SRC)
+    patches = patches_of(index, EXPOSURES, LAYOUT, N_SRC)
     check(patches, index)
     assert len(patches.parts) > 3
     for patch in patches.parts:
@@ -53,26 +55,26 @@ def test_patch_is_of_sources_seen_by_the_same_fields(index):
 
 
 def test_patches_that_save_nothing_are_joined(index, monkeypatch):
-    alone = len(patches_of(index, FIELD, LAYOUT, N_SRC).parts)
+    alone = len(patches_of(index, EXPOSURES, LAYOUT, N_SRC).parts)
     monkeypatch.setattr("solver.patches.OF_ONE_BLOCK", 2.0 * LAYOUT.size**2)
-    some = patches_of(index, FIELD, LAYOUT, N_SRC)
+    some = patches_of(index, EXPOSURES, LAYOUT, N_SRC)
     check(some, index)
     assert 1 < len(some.parts) < alone
     monkeypatch.setattr("solver.patches.OF_ONE_BLOCK", 1e300)
-    (patch,) = patches_of(index, FIELD, LAYOUT, N_SRC).parts
+    (patch,) = patches_of(index, EXPOSURES, LAYOUT, N_SRC).parts
     np.testing.assert_array_equal(patch.columns, np.arange(LAYOUT.size))
 
 
 def test_rare_sets_of_fields_share_a_patch(index, monkeypatch):
     monkeypatch.setattr("solver.patches.MOST", 3)
-    patches = patches_of(index, FIELD, LAYOUT, N_SRC)
+    patches = patches_of(index, EXPOSURES, LAYOUT, N_SRC)
     check(patches, index)
     assert len(patches.parts) == 3 < MOST
 
 
 def test_no_measurement_makes_one_patch():
     nothing = np.zeros(0, dtype=np.int64)
-    (patch,) = patches_of(Index(*3 * [nothing]), FIELD, LAYOUT, N_SRC).parts
+    (patch,) = patches_of(Index(*3 * [nothing]), EXPOSURES, LAYOUT, N_SRC).parts
     assert patch.places == slice(0, N_SRC)
 
 
@@ -85,7 +87,7 @@ def test_nothing_lies_outside_the_blocks(equations):
 
 
 def test_solution_does_not_depend_on_the_patches(reduced, problem, expansion_point):
-    together = np.zeros(problem.layout.n_exp, dtype=np.int64)
+    together = problem.exposures.assign(field_id=0)
     joined = replace(
         problem, patches=patches_of(problem.index, together, problem.layout, problem.n_src)
     )

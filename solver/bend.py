@@ -16,6 +16,7 @@ from solver.gauss_newton import Mode, downhill
 from solver.objective import gradient
 from solver.problem import Problem
 from solver.schur import Reduced
+from solver.spectrum import source_shifts
 
 # Short steps with the Jacobians of the mode; each brings a hundredth of the way that is left.
 _SETTLING_STEPS = 4
@@ -41,7 +42,7 @@ def bend_at(problem: Problem, mode: Mode, reduced: Reduced) -> Bend:
     def settled(*numbers: int, sign: float = 1.0) -> _Point:
         """Return how far all else settles from there after a sigma along some directions."""
         way = sign * ways[list(numbers)].sum(axis=0)
-        follow = -reduced.of_whitened(reduced.onto_sources(way[None]))[0].T
+        follow = source_shifts(reduced, way[:, None])[0].T
         theta, sources = mode.theta + way, mode.sources + follow
         for _ in range(_SETTLING_STEPS):
             right = downhill(problem, theta, sources, gradient(problem, theta, sources))

@@ -27,6 +27,7 @@ from solver.objective import Gradient
 from solver.patches import Patches
 from solver.problem import Problem
 from solver.tile_sums import N_LOCAL, TileSums
+from solver.tiles import Gathering
 
 Made = TypeVar("Made")
 
@@ -151,28 +152,23 @@ def accumulate(
             under_way = helper.submit(_sum_with_terms, multiplied, i, here.detector, sums, summed)
             sums.sum_local(chunk, i)
             _add_sources(here, multiplied, source, by_source)
-            places = here._replace(source=problem.patches.position[here.source])
-            _add_cross_local(places, multiplied, layout, cross)
+            in_order = here._replace(source=problem.patches.position[here.source])
+            _add_cross_local(in_order, multiplied, layout, cross)
         under_way.result()
         of_coefficients = np.empty((n_det, 2 * n_coef, 2, n_src))
         some, others = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)
-        under_way = helper.submit(_cross_coefficients, problem, sums, some, of_coefficients)
+        # Made here, or both threads would make it.
+        places = problem.by_source
+        under_way = helper.submit(_cross_coefficients, places, sums, some, of_coefficients)
         hessian, by_theta, chi2 = _assemble(index, layout, sums, of_terms)
-        _cross_coefficients(problem, sums, others, of_coefficients)
+        _cross_coefficients(places, sums, others, of_coefficients)
         under_way.result()
     np.sum(of_coefficients, axis=0, out=cross[layout.coefficients()])
     own = DetectorSums(chi2, by_theta, by_source, hessian, source, of_coefficients)
     gradient = Gradient(float(chi2.sum()), by_theta.sum(axis=0), by_source.sum(axis=0).T.copy())
     of_sources = source.sum(axis=0).transpose(2, 0, 1).copy()
-    return NormalEquations(
-        (theta, sources),
-        gradient,
-        hessian.sum(axis=0),
-        of_sources,
-        problem.patches,
-        cross,
-        own,
-    )
+    at, of_theta = (theta, sources), hessian.sum(axis=0)
+    return NormalEquations(at, gradient, of_theta, of_sources, problem.patches, cross, own)
 
 
 def _sum_with_terms(
@@ -240,7 +236,7 @@ def _add_cross_local(
 
 
 def _cross_coefficients(
-    problem: Problem,
+    places: Gathering,
     sums: TileSums,
     detectors: slice,
     cross: Float[np.ndarray, "det two_coef 2 src"],
@@ -250,8 +246,7 @@ def _cross_coefficients(
     They are sums over the measurements of a source of a 2 x 2 matrix times the basis: a
     sparse matrix that gathers them, times the dense basis.
     """
-    n_src, n_coef = problem.n_src, problem.layout.n_coef
-    places, found = problem.by_source, cross[detectors]
+    n_src, n_coef, found = cross.shape[-1], sums.basis.shape[-1], cross[detectors]
     # Its rows are the values of each source, detector after detector.
     begin = 4 * n_src * detectors.indices(len(cross))[0]
     first = places.first[begin : begin + 4 * n_src * len(found) + 1]

@@ -276,6 +276,15 @@ def test_blocks_of_a_lower_order_are_those_made_anew(left_out, orbit, problem, e
     compare_blocks(carry_over(accumulate(problem, *expansion_point), problem, lower), lower)
 
 
+def test_blocks_between_the_terms_of_a_lower_order_are_at_hand(
+    orbit, problem, expansion_point, monkeypatch
+):
+    equations = accumulate(problem, *expansion_point)
+    monkeypatch.setattr("solver.normal._add_coefficients", None)
+    lower = without(Exclusions(), orbit, FitSettings(order=problem.order - 1))
+    assert carry_over(equations, problem, lower) is not None
+
+
 def without(exclusions, orbit, settings=None):
     return build_problem(
         exclusions.without(orbit.data), orbit.instrument, settings or FitSettings()

@@ -32,8 +32,8 @@ def carry_over(equations: NormalEquations, old: Problem, new: Problem) -> Normal
     if new.layout.n_coef > old.layout.n_coef or not _same_model(old, new):
         return None
     gone = np.zeros(old.n_obs, dtype=bool)
-    if not np.array_equal(old.label, new.label):
-        gone = ~np.isin(old.label, new.label)
+    if not np.array_equal(old.observed.label, new.observed.label):
+        gone = ~np.isin(old.observed.label, new.observed.label)
     if old.n_obs - gone.sum() != new.n_obs:
         return None
     columns = _columns(old, new)

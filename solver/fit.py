@@ -11,7 +11,6 @@ from solver.device import require_device
 from solver.engines import Resumption, estimate
 from solver.errors import FitError, InputError
 from solver.estimate import Estimate
-from solver.exclusions import of_rows, thinned_orbit
 from solver.gauss_newton import Iteration, Mode, find_mode
 from solver.history import history_table
 from solver.instrument import MINI_MOCK, Instrument
@@ -19,9 +18,10 @@ from solver.leverage import Covariances
 from solver.mode_tables import mode_tables
 from solver.orbit import OrbitData
 from solver.orders import compare_orders
-from solver.problem import Problem, build_problem, orders_held
+from solver.problem import Problem, orders_held, rebuilt
 from solver.result import FitResult
 from solver.robust import find_outliers, outlier_table
+from solver.selection import Selection
 from solver.settings import FitSettings
 from solver.starts import Start, likely, nearest
 from solver.summary import summarise, truth_summary
@@ -87,7 +87,8 @@ class OrbitFitter:
     def __init__(self, data: OrbitData, instrument: Instrument = MINI_MOCK) -> None:
         """Take checked tables, as from `solver.read_orbit`; InputError if JAX has no device."""
         require_device()
-        self._data = data
+        self._selection = Selection(data, instrument)
+        self._orbit_id = data.orbit_id
         self._instrument = instrument
         self._kept: _Fitted | None = None
         self._starts: list[Start] = []
@@ -105,11 +106,11 @@ class OrbitFitter:
         A run of the svi engine that was stopped is gone on with where it was.
         """
         start = time.perf_counter()
-        data, problem = self._prepare(settings)
+        data, problem = self._selection.choose(settings)
         outliers = None
         if settings.robust:
             outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
-            data, problem = self._prepare(settings, outliers)
+            data, problem = self._selection.choose(settings, outliers)
         prepared = time.perf_counter()
         found = estimate(problem, settings, progress, resumption or self._resumption(settings))
         result, solution = _result(
@@ -117,7 +118,7 @@ class OrbitFitter:
         )
         self._stopped = None
         fitted = time.perf_counter()
-        orders = self._compare_orders(data, problem, settings, progress)
+        orders = self._compare_orders(problem, settings, progress)
         if found.mode.status.is_solution:
             self._kept = _Fitted(
                 settings, problem, found.mode, solution.covariance, outliers, orders
@@ -143,7 +144,7 @@ class OrbitFitter:
         if kept.settings.robust != settings.robust:
             return None
         start = time.perf_counter()
-        data, problem = self._prepare(settings, kept.outliers)
+        data, problem = self._selection.choose(settings, kept.outliers)
         prepared = time.perf_counter()
         near = nearest(self._starts, settings)
         mode = near and re_solve(near.mode, near.problem, problem, settings)
@@ -167,7 +168,7 @@ class OrbitFitter:
         """
         kept = self._kept
         if kept is None or kept.settings != result.settings or kept.mode.reduced is None:
-            raise FitError(f"orbit {self._data.orbit_id}: {result.summary['reason']}")
+            raise FitError(f"orbit {self._orbit_id}: {result.summary['reason']}")
         return history_table(kept.problem, kept.mode.reduced, kept.covariance, result)
 
     def get_ready(self, order: int) -> Iterator[None]:
@@ -199,7 +200,7 @@ class OrbitFitter:
     def _started(self, kept: _Fitted, settings: FitSettings) -> list[Start]:
         """Return a change of the last fit, linearised at its own solution, where there is one."""
         try:
-            _, problem = self._prepare(settings, kept.outliers)
+            _, problem = self._selection.choose(settings, kept.outliers)
         except InputError:
             # A prior is shifted of a term that the lower order has not, or too little is left.
             return []
@@ -209,19 +210,8 @@ class OrbitFitter:
         is_solved = mode.status.is_solution
         return [Start(settings, problem, linearised(problem, mode))] if is_solved else []
 
-    def _prepare(
-        self, settings: FitSettings, outliers: pd.DataFrame | None = None
-    ) -> tuple[OrbitData, Problem]:
-        data = settings.exclusions.without(self._data)
-        data = thinned_orbit(data, self._data, settings.thin)
-        if outliers is not None:
-            # Its labels are those of the table of measurements.
-            data = of_rows(data, ~data.measurements.index.isin(outliers.index))
-        return data, build_problem(data, self._instrument, settings)
-
     def _compare_orders(
         self,
-        data: OrbitData,
         problem: Problem,
         settings: FitSettings,
         progress: Callable[[Iteration], None],
@@ -229,7 +219,7 @@ class OrbitFitter:
         if not settings.compare_orders:
             return None
         highest = max(orders_held(problem.n_obs, problem.n_src, problem.layout))
-        highest_problem = build_problem(data, self._instrument, settings.with_(order=highest))
+        highest_problem = rebuilt(problem, self._instrument, settings.with_(order=highest))
         return compare_orders(highest_problem, settings, progress)
 
     def _resumption(self, settings: FitSettings) -> Resumption:

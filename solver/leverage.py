@@ -74,7 +74,7 @@ def residuals(
     covariance: Covariances,
 ) -> Residuals:
     """Return the residuals at a point, with their leverage."""
-    tiles = problem.tiles
+    tiles = problem.observed.tiles
 
     def of_chunk(
         i: int, chunk: Linearised, jacobians: Linearised

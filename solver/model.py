@@ -52,7 +52,7 @@ class Evidence(eqx.Module):
 
 def evidence_of(problem: Problem) -> Evidence:
     """Return what the model needs of a problem."""
-    layout, priors, tiles = problem.layout, problem.priors, problem.tiles
+    layout, priors, tiles = problem.layout, problem.priors, problem.observed.tiles
     width = layout.scatter(priors.width)
     return Evidence(
         geometry=problem.geometry,
@@ -62,7 +62,8 @@ def evidence_of(problem: Problem) -> Evidence:
         width=width,
         centre=layout.scatter(priors.centre),
         precision=priors.precision,
-        log_norm=-np.log(problem.sigma).sum() - np.array(problem.sigma.size * _HALF_LOG_2PI),
+        log_norm=-np.log(problem.observed.sigma).sum()
+        - np.array(problem.observed.sigma.size * _HALF_LOG_2PI),
         layout=layout,
         flat=frozenset(name for name, values in width.items() if np.isinf(values).any()),
     )

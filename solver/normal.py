@@ -89,13 +89,13 @@ def _chunks(
     made: Callable[[Linearised], Made],
 ) -> Iterator[Made]:
     """Return what is made of each chunk."""
-    n_chunks = len(problem.tiles.measured)
+    n_chunks = len(problem.observed.tiles.measured)
     # Once, and not with every chunk.
     offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
     turn = turning(offsets, geometry)
 
     def start(i: int) -> Made:
-        chunk = linearise(turn, offsets, geometry, *problem.tiles.chunk(i))
+        chunk = linearise(turn, offsets, geometry, *problem.observed.tiles.chunk(i))
         return made(chunk.with_terms(problem.layout.n_coef))
 
     ahead = start(0)
@@ -133,7 +133,7 @@ def accumulate(
     coefficients : the blocks between the distortion's own terms, of each detector, where they are
         known: they depend on where the sources are seen, and not on how far each is displaced
     """
-    layout, n_src, index = problem.layout, problem.n_src, problem.tiles.index
+    layout, n_src, index = problem.layout, problem.n_src, problem.observed.tiles.index
     n_det, n_coef = layout.n_det, layout.n_coef
     cross = np.zeros((layout.size, 2, n_src))
     source, by_source = np.zeros((n_det, 2, 2, n_src)), np.zeros((n_det, 2, n_src))
@@ -158,7 +158,7 @@ def accumulate(
         of_coefficients = np.empty((n_det, 2 * n_coef, 2, n_src))
         some, others = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)
         # Made here, or both threads would make it.
-        places = problem.by_source
+        places = problem.observed.by_source
         under_way = helper.submit(_cross_coefficients, places, sums, some, of_coefficients)
         hessian, by_theta, chi2 = _assemble(index, layout, sums, of_terms)
         _cross_coefficients(places, sums, others, of_coefficients)

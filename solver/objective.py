@@ -45,10 +45,10 @@ def gradient(
     """Return chi2 of the data and its gradient at one point."""
     offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
     seen = _directions(offsets, geometry)
-    n_chunks, parts, total = len(problem.tiles.measured), deque(), None
+    n_chunks, parts, total = len(problem.observed.tiles.measured), deque(), None
     for i in range(n_chunks + _IN_FLIGHT):
         if i < n_chunks:
-            parts.append(_of_chunk(seen, offsets, geometry, *problem.tiles.chunk(i)))
+            parts.append(_of_chunk(seen, offsets, geometry, *problem.observed.tiles.chunk(i)))
         if i >= _IN_FLIGHT and parts:
             part = jax.tree.map(np.asarray, parts.popleft())
             total = part if total is None else jax.tree.map(np.add, total, part)

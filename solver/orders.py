@@ -131,7 +131,7 @@ def judge_reserved(
     ----------
     mode : of the whole problem; the last row of its trace is that of its point
     """
-    dof = 2 * int(reserved[problem.index.source].sum())
+    dof = 2 * int(reserved[problem.observed.index.source].sum())
     if dof == 0 or not mode.status.is_solution:
         return HeldOut(np.nan, dof, np.nan)
     others = thinned(problem, ~reserved)
@@ -176,7 +176,7 @@ def _evaluated(problem: Problem, mode: Mode) -> Mode:
 
 
 def _log_evidence(problem: Problem, mode: Mode) -> float:
-    log_sigma = float(np.log(problem.sigma).sum())
+    log_sigma = float(np.log(problem.observed.sigma).sum())
     return log_evidence(mode, problem.priors, log_sigma, 2 * problem.n_obs)
 
 

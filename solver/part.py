@@ -30,7 +30,7 @@ class Part(NamedTuple):
 
 def part_of(equations: NormalEquations, problem: Problem, gone: Bool[np.ndarray, " obs"]) -> Part:
     """Return what the measurements `gone` have added to the equations of a problem."""
-    index, own = problem.index, equations.by_detector
+    index, own = problem.observed.index, equations.by_detector
     detectors = np.bincount(index.detector[gone], minlength=problem.layout.n_det) > 0
     if own is not None and np.array_equal(gone, detectors[index.detector]):
         seen = index.exposure * problem.n_src + index.source

@@ -6,7 +6,6 @@ common with the calibration is a dense block in the columns of the exposures of 
 where an orbit has four fields, eliminating its sources takes a quarter of the products.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,9 @@ from jaxtyping import Bool, Float, Int
 from solver.forward import Index
 from solver.layout import PER_EXPOSURE, Layout
 
+# About so many columns are those of all exposures: the distortion of the paper's order, and the
+# detectors. It decides on time alone.
+OF_ALL = 60
 # As many multiplications as take the time of handling one more block.
 OF_ONE_BLOCK = 3e7
 # Only so many sets of fields are told apart, the commonest.
@@ -45,8 +47,35 @@ class Patches:
     parts: tuple[Patch, ...]
 
 
-def patches_of(index: Index, exposures: pd.DataFrame, layout: Layout, n_src: int) -> Patches:
-    """Put the sources in patches.
+@dataclass(frozen=True)
+class FieldSets:
+    """Sources by the set of fields that has seen them, whatever parameters there are.
+
+    Attributes
+    ----------
+    order : the sources, set after set
+    position : the place of each source in that order
+    places : of the sources of each set
+    exposures : those of its fields
+    """
+
+    order: Int[np.ndarray, " src"]
+    position: Int[np.ndarray, " src"]
+    places: tuple[slice, ...]
+    exposures: Bool[np.ndarray, "set exp"]
+
+    def touching(self, layout: Layout) -> Patches:
+        """Return each set as a patch, with the columns that it touches."""
+        parts = zip(self.places, self.exposures, strict=True)
+        return Patches(
+            self.order,
+            self.position,
+            tuple(Patch(places, _touched(exposures, layout)) for places, exposures in parts),
+        )
+
+
+def field_sets(index: Index, exposures: pd.DataFrame, n_src: int) -> FieldSets:
+    """Tell the sources apart by the fields that have seen them, as far as that saves time.
 
     Parameters
     ----------
@@ -54,26 +83,16 @@ def patches_of(index: Index, exposures: pd.DataFrame, layout: Layout, n_src: int
     exposures : with the `field_id` of each
     """
     field_ids, field = np.unique(exposures["field_id"].to_numpy(), return_inverse=True)
-    n_fields = len(field_ids)
-    seen = np.zeros((n_src, n_fields), dtype=bool)
+    seen = np.zeros((n_src, len(field_ids)), dtype=bool)
     seen[index.source, field[index.exposure]] = True
-    of_fields = len(PER_EXPOSURE) * np.bincount(field, minlength=n_fields)
-    shared = layout.size - len(PER_EXPOSURE) * layout.n_exp
-
-    def width(by_fields: Bool[np.ndarray, "*n field"]) -> Float[np.ndarray, "*n"]:
-        return shared + by_fields @ of_fields.astype(np.float64)
-
-    which, by_fields = _joined(*_told_apart(seen), width)
+    of_fields = len(PER_EXPOSURE) * np.bincount(field, minlength=len(field_ids))
+    which, by_fields = _joined(*_told_apart(seen), of_fields.astype(np.float64))
     order = np.argsort(which, kind="stable")
     position = np.empty(n_src, dtype=np.int64)
     position[order] = np.arange(n_src)
     bounds = np.cumsum([0, *np.bincount(which, minlength=len(by_fields))]).tolist()
-    parts = zip(bounds[:-1], bounds[1:], by_fields, strict=True)
-    return Patches(
-        order,
-        position,
-        tuple(Patch(slice(i, j), _touched(fields[field], layout)) for i, j, fields in parts),
-    )
+    places = tuple(map(slice, bounds[:-1], bounds[1:]))
+    return FieldSets(order, position, places, by_fields[:, field])
 
 
 def _told_apart(
@@ -95,14 +114,18 @@ def _told_apart(
 def _joined(
     which: Int[np.ndarray, " src"],
     by_fields: Bool[np.ndarray, "patch field"],
-    width: Callable[[Bool[np.ndarray, "*n field"]], Float[np.ndarray, "*n"]],
+    of_fields: Float[np.ndarray, " field"],
 ) -> tuple[Int[np.ndarray, " src"], Bool[np.ndarray, "fewer field"]]:
     """Join patches as long as that saves time, first the two that save most.
 
     Parameters
     ----------
-    width : the number of columns that some fields touch
+    of_fields : the number of columns that are of exposures of each field
     """
+
+    def width(by_fields: Bool[np.ndarray, "*n field"]) -> Float[np.ndarray, "*n"]:
+        return OF_ALL + by_fields @ of_fields
+
     while len(by_fields) > 1:
         count = np.bincount(which, minlength=len(by_fields))
         both = by_fields[:, None] | by_fields

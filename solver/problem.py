@@ -1,8 +1,6 @@
-"""Problem: the tables of one orbit as arrays, in the order that the engines work in.
+"""Problem: one orbit under one set of settings: measurements, origins and priors as arrays.
 
-Measurements are sorted by exposure, detector and source, so that those which share a
-run of calibration parameters lie together. Shapes are padded to few sizes, because each
-new one costs JAX a compilation.
+Shapes are padded to few sizes, because each new one costs JAX a compilation.
 """
 
 from collections.abc import Mapping
@@ -11,26 +9,25 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from solver.astrometry import propagate, sky_position
 from solver.centres import calibration_centres, catalogue_shift
 from solver.distortion import terms
 from solver.ephemeris import observer_at
 from solver.errors import InputError
-from solver.forward import Geometry, Index
+from solver.forward import Geometry
 from solver.instrument import Instrument
 from solver.layout import Layout
+from solver.observed import KEY, Observed, observe
 from solver.orbit import OrbitData
 from solver.parameters import CALIBRATION_GROUPS, PARAMETERS, SOURCES
-from solver.patches import Patches, patches_of
+from solver.patches import Patches
 from solver.priors import Priors, group_widths
 from solver.projection import displace, tangent_frame
 from solver.settings import MAX_ORDER, FitSettings
-from solver.tiles import Gathering, Tiles, lay_tiles
 from solver.units import ARCSEC_PER_DEG, RAD_PER_MAS
 
-_KEY = ["field_id", "plate_id"]
 # The terms of lower orders are computed with coefficients of zero: one compilation does for all.
 _LEAST_ORDER = 5
 
@@ -43,37 +40,27 @@ class Problem:
     ----------
     order : highest degree of the distortion
     geometry : origins of all parameters, padded along src, exp and coef
-    index : source, exposure and detector of each measurement
-    measured : pixels from the detector's centre
-    sigma : pixels
-    row : row of each measurement in the input table
-    label : of that row, the same in a table from which others were taken out
+    observed : the measurements
     sources : catalogue rows of the measured sources, in ascending source_id
     exposures : environment rows, in order of (field_id, plate_id)
     priors : in offsets from the origins
     layout : columns of the calibration parameters
-    patches : the sources by the fields that have seen them
     epoch : mean epoch, MJD in TCB
     """
 
     order: int
     geometry: Geometry
-    index: Index
-    measured: Float[np.ndarray, "obs 2"]
-    sigma: Float[np.ndarray, "obs 2"]
-    row: Int[np.ndarray, " obs"]
-    label: Int[np.ndarray, " obs"]
+    observed: Observed
     sources: pd.DataFrame
     exposures: pd.DataFrame
     priors: Priors
     layout: Layout
-    patches: Patches
     epoch: float
 
     @property
     def n_obs(self) -> int:
         """Number of measurements, two coordinates each."""
-        return len(self.row)
+        return len(self.observed.row)
 
     @property
     def n_src(self) -> int:
@@ -81,14 +68,9 @@ class Problem:
         return len(self.sources)
 
     @cached_property
-    def tiles(self) -> Tiles:
-        """The measurements in tiles."""
-        return lay_tiles(self.index, self.measured, self.sigma)
-
-    @cached_property
-    def by_source(self) -> Gathering:
-        """How a 2 x 2 matrix of each slot is gathered by its detector and place in a patch."""
-        return self.tiles.by_source(self.patches.position, self.layout.n_det, 4)
+    def patches(self) -> Patches:
+        """The sources in patches, with the columns that each touches."""
+        return self.observed.sets.touching(self.layout)
 
     def offsets(
         self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
@@ -108,14 +90,7 @@ class Problem:
 
 def of_rows(problem: Problem, chosen: Bool[np.ndarray, " obs"]) -> Problem:
     """Return the problem with some of its measurements, and all of its parameters."""
-    return replace(
-        problem,
-        index=Index(*(column[chosen] for column in problem.index)),
-        measured=problem.measured[chosen],
-        sigma=problem.sigma[chosen],
-        row=problem.row[chosen],
-        label=problem.label[chosen],
-    )
+    return replace(problem, observed=problem.observed.of_rows(chosen))
 
 
 def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
@@ -123,15 +98,12 @@ def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
 
     Its arrays in JAX have the shapes of the whole problem's, so that nothing is compiled anew.
     """
-    part = of_rows(problem, keep[problem.index.source])
-    index = part.index._replace(source=(np.cumsum(keep) - 1)[part.index.source])
     frames = problem.geometry.source_frame
     kept_first = np.argsort(~np.pad(keep, (0, len(frames) - len(keep))), kind="stable")
     return replace(
-        part,
+        problem,
         geometry=replace(problem.geometry, source_frame=frames[kept_first]),
-        index=index,
-        patches=patches_of(index, problem.exposures, problem.layout, int(keep.sum())),
+        observed=problem.observed.of_sources(keep, problem.exposures),
         sources=problem.sources[keep].reset_index(drop=True),
         priors=problem.priors._replace(precision=problem.priors.precision[keep]),
     )
@@ -146,55 +118,47 @@ def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings
         If a detector is not part of the instrument, or the measurements cannot hold the
         distortion order asked for.
     """
-    exposures = data.exposures.sort_values(_KEY, ignore_index=True)
+    exposures = data.exposures.sort_values(KEY, ignore_index=True)
     measured_ids = np.unique(data.measurements["source_id"].to_numpy())
     sources = data.catalogue.set_index("source_id").loc[measured_ids].reset_index()
-    index, row = _index(data.measurements, exposures, measured_ids, instrument)
-    layout = Layout(len(exposures), len(terms(settings.order)), len(instrument.detectors))
-    _check_freedom(len(row), len(sources), layout, settings.order)
+    observed = observe(data.measurements, exposures, measured_ids, instrument)
+    return _build(observed, sources, exposures, instrument, settings)
 
+
+def rebuilt(problem: Problem, instrument: Instrument, settings: FitSettings) -> Problem:
+    """Return the problem of the same measurements under other settings.
+
+    Raises
+    ------
+    InputError
+        If the measurements cannot hold the distortion order asked for.
+    """
+    return _build(problem.observed, problem.sources, problem.exposures, instrument, settings)
+
+
+def _build(
+    observed: Observed,
+    sources: pd.DataFrame,
+    exposures: pd.DataFrame,
+    instrument: Instrument,
+    settings: FitSettings,
+) -> Problem:
+    layout = Layout(len(exposures), len(terms(settings.order)), observed.n_det)
+    _check_freedom(len(observed.row), len(sources), layout, settings.order)
     epoch = float(exposures["obstime"].mean())
     places = propagate(sources, epoch, observer_at(np.array([epoch])).position[0])
     centres = calibration_centres(exposures, instrument, layout, settings)
     frame = _shifted(places.frame, catalogue_shift(settings))
-    table = data.measurements.iloc[row]
     return Problem(
         order=settings.order,
         geometry=_geometry(frame, exposures, centres, instrument, settings),
-        index=index,
-        measured=table[["nx", "ny"]].to_numpy(),
-        sigma=table[["sx", "sy"]].to_numpy(),
-        row=row,
-        label=table.index.to_numpy(),
+        observed=observed,
         sources=sources,
         exposures=exposures,
         priors=_priors(places.covariance, centres, settings, layout),
         layout=layout,
-        patches=patches_of(index, exposures, layout, len(sources)),
         epoch=epoch,
     )
-
-
-def _index(
-    measurements: pd.DataFrame,
-    exposures: pd.DataFrame,
-    source_ids: Int[np.ndarray, " src"],
-    instrument: Instrument,
-) -> tuple[Index, Int[np.ndarray, " obs"]]:
-    """Return the indices of the measurements in working order, and their input rows."""
-    source = np.searchsorted(source_ids, measurements["source_id"].to_numpy())
-    keys = pd.MultiIndex.from_frame(exposures[_KEY])
-    exposure = keys.get_indexer(pd.MultiIndex.from_frame(measurements[_KEY]))
-    detector = instrument.index_of(measurements["detector_id"].to_numpy())
-    if (detector < 0).any():
-        unknown = sorted(set(measurements["detector_id"].to_numpy()[detector < 0].tolist()))
-        known = [d.detector_id for d in instrument.detectors]
-        raise InputError(
-            f"column detector_id of the measurements: expected detectors of the instrument "
-            f"{instrument.name!r} ({known}), found {unknown}"
-        )
-    row = np.lexsort((source, detector, exposure))
-    return Index(source[row], exposure[row], detector[row]), row
 
 
 def _check_freedom(n_obs: int, n_src: int, layout: Layout, order: int) -> None:

@@ -86,7 +86,7 @@ def outlier_table(
     """
     if outliers is None:
         return None
-    table = data.measurements.iloc[problem.row[outliers.found]].assign(
+    table = data.measurements.iloc[problem.observed.row[outliers.found]].assign(
         residual_x=outliers.residual[:, 0],
         residual_y=outliers.residual[:, 1],
         distance=outliers.distance,
@@ -97,28 +97,32 @@ def outlier_table(
 
 
 def _weighted(problem: Problem, weight: Float[np.ndarray, " obs"]) -> Problem:
-    return replace(problem, sigma=problem.sigma / np.sqrt(weight)[:, None])
+    observed = problem.observed
+    sigma = observed.sigma / np.sqrt(weight)[:, None]
+    return replace(problem, observed=replace(observed, sigma=sigma))
 
 
 def _whitened(problem: Problem, mode: Mode) -> Float[np.ndarray, "obs 2"]:
     parts = [side_by_side(c.residual) for c in chunks(problem, mode.theta, mode.sources)]
-    return np.concatenate(parts)[problem.tiles.place]
+    return np.concatenate(parts)[problem.observed.tiles.place]
 
 
 def _described(problem: Problem, mode: Mode, found: Bool[np.ndarray, " obs"]) -> Outliers:
     if mode.reduced is None or not found.any():
         return Outliers(found, np.empty((0, 2)), np.empty(0), np.empty((0, 2)))
     few = of_rows(problem, found)
-    place = few.tiles.place
+    place = few.observed.tiles.place
     whitened, jacobian = [], []
     for chunk in chunks(few, mode.theta, mode.sources):
         whitened.append(side_by_side(chunk.residual))
         jacobian.append(np.stack([side_by_side(pair) for pair in chunk.source], axis=-1))
     residual, by_source = np.concatenate(whitened)[place], np.concatenate(jacobian)[place]
-    covariance = mode.reduced.marginal_covariance()[few.index.source]
+    covariance = mode.reduced.marginal_covariance()[few.observed.index.source]
     # As one more measurement of the source moves it: gain times residual.
     spread = by_source @ covariance @ by_source.swapaxes(1, 2) + np.eye(2)
     gain = covariance @ by_source.swapaxes(1, 2) @ np.linalg.inv(spread)
     moved = np.einsum("oab,ob->oa", gain, residual)
     sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    return Outliers(found, residual * few.sigma, np.sqrt((residual**2).sum(axis=1)), moved / sigma)
+    return Outliers(
+        found, residual * few.observed.sigma, np.sqrt((residual**2).sum(axis=1)), moved / sigma
+    )

@@ -29,7 +29,7 @@ def summarise(
     curvature = problem.priors.curvature(mode.theta)
     parameters = effective_parameters(problem.priors, curvature, solution.covariance)
     dof = whitened.size - parameters
-    scatter = np.sqrt(np.mean((whitened * problem.sigma) ** 2, axis=0))
+    scatter = np.sqrt(np.mean((whitened * problem.observed.sigma) ** 2, axis=0))
     return {
         "converged": mode.status.is_solution,
         "reason": mode.status.value,
@@ -48,7 +48,7 @@ def summarise(
         "dof": dof,
         "chi2_per_dof": chi2 / dof,
         "log_evidence": log_evidence(
-            mode, problem.priors, float(np.log(problem.sigma).sum()), whitened.size
+            mode, problem.priors, float(np.log(problem.observed.sigma).sum()), whitened.size
         ),
         "residual_rms_x": float(scatter[0]),
         "residual_rms_y": float(scatter[1]),

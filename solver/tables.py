@@ -77,7 +77,7 @@ def source_table(solution: Solution) -> pd.DataFrame:
     frame = source_frame(problem)
     ra, dec = sky_position(_displaced(frame, solution.mode.sources, RAD_PER_MAS))
     prior_ra, prior_dec = sky_position(frame[:, 0])
-    n_src, index = problem.n_src, problem.index.source
+    n_src, index = problem.n_src, problem.observed.index.source
     chi2 = (solution.residuals.whitened**2).sum(axis=1)
     prior_sigma = _sigmas(np.linalg.inv(problem.priors.precision))
     columns = {
@@ -104,11 +104,11 @@ def source_table(solution: Solution) -> pd.DataFrame:
 def residual_table(solution: Solution, measurements: pd.DataFrame) -> pd.DataFrame:
     """Return `schema.RESIDUALS`, in the row order of `measurements`."""
     problem, residuals = solution.problem, solution.residuals
-    input_order = np.empty_like(problem.row)
-    input_order[problem.row] = np.arange(problem.n_obs)
+    input_order = np.empty_like(problem.observed.row)
+    input_order[problem.observed.row] = np.arange(problem.n_obs)
     pairs = {
         "model_": residuals.pixel,
-        "residual_": residuals.whitened * problem.sigma,
+        "residual_": residuals.whitened * problem.observed.sigma,
         "standardised_": residuals.standardised,
         "ideal_": residuals.ideal,
         "focal_": residuals.focal,
@@ -124,7 +124,7 @@ def residual_table(solution: Solution, measurements: pd.DataFrame) -> pd.DataFra
 def exposure_table(solution: Solution) -> pd.DataFrame:
     """Return `schema.EXPOSURES`."""
     problem, residuals = solution.problem, solution.residuals
-    n_exp, index = len(problem.exposures), problem.index.exposure
+    n_exp, index = len(problem.exposures), problem.observed.index.exposure
     columns = {name: problem.exposures[name].to_numpy() for name in EXPOSURES.names[:4]}
     columns["n_obs"] = np.bincount(index, minlength=n_exp)
     columns["chi2"] = np.bincount(index, (residuals.whitened**2).sum(axis=1), n_exp)

@@ -9,8 +9,9 @@ import numpy as np
 from solver.gauss_newton import Mode, find_mode
 from solver.instrument import MINI_MOCK
 from solver.orbit import OrbitData
-from solver.problem import Problem, build_problem
+from solver.problem import Problem
 from solver.schur import Reduced
+from solver.selection import Selection
 from solver.settings import FitSettings
 from solver.what_if import linearised, re_solve
 
@@ -25,8 +26,7 @@ def unit_product(problem: Problem) -> Callable[[], object]:
 
 
 def fit_with_sigmas(problem: Problem, settings: FitSettings) -> object:
-    # A problem of its own, whose tiles are still to be laid.
-    reduced = find_mode(replace(problem), settings).reduced
+    reduced = find_mode(_as_new(problem), settings).reduced
     return None if reduced is None else marginal_sigmas(reduced)
 
 
@@ -39,19 +39,28 @@ def what_if(
     ----------
     made_ready : from which the worker starts instead, as it prepares it while nobody waits
     """
-    solved = build_problem(data, MINI_MOCK, before)
+    selection = Selection(data, MINI_MOCK)
+    _, solved = selection.choose(before)
     mode = find_mode(solved, before)
     if made_ready is not None:
-        near = build_problem(made_ready.exclusions.without(data), MINI_MOCK, made_ready)
+        _, near = selection.choose(made_ready)
         found = re_solve(mode, solved, near, made_ready) or find_mode(near, made_ready)
         mode, solved = linearised(near, found), near
-    changed = build_problem(after.exclusions.without(data), MINI_MOCK, after)
+    _, changed = selection.choose(after)
+    is_same = changed.observed is solved.observed
 
     def work() -> object:
-        reduced = _re_solved(mode, solved, changed, after).reduced
+        # The tiles of the same measurements are laid, and those of others are not.
+        asked = changed if is_same else _as_new(changed)
+        reduced = _re_solved(mode, solved, asked, after).reduced
         return None if reduced is None else marginal_sigmas(reduced)
 
     return work
+
+
+def _as_new(problem: Problem) -> Problem:
+    """Return a problem whose tiles are still to be laid."""
+    return replace(problem, observed=replace(problem.observed))
 
 
 def _re_solved(mode: Mode, solved: Problem, changed: Problem, settings: FitSettings) -> Mode:

@@ -141,7 +141,7 @@ def _dense_jacobian(offsets, geometry, index):
 def dense_jacobian(problem, theta, sources):
     """Return the derivatives of all pixels by all parameters, shape (2 obs, parameters)."""
     offsets = {**problem.layout.scatter(theta), SOURCES.name: sources}
-    blocks = _dense_jacobian(offsets, unpadded(problem), problem.index)
+    blocks = _dense_jacobian(offsets, unpadded(problem), problem.observed.index)
     n_rows = 2 * problem.n_obs
     jacobian = np.zeros((n_rows, problem.layout.size + sources.size))
     for group in CALIBRATION_GROUPS:
@@ -189,10 +189,12 @@ def make_dense():
     """Return the function that builds the dense posterior of a problem at a point."""
 
     def make(problem, theta, sources):
-        weight = 1.0 / problem.sigma.ravel()
+        weight = 1.0 / problem.observed.sigma.ravel()
         jacobian = dense_jacobian(problem, theta, sources) * weight[:, None]
-        predicted = _pixels(problem.offsets(theta, sources), problem.geometry, problem.index)
-        residual = (problem.measured - np.asarray(predicted)).ravel() * weight
+        predicted = _pixels(
+            problem.offsets(theta, sources), problem.geometry, problem.observed.index
+        )
+        residual = (problem.observed.measured - np.asarray(predicted)).ravel() * weight
         n_calib = problem.layout.size
         prior = np.zeros((jacobian.shape[1],) * 2)
         prior[:n_calib, :n_calib] = np.diag(problem.priors.curvature(theta))

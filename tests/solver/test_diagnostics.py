@@ -138,7 +138,7 @@ def test_evidence_is_the_density_of_the_data_in_the_linearised_model(make_dense)
     mean = dense.residual + dense.jacobian @ point
     covariance = np.eye(len(mean)) + dense.jacobian @ np.linalg.inv(precision) @ dense.jacobian.T
     _, log_det = np.linalg.slogdet(covariance)
-    log_sigma = float(np.log(problem.sigma).sum())
+    log_sigma = float(np.log(problem.observed.sigma).sum())
     expected = -0.5 * (len(mean) * np.log(2 * np.pi) + log_det)
     expected -= 0.5 * mean @ np.linalg.solve(covariance, mean) + log_sigma
     found = log_evidence(mode, problem.priors, log_sigma, len(mean))

@@ -21,7 +21,7 @@ _predict = jax.jit(predict)
 def predicted(problem, theta, sources):
     """Predict in one shape for all orbits, which spares compilations."""
     take = np.minimum(np.arange(512), problem.n_obs - 1)
-    index = Index(*(column[take] for column in problem.index))
+    index = Index(*(column[take] for column in problem.observed.index))
     at = _predict(problem.offsets(theta, sources), problem.geometry, index)
     return Prediction(*(np.stack(part, axis=-1)[: problem.n_obs] for part in at))
 
@@ -46,7 +46,7 @@ def test_prediction_at_the_truth_is_that_of_the_papers_equations(changes):
     )
     problem = build_problem(orbit.data, orbit.instrument, settings)
     pixels = predicted(problem, *true_offsets(orbit, problem)).pixel
-    np.testing.assert_allclose(pixels, orbit.pixels[problem.row], atol=PIXEL)
+    np.testing.assert_allclose(pixels, orbit.pixels[problem.observed.row], atol=PIXEL)
 
 
 def test_prediction_gives_the_positions_between_sky_and_pixel(problem, expansion_point):
@@ -57,7 +57,7 @@ def test_prediction_gives_the_positions_between_sky_and_pixel(problem, expansion
 
 
 def test_displacement_is_added_on_the_focal_plane(problem, expansion_point):
-    arguments = (problem.offsets(*expansion_point), problem.geometry, problem.index)
+    arguments = (problem.offsets(*expansion_point), problem.geometry, problem.observed.index)
     ideal = jax.jit(ideal_position)(jax.jit(directions)(*arguments[:2]), *arguments)
     still, moved = (jax.jit(image)(ideal, *arguments, by) for by in ((0.0, 0.0), (2.0, -3.0)))
     for axis, shift in enumerate((2.0, -3.0)):

@@ -87,14 +87,14 @@ def test_measurement_that_decides_its_own_prediction_has_no_standardised_residua
     """A source measured once and all but free otherwise: its residual is nothing but rounding."""
     settings = FitSettings(prior_widths={"sources": 1e5})
     problem = build_problem(small_orbit.data, small_orbit.instrument, settings)
-    rows = np.bincount(problem.index.source, minlength=problem.n_src)
+    rows = np.bincount(problem.observed.index.source, minlength=problem.n_src)
     free = ~problem.sources["is_reference"].to_numpy(bool)
     alone = np.flatnonzero((rows == 1) & free)
     assert len(alone) > 0
     theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
     reduced = at_origin(problem, theta, sources)
     found = residuals(problem, theta, sources, covariances(reduced))
-    here = np.isin(problem.index.source, alone)
+    here = np.isin(problem.observed.index.source, alone)
     assert np.isnan(found.standardised[here]).all()
     assert np.isfinite(found.standardised[~here]).all()
     np.testing.assert_allclose(found.trace[here], 2.0, atol=1e-5)

@@ -13,7 +13,7 @@ _predict = jax.jit(predict)
 
 def in_working_order(problem, weight, at):
     """Linearise all chunks; return what belongs to each measurement, in working order."""
-    tiles, offsets = problem.tiles, problem.offsets(*at)
+    tiles, offsets = problem.observed.tiles, problem.offsets(*at)
     turn, chunks = turning(offsets, problem.geometry), []
     for i in range(len(tiles.measured)):
         index, measured, _ = tiles.chunk(i)
@@ -23,17 +23,17 @@ def in_working_order(problem, weight, at):
 
 
 def pixels(problem, offsets):
-    return np.stack(_predict(offsets, problem.geometry, problem.index).pixel, axis=-1)
+    return np.stack(_predict(offsets, problem.geometry, problem.observed.index).pixel, axis=-1)
 
 
 @pytest.fixture
 def linearised(problem, expansion_point):
-    return in_working_order(problem, problem.tiles.weight, expansion_point)
+    return in_working_order(problem, problem.observed.tiles.weight, expansion_point)
 
 
 def of_pixels(problem, pair):
     """Return a pair of whitened derivatives as those of the pixels, one column each."""
-    return np.stack(pair, axis=-1) * problem.sigma
+    return np.stack(pair, axis=-1) * problem.observed.sigma
 
 
 def finite_difference(problem, point, group, element, step):
@@ -86,7 +86,7 @@ def test_displacement_times_basis_is_the_derivative_by_the_coefficients(
 def test_all_derivatives_are_those_of_the_whole_model(problem, linearised, dense):
     """Against the Jacobian of `predict` by all parameters at once."""
     layout, jacobian = problem.layout, dense.jacobian.reshape(problem.n_obs, 2, -1)
-    source, exposure, detector = problem.index
+    source, exposure, detector = problem.observed.index
     columns = layout.touched(exposure, detector).T
     expected_columns = [*zip(linearised.local, columns, strict=True)]
     expected_columns += [(linearised.source[a], layout.size + 2 * source + a) for a in range(2)]
@@ -113,7 +113,9 @@ def test_products_are_sums_over_the_two_coordinates(linearised):
 
 
 def test_residual_is_measured_minus_predicted_over_sigma(small_orbit, problem):
-    at = in_working_order(problem, problem.tiles.weight, true_offsets(small_orbit, problem))
+    at = in_working_order(
+        problem, problem.observed.tiles.weight, true_offsets(small_orbit, problem)
+    )
     truth = predict_pixels(
         small_orbit.truth,
         small_orbit.source,
@@ -121,14 +123,16 @@ def test_residual_is_measured_minus_predicted_over_sigma(small_orbit, problem):
         small_orbit.detector,
         observer_of(small_orbit.data.exposures, aberration=True),
         small_orbit.instrument.distortion_scale_um,
-    )[problem.row]
-    expected = (problem.measured - truth) / problem.sigma
+    )[problem.observed.row]
+    expected = (problem.observed.measured - truth) / problem.observed.sigma
     np.testing.assert_allclose(np.stack(at.residual, axis=-1), expected, atol=1e-5)
 
 
 def test_zero_weight_removes_a_coordinate(problem, expansion_point):
-    weight = problem.tiles.weight.copy()
-    chunk, tile, slot = np.unravel_index(problem.tiles.place[3], problem.tiles.index.source.shape)
+    weight = problem.observed.tiles.weight.copy()
+    chunk, tile, slot = np.unravel_index(
+        problem.observed.tiles.place[3], problem.observed.tiles.index.source.shape
+    )
     weight[chunk, 1, tile, slot] = 0.0
     at = in_working_order(problem, weight, expansion_point)
     for _, y in (at.residual, *at.source, *at.local, *at.displacement):

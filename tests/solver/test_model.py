@@ -28,7 +28,9 @@ def test_density_is_that_of_the_posterior(small_orbit, expansion_point, widths):
     problem = build_problem(small_orbit.data, small_orbit.instrument, settings)
     theta, sources = expansion_point
     at = gradient(problem, theta, sources)
-    likelihood = -np.log(problem.sigma).sum() - 0.5 * problem.sigma.size * np.log(2.0 * np.pi)
+    likelihood = -np.log(problem.observed.sigma).sum() - 0.5 * problem.observed.sigma.size * np.log(
+        2.0 * np.pi
+    )
     expected = likelihood + problem.priors.log_normalisation()
     expected -= 0.5 * objective(problem, theta, sources, at)
     # A gamma prior's normalisation is that of a normal one to a part in a million.

@@ -57,7 +57,9 @@ def test_sums_of_a_detector_are_those_of_its_measurements(
     detector, equations, problem, expansion_point
 ):
     own, layout = equations.by_detector, problem.layout
-    alone = accumulate(of_rows(problem, problem.index.detector == detector), *expansion_point)
+    alone = accumulate(
+        of_rows(problem, problem.observed.index.detector == detector), *expansion_point
+    )
     close(own.theta[detector], alone.theta)
     close(own.source[detector].transpose(2, 0, 1), alone.source)
     close(own.coefficients[detector], alone.cross[layout.coefficients()])
@@ -97,8 +99,8 @@ def test_known_blocks_between_terms_are_taken_as_they_are(problem, equations, ex
 
 def test_chunks_are_those_of_the_tiles(problem, expansion_point):
     found = list(chunks(problem, *expansion_point))
-    assert len(found) == len(problem.tiles.measured) > 1
-    for chunk, weight in zip(found, problem.tiles.weight, strict=True):
+    assert len(found) == len(problem.observed.tiles.measured) > 1
+    for chunk, weight in zip(found, problem.observed.tiles.weight, strict=True):
         assert chunk.residual[0].shape == weight[0].shape
         assert (chunk.residual[0][weight[0] == 0.0] == 0.0).all()
 

@@ -21,7 +21,7 @@ def traces(monkeypatch):
 
 def test_gradient_is_traced_once_for_all_chunks(problem, traces):
     """Each trace is a compilation, or a second of a short run."""
-    assert len(problem.tiles.measured) > 1
+    assert len(problem.observed.tiles.measured) > 1
     theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
     objective.gradient(problem, theta, sources)
     assert len(traces) == 1

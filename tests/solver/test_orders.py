@@ -142,17 +142,17 @@ def linear(request, make_dense):
 def test_evidence_is_the_density_of_the_data(linear):
     """With every normalisation of every prior, to the last digits of a number of thousands."""
     problem, model = linear
-    log_sigma = float(np.log(problem.sigma).sum())
-    found = log_evidence(model.mode, problem.priors, log_sigma, problem.sigma.size)
-    assert found == pytest.approx(model.log_density(problem.sigma), abs=1e-6)
+    log_sigma = float(np.log(problem.observed.sigma).sum())
+    found = log_evidence(model.mode, problem.priors, log_sigma, problem.observed.sigma.size)
+    assert found == pytest.approx(model.log_density(problem.observed.sigma), abs=1e-6)
 
 
 def test_reserved_sources_are_judged_by_their_predictive_density(linear):
     problem, model = linear
     reserved = reserved_sources(problem)
     found = judge_reserved(problem, model.mode, reserved, EXACT)
-    held = np.repeat(reserved[problem.index.source], 2)
-    chi2, log_density = model.prediction(held, problem.sigma)
+    held = np.repeat(reserved[problem.observed.index.source], 2)
+    chi2, log_density = model.prediction(held, problem.observed.sigma)
     assert found.dof == held.sum()
     assert found.chi2 == pytest.approx(chi2, rel=1e-4)
     assert found.log_density == pytest.approx(log_density, abs=1e-2)

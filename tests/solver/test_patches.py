@@ -7,7 +7,7 @@ import pytest
 from solver.forward import Index
 from solver.layout import PER_EXPOSURE, Layout
 from solver.normal import accumulate
-from solver.patches import MOST, patches_of
+from solver.patches import MOST, field_sets
 from solver.schur import reduce
 
 N_SRC = 60
@@ -45,8 +45,12 @@ def check(patches, index):
             assert touched(index, source) <= {*patch.columns.tolist()}
 
 
+def patches_of(index):
+    return field_sets(index, EXPOSURES, N_SRC).touching(LAYOUT)
+
+
 def test_patch_is_of_sources_seen_by_the_same_fields(index):
-    patches = patches_of(index, EXPOSURES, LAYOUT, N_SRC)
+    patches = patches_of(index)
     check(patches, index)
     assert len(patches.parts) > 3
     for patch in patches.parts:
@@ -55,26 +59,27 @@ def test_patch_is_of_sources_seen_by_the_same_fields(index):
 
 
 def test_patches_that_save_nothing_are_joined(index, monkeypatch):
-    alone = len(patches_of(index, EXPOSURES, LAYOUT, N_SRC).parts)
+    alone = len(patches_of(index).parts)
+    monkeypatch.setattr("solver.patches.OF_ALL", LAYOUT.size - LAYOUT.first_coefficient)
     monkeypatch.setattr("solver.patches.OF_ONE_BLOCK", 2.0 * LAYOUT.size**2)
-    some = patches_of(index, EXPOSURES, LAYOUT, N_SRC)
+    some = patches_of(index)
     check(some, index)
     assert 1 < len(some.parts) < alone
     monkeypatch.setattr("solver.patches.OF_ONE_BLOCK", 1e300)
-    (patch,) = patches_of(index, EXPOSURES, LAYOUT, N_SRC).parts
+    (patch,) = patches_of(index).parts
     np.testing.assert_array_equal(patch.columns, np.arange(LAYOUT.size))
 
 
 def test_rare_sets_of_fields_share_a_patch(index, monkeypatch):
     monkeypatch.setattr("solver.patches.MOST", 3)
-    patches = patches_of(index, EXPOSURES, LAYOUT, N_SRC)
+    patches = patches_of(index)
     check(patches, index)
     assert len(patches.parts) == 3 < MOST
 
 
 def test_no_measurement_makes_one_patch():
     nothing = np.zeros(0, dtype=np.int64)
-    (patch,) = patches_of(Index(*3 * [nothing]), EXPOSURES, LAYOUT, N_SRC).parts
+    (patch,) = patches_of(Index(*3 * [nothing])).parts
     assert patch.places == slice(0, N_SRC)
 
 
@@ -88,9 +93,8 @@ def test_nothing_lies_outside_the_blocks(equations):
 
 def test_solution_does_not_depend_on_the_patches(reduced, problem, expansion_point):
     together = problem.exposures.assign(field_id=0)
-    joined = replace(
-        problem, patches=patches_of(problem.index, together, problem.layout, problem.n_src)
-    )
+    sets = field_sets(problem.observed.index, together, problem.n_src)
+    joined = replace(problem, observed=replace(problem.observed, sets=sets))
     assert len(joined.patches.parts) == 1 < len(reduced.patches.parts)
     other = reduce(accumulate(joined, *expansion_point), joined.priors)
     for name in ("theta_covariance", "marginal_covariance", "log_determinant"):

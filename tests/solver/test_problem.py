@@ -12,15 +12,15 @@ from tests.solver.small_orbit import Design, epoch_places, make_orbit
 
 
 def test_measurements_are_in_order_of_exposure_detector_and_source(problem):
-    source, exposure, detector = problem.index
+    source, exposure, detector = problem.observed.index
     order = np.lexsort((source, detector, exposure))
     np.testing.assert_array_equal(order, np.arange(problem.n_obs))
 
 
 def test_rows_lead_back_to_the_input(small_orbit, problem):
-    rows = small_orbit.data.measurements.iloc[problem.row]
-    np.testing.assert_array_equal(rows[["nx", "ny"]].to_numpy(), problem.measured)
-    ids = problem.sources["source_id"].to_numpy()[problem.index.source]
+    rows = small_orbit.data.measurements.iloc[problem.observed.row]
+    np.testing.assert_array_equal(rows[["nx", "ny"]].to_numpy(), problem.observed.measured)
+    ids = problem.sources["source_id"].to_numpy()[problem.observed.index.source]
     np.testing.assert_array_equal(ids, rows["source_id"].to_numpy())
 
 
@@ -132,16 +132,19 @@ def test_thinned_problem_holds_the_measurements_of_the_kept_sources(problem, exp
     theta, sources = expansion_point
     keep = np.arange(problem.n_src) % 3 == 1
     part = thinned(problem, keep)
-    rows = keep[problem.index.source]
-    np.testing.assert_array_equal(part.label, problem.label[rows])
+    rows = keep[problem.observed.index.source]
+    np.testing.assert_array_equal(part.observed.label, problem.observed.label[rows])
     ids = problem.sources["source_id"].to_numpy()
     np.testing.assert_array_equal(part.sources["source_id"], ids[keep])
     np.testing.assert_array_equal(
-        part.sources["source_id"].to_numpy()[part.index.source], ids[problem.index.source[rows]]
+        part.sources["source_id"].to_numpy()[part.observed.index.source],
+        ids[problem.observed.index.source[rows]],
     )
     # Its model is that of the whole: the same measurements have the same residuals.
     whole, found = (
-        np.concatenate([np.ravel(c.residual[0]) for c in chunks(p, theta, s)])[p.tiles.place]
+        np.concatenate([np.ravel(c.residual[0]) for c in chunks(p, theta, s)])[
+            p.observed.tiles.place
+        ]
         for p, s in ((problem, sources), (part, sources[keep]))
     )
     np.testing.assert_allclose(found, whole[rows], atol=1e-6)

@@ -103,7 +103,10 @@ def test_bound_falls_short_of_the_evidence_by_the_density_of_the_calibration(
     """K/2 log 2 pi in whitened coordinates, where that density is the unit normal's."""
     problem = solution.problem
     evidence = log_evidence(
-        solution.mode, problem.priors, float(np.log(problem.sigma).sum()), 2 * problem.n_obs
+        solution.mode,
+        problem.priors,
+        float(np.log(problem.observed.sigma).sum()),
+        2 * problem.n_obs,
     )
     bound = -loss(whitened(reduced_at_mode), at_mode(1.0))
     deficit = 0.5 * problem.layout.size * np.log(2.0 * np.pi)

@@ -301,5 +301,6 @@ def compare_blocks(found, problem):
 
 
 def test_more_measurements_cannot_be_carried_over(problem, expansion_point):
-    fewer = replace(problem, label=problem.label + 1)
+    observed = replace(problem.observed, label=problem.observed.label + 1)
+    fewer = replace(problem, observed=observed)
     assert carry_over(accumulate(problem, *expansion_point), problem, fewer) is None

@@ -22,6 +22,7 @@ from solver.linearise import Linearised
 from solver.normal import chunks, one_blas_thread
 from solver.patches import Patches
 from solver.problem import Problem
+from solver.products import side_by_side
 from solver.schur import Reduced
 
 
@@ -82,7 +83,7 @@ def residuals(
         index = Index(*(part[i] for part in tiles.index))
         leverage = _leverage(index, jacobians, problem.layout, covariance)
         at = chunk.prediction
-        return [leverage, *map(side_by_side, (chunk.residual, at.pixel, at.ideal, at.focal))]
+        return [leverage, *map(of_slots, (chunk.residual, at.pixel, at.ideal, at.focal))]
 
     parts, under_way = [], deque()
     with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as helpers:
@@ -102,7 +103,7 @@ def residuals(
     return Residuals(residual, _standardised(residual, leverage), trace, pixel, ideal, focal)
 
 
-def side_by_side(pair: Pair) -> Float[np.ndarray, "slots 2"]:
+def of_slots(pair: Pair) -> Float[np.ndarray, "slots 2"]:
     """Return x and y of every slot of a chunk."""
     return np.stack([values.ravel() for values in pair], axis=-1)
 
@@ -111,7 +112,7 @@ def _leverage(
     index: Index, chunk: Linearised, layout: Layout, covariance: Covariances
 ) -> Float[np.ndarray, "slots 2 2"]:
     """Return J C J' of every slot of a chunk."""
-    source, local, displacement = map(_rows, (chunk.source, chunk.local, chunk.displacement))
+    source, local, displacement = map(side_by_side, (chunk.source, chunk.local, chunk.displacement))
     of_local, with_displacement, of_displacement = _calibration_covariance(
         index, chunk.prediction.basis, layout, covariance.theta
     )
@@ -136,10 +137,6 @@ def _leverage(
         half = _between(rows, between, columns)
         leverage += half + half.swapaxes(1, 2)
     return leverage.transpose(0, 3, 1, 2).reshape(-1, 2, 2)
-
-
-def _rows(part: list[Pair]) -> Float[np.ndarray, "tile row 2 slot"]:
-    return np.stack([np.stack(pair, axis=1) for pair in part], axis=1)
 
 
 def _between(

@@ -30,19 +30,6 @@ from solver.layout import LOCAL_GROUPS
 from solver.parameters import SOURCES
 
 
-class Products(NamedTuple):
-    """Sums over a measurement's two coordinates of products of the parts of `Linearised`.
-
-    The last entries of those with `local` are the products with the residual.
-    """
-
-    source_source: list[list[Float[AnyArray, "tile slot"]]]
-    local_source: list[list[Float[AnyArray, "tile slot"]]]
-    local_displacement: list[list[Float[AnyArray, "tile slot"]]]
-    displacement_source: list[list[Float[AnyArray, "tile slot"]]]
-    displacement_displacement: list[list[Float[AnyArray, "tile slot"]]]
-
-
 class Linearised(NamedTuple):
     """A run of tiles, linearised; all but `prediction` divided by sigma, x and y apart.
 
@@ -131,25 +118,6 @@ def linearise(
     return Linearised(residual, source, local, displacement, at.prediction)
 
 
-def products(chunk: Linearised) -> Products:
-    """Return the products of the parts of a chunk: many and tiny, and so not for NumPy."""
-    return _products(chunk.residual, chunk.source, chunk.local, chunk.displacement)
-
-
-@jax.jit
-def _products(
-    residual: Pair, source: list[Pair], local: list[Pair], displacement: list[Pair]
-) -> Products:
-    with_residual = [*local, residual]
-    return Products(
-        _dots(source, source),
-        _dots(with_residual, source),
-        _dots(with_residual, displacement),
-        _dots(displacement, source),
-        _dots(displacement, displacement),
-    )
-
-
 @jax.jit
 def _imaged(turn: Turning, offsets: Offsets, geometry: Geometry, index: Index) -> Imaged:
     ideal = ideal_position(turn.at, offsets, geometry, index)
@@ -214,7 +182,3 @@ def _by_axes(of: Callable[[Pair], Pair], at: Pair) -> list[Pair]:
     """Return the derivatives of a function by the two components of its argument."""
     one, zero = jnp.ones_like(at[0]), jnp.zeros_like(at[0])
     return [jax.jvp(of, (at,), (unit,))[1] for unit in ((one, zero), (zero, one))]
-
-
-def _dots(first: list[Pair], second: list[Pair]) -> list[list[Float[Array, "tile slot"]]]:
-    return [[a[0] * b[0] + a[1] * b[1] for b in second] for a in first]

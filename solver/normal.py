@@ -7,12 +7,11 @@ sources cheap to eliminate (`solver.schur`). Priors are added there, so that the
 outlive a change of the priors.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
-from typing import TypeVar
 
 import jax
 import numpy as np
@@ -22,14 +21,13 @@ from threadpoolctl import ThreadpoolController
 
 from solver.forward import Index
 from solver.layout import LOCAL_GROUPS, PER_DETECTOR, PER_EXPOSURE, Layout
-from solver.linearise import Linearised, Products, linearise, products, turning
+from solver.linearise import Linearised, linearise, turning
 from solver.objective import Gradient
 from solver.patches import Patches
 from solver.problem import Problem
+from solver.products import Rows, one_by_one, rows_of
 from solver.tile_sums import N_LOCAL, TileSums
 from solver.tiles import Gathering
-
-Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -79,24 +77,14 @@ def chunks(
 
     The next chunk is under way in JAX while the caller works on this one.
     """
-    return _chunks(problem, theta, sources, lambda chunk: chunk)
-
-
-def _chunks(
-    problem: Problem,
-    theta: Float[np.ndarray, " calib"],
-    sources: Float[np.ndarray, "src 2"],
-    made: Callable[[Linearised], Made],
-) -> Iterator[Made]:
-    """Return what is made of each chunk."""
     n_chunks = len(problem.observed.tiles.measured)
     # Once, and not with every chunk.
     offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
     turn = turning(offsets, geometry)
 
-    def start(i: int) -> Made:
+    def start(i: int) -> Linearised:
         chunk = linearise(turn, offsets, geometry, *problem.observed.tiles.chunk(i))
-        return made(chunk.with_terms(problem.layout.n_coef))
+        return chunk.with_terms(problem.layout.n_coef)
 
     ahead = start(0)
     for i in range(n_chunks):
@@ -142,18 +130,17 @@ def accumulate(
     sums = TileSums.empty(index.source.shape, n_coef)
     with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
         under_way = helper.submit(lambda: None)
-        both = _chunks(problem, theta, sources, lambda chunk: (chunk, products(chunk)))
-        for i, (chunk, multiplied) in enumerate(both):
-            here = Index(*(part[i] for part in index))
-            sums.keep_slots(chunk, multiplied, i)
+        for i, chunk in enumerate(chunks(problem, theta, sources)):
+            here, rows = Index(*(part[i] for part in index)), rows_of(chunk)
+            sums.keep_slots(chunk, rows, i)
             # One chunk at a time: they are large.
             under_way.result()
             summed = None if is_known else of_terms
-            under_way = helper.submit(_sum_with_terms, multiplied, i, here.detector, sums, summed)
-            sums.sum_local(chunk, i)
-            _add_sources(here, multiplied, source, by_source)
+            under_way = helper.submit(_sum_in_tiles, rows, i, here.detector, sums, summed)
+            by_row = one_by_one(rows.local, rows.source)
+            _add_sources(here, rows.source, by_row[-1], source, by_source)
             in_order = here._replace(source=problem.patches.position[here.source])
-            _add_cross_local(in_order, multiplied, layout, cross)
+            _add_cross_local(in_order, by_row, layout, cross)
         under_way.result()
         of_coefficients = np.empty((n_det, 2 * n_coef, 2, n_src))
         some, others = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)
@@ -171,31 +158,32 @@ def accumulate(
     return NormalEquations(at, gradient, of_theta, of_sources, problem.patches, cross, own)
 
 
-def _sum_with_terms(
-    products: Products,
+def _sum_in_tiles(
+    rows: Rows,
     i: int,
     detector: Int[np.ndarray, "tile 1"],
     sums: TileSums,
     coefficients: Float[np.ndarray, "det 2 coef 2 coef"] | None,
 ) -> None:
-    """Sum the products of chunk `i` with the distortion's terms, and add those between them."""
-    sums.sum_mixed(products, i)
+    """Sum the products of chunk `i` that are of a whole tile, and add those between the terms."""
+    sums.sum_local(rows, i)
+    sums.sum_mixed(rows, i)
     if coefficients is not None:
-        _add_coefficients(detector, products, sums.basis[i], coefficients)
+        _add_coefficients(detector, rows.displacement, sums.basis[i], coefficients)
 
 
 def _add_coefficients(
     detector: Int[np.ndarray, "tile 1"],
-    products: Products,
+    displacement: Float[np.ndarray, "tile 2 2 slot"],
     basis: Float[np.ndarray, "tile slot coef"],
     hessian: Float[np.ndarray, "det 2 coef 2 coef"],
 ) -> None:
     n_det, n_coef = len(hessian), basis.shape[-1]
     on_detector = (np.arange(n_det)[:, None] == detector.T).astype(np.float64)
+    weight = one_by_one(displacement, displacement)
     weighted, of_tiles = np.empty(basis.shape), np.empty((len(basis), n_coef, n_coef))
     for i, j in ((0, 0), (0, 1), (1, 1)):
-        weight = products.displacement_displacement[i][j]
-        np.multiply(weight[:, :, None], basis, out=weighted)
+        np.multiply(weight[i, j, :, :, None], basis, out=weighted)
         np.matmul(weighted.swapaxes(1, 2), basis, out=of_tiles)
         sums = on_detector @ of_tiles.reshape(len(basis), n_coef * n_coef)
         hessian[:, i, :, j] += sums.reshape(n_det, n_coef, n_coef)
@@ -204,7 +192,8 @@ def _add_coefficients(
 
 def _add_sources(
     index: Index,
-    products: Products,
+    rows: Float[np.ndarray, "tile 2 2 slot"],
+    by_residual: Float[np.ndarray, "2 tile slot"],
     hessian: Float[np.ndarray, "det 2 2 src"],
     gradient: Float[np.ndarray, "det 2 src"],
 ) -> None:
@@ -214,25 +203,28 @@ def _add_sources(
     def sums(values: Float[np.ndarray, "tile slot"]) -> Float[np.ndarray, "det src"]:
         return np.bincount(pair, values.ravel(), n_det * n_src).reshape(n_det, n_src)
 
+    squares = one_by_one(rows, rows)
     for a in range(2):
-        gradient[:, a] += sums(products.local_source[-1][a])
+        gradient[:, a] += sums(by_residual[a])
         for b in range(a + 1):
-            hessian[:, a, b] += sums(products.source_source[a][b])
+            hessian[:, a, b] += sums(squares[a, b])
     hessian[:, 0, 1] = hessian[:, 1, 0]
 
 
 def _add_cross_local(
-    index: Index, products: Products, layout: Layout, cross: Float[np.ndarray, "calib 2 src"]
+    index: Index,
+    by_row: Float[np.ndarray, "local 2 tile slot"],
+    layout: Layout,
+    cross: Float[np.ndarray, "calib 2 src"],
 ) -> None:
     """Add the blocks between the sources and what each of their measurements touches."""
     n_src, flat = cross.shape[-1], cross.reshape(-1)
     for number, groups in ((index.exposure, PER_EXPOSURE), (index.detector, PER_DETECTOR)):
         for group in groups:
             row = layout.columns(group)[number]
-            by_source = products.local_source[LOCAL_GROUPS.index(group)]
             for a in range(2):
                 place = (2 * row + a) * n_src + index.source
-                np.add.at(flat, place.ravel(), by_source[a].ravel())
+                np.add.at(flat, place.ravel(), by_row[LOCAL_GROUPS.index(group), a].ravel())
 
 
 def _cross_coefficients(

@@ -15,7 +15,7 @@ import pandas as pd
 from jaxtyping import Bool, Float
 
 from solver.gauss_newton import Iteration, Mode, find_mode
-from solver.leverage import side_by_side
+from solver.leverage import of_slots
 from solver.normal import chunks
 from solver.orbit import OrbitData
 from solver.problem import Problem, of_rows
@@ -103,7 +103,7 @@ def _weighted(problem: Problem, weight: Float[np.ndarray, " obs"]) -> Problem:
 
 
 def _whitened(problem: Problem, mode: Mode) -> Float[np.ndarray, "obs 2"]:
-    parts = [side_by_side(c.residual) for c in chunks(problem, mode.theta, mode.sources)]
+    parts = [of_slots(c.residual) for c in chunks(problem, mode.theta, mode.sources)]
     return np.concatenate(parts)[problem.observed.tiles.place]
 
 
@@ -114,8 +114,8 @@ def _described(problem: Problem, mode: Mode, found: Bool[np.ndarray, " obs"]) ->
     place = few.observed.tiles.place
     whitened, jacobian = [], []
     for chunk in chunks(few, mode.theta, mode.sources):
-        whitened.append(side_by_side(chunk.residual))
-        jacobian.append(np.stack([side_by_side(pair) for pair in chunk.source], axis=-1))
+        whitened.append(of_slots(chunk.residual))
+        jacobian.append(np.stack([of_slots(pair) for pair in chunk.source], axis=-1))
     residual, by_source = np.concatenate(whitened)[place], np.concatenate(jacobian)[place]
     covariance = mode.reduced.marginal_covariance()[few.observed.index.source]
     # As one more measurement of the source moves it: gain times residual.

@@ -1,14 +1,13 @@
 """Sums of products within each tile, before it is known where they belong."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from solver.forward import AnyArray
 from solver.layout import LOCAL_GROUPS
-from solver.linearise import Linearised, Products
+from solver.linearise import Linearised
+from solver.products import Rows, in_tiles, one_by_one
 
 N_LOCAL = len(LOCAL_GROUPS)
 
@@ -41,26 +40,18 @@ class TileSums:
             np.empty((2, 2, *shape)),
         )
 
-    def keep_slots(self, chunk: Linearised, products: Products, i: int) -> None:
+    def keep_slots(self, chunk: Linearised, rows: Rows, i: int) -> None:
         """Fill in what is kept of each slot of chunk `i`."""
         for term, values in enumerate(chunk.prediction.basis):
             self.basis[i, :, :, term] = values
-        for axis in range(2):
-            for a in range(2):
-                self.shared[axis, a, i] = products.displacement_source[axis][a]
+        self.shared[:, :, i] = one_by_one(rows.displacement, rows.source)
 
-    def sum_local(self, chunk: Linearised, i: int) -> None:
+    def sum_local(self, rows: Rows, i: int) -> None:
         """Fill in `local` of chunk `i`."""
-        rows = np.stack(_flatten([*chunk.local, chunk.residual]), axis=1)
-        rows = rows.reshape(len(rows), N_LOCAL + 1, -1)
-        np.matmul(rows, rows.swapaxes(1, 2), out=self.local[i])
+        flat = rows.local.reshape(len(rows.local), N_LOCAL + 1, -1)
+        np.matmul(flat, flat.swapaxes(1, 2), out=self.local[i])
 
-    def sum_mixed(self, products: Products, i: int) -> None:
+    def sum_mixed(self, rows: Rows, i: int) -> None:
         """Fill in `mixed` of chunk `i`, whose slots are kept."""
-        mixed = np.stack(_flatten(products.local_displacement), axis=1) @ self.basis[i]
+        mixed = in_tiles(rows.local, rows.displacement) @ self.basis[i]
         self.mixed[i] = mixed.reshape(self.mixed[i].shape)
-
-
-def _flatten(nested: Iterable[Iterable[AnyArray]]) -> list[AnyArray]:
-    """Return the arrays of a list of rows, row after row."""
-    return [values for row in nested for values in row]

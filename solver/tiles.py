@@ -49,21 +49,22 @@ class Tiles(NamedTuple):
     def by_source(
         self, position: Int[np.ndarray, " src"], n_det: int, n_values: int
     ) -> "Gathering":
-        """Return how to gather so many values of each slot by its detector and source.
+        """Return how to gather so many values of each measurement by its detector and source.
 
         Parameters
         ----------
         position : of each source among the rows
         """
-        pair = (self.index.detector * len(position) + position[self.index.source]).ravel()
-        order = np.argsort(pair, kind="stable")
+        pair = self.index.detector * len(position) + position[self.index.source]
+        pair = pair.reshape(-1)[self.place]
+        order = self.place[np.argsort(pair, kind="stable")]
         count = np.bincount(pair, minlength=n_det * len(position))
         first = np.cumsum(count) - count
         begin = n_values * first + np.arange(n_values)[:, None] * count
         place = np.repeat(begin - first, count, axis=1) + np.arange(len(order))
         slot, value = np.empty(place.size, dtype=np.int32), np.empty(place.size, dtype=np.int64)
         slot[place] = order
-        value[place] = order + len(order) * np.arange(n_values)[:, None]
+        value[place] = order + self.index.source.size * np.arange(n_values)[:, None]
         return Gathering(value, slot, np.append(begin.T, place.size).astype(np.int32))
 
 

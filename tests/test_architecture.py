@@ -46,6 +46,7 @@ RUNGS = (
     ("solver.selection",),
     ("solver.simulate",),
     ("solver.linearise", "solver.objective"),
+    ("solver.products",),
     ("solver.tile_sums",),
     ("solver.normal",),
     ("solver.schur", "solver.part"),

@@ -5,7 +5,6 @@ import pytest
 from solver.forward import predict
 from solver.layout import LOCAL_GROUPS
 from solver.linearise import linearise, turning
-from solver.linearise import products as multiplied
 from tests.solver.small_orbit import observer_of, predict_pixels, true_offsets
 
 _predict = jax.jit(predict)
@@ -94,22 +93,6 @@ def test_all_derivatives_are_those_of_the_whole_model(problem, linearised, dense
         expected = jacobian[np.arange(problem.n_obs), :, column]
         found = np.stack(pair, axis=-1)
         np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
-
-
-def test_products_are_sums_over_the_two_coordinates(linearised):
-    in_one_tile = jax.tree.map(lambda values: values[None], linearised)
-    products, residual = multiplied(in_one_tile), linearised.residual
-    with_residual = [*linearised.local, residual]
-    for found, first, second in (
-        (products.source_source, linearised.source, linearised.source),
-        (products.local_source, with_residual, linearised.source),
-        (products.local_displacement, with_residual, linearised.displacement),
-        (products.displacement_source, linearised.displacement, linearised.source),
-        (products.displacement_displacement, linearised.displacement, linearised.displacement),
-    ):
-        expected = np.einsum("ipo,jpo->ijo", np.array(first), np.array(second))
-        found = np.array(found)[:, :, 0]
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
 def test_residual_is_measured_minus_predicted_over_sigma(small_orbit, problem):

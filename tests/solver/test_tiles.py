@@ -76,11 +76,13 @@ def test_values_are_gathered_by_detector_and_source(laid):
     seen = np.random.default_rng(1).standard_normal((n_slots, 2))
     position = np.random.default_rng(2).permutation(50)
     places = tiles.by_source(position, 4, n_values)
-    gather = sp.csr_array((values.ravel()[places.value], places.slot, places.first))
+    gather = sp.csr_array(
+        (values.ravel()[places.value], places.slot, places.first), shape=(600, n_slots)
+    )
     found = (gather @ seen).reshape(4, 50, n_values, 2)
     detector = np.broadcast_to(tiles.index.detector, tiles.index.source.shape).ravel()
     expected = np.zeros_like(found)
     for value in range(n_values):
-        pairs = (detector, position[tiles.index.source].ravel(), value)
-        np.add.at(expected, pairs, values[value][:, None] * seen)
+        pairs = np.stack([detector, position[tiles.index.source].ravel()])[:, tiles.place]
+        np.add.at(expected, (*pairs, value), (values[value][:, None] * seen)[tiles.place])
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)

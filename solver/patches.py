@@ -46,6 +46,29 @@ class Patches:
     position: Int[np.ndarray, " src"]
     parts: tuple[Patch, ...]
 
+    def chains(self) -> list[list[int]]:
+        """Return the numbers of the patches, in chains.
+
+        The columns of each patch are among those of the one before it.
+        """
+        chains: list[list[int]] = []
+        for number in sorted(range(len(self.parts)), key=lambda n: -len(self.parts[n].columns)):
+            columns = self.parts[number].columns
+            for chain in chains:
+                if np.isin(columns, self.parts[chain[-1]].columns).all():
+                    chain.append(number)
+                    break
+            else:
+                chains.append([number])
+        return chains
+
+    def last(self, chain: list[int], size: int) -> Int[np.ndarray, " calib"]:
+        """Return all columns in an order in which those of every patch of a chain stand last."""
+        rank = np.zeros(size, dtype=np.int64)
+        for number in chain:
+            rank[self.parts[number].columns] += 1
+        return np.argsort(rank, kind="stable")
+
 
 @dataclass(frozen=True)
 class FieldSets:

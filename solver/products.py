@@ -1,7 +1,7 @@
 """Products of the derivatives of a chunk, summed over the two coordinates of each measurement.
 
 The derivatives of one tile stand together, so that all its products are made while they are in
-the caches: XLA goes through the whole chunk once for each of fifty, and takes twice as long.
+the caches: XLA goes through the whole chunk once for each of fifty, and takes nearly twice as long.
 """
 
 from typing import NamedTuple

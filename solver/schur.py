@@ -7,6 +7,7 @@ each of a patch of sources and the columns that they touch (`solver.patches`).
 """
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,6 +25,8 @@ from solver.triangles import lower_solve, rows_solved, upper_solve
 _WEAK, POORLY_HELD = 1e-6, 1e-3
 # At most so many of them are looked for.
 _BLOCK = 16
+# More would wait for memory.
+_WORKERS = 2
 
 
 @dataclass(frozen=True)
@@ -160,22 +163,24 @@ class Reduced:
 
         Its other rows are zero then, and the last of R are a factor by themselves.
         """
-        factors = [self._last_of_factor(patch.columns) for patch in self.patches.parts]
-        for factor, (patch, block) in zip(factors, self._blocks(), strict=True):
-            yield patch.places, rows_solved(factor, block.copy(), trans=True)
+        for chain in self.patches.chains():
+            order = self.patches.last(chain, len(self.factor))
+            factor = self._turned(order)
+            for number in chain:
+                patch, block = self.patches.parts[number], self.whitened[number]
+                own = slice(len(order) - len(block), None)
+                rows = np.searchsorted(patch.columns, order[own])
+                yield patch.places, rows_solved(factor[own, own], block[rows], trans=True)
 
-    def _last_of_factor(self, columns: Int[np.ndarray, " k"]) -> Float[np.ndarray, "k k"]:
-        """Return the last rows of R where some columns stand last."""
-        others = np.setdiff1d(np.arange(len(self.factor)), columns)
-        if not len(others):
+    def _turned(self, order: Int[np.ndarray, " calib"]) -> Float[np.ndarray, "calib calib"]:
+        """Return R where the columns stand in another order."""
+        if (order[:-1] < order[1:]).all():
             return self.factor
-        order = np.concatenate([others, columns])
         try:
-            last = np.linalg.cholesky(self.matrix[order][:, order]).T
+            return np.linalg.cholesky(self.matrix[np.ix_(order, order)]).T
         except np.linalg.LinAlgError:
             # Slower, but R can be turned where S is as good as singular.
-            last = np.asarray(np.linalg.qr(self.factor[:, order], mode="r"))
-        return last[len(others) :, len(others) :]
+            return np.asarray(np.linalg.qr(self.factor[:, order], mode="r"))
 
     def weak_directions(self, below: float = _WEAK) -> Float[np.ndarray, "calib weak"]:
         """Return the directions of the calibration that only the priors hold.
@@ -239,7 +244,7 @@ def reduce(
         if before is not None and np.array_equal(before.source_factor, source_factor):
             whitened, of_data = before.whitened, before.of_data
         else:
-            whitened = tuple(_whitened(equations, source_factor))
+            whitened = _whitened(equations, source_factor)
             of_data = equations.theta.copy()
             for patch, block in zip(equations.patches.parts, whitened, strict=True):
                 rows = block.reshape(len(block), -1)
@@ -271,12 +276,16 @@ def reduce(
 
 def _whitened(
     equations: NormalEquations, source_factor: Float[np.ndarray, "src 2 2"]
-) -> Iterator[Float[np.ndarray, "_ 2 _"]]:
+) -> tuple[Float[np.ndarray, "_ 2 _"], ...]:
     """Return the block of Z of each patch."""
     ordered = source_factor[equations.patches.order]
-    for patch in equations.patches.parts:
+
+    def of_patch(patch: Patch) -> Float[np.ndarray, "_ 2 _"]:
         block = equations.cross[patch.columns, :, patch.places]
-        yield lower_solve(ordered[patch.places], block)
+        return lower_solve(ordered[patch.places], block)
+
+    with ThreadPoolExecutor(max_workers=_WORKERS) as helpers:
+        return tuple(helpers.map(of_patch, equations.patches.parts))
 
 
 def _with_diagonal(

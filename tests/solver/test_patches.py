@@ -77,6 +77,19 @@ def test_rare_sets_of_fields_share_a_patch(index, monkeypatch):
     assert len(patches.parts) == 3 < MOST
 
 
+def test_patches_of_a_chain_stand_last(index):
+    patches = patches_of(index)
+    chains = patches.chains()
+    assert sorted(number for chain in chains for number in chain) == [*range(len(patches.parts))]
+    assert len(chains) < len(patches.parts)
+    for chain in chains:
+        order = patches.last(chain, LAYOUT.size)
+        np.testing.assert_array_equal(np.sort(order), np.arange(LAYOUT.size))
+        for number in chain:
+            columns = patches.parts[number].columns
+            assert {*order[-len(columns) :].tolist()} == {*columns.tolist()}
+
+
 def test_no_measurement_makes_one_patch():
     nothing = np.zeros(0, dtype=np.int64)
     (patch,) = patches_of(Index(*3 * [nothing])).parts

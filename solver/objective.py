@@ -143,13 +143,15 @@ def _of_chunk(
     (half, basis), (by_directions, by_touched, by_displacement) = jax.value_and_grad(
         of, argnums=(0, 1, 2), has_aux=True
     )(seen, touched, still)
-    # A product of matrices: term by term, XLA would make each sum by a loop of its own.
+    # Both directions at once, and each term where it is: one product with all terms would need
+    # them copied side by side first, which takes twice as long as the products.
     pair = jnp.stack(by_displacement).reshape(2, -1)
-    terms = jnp.stack(basis).reshape(-1, pair.shape[1]) if basis else jnp.zeros((0, pair.shape[1]))
+    by_terms = [pair @ term.reshape(-1) for term in basis]
+    by_coefficients = jnp.stack(by_terms, axis=1) if basis else jnp.zeros((2, 0))
     return (
         half,
         by_directions,
-        {**by_touched, **dict(zip(_COEFFICIENTS, pair @ terms.T, strict=True))},
+        {**by_touched, **dict(zip(_COEFFICIENTS, by_coefficients, strict=True))},
     )
 
 

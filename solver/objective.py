@@ -144,7 +144,7 @@ def _of_chunk(
         of, argnums=(0, 1, 2), has_aux=True
     )(seen, touched, still)
     # Both directions at once, and each term where it is: one product with all terms would need
-    # them copied side by side first, which takes twice as long as the products.
+    # them copied side by side first, which takes longer than the products.
     pair = jnp.stack(by_displacement).reshape(2, -1)
     by_terms = [pair @ term.reshape(-1) for term in basis]
     by_coefficients = jnp.stack(by_terms, axis=1) if basis else jnp.zeros((2, 0))

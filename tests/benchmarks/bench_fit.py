@@ -28,7 +28,7 @@ from solver.memory import keep_memory
 from solver.normal import accumulate
 from solver.objective import gradient
 from solver.orbit import OrbitData
-from solver.problem import Problem, build_problem
+from solver.problem import Problem, build_problem, rebuilt
 from solver.schur import reduce
 from solver.settings import FitSettings
 from solver.svi import blocks, start_state
@@ -96,6 +96,7 @@ def stages(
     covariance = covariances(reduced)
     return {
         "build_problem": lambda: build_problem(data, MINI_MOCK, settings),
+        "rebuilt, for other settings": lambda: rebuilt(problem, MINI_MOCK, settings),
         "accumulate, one linearisation pass": lambda: accumulate(problem, theta, sources),
         "gradient, one pass": lambda: gradient(problem, theta, sources),
         "reduce": lambda: reduce(equations, problem.priors),

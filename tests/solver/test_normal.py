@@ -82,7 +82,9 @@ def test_chi2_is_that_of_the_residuals(equations, dense):
 
 def test_length_of_chunks_changes_nothing(problem, equations, expansion_point, monkeypatch):
     monkeypatch.setattr("solver.tiles.CHUNK", 20)
-    other = accumulate(replace(problem), *expansion_point)
+    anew = replace(problem, observed=replace(problem.observed))
+    other = accumulate(anew, *expansion_point)
+    assert anew.observed.tiles.measured.shape[2] == 20 != problem.observed.tiles.measured.shape[2]
     for name in ("chi2", "by_theta", "by_source", "theta", "source", "cross"):
         close(part_of(other, name), part_of(equations, name), rtol=1e-7)
 

@@ -19,17 +19,17 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from solver.data.instrument import Instrument as Instrument
+    from solver.data.orbit import OrbitData as OrbitData
+    from solver.data.parameters import PARAMETERS as PARAMETERS
+    from solver.data.result import FitResult as FitResult
+    from solver.data.settings import FitSettings as FitSettings
     from solver.errors import InputError as InputError
     from solver.fit import fit_orbit as fit_orbit
-    from solver.instrument import Instrument as Instrument
     from solver.io.inspect import inspect_files as inspect_files
-    from solver.io.read import read_orbit as read_orbit
+    from solver.io.read_orbit import read_orbit as read_orbit
     from solver.io.result import read_result as read_result
     from solver.io.result import write_result as write_result
-    from solver.orbit import OrbitData as OrbitData
-    from solver.parameters import PARAMETERS as PARAMETERS
-    from solver.result import FitResult as FitResult
-    from solver.settings import FitSettings as FitSettings
     from solver.simulate.settings import SurveySettings as SurveySettings
     from solver.simulate.survey import simulate_survey as simulate_survey
 
@@ -41,16 +41,16 @@ if "jax" in sys.modules:
     sys.modules["jax"].config.update("jax_enable_x64", True)
 
 _PUBLIC = {
-    "FitResult": "solver.result",
-    "FitSettings": "solver.settings",
+    "FitResult": "solver.data.result",
+    "FitSettings": "solver.data.settings",
     "InputError": "solver.errors",
-    "Instrument": "solver.instrument",
-    "OrbitData": "solver.orbit",
-    "PARAMETERS": "solver.parameters",
+    "Instrument": "solver.data.instrument",
+    "OrbitData": "solver.data.orbit",
+    "PARAMETERS": "solver.data.parameters",
     "SurveySettings": "solver.simulate.settings",
     "fit_orbit": "solver.fit",
     "inspect_files": "solver.io.inspect",
-    "read_orbit": "solver.io.read",
+    "read_orbit": "solver.io.read_orbit",
     "read_result": "solver.io.result",
     "simulate_survey": "solver.simulate.survey",
     "write_result": "solver.io.result",

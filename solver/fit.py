@@ -7,36 +7,36 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from solver.device import require_device
-from solver.engines import Resumption, estimate
+from solver.data.instrument import MINI_MOCK, Instrument
+from solver.data.orbit import OrbitData
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings
+from solver.engines.estimate import Estimate
+from solver.engines.gauss_newton import Iteration, Mode, find_mode
+from solver.engines.robust import find_outliers, outlier_table
+from solver.engines.run_engine import Resumption, run_engine
+from solver.engines.warm_starts import WarmStart, likely, nearest
+from solver.engines.what_if import linearised, solve_what_if
 from solver.errors import FitError, InputError
-from solver.estimate import Estimate
-from solver.gauss_newton import Iteration, Mode, find_mode
-from solver.history import history_table
-from solver.instrument import MINI_MOCK, Instrument
-from solver.leverage import Covariances
-from solver.mode_tables import mode_tables
-from solver.orbit import OrbitData
-from solver.orders import compare_orders
-from solver.problem import Problem, orders_held, rebuilt
-from solver.result import FitResult
-from solver.robust import find_outliers, outlier_table
-from solver.selection import Selection
-from solver.settings import FitSettings
-from solver.starts import Start, likely, nearest
-from solver.summary import summarise, truth_summary
-from solver.tables import (
-    Solution,
+from solver.linear.leverage import Covariances
+from solver.problem.problem import Problem, orders_held, rebuilt
+from solver.problem.problem_cache import ProblemCache
+from solver.results.eigenmode_tables import eigenmode_tables
+from solver.results.orders import compare_orders
+from solver.results.source_history import history_table
+from solver.results.summary import summarise, truth_summary
+from solver.results.tables import (
+    SolvedProblem,
     calibration_table,
     exposure_table,
     loss_table,
     residual_table,
-    solution_of,
+    solved_problem,
     source_table,
     trace_table,
     true_places,
 )
-from solver.what_if import linearised, re_solve
+from solver.runtime.device import require_device
 
 
 def fit_orbit(
@@ -87,11 +87,11 @@ class OrbitFitter:
     def __init__(self, data: OrbitData, instrument: Instrument = MINI_MOCK) -> None:
         """Take checked tables, as from `solver.read_orbit`; InputError if JAX has no device."""
         require_device()
-        self._selection = Selection(data, instrument)
+        self._selection = ProblemCache(data, instrument)
         self._orbit_id = data.orbit_id
         self._instrument = instrument
         self._kept: _Fitted | None = None
-        self._starts: list[Start] = []
+        self._starts: list[WarmStart] = []
         self._tried: list[FitSettings] = []
         self._stopped: tuple[FitSettings, object] | None = None
 
@@ -112,7 +112,7 @@ class OrbitFitter:
             outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
             data, problem = self._selection.choose(settings, outliers)
         prepared = time.perf_counter()
-        found = estimate(problem, settings, progress, resumption or self._resumption(settings))
+        found = run_engine(problem, settings, progress, resumption or self._resumption(settings))
         result, solution = _result(
             data, self._instrument, settings, problem, found, (start, prepared)
         )
@@ -123,7 +123,7 @@ class OrbitFitter:
             self._kept = _Fitted(
                 settings, problem, found.mode, solution.covariance, outliers, orders
             )
-            self._starts, self._tried = [Start(settings, problem, found.mode)], [settings]
+            self._starts, self._tried = [WarmStart(settings, problem, found.mode)], [settings]
         result = _with_outliers(result, outliers)
         return _with_orders(result, orders, time.perf_counter() - fitted)
 
@@ -136,7 +136,7 @@ class OrbitFitter:
         Returns
         -------
         None if there is no fit to start from, or only a refit can tell; see
-        `solver.what_if.re_solve`.
+        `solver.engines.what_if.solve_what_if`.
         """
         kept = self._kept
         if kept is None or kept.settings.aberration != settings.aberration:
@@ -147,7 +147,7 @@ class OrbitFitter:
         data, problem = self._selection.choose(settings, kept.outliers)
         prepared = time.perf_counter()
         near = nearest(self._starts, settings)
-        mode = near and re_solve(near.mode, near.problem, problem, settings)
+        mode = near and solve_what_if(near.mode, near.problem, problem, settings)
         if mode is None:
             return None
         found = Estimate(mode)
@@ -159,7 +159,7 @@ class OrbitFitter:
     def history(self, result: FitResult) -> pd.DataFrame:
         """Return what the last fit, whose result is given, adds to the history of its sources.
 
-        See `solver.history.history_table`.
+        See `solver.results.source_history.history_table`.
 
         Raises
         ------
@@ -174,7 +174,7 @@ class OrbitFitter:
     def get_ready(self, order: int) -> Iterator[None]:
         """Prepare, while nobody waits, for what may be asked of the last fit next.
 
-        See `solver.starts.likely`; with that, it takes no longer than other priors do.
+        See `solver.engines.warm_starts.likely`; with that, it takes no longer than other priors do.
 
         Parameters
         ----------
@@ -197,18 +197,18 @@ class OrbitFitter:
                 self._starts += self._started(kept, settings)
                 yield
 
-    def _started(self, kept: _Fitted, settings: FitSettings) -> list[Start]:
+    def _started(self, kept: _Fitted, settings: FitSettings) -> list[WarmStart]:
         """Return a change of the last fit, linearised at its own solution, where there is one."""
         try:
             _, problem = self._selection.choose(settings, kept.outliers)
         except InputError:
             # A prior is shifted of a term that the lower order has not, or too little is left.
             return []
-        mode = re_solve(kept.mode, kept.problem, problem, settings)
+        mode = solve_what_if(kept.mode, kept.problem, problem, settings)
         # So far may the stars have to move that only a fit can tell.
         mode = mode or find_mode(problem, settings)
         is_solved = mode.status.is_solution
-        return [Start(settings, problem, linearised(problem, mode))] if is_solved else []
+        return [WarmStart(settings, problem, linearised(problem, mode))] if is_solved else []
 
     def _compare_orders(
         self,
@@ -251,13 +251,13 @@ def _result(
     problem: Problem,
     found: Estimate,
     times: tuple[float, float],
-) -> tuple[FitResult, Solution]:
+) -> tuple[FitResult, SolvedProblem]:
     mode = found.mode
     if mode.reduced is None:
         raise FitError(f"orbit {data.orbit_id}: {mode.status.value}")
     start, prepared = times
     solved = time.perf_counter()
-    solution = solution_of(problem, found, mode.reduced)
+    solution = solved_problem(problem, found, mode.reduced)
     sources, places = source_table(solution), true_places(solution, data.truth)
     calibration = calibration_table(solution, instrument)
     tables = {
@@ -268,7 +268,7 @@ def _result(
         "trace": trace_table(mode),
         "true_places": places,
         "losses": loss_table(found.losses),
-        **mode_tables(solution, calibration, instrument),
+        **eigenmode_tables(solution, calibration, instrument),
     }
     seconds = {
         "prepare": prepared - start,

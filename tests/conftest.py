@@ -6,8 +6,8 @@ from pathlib import Path
 import jax
 import pytest
 
-from solver.device import require_device
 from solver.errors import InputError
+from solver.runtime.device import require_device
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 

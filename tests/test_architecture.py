@@ -1,4 +1,4 @@
-"""Imports go one way: every module has a rung, and imports nothing from a rung above it."""
+"""Imports go one way: each package has a list of folders, and none imports one above it."""
 
 import ast
 import importlib
@@ -11,110 +11,56 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-PACKAGES = ("solver", "plateviz")
 
-# Low to high. The modules of a package share its rung, and those of a rung may use each other.
-RUNGS = (
-    ("solver.errors", "solver.units", "solver.versions"),
-    (
-        "solver.schema",
-        "solver.mode_schema",
-        "solver.order_schema",
-        "solver.survey_schema",
-        "solver.columns",
+# Low to high: a folder imports what stands before it. `plateviz` imports all of `solver`.
+FOLDERS = {
+    "solver": (
+        "errors",
+        "units",
+        "data",
+        "runtime",
+        "model",
+        "io",
+        "problem",
+        "simulate",
+        "linear",
+        "engines",
+        "results",
+        "fit",
     ),
-    ("solver.parameters", "solver.device", "solver.threads", "solver.memory"),
-    ("solver.orbit", "solver.instrument"),
-    ("solver.exclusions", "solver.prior_text"),
-    ("solver.settings",),
-    ("solver.result",),
-    ("solver.io",),
-    (
-        "solver.projection",
-        "solver.aberration",
-        "solver.distortion",
-        "solver.detector",
-        "solver.correlation",
+    "plateviz": (
+        "cache",
+        "tables",
+        "plots",
+        "runs",
+        "solving",
+        "reports",
+        "dashboard",
+        "notebook",
+        "gaia",
+        "cli",
     ),
-    ("solver.astrometry", "solver.ephemeris", "solver.layout"),
-    ("solver.apparent_motion",),
-    ("solver.simple_structure", "solver.mode_names"),
-    ("solver.forward", "solver.centres"),
-    ("solver.tiles", "solver.patches", "solver.triangles"),
-    ("solver.observed", "solver.priors"),
-    ("solver.problem",),
-    ("solver.selection",),
-    ("solver.simulate",),
-    ("solver.linearise", "solver.objective"),
-    ("solver.products",),
-    ("solver.tile_sums",),
-    ("solver.normal",),
-    ("solver.schur", "solver.part"),
-    ("solver.coordinates",),
-    ("solver.gauss_newton", "solver.leverage", "solver.carry"),
-    ("solver.spectrum",),
-    ("solver.estimate", "solver.bend", "solver.model"),
-    ("solver.guide",),
-    ("solver.svi", "solver.nuts", "solver.what_if", "solver.robust", "solver.starts"),
-    ("solver.engines",),
-    ("solver.checkpoint", "solver.agreement"),
-    ("solver.diagnostics",),
-    ("solver.orders",),
-    ("solver.tables",),
-    ("solver.mode_tables",),
-    ("solver.summary",),
-    ("solver.shared_errors",),
-    ("solver.history", "solver.motion"),
-    ("solver.time_series",),
-    ("solver.fit",),
-    ("plateviz.tables", "plateviz.job", "plateviz.cache"),
-    ("plateviz.source", "plateviz.store", "plateviz.strip"),
-    ("plateviz.runs",),
-    ("plateviz.history", "plateviz.survey_worker"),
-    ("plateviz.survey",),
-    ("plateviz.plots",),
-    ("plateviz.gallery", "plateviz.survey_tables"),
-    ("plateviz.reports",),
-    ("plateviz.state", "plateviz.worker", "plateviz.worker_process"),
-    ("plateviz.workbench", "plateviz.session"),
-    ("plateviz.navigation",),
-    ("plateviz.views",),
-    ("plateviz.app", "plateviz.closed_pages"),
-    ("plateviz.server",),
-    ("plateviz.demo", "plateviz.cli_output", "plateviz.cli_options", "plateviz.tap"),
-    ("plateviz.notebook",),
-    ("plateviz.gaia",),
-    ("plateviz.cli_fit", "plateviz.cli_survey", "plateviz.cli_gaia", "plateviz.cli_report"),
-    ("plateviz.cli_serve",),
-    ("plateviz.reproduction",),
-    ("plateviz.cli_reproduce",),
-    ("plateviz.cli",),
-)
+}
+# Modules at the top of a package: everybody's, and the front door.
+LOOSE = {"solver.errors", "solver.units", "solver.fit", "plateviz.cache"}
 
 USER_INTERFACE = ("panel", "param", "holoviews", "bokeh", "datashader")
 NEVER = {
     "solver": ("plateviz", *USER_INTERFACE),
-    "solver.simulate": ("solver.io.result",),
     "plateviz.tables": USER_INTERFACE,
-    "plateviz.strip": USER_INTERFACE,
-    "plateviz.source": USER_INTERFACE,
-    "plateviz.job": USER_INTERFACE,
-    "plateviz.cache": USER_INTERFACE,
-    "plateviz.store": USER_INTERFACE,
-    "plateviz.runs": (*USER_INTERFACE, "jax"),
-    "plateviz.history": (*USER_INTERFACE, "jax"),
-    "plateviz.plots": ("panel", "param", "plateviz.source", "plateviz.store"),
-    "plateviz.state": ("panel",),
-    "plateviz.navigation": ("panel", "holoviews", "bokeh", "datashader"),
-    "plateviz.worker": ("panel",),
-    "plateviz.worker_process": USER_INTERFACE,
-    "plateviz.workbench": ("panel", "holoviews", "bokeh", "datashader"),
+    "plateviz.runs": USER_INTERFACE,
+    "plateviz.solving": USER_INTERFACE,
+    "plateviz.plots": ("panel", "param", "plateviz.runs", "plateviz.solving"),
+    "plateviz.dashboard.state": ("panel",),
+    "plateviz.dashboard.session": ("panel", "holoviews", "bokeh", "datashader"),
+    "plateviz.dashboard.navigation": ("panel", "holoviews", "bokeh", "datashader"),
 }
 
 # The web process, the command line that starts it and all that they load stay free of JAX.
 JAX = ("jax", "jaxlib", "equinox", "numpyro", "optax")
-WITHOUT_JAX = ("solver.io", "solver.result", "solver.orbit", "plateviz")
-WITH_JAX = ("plateviz.worker_process", "plateviz.survey", "plateviz.cli_survey")
+WITHOUT_JAX = ("solver.data", "solver.io", "plateviz")
+# The process that fits, and what `plateviz survey` imports once it fits.
+WITH_JAX = ("plateviz.solving.solver_process", "plateviz.runs.fit_survey")
 
 
 def _within(name: str, parents: tuple[str, ...]) -> bool:
@@ -128,10 +74,10 @@ def _module_name(path: Path) -> str:
 
 MODULES = {
     _module_name(path): ast.parse(path.read_text("utf-8"))
-    for package in PACKAGES
+    for package in FOLDERS
     for path in sorted((REPOSITORY / package).rglob("*.py"))
 }
-PLACED = sorted(set(MODULES) - set(PACKAGES))
+PLACED = sorted(set(MODULES) - set(FOLDERS))
 
 
 def _nodes(node: ast.AST, at_load: bool) -> Iterator[ast.AST]:
@@ -151,7 +97,7 @@ def _resolve(module: str, name: str) -> str:
     """Return the module that `from module import name` means."""
     if f"{module}.{name}" in MODULES:
         return f"{module}.{name}"
-    if module in PACKAGES:
+    if module in FOLDERS:
         return getattr(importlib.import_module(module), "_PUBLIC", {}).get(name, module)
     return module
 
@@ -166,8 +112,10 @@ def _imports(module: str, at_load: bool = False) -> set[str]:
     return found - {module}
 
 
-def _rung(module: str) -> int | None:
-    return next((i for i, rung in enumerate(RUNGS) if _within(module, rung)), None)
+def _height(module: str) -> tuple[int, int]:
+    """Return how high the folder of a module stands; ValueError if no list names it."""
+    package, folder = module.split(".")[:2]
+    return list(FOLDERS).index(package), FOLDERS[package].index(folder)
 
 
 def _loaded_by(module: str) -> set[str]:
@@ -183,16 +131,39 @@ def _loaded_by(module: str) -> set[str]:
     return loaded
 
 
-@pytest.mark.parametrize("module", PLACED)
-def test_every_module_has_a_rung(module):
-    assert _rung(module) is not None, f"give {module} a place in RUNGS"
+def test_every_module_and_folder_is_listed():
+    found = {
+        package: {m.split(".")[1] for m in PLACED if _within(m, (package,))} for package in FOLDERS
+    }
+    assert found == {package: set(folders) for package, folders in FOLDERS.items()}
+
+
+def test_every_rule_is_about_a_module_that_exists():
+    named = [*LOOSE, *NEVER, *WITHOUT_JAX, *WITH_JAX]
+    assert not {name for name in named if name not in MODULES}
+
+
+def test_nothing_else_lies_loose_at_the_top():
+    loose = {
+        m
+        for m in PLACED
+        if m.count(".") == 1 and (REPOSITORY / f"{m.replace('.', '/')}.py").exists()
+    }
+    assert loose == LOOSE
+
+
+@pytest.mark.parametrize("folder", [m for m in PLACED if m not in LOOSE and m.count(".") == 1])
+def test_every_folder_says_in_one_sentence_what_it_holds_and_imports(folder):
+    summary, *rest = (ast.get_docstring(MODULES[folder]) or "").split("\n\n")
+    assert summary.endswith(".")
+    assert "\n" not in summary
+    assert "Imports" in "\n\n".join(rest)
 
 
 @pytest.mark.parametrize("module", PLACED)
-def test_no_import_points_back(module):
-    rung = _rung(module)
-    above = {name for name in _imports(module) if (_rung(name) or 0) > (rung or 0)}
-    assert not above
+def test_no_import_points_up(module):
+    known = [name for name in _imports(module) if name in PLACED]
+    assert not {name for name in known if _height(name) > _height(module)}
 
 
 @pytest.mark.parametrize("module", sorted(MODULES))
@@ -215,11 +186,17 @@ def test_web_process_modules_load_no_jax(module):
 
 
 @pytest.mark.parametrize(
-    "module", ["solver.io.read", "plateviz.tables", "plateviz.plots", "plateviz.app"]
+    "module",
+    ["solver.io.read_orbit", "plateviz.tables", "plateviz.plots", "plateviz.dashboard.app"],
 )
 def test_import_leaves_jax_out(module):
-    if module not in MODULES:
-        pytest.skip(f"no module {module} yet")
     code = f"import sys, {module}; sys.exit('jax' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True)
     assert run.returncode == 0, run.stderr.decode()
+
+
+def test_tests_mirror_the_folders():
+    """A test module lies in the folder of the modules that it tests, or above it."""
+    for package, folders in FOLDERS.items():
+        tests = {p.name for p in (REPOSITORY / "tests" / package).iterdir() if p.is_dir()}
+        assert tests - {"__pycache__"} <= set(folders)

@@ -14,13 +14,13 @@ import numpy as np
 import pandas as pd
 
 from plateviz.plots.diagnostic import Chosen
-from solver.exclusions import Exclusions
+from solver.data.exclusions import Exclusions
 from solver.fit import fit_orbit
-from solver.instrument import MINI_MOCK
+from solver.data.instrument import MINI_MOCK
 from solver.io.survey import read_survey_orbit
-from solver.orbit import OrbitData
-from solver.result import FitResult
-from solver.settings import FitSettings, SviSettings
+from solver.data.orbit import OrbitData
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings, SviSettings
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 
@@ -162,11 +162,11 @@ ORBITS: Mapping[str, Pair] = {
     "exposure-chi2": (_good_chosen, lambda: _chosen(_fitted(_measured(_trailed)))),
     "distortion": (_good_chosen, lambda: _chosen(_sparse_distortion())),
     "prior-shares": (_good_chosen, lambda: _chosen(_assumed())),
-    "mode-spectrum": (_good_chosen, lambda: _chosen(_one_field())),
+    "eigenmode-spectrum": (_good_chosen, lambda: _chosen(_one_field())),
     "orders": (_good_chosen, lambda: _chosen(_low_order())),
-    "weak-modes": (_good_chosen, lambda: _chosen(_one_field())),
-    "mode-groups": (_good_chosen, lambda: _chosen(_one_field())),
-    "mode-shifts": (_good_chosen, lambda: _chosen(_few_references())),
+    "weak-directions": (_good_chosen, lambda: _chosen(_one_field())),
+    "eigenmode-groups": (_good_chosen, lambda: _chosen(_one_field())),
+    "eigenmode-shifts": (_good_chosen, lambda: _chosen(_few_references())),
     "comparison": (
         lambda: _chosen(_fitted(prior_widths=dict.fromkeys(_CALIBRATION[2:], 2.0)), _good()),
         lambda: _chosen(_low_order(), _good()),

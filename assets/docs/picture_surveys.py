@@ -11,13 +11,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 
-from plateviz.history import SurveyRun, open_run
-from plateviz.plots.survey_figure import SourceTables, SurveyTables
-from plateviz.survey import fit_survey
-from plateviz.survey_tables import survey_tables
+from plateviz.runs.queries import SurveyRun, open_run
+from plateviz.tables.survey_tables import SourceTables, SurveyTables
+from plateviz.runs.fit_survey import fit_survey
+from plateviz.runs.survey_tables import survey_tables
 from solver.io.survey import measurement_path, read_survey_table, write_survey_table
-from solver.schema import MEASUREMENT
-from solver.settings import FitSettings
+from solver.data.schema import MEASUREMENT
+from solver.data.settings import FitSettings
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey

@@ -23,7 +23,7 @@ from picture_surveys import SOURCES, SURVEYS, Surveys, surveys
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
-from plateviz.gallery import diagnostics, source_figures, survey_figures
+from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 
 FOLDER = Path(__file__).resolve().parent / "pictures"
 _FLAGS = ["--no-sandbox", "--disable-gpu", "--hide-scrollbars"]

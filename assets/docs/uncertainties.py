@@ -20,18 +20,18 @@ import solver  # noqa: F401, I001
 import numpy as np
 import pandas as pd
 
-from solver.diagnostics import error_budget, mean_covariance
-from solver.estimate import Estimate
-from solver.gauss_newton import find_mode
-from solver.instrument import MINI_MOCK
-from solver.orbit import OrbitData
-from solver.problem import build_problem
-from solver.settings import FitSettings
+from solver.results.diagnostics import error_budget, mean_covariance
+from solver.engines.estimate import Estimate
+from solver.engines.gauss_newton import find_mode
+from solver.data.instrument import MINI_MOCK
+from solver.data.orbit import OrbitData
+from solver.problem.problem import build_problem
+from solver.data.settings import FitSettings
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.measure import measure_orbit
 from solver.simulate.settings import SurveySettings
-from solver.summary import class_members
-from solver.tables import Solution, solution_of, source_table, true_places
+from solver.results.summary import class_members
+from solver.results.tables import SolvedProblem, solved_problem, source_table, true_places
 from solver.units import MAS_PER_DEG
 
 KINDS = ("reference", "non-reference", "artificial")
@@ -84,13 +84,13 @@ def solve(settings: SurveySettings) -> tuple[pd.DataFrame, pd.DataFrame]:
         mode = find_mode(problem, FitSettings())
         if mode.reduced is None or not mode.status.is_solution:
             sys.exit(f"orbit {orbit_id}: {mode.status.value}")
-        solution = solution_of(problem, Estimate(mode), mode.reduced)
+        solution = solved_problem(problem, Estimate(mode), mode.reduced)
         sources.append(source_rows(solution, truth).assign(orbit=orbit_id))
         means.append(mean_rows(solution, sources[-1]))
     return pd.concat(sources), pd.concat(means)
 
 
-def source_rows(solution: Solution, truth: pd.DataFrame) -> pd.DataFrame:
+def source_rows(solution: SolvedProblem, truth: pd.DataFrame) -> pd.DataFrame:
     """Return a row for each source and axis of one orbit: deviation, its parts, and sigmas, uas."""
     table, places = source_table(solution), pd.DataFrame(true_places(solution, truth))
     members = class_members(table)
@@ -123,7 +123,7 @@ def source_rows(solution: Solution, truth: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def mean_rows(solution: Solution, rows: pd.DataFrame) -> pd.DataFrame:
+def mean_rows(solution: SolvedProblem, rows: pd.DataFrame) -> pd.DataFrame:
     """Return, for each class and axis, the deviation of the mean position and its sigmas."""
     members = class_members(source_table(solution))
     parts = []

@@ -8,7 +8,7 @@
 | solution.py  | a solution: its tables, its figures, its report                         |
 | source.py    | a source through the orbits of a run                                    |
 | choices.py   | the choices of a fit, as keywords                                       |
-| bench.py     | the solver process of a source, started when it is first needed         |
+| lazy_solver.py     | the solver process of a source, started when it is first needed         |
 | progress.py  | a line of progress in a cell, or in a terminal                          |
 | named.py     | figures or tables by their names, for those who press Tab               |
 | table.py     | tables with units                                                       |
@@ -16,6 +16,6 @@
 | card.py      | the verdict and the numbers of an object as HTML                        |
 | dashboard.py | the dashboard in a cell                                                 |
 
-This process stays without JAX: fits run in a process of their own, as the dashboard's do. Panel
-and HoloViews are imported when the first figure is drawn.
+Imports `plateviz.dashboard` and below. This process never imports JAX: fits run in the solver
+process. Panel and HoloViews are imported when the first figure is drawn.
 """

@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from typing import Any, TypedDict, TypeVar, get_type_hints
 
+from solver.data.exclusions import parse_exclusions
+from solver.data.prior_text import parse_shift, parse_width
+from solver.data.settings import FitSettings, NutsSettings, svi_settings
 from solver.errors import InputError
-from solver.exclusions import parse_exclusions
-from solver.prior_text import parse_shift, parse_width
-from solver.settings import FitSettings, NutsSettings, svi_settings
 
 _Function = TypeVar("_Function", bound=Callable)
 _SWITCHES = ("aberration", "robust", "compare_orders")

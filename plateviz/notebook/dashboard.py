@@ -9,9 +9,9 @@ import weakref
 from html import escape
 from typing import TYPE_CHECKING, Any, Self
 
-from plateviz.notebook.bench import Bench
+from plateviz.notebook.lazy_solver import LazySolver
 from plateviz.notebook.progress import notebook_shell
-from plateviz.workbench import Workbench
+from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ _HIGHEST_PORT = 65535
 
 
 class Dashboard:
-    """The dashboard of what a bench has, started when it is first shown."""
+    """The dashboard of one origin, started when it is first shown."""
 
-    def __init__(self, bench: Bench, port: int, height: int) -> None:
+    def __init__(self, solver: LazySolver, port: int, height: int) -> None:
         """Take what to show.
 
         Parameters
@@ -41,7 +41,7 @@ class Dashboard:
             raise InputError(f"port: expected 0 to {_HIGHEST_PORT}, found {port!r}")
         if not isinstance(height, int) or height < 1:
             raise InputError(f"height: expected a number of pixels, found {height!r}")
-        self._bench, self._port, self._height = bench, port, height
+        self._solver, self._port, self._height = solver, port, height
         self._servers: list[Any] = []
         weakref.finalize(self, _stop, self._servers)
 
@@ -56,10 +56,10 @@ class Dashboard:
         """
         if not self._servers:
             # The server, and all that it draws with, takes seconds to import.
-            from plateviz.server import Place, begin, check_address
+            from plateviz.dashboard.server import Place, begin, check_address
 
             port = check_address(_ADDRESS, self._port)
-            self._servers.append(begin(self._bench.workbench, Place(port, _ADDRESS)))
+            self._servers.append(begin(self._solver.store, Place(port, _ADDRESS)))
             self._port = port
         return f"http://{_ADDRESS}:{self._port}/"
 
@@ -76,24 +76,24 @@ class Dashboard:
         """
         panel = sys.modules.get("panel")
         if panel is not None and panel.state.curdoc is not None:
-            from plateviz.app import build_app
+            from plateviz.dashboard.app import build_app
 
             build_app(self._served()).servable()
         return self
 
     def __panel__(self) -> "pn.viewable.Viewable":
         """Return the dashboard as a part of a served page."""
-        from plateviz.app import build_part
+        from plateviz.dashboard.app import build_part
 
         return build_part(self._served())
 
-    def _served(self) -> Workbench:
-        """Return the workbench for a page of this session, with whose end it is closed."""
+    def _served(self) -> SolutionStore:
+        """Return the store for a page of this session, with whose end it is closed."""
         import panel as pn
 
         pn.extension("tabulator")
-        pn.state.on_session_destroyed(lambda _: self._bench.close())
-        return self._bench.workbench
+        pn.state.on_session_destroyed(lambda _: self._solver.close())
+        return self._solver.store
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
         words = {"text/plain": repr(self)}
@@ -109,7 +109,7 @@ class Dashboard:
 
     def __repr__(self) -> str:
         """Return what it is."""
-        return f"dashboard of {self._bench.source.title}; the last line of a cell shows it"
+        return f"dashboard of {self._solver.origin.title}; the last line of a cell shows it"
 
 
 def _stop(servers: list[Any]) -> None:

@@ -145,7 +145,7 @@ class Illustrated(ABC):
         """Return the card."""
 
 
-class Figure(NamedTuple):
+class FigureRecipe(NamedTuple):
     """What is said of a figure of the gallery; the gallery itself needs HoloViews."""
 
     name: str
@@ -154,7 +154,7 @@ class Figure(NamedTuple):
     draw: Draw
 
 
-def drawings(figures: Sequence[Figure], theme: str) -> Named[Drawing]:
+def drawings(figures: Sequence[FigureRecipe], theme: str) -> Named[Drawing]:
     """Return figures as drawings, by name; InputError if there is no such theme."""
     if theme not in _THEMES:
         raise InputError(f"theme: expected one of {', '.join(_THEMES)}, found {theme!r}")

@@ -3,15 +3,15 @@
 from os import PathLike
 from pathlib import Path
 
-from plateviz.job import Job
-from plateviz.notebook.bench import Bench, run_job
+from plateviz.notebook.lazy_solver import LazySolver, run_job
 from plateviz.notebook.orbit import OpenOrbit
 from plateviz.notebook.report import path_of
 from plateviz.notebook.solution import OpenSolution
 from plateviz.notebook.survey import OpenSurvey
-from plateviz.source import OrbitFiles
+from plateviz.solving.job import Job
+from plateviz.solving.origin import OrbitFiles
+from solver.data.instrument import MINI_MOCK, read_instrument
 from solver.errors import InputError
-from solver.instrument import MINI_MOCK, read_instrument
 from solver.io.atomic import sha256_of
 from solver.io.result import read_result
 from solver.io.survey import HEADER, read_header, section
@@ -121,7 +121,7 @@ def _open_orbit(
         orbit,
         None if instrument is None else str(_there(instrument)),
     )
-    return OpenOrbit(Bench(files), orbit, f"plateviz.open({files.observations!r}, ...)")
+    return OpenOrbit(LazySolver(files), orbit, f"plateviz.open({files.observations!r}, ...)")
 
 
 def _there(given: object) -> Path:

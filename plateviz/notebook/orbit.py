@@ -6,20 +6,20 @@ from functools import partial
 import pandas as pd
 from astropy.table import QTable
 
-from plateviz.history import SurveyRun
-from plateviz.notebook.bench import Bench, OnBench
+from plateviz.dashboard.state import describe
 from plateviz.notebook.card import card, in_words
 from plateviz.notebook.choices import settings_with, takes_choices
 from plateviz.notebook.dashboard import Dashboard
+from plateviz.notebook.lazy_solver import HasSolver, LazySolver
 from plateviz.notebook.named import Named, no_such
 from plateviz.notebook.solution import OpenSolution
 from plateviz.notebook.table import OpenTable
-from plateviz.state import describe
+from plateviz.runs.queries import SurveyRun
 from plateviz.tables import SummaryItem
+from solver.data.orbit import OrbitData
+from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
+from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.orbit import OrbitData
-from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
-from solver.settings import FitSettings
 
 _SCHEMAS = {
     "measurements": MEASUREMENT,
@@ -29,7 +29,7 @@ _SCHEMAS = {
 }
 
 
-class OpenOrbit(OnBench):
+class OpenOrbit(HasSolver):
     """The measurements of one orbit, its catalogue, and the solutions made of them.
 
     Attributes
@@ -39,14 +39,14 @@ class OpenOrbit(OnBench):
     """
 
     def __init__(
-        self, bench: Bench, orbit: int | None, call: str, run: SurveyRun | None = None
+        self, solver: LazySolver, orbit: int | None, call: str, run: SurveyRun | None = None
     ) -> None:
         """Read the orbit, and check it.
 
         Parameters
         ----------
-        bench : that solves it
-        orbit : of the bench's source, None where that is the file of one
+        solver : solves the orbit
+        orbit : of its origin, None where that is the file of one
         call : what a person wrote to get it
         run : that has it fitted, or None
 
@@ -55,13 +55,13 @@ class OpenOrbit(OnBench):
         InputError
             If something is wrong with the files.
         """
-        super().__init__(bench)
+        super().__init__(solver)
         self._orbit, self._call = orbit, call
-        self._data: OrbitData = bench.source.read(orbit)
-        self._instrument = bench.source.read_instrument()
+        self._data: OrbitData = solver.origin.read(orbit)
+        self._instrument = solver.origin.read_instrument()
         self._solution = None if run is None else self._of_run(run)
         self.number = self._data.orbit_id
-        self.origin = bench.source.title
+        self.origin = solver.origin.title
 
     @property
     def tables(self) -> Named[pd.DataFrame]:
@@ -131,7 +131,7 @@ class OpenOrbit(OnBench):
 
     def dashboard(self, *, port: int = 0, height: int = 900) -> Dashboard:
         """Return the dashboard of the orbit, which a cell shows; see `OpenSurvey.dashboard`."""
-        return Dashboard(self._bench, port, height)
+        return Dashboard(self._solver, port, height)
 
     def __repr__(self) -> str:
         """Return what it is."""
@@ -157,7 +157,7 @@ class OpenOrbit(OnBench):
         if orbits.get(self._data.orbit_id) != "complete":
             return None
         result = run.result(self._data.orbit_id)
-        origin = f"{self._bench.source.title}, run {run.name}"
+        origin = f"{self._solver.origin.title}, run {run.name}"
         return OpenSolution(
             result, self._instrument, origin, f"{self._call}.solution", refits=_Refits(self)
         )
@@ -165,7 +165,7 @@ class OpenOrbit(OnBench):
     def _solve(self, settings: FitSettings, base: OpenSolution | None) -> OpenSolution:
         """Return a solution; by a step from the last fit where it is to be compared with one."""
         title = f"{'what if' if base else 'fit'}: {describe(settings)}"
-        result = self._bench.solve(
+        result = self._solver.solve(
             self._orbit, settings, what_if=base is not None, title=f"orbit {self.number}, {title}"
         )
         call = f"{self._call}.{'what_if' if base else 'fit'}(...)"

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from html import escape
 from typing import Any
 
-from plateviz import cli_output
-from plateviz.cli_output import Reporter
+from plateviz.solving import progress as terminal
+from plateviz.solving.progress import Reporter
 
 # A cell is not written anew more often than this.
 _PAUSE_S = 0.1
@@ -64,7 +64,7 @@ def reporting(title: str) -> Iterator[Reporter]:
     """Give a line of progress; a cell keeps it with the time that it took."""
     shell = notebook_shell()
     if shell is None:
-        with cli_output.reporting(title) as reporter:
+        with terminal.reporting(title) as reporter:
             yield reporter
         return
     reporter = CellReporter(shell, title)

@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING, Any, Protocol
 import pandas as pd
 from astropy.table import QTable
 
+from plateviz.dashboard.state import describe
 from plateviz.notebook.card import card, in_words
 from plateviz.notebook.choices import takes_choices
-from plateviz.notebook.drawing import Drawing, Figure, Illustrated, drawings
+from plateviz.notebook.drawing import Drawing, FigureRecipe, Illustrated, drawings
 from plateviz.notebook.named import Named, no_such
 from plateviz.notebook.report import path_of, write_report
 from plateviz.notebook.table import OpenTable, result_tables
-from plateviz.state import describe
 from plateviz.tables.summary import summary_strip
 from plateviz.tables.verdict import Verdict, orbit_verdict
+from solver.data.instrument import Instrument
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.instrument import Instrument
 from solver.io.result import write_result
-from solver.result import FitResult
-from solver.settings import FitSettings
 
 if TYPE_CHECKING:
     from plateviz.plots.diagnostic import Chosen, Diagnostic
@@ -47,7 +47,7 @@ class OpenSolution(Illustrated):
 
     Attributes
     ----------
-    result : the solution as the solver has it, `solver.result.FitResult`
+    result : the solution as the solver has it, `solver.data.result.FitResult`
     instrument : that took the orbit
     origin : where it comes from, in words
     call : what a person wrote to get it
@@ -225,7 +225,7 @@ class OpenSolution(Illustrated):
         return self._drawings_of(self._chosen(None, None), theme)
 
     def _drawings_of(self, chosen: "Chosen", theme: str) -> Named[Drawing]:
-        from plateviz.gallery import diagnostics
+        from plateviz.plots.gallery import diagnostics
 
         found = [one for one in diagnostics() if one.has_data(chosen)]
         return drawings([_figure(one, chosen) for one in found], theme)
@@ -262,9 +262,9 @@ def _frame(table: OpenTable) -> pd.DataFrame:
     return table.frame.copy(deep=False)
 
 
-def _figure(diagnostic: "Diagnostic", chosen: "Chosen") -> Figure:
+def _figure(diagnostic: "Diagnostic", chosen: "Chosen") -> FigureRecipe:
     draw = partial(diagnostic.draw, chosen)
-    return Figure(diagnostic.name, diagnostic.title, diagnostic.caption, draw)
+    return FigureRecipe(diagnostic.name, diagnostic.title, diagnostic.caption, draw)
 
 
 def _pairs(exposures: object) -> list[tuple[int, int]]:

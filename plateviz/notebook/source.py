@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 import pandas as pd
 from astropy.table import QTable
 
-from plateviz.history import SurveyRun
 from plateviz.notebook.card import card, in_words
-from plateviz.notebook.drawing import Drawing, Figure, Illustrated, drawings
+from plateviz.notebook.drawing import Drawing, FigureRecipe, Illustrated, drawings
 from plateviz.notebook.named import Named
 from plateviz.notebook.report import write_report
 from plateviz.notebook.table import OpenTable
+from plateviz.runs.queries import SurveyRun
 from plateviz.tables import motion_table, source_class, source_strip, time_series
 from plateviz.tables.verdict import Verdict, source_verdict
+from solver.data.survey_schema import HISTORY
 from solver.errors import InputError
-from solver.survey_schema import HISTORY
 
 if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
@@ -58,7 +58,7 @@ class OpenSource(Illustrated):
 
     @property
     def history(self) -> pd.DataFrame:
-        """Its positions, a row per orbit: `solver.survey_schema.HISTORY`."""
+        """Its positions, a row per orbit: `solver.data.survey_schema.HISTORY`."""
         return self._history.copy(deep=False)
 
     @property
@@ -107,12 +107,12 @@ class OpenSource(Illustrated):
 
     def _drawings(self, theme: str) -> Named[Drawing]:
         # What draws takes seconds to import.
-        from plateviz.gallery import source_figures
+        from plateviz.plots.gallery import source_figures
         from plateviz.plots.survey_figure import SourceTables
 
         tables = SourceTables(self._history, self._motion)
         figures = [
-            Figure(one.name, one.title, one.caption, partial(one.draw, tables))
+            FigureRecipe(one.name, one.title, one.caption, partial(one.draw, tables))
             for one in source_figures()
         ]
         return drawings(figures, theme)

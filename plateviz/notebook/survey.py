@@ -8,34 +8,34 @@ from typing import TYPE_CHECKING, Self
 import pandas as pd
 from astropy.table import QTable
 
-from plateviz.history import SurveyRun, open_run, survey_runs
-from plateviz.job import Job
-from plateviz.notebook.bench import Bench, OnBench, run_job
 from plateviz.notebook.card import card, in_words
 from plateviz.notebook.choices import settings_with, takes_choices
 from plateviz.notebook.dashboard import Dashboard
-from plateviz.notebook.drawing import Drawing, Figure, Illustrated, drawings
+from plateviz.notebook.drawing import Drawing, FigureRecipe, Illustrated, drawings
+from plateviz.notebook.lazy_solver import HasSolver, LazySolver, run_job
 from plateviz.notebook.named import Named, no_such
 from plateviz.notebook.orbit import OpenOrbit
 from plateviz.notebook.report import write_report
 from plateviz.notebook.source import OpenSource
 from plateviz.notebook.table import OpenTable
-from plateviz.runs import DEFAULT_RUN
-from plateviz.source import SurveyFolder
+from plateviz.runs.queries import SurveyRun, open_run, survey_runs
+from plateviz.runs.run import DEFAULT_RUN
+from plateviz.solving.job import Job
+from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import SummaryItem, run_strip, source_list
 from plateviz.tables.verdict import Verdict, run_verdict
-from solver.columns import Table
+from solver.data.columns import Table
+from solver.data.schema import CATALOGUE, TRUTH
+from solver.data.settings import FitSettings
+from solver.data.survey_schema import MOTIONS, RUN_ORBITS
 from solver.errors import InputError
 from solver.io.survey import REFERENCE, TRUTH_FILE, read_survey_table
-from solver.schema import CATALOGUE, TRUTH
-from solver.settings import FitSettings
-from solver.survey_schema import MOTIONS, RUN_ORBITS
 
 if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
 
 
-class OpenSurvey(OnBench, Illustrated):
+class OpenSurvey(HasSolver, Illustrated):
     """A survey directory, as one of its runs has it.
 
     Attributes
@@ -56,9 +56,9 @@ class OpenSurvey(OnBench, Illustrated):
         InputError
             If the directory is no survey, or it has no such run.
         """
-        super().__init__(Bench(SurveyFolder(str(directory))))
+        super().__init__(LazySolver(SurveyFolder(str(directory))))
         self.directory = directory
-        self._numbers = self._bench.source.orbits()
+        self._numbers = self._solver.origin.orbits()
         self.run_name = open_run(directory, run).name if run is not None else self._first()
 
     @property
@@ -119,7 +119,7 @@ class OpenSurvey(OnBench, Illustrated):
                 f"{self._numbers[-1]}, found {number!r}"
             )
         run = None if self.run_name is None else self._run()
-        return OpenOrbit(self._bench, int(number), f"{self._call()}.orbit({number})", run)
+        return OpenOrbit(self._solver, int(number), f"{self._call()}.orbit({number})", run)
 
     def source(self, source_id: int | str) -> OpenSource:
         """Return one source through the orbits of the run.
@@ -186,7 +186,7 @@ class OpenSurvey(OnBench, Illustrated):
             another machine, one that is forwarded from there
         height : of the frame, screen pixels
         """
-        return Dashboard(self._bench, port, height)
+        return Dashboard(self._solver, port, height)
 
     def report(self, path: str | PathLike[str]) -> Path:
         """Write the run as one HTML file that opens anywhere.
@@ -235,12 +235,12 @@ class OpenSurvey(OnBench, Illustrated):
 
     def _drawings(self, theme: str) -> Named[Drawing]:
         # What draws takes seconds to import.
-        from plateviz.gallery import survey_figures
-        from plateviz.survey_tables import survey_tables
+        from plateviz.plots.gallery import survey_figures
+        from plateviz.runs.survey_tables import survey_tables
 
         tables = survey_tables(self._run())
         figures = [
-            Figure(one.name, one.title, one.caption, partial(one.draw, tables))
+            FigureRecipe(one.name, one.title, one.caption, partial(one.draw, tables))
             for one in survey_figures()
         ]
         return drawings(figures, theme)

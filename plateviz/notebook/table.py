@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 from astropy.table import QTable
 
-from solver.columns import Column
-from solver.parameters import Axis, groups_on
-from solver.result import FitResult
-from solver.schema import RESULT_TABLES
+from solver.data.columns import Column
+from solver.data.parameters import Axis, groups_on
+from solver.data.result import FitResult
+from solver.data.schema import RESULT_TABLES
 
 # Of the calibration: name of the table -> what it has a row for.
 FITTED: dict[str, Axis] = {"pointings": "exp", "detectors": "det", "distortion": "coef"}
@@ -39,7 +39,7 @@ def result_tables(result: FitResult) -> dict[str, OpenTable]:
 
     Returns
     -------
-    Those of `solver.schema.RESULT_TABLES`, and "pointings", "detectors" and "distortion": the
+    Those of `solver.data.schema.RESULT_TABLES`, and "pointings", "detectors" and "distortion": the
     fitted calibration with a row per exposure, detector and distortion term
     """
     tables = {name: _fitted(result, axis) for name, axis in FITTED.items()}

@@ -1,7 +1,7 @@
-"""Pictures: pure functions from the tables of `plateviz.tables` to HoloViews objects.
+"""Figures: pure functions from the tables of `plateviz.tables` to HoloViews objects.
 
-Every `plot_<noun>(table, *, options)` returns an object for the Bokeh backend, an empty
-and titled one for an empty table. The dashboard, notebooks and reports use the same.
+Imports `plateviz.tables`. Every `plot_<noun>(table, *, options)` returns an object for the Bokeh
+backend, an empty and titled one for an empty table. Dashboard, notebooks and reports share them.
 """
 
 from plateviz.plots.comparison import (
@@ -12,11 +12,11 @@ from plateviz.plots.comparison import (
 from plateviz.plots.convergence import plot_convergence
 from plateviz.plots.deviation import plot_deviation
 from plateviz.plots.distortion import plot_distortion
+from plateviz.plots.eigenmode_groups import plot_eigenmode_groups
+from plateviz.plots.eigenmode_shifts import plot_eigenmode_shifts
+from plateviz.plots.eigenmodes import plot_eigenmode_deciders, plot_eigenmode_spectrum
 from plateviz.plots.error_by_count import plot_error_by_count
 from plateviz.plots.footprint import plot_footprint
-from plateviz.plots.mode_groups import plot_mode_groups
-from plateviz.plots.mode_shifts import plot_mode_shifts
-from plateviz.plots.modes import plot_mode_deciders, plot_mode_spectrum
 from plateviz.plots.motion_pulls import plot_motion_pulls
 from plateviz.plots.orbit_counts import plot_orbit_counts
 from plateviz.plots.orbit_health import plot_orbit_health
@@ -42,10 +42,10 @@ __all__ = [
     "plot_error_by_count",
     "plot_exposure_chi2",
     "plot_footprint",
-    "plot_mode_deciders",
-    "plot_mode_groups",
-    "plot_mode_shifts",
-    "plot_mode_spectrum",
+    "plot_eigenmode_deciders",
+    "plot_eigenmode_groups",
+    "plot_eigenmode_shifts",
+    "plot_eigenmode_spectrum",
     "plot_motion_pulls",
     "plot_orbit_counts",
     "plot_orbit_health",

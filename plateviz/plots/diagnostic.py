@@ -1,7 +1,7 @@
 """Diagnostic: one picture of a solution, with its title, its caption and what it shows.
 
 A module of this package that defines `DIAGNOSTICS` is on the Orbit page, and in every
-report, without being named anywhere else (`plateviz.gallery` finds it): a new diagnostic
+report, without being named anywhere else (`plateviz.plots.gallery` finds it): a new diagnostic
 is its table in `plateviz.tables` and its plot here.
 """
 
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import holoviews as hv
 
-from solver.instrument import Instrument
-from solver.result import FitResult
+from solver.data.instrument import Instrument
+from solver.data.result import FitResult
 
 
 @dataclass(frozen=True)

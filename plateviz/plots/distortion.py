@@ -12,7 +12,7 @@ from plateviz.plots.style import FRAME_WIDTH, AxisLabels, drawn, framed, message
 from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_text
 from plateviz.tables.calibration import distortion
-from solver.instrument import Detector
+from solver.data.instrument import Detector
 
 _TITLE = "Fitted distortion, distorted minus ideal place"
 _LABELS: AxisLabels = {"xlabel": "focal-plane x (mm)", "ylabel": "focal-plane y (mm)"}

@@ -13,11 +13,12 @@ from plateviz.plots.style import (
     framed,
     message,
 )
-from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.theme import theme_of
 from plateviz.plots.ticks import log_ticks
 from plateviz.plots.units import angle_text
 from plateviz.tables.sources import ARTIFICIAL, REFERENCE
+from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Positional error of the artificial sources"
 _LABELS: AxisLabels = {

@@ -5,8 +5,9 @@ import pandas as pd
 
 from plateviz.plots.points import steps, unit_normal
 from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS, framed, message, side_by_side
-from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.tables.motion_pulls import CHI2, LEAST_ORBITS, motion_pulls
+from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Pulls of the fitted motions"
 _NAMES = {

@@ -5,9 +5,10 @@ import pandas as pd
 
 from plateviz.plots.points import steps
 from plateviz.plots.style import CLASS_COLOURS, FRAME_WIDTH, AxisLabels, framed, message
-from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.ticks import log_ticks
 from plateviz.tables.orbit_counts import orbit_counts
+from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Orbits of each source"
 # Where a bin without a source is put, below the frame: a logarithm has no zero.

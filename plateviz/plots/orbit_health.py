@@ -13,9 +13,10 @@ from plateviz.plots.style import (
     message,
     side_by_side,
 )
-from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.theme import theme_of
 from plateviz.tables.orbit_health import orbit_health
+from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "χ² over its expected value, by orbit"
 _X = hv.Dimension("year", label="epoch (Julian year, TCB)")

@@ -18,7 +18,7 @@ from plateviz.plots.style import (
 )
 from plateviz.plots.theme import theme_of
 from plateviz.tables.orders import order_comparison, preferred_order
-from solver.settings import MAX_ORDER
+from solver.data.settings import MAX_ORDER
 
 _TITLE = "Orders of the distortion"
 _DIFFERENCE = "Evidence and prediction, against the best order"

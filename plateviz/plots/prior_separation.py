@@ -14,10 +14,11 @@ from plateviz.plots.style import (
     message,
     side_by_side,
 )
-from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_text, angle_unit
 from plateviz.tables.prior_separation import EPOCH, prior_separation, prior_separation_histogram
+from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Catalogue minus truth"
 

@@ -15,11 +15,12 @@ from plateviz.plots.style import (
     message,
     side_by_side,
 )
-from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.theme import theme_of
 from plateviz.plots.ticks import log_ticks
 from plateviz.tables.histogram import pull_bins
 from plateviz.tables.reference_scatter import LEAST_ORBITS, reference_scatter, scatter_cells
+from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Scatter of the reference sources"
 _NAMES = {"ra": "α cos δ", "dec": "δ"}

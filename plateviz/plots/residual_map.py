@@ -17,7 +17,7 @@ from plateviz.plots.style import (
 from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_text
 from plateviz.tables.residuals import binned_vectors, residual_map
-from solver.instrument import Detector, Instrument
+from solver.data.instrument import Detector, Instrument
 
 _BINS_ON_DETECTOR, _BINS_ON_FOCAL_PLANE = 16, 24
 _LEAST_SHARE = 0.25

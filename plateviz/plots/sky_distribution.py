@@ -14,10 +14,11 @@ from plateviz.plots.style import (
     message,
     side_by_side,
 )
-from plateviz.plots.survey_figure import SurveyFigure, SurveyTables
+from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.theme import theme_of
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sources import CLASSES
+from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Sources in the sky"
 _LABELS: AxisLabels = {"xlabel": "l (deg)", "ylabel": "b (deg)"}

@@ -14,10 +14,11 @@ from plateviz.plots.style import (
     framed,
     message,
 )
-from plateviz.plots.survey_figure import SourceFigure, SourceTables
+from plateviz.plots.survey_figure import SourceFigure
 from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_text, orbits_text
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
+from plateviz.tables.survey_tables import SourceTables
 
 _TITLE = "Motion on the sky"
 _LABELS: AxisLabels = {"xlabel": "Δα cos δ (mas, East to the left)", "ylabel": "Δδ (mas)"}

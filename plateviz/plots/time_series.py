@@ -14,9 +14,10 @@ from plateviz.plots.style import (
     message,
     side_by_side,
 )
-from plateviz.plots.survey_figure import SourceFigure, SourceTables
+from plateviz.plots.survey_figure import SourceFigure
 from plateviz.plots.theme import theme_of
 from plateviz.plots.units import orbits_text
+from plateviz.tables.survey_tables import SourceTables
 from plateviz.tables.time_series import time_series
 
 _TITLE = "Time series"

@@ -1,4 +1,5 @@
-"""Reports: one self-contained HTML file of an orbit, from the same tables and pictures.
+"""Reports: one self-contained HTML file of an orbit, a source or a survey.
 
-`report` says what a file holds, `orbit` composes it, `page` makes it HTML, `pdf` prints it.
+Imports `plateviz.solving` and below. `report` defines the content of a file, `orbit` and `survey`
+compose it, `page` renders it as HTML, `pdf` prints it.
 """

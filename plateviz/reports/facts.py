@@ -3,7 +3,7 @@
 import platform
 
 from plateviz.reports.report import Facts
-from solver.versions import versions_of
+from solver.runtime.versions import versions_of
 
 _PACKAGES = ("plateviz", "jax", "numpy", "scipy", "holoviews", "bokeh")
 

@@ -8,13 +8,13 @@ from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
-from plateviz.history import SurveyRun, open_run
 from plateviz.reports.page import page_of
 from plateviz.reports.report import Facts, Link, Report
 from plateviz.reports.survey import survey_orbit_report, survey_report
+from plateviz.runs.queries import SurveyRun, open_run
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
-from solver.versions import versions_of
+from solver.runtime.versions import versions_of
 
 _INDEX = "index.html"
 # Which run the pages are of; those of another are not mixed with them.

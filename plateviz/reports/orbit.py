@@ -6,15 +6,15 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from plateviz.gallery import diagnostics
 from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.gallery import diagnostics
 from plateviz.reports.report import Facts, Picture, Report, plain
 from plateviz.tables import calibration_tables, exposure_chi2, outlier_list, summary_strip
 from plateviz.tables.labels import dates
 from plateviz.tables.verdict import Verdict, orbit_verdict
-from solver.instrument import Instrument
-from solver.orbit import OrbitData
-from solver.result import FitResult
+from solver.data.instrument import Instrument
+from solver.data.orbit import OrbitData
+from solver.data.result import FitResult
 
 # So many exposures can be chosen by themselves: those whose chi2 is farthest off.
 _FARTHEST = 3

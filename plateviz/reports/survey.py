@@ -2,13 +2,13 @@
 
 from functools import partial
 
-from plateviz.gallery import source_figures, survey_figures
-from plateviz.history import SurveyRun
-from plateviz.plots.survey_figure import SourceFigure, SourceTables, SurveyFigure, SurveyTables
+from plateviz.plots.gallery import source_figures, survey_figures
+from plateviz.plots.survey_figure import SourceFigure, SurveyFigure
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.report import SOLVED, Facts, Picture, Report, plain
-from plateviz.source import SurveyFolder
-from plateviz.survey_tables import survey_tables
+from plateviz.runs.queries import SurveyRun
+from plateviz.runs.survey_tables import survey_tables
+from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import (
     motion_table,
     orbit_list,
@@ -19,9 +19,10 @@ from plateviz.tables import (
 )
 from plateviz.tables.headings import MOTION, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in_words
 from plateviz.tables.run_health import MISSING
+from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from plateviz.tables.verdict import run_verdict, source_verdict
+from solver.data.result import FitResult
 from solver.errors import InputError
-from solver.result import FitResult
 
 
 def survey_report(run: SurveyRun, facts: Facts) -> Report:

@@ -1,16 +1,21 @@
-"""A FitResult (and the truth, where there is one) as tidy tables, one function per plot.
+"""Results as tidy tables, one function per figure; all numbers on the screen come from here.
 
-Every number that a plot, a view or a report shows is computed here. The truth is a
-frame with `source_id`, `ra` and `dec` (deg, direction at the mean epoch of the orbit,
-without aberration), or None; what needs a truth is an empty table without one.
+Imports `solver` only. The truth is a frame with `source_id`, `ra` and `dec` (deg, direction at
+the mean epoch of the orbit, without aberration), or None; a table that needs the truth is empty
+without it.
 """
 
 from plateviz.tables.calibration import calibration_tables, distortion
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.convergence import convergence, loss_excess
+from plateviz.tables.eigenmodes import (
+    eigenmode_deciders,
+    eigenmode_groups,
+    eigenmode_shifts,
+    eigenmode_spectrum,
+)
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.histogram import pull_bins
-from plateviz.tables.modes import mode_deciders, mode_groups, mode_shifts, mode_spectrum
 from plateviz.tables.motion_pulls import motion_pulls
 from plateviz.tables.orbit_counts import orbit_counts
 from plateviz.tables.orbit_health import orbit_health
@@ -50,7 +55,7 @@ from plateviz.tables.sources import (
 )
 from plateviz.tables.summary import SummaryItem, summary_strip
 from plateviz.tables.time_series import time_series
-from solver.apparent_motion import julian_year
+from solver.model.apparent_motion import julian_year
 
 __all__ = [
     "ARTIFICIAL",
@@ -73,10 +78,10 @@ __all__ = [
     "footprint_sources",
     "julian_year",
     "loss_excess",
-    "mode_deciders",
-    "mode_groups",
-    "mode_shifts",
-    "mode_spectrum",
+    "eigenmode_deciders",
+    "eigenmode_groups",
+    "eigenmode_shifts",
+    "eigenmode_spectrum",
     "motion_pulls",
     "motion_table",
     "orbit_counts",

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 from numpy.polynomial import legendre
 
-from solver.instrument import Instrument
-from solver.parameters import Axis, groups_on
-from solver.result import FitResult
+from solver.data.instrument import Instrument
+from solver.data.parameters import Axis, groups_on
+from solver.data.result import FitResult
 from solver.units import RAD_PER_MAS
 
 _UM_PER_MM = 1000.0

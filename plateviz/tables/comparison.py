@@ -6,7 +6,7 @@ import pandas as pd
 from plateviz.tables.labels import id_strings
 from plateviz.tables.sky import mean_direction, offsets_arcmin, offsets_mas
 from plateviz.tables.sources import ordered_by_class
-from solver.result import FitResult
+from solver.data.result import FitResult
 
 
 def comparison(result_a: FitResult, result_b: FitResult) -> pd.DataFrame:

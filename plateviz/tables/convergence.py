@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from solver.result import FitResult
+from solver.data.result import FitResult
 
 # Steps at the end of an svi run whose mean is its final loss.
 _FINAL_STEPS = 50

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.histogram import pull_bins
-from solver.survey_schema import MOTION_PARAMETERS
+from solver.data.survey_schema import MOTION_PARAMETERS
 
 LEAST_ORBITS = 40
 CHI2 = "chi2"

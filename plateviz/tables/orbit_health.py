@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from solver.apparent_motion import julian_year
+from solver.model.apparent_motion import julian_year
 
 
 def orbit_health(orbits: pd.DataFrame) -> pd.DataFrame:

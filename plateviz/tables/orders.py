@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from solver.result import FitResult
-from solver.settings import MAX_ORDER
+from solver.data.result import FitResult
+from solver.data.settings import MAX_ORDER
 
 _COLUMNS = (
     *("order", "n_terms", "converged", "is_fitted"),

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from plateviz.tables.labels import exposure_labels, id_strings
-from solver.result import FitResult
+from solver.data.result import FitResult
 
 
 def outlier_list(result: FitResult) -> pd.DataFrame | None:

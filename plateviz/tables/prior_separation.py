@@ -5,8 +5,8 @@ import pandas as pd
 
 from plateviz.tables.labels import id_strings
 from plateviz.tables.sky import offsets_mas
-from solver.apparent_motion import mjd_of, parallax_factors
-from solver.ephemeris import observer_at
+from solver.model.apparent_motion import mjd_of, parallax_factors
+from solver.model.ephemeris import observer_at
 
 EPOCH = 2029.0
 GROUPS = ("reference", "non-reference")

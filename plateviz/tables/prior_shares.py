@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from solver.parameters import BY_NAME
-from solver.result import FitResult
+from solver.data.parameters import BY_NAME
+from solver.data.result import FitResult
 
 _HALF_BAND = 0.36
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import exposure_labels
-from solver.result import FitResult
+from solver.data.result import FitResult
 
 
 def pull_histogram(result: FitResult, *, bins: int = 48, limit: float = 6.0) -> pd.DataFrame:

@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import exposure_labels, id_strings
-from solver.instrument import Instrument
-from solver.result import FitResult
+from solver.data.instrument import Instrument
+from solver.data.result import FitResult
 from solver.units import RAD_PER_MAS
 
 ExposureKey = tuple[int, int]

@@ -9,7 +9,7 @@ from plateviz.tables.headings import ORBITS_OF_SOURCE, SOURCES_OF_RUN
 from plateviz.tables.labels import dates, id_strings
 from plateviz.tables.sources import ordered_by_class
 from plateviz.tables.summary import SummaryItem
-from solver.survey_schema import MOTION_PARAMETERS
+from solver.data.survey_schema import MOTION_PARAMETERS
 
 _NAMES = {
     "ra": ("Δα cos δ at {epoch:.2f}", "mas"),

@@ -5,8 +5,8 @@ import pandas as pd
 
 from plateviz.tables.labels import id_strings
 from plateviz.tables.sky import offsets_mas
-from solver.instrument import Instrument
-from solver.result import FitResult
+from solver.data.instrument import Instrument
+from solver.data.result import FitResult
 from solver.units import RAD_PER_MAS
 
 REFERENCE = "reference"

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
-from solver.result import FitResult
+from solver.data.result import FitResult
 
 State = Literal["good", "warn", "bad", "neutral"]
 _SIGMAS = 3.0

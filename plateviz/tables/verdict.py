@@ -12,7 +12,7 @@ from plateviz.tables.pulls import exposure_chi2
 from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
-from solver.result import FitResult
+from solver.data.result import FitResult
 
 # Among good exposures, or good sources, one so far off would be found in one orbit of a hundred.
 _BY_CHANCE = 0.01

@@ -8,8 +8,8 @@ from astropy.io import fits
 from astropy.table import Column, MaskedColumn, Table
 
 from solver.errors import InputError
-from solver.io.extent import extents
-from solver.io.failure import reading
+from solver.io.failures import reading
+from solver.io.fits_extent import extents
 
 _VALID_LOGICALS = (ord("T"), ord("F"))
 

@@ -6,8 +6,8 @@ import math
 import numpy as np
 from astropy.io import fits
 
-from solver.result import FitResult
-from solver.versions import versions_of
+from solver.data.result import FitResult
+from solver.runtime.versions import versions_of
 
 ORIGIN = "plateviz"
 FORMAT = 1

@@ -10,15 +10,15 @@ from astropy.table import Column as RawColumn
 from astropy.table import Table as RawTable
 from astropy.time import Time
 
+from solver.data.instrument import read_instrument
+from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
 from solver.errors import InputError
-from solver.instrument import read_instrument
-from solver.io.check import examine, matched_names
 from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
 from solver.io.fits import read_fits
-from solver.io.read import names_of
+from solver.io.formats import has_reader, is_fits, place, read_tables
+from solver.io.read_orbit import names_of
 from solver.io.result import is_result, to_result
-from solver.io.tables import has_reader, is_fits, place, read_tables
-from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
+from solver.io.table_check import examine, matched_names
 
 _INPUTS = (MEASUREMENT, ENVIRONMENT, CATALOGUE, TRUTH)
 _LEAST_SHARE_OF_COLUMNS = 0.5

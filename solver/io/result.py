@@ -9,16 +9,16 @@ import pandas as pd
 from astropy.io import fits
 from astropy.table import Table as RawTable
 
-from solver import schema
+from solver.data import schema
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.io import layout
+from solver.io import published as layout
 from solver.io.atomic import write_atomically
-from solver.io.failure import reading
+from solver.io.failures import reading
 from solver.io.fits import FitsFile, read_fits
 from solver.io.header import FORMAT, ORIGIN, primary_header, result_header, versions_in
-from solver.io.layout import Derived, Layout
-from solver.result import FitResult
-from solver.settings import FitSettings
+from solver.io.published import Derived, PublishedTable
 
 _SUMMARY = "SUMMARY"
 _SECTIONS = ("summary", "settings", "provenance")
@@ -139,7 +139,7 @@ def _check_format(path: Path, primary: fits.Header) -> None:
 
 
 def _table_hdu(
-    kept: Layout,
+    kept: PublishedTable,
     frame: pd.DataFrame,
     extra: list[Derived] | None = None,
     header: fits.Header | None = None,
@@ -236,7 +236,7 @@ def _table(path: Path, file: FitsFile, name: str) -> RawTable:
     return file.tables[name]
 
 
-def _frame(path: Path, file: FitsFile, kept: Layout) -> pd.DataFrame:
+def _frame(path: Path, file: FitsFile, kept: PublishedTable) -> pd.DataFrame:
     table = _table(path, file, kept.hdu)
     missing = [kept.name(c) for c in kept.table if kept.name(c) not in table.colnames]
     if missing:

@@ -20,14 +20,14 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from solver.data.orbit import OrbitData
+from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
-from solver.io.check import conform, refuse
 from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
 from solver.io.parquet import write_parquet
-from solver.io.read import find_catalogue
-from solver.orbit import OrbitData
-from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
+from solver.io.read_orbit import find_catalogue
+from solver.io.table_check import conform, refuse
 
 FORMAT = 1
 HEADER = "survey.toml"

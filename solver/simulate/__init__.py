@@ -13,5 +13,6 @@
 | measure.py   | the measurements of one orbit                                     |
 | survey.py    | a survey directory                                                |
 
-Only `measure.py` and `survey.py` import JAX. Every optical step is `solver.forward`'s.
+Imports `solver.problem` and below. Only `measure.py` and `survey.py` import JAX. Every optical
+step is that of `solver.model.forward`.
 """

@@ -8,10 +8,10 @@ import pandas as pd
 from astropy.table import Table as RawTable
 from jaxtyping import Float
 
-from solver.columns import numpy_dtype
-from solver.correlation import ASTROMETRY, CORRELATIONS, correlation_matrices, square_roots
+from solver.data.columns import numpy_dtype
+from solver.data.schema import CATALOGUE, TRUTH
 from solver.errors import InputError
-from solver.schema import CATALOGUE, TRUTH
+from solver.model.correlation import ASTROMETRY, CORRELATIONS, correlation_matrices, square_roots
 from solver.simulate.gaia import gaia_stars
 from solver.simulate.population import Stars, draw_stars, satisfies_cuts
 from solver.simulate.settings import Stream, SurveySettings

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 from astropy.table import Table as RawTable
 
-from solver.columns import Table
+from solver.data.columns import Table
+from solver.data.schema import CATALOGUE
 from solver.errors import InputError
-from solver.io.check import conform, matched_names
-from solver.io.column import missing_rows
-from solver.schema import CATALOGUE
+from solver.io.column_check import missing_rows
+from solver.io.table_check import conform, matched_names
 
 _FLAGS = ("is_reference", "is_artificial")
 

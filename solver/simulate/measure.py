@@ -1,4 +1,4 @@
-"""The measurements of one orbit: where `solver.forward` puts the true sources, plus noise.
+"""The measurements of one orbit: where `solver.model.forward` puts the true sources, plus noise.
 
 Paper, section "Mock measurements". Of all effects on the way only the aberration by the
 Earth's motion is included, and the sources do not move during an orbit.
@@ -12,17 +12,17 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Array, Bool, Float, Int
 
-from solver.astrometry import frames_at, sky_position
-from solver.centres import calibration_centres
-from solver.distortion import terms
-from solver.ephemeris import observer_at
-from solver.forward import Geometry, Index, predict
-from solver.instrument import MINI_MOCK, Instrument
-from solver.layout import Layout
-from solver.parameters import CALIBRATION_GROUPS, PARAMETERS
-from solver.projection import tangent_frame
-from solver.schema import MEASUREMENT
-from solver.settings import FitSettings
+from solver.data.instrument import MINI_MOCK, Instrument
+from solver.data.parameters import CALIBRATION_GROUPS, PARAMETERS
+from solver.data.schema import MEASUREMENT
+from solver.data.settings import FitSettings
+from solver.model.astrometry import frames_at, sky_position
+from solver.model.distortion import terms
+from solver.model.ephemeris import observer_at
+from solver.model.forward import Geometry, Index, predict
+from solver.model.projection import tangent_frame
+from solver.problem.parameter_vector import VectorLayout
+from solver.problem.prior_centres import calibration_centres
 from solver.simulate.placement import place_detectors
 from solver.simulate.schedule import environment, orbit_attitude
 from solver.simulate.settings import Stream, SurveySettings
@@ -133,7 +133,7 @@ def true_geometry(
     instrument : the nominal one
     """
     order = max((k + j for k, j, _, _ in settings.distortion_um), default=0)
-    layout = Layout(len(attitude), len(terms(order)), len(instrument.detectors))
+    layout = VectorLayout(len(attitude), len(terms(order)), len(instrument.detectors))
     true_exposures = attitude.assign(
         ra_est=attitude["ra"],
         dec_est=attitude["dec"],

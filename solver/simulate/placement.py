@@ -6,7 +6,7 @@ mission and unknown to the fit.
 
 from dataclasses import replace
 
-from solver.instrument import Instrument
+from solver.data.instrument import Instrument
 from solver.simulate.settings import Stream, SurveySettings
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from solver.schema import ENVIRONMENT
+from solver.data.schema import ENVIRONMENT
 from solver.simulate.seasons import Season
 from solver.simulate.settings import Stream, SurveySettings
 from solver.simulate.sky import galactic_to_icrs, position_angle_to_icrs

@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from solver.data.settings import MAX_ORDER
 from solver.errors import InputError
-from solver.settings import MAX_ORDER
 from solver.simulate.seasons import SEASONS, Season, read_season
 
 _SECONDS_PER_DAY = 86_400.0

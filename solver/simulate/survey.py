@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from solver.device import require_device
+from solver.data.instrument import MINI_MOCK, Instrument, write_instrument
+from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
 from solver.errors import InputError
-from solver.instrument import MINI_MOCK, Instrument, write_instrument
 from solver.io.atomic import sha256_of
-from solver.io.read import find_catalogue
+from solver.io.read_orbit import find_catalogue
 from solver.io.survey import (
     EXPOSURES,
     HEADER,
@@ -22,7 +22,8 @@ from solver.io.survey import (
     write_header,
     write_survey_table,
 )
-from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
+from solver.runtime.device import require_device
+from solver.runtime.versions import versions_of
 from solver.simulate.catalogue import (
     reference_catalogue,
     truth_catalogue,
@@ -31,7 +32,6 @@ from solver.simulate.catalogue import (
 from solver.simulate.measure import measure_orbit
 from solver.simulate.schedule import environment, orbit_attitude
 from solver.simulate.settings import SurveySettings
-from solver.versions import versions_of
 
 UNFINISHED = "unfinished.toml"
 

@@ -28,16 +28,16 @@ import pandas as pd
 from astropy.io import fits
 from astropy.table import Table
 
-from solver.instrument import MINI_MOCK
-from solver.orbit import OrbitData
-from solver.problem import build_problem
-from solver.settings import FitSettings
+from solver.data.instrument import MINI_MOCK
+from solver.data.orbit import OrbitData
+from solver.problem.problem import build_problem
+from solver.data.settings import FitSettings
 from tests.benchmarks.machine import device, machine, time_of, write
 from tests.benchmarks.orbits import SOURCES_OF_THE_PAPER, simulated_orbit, survey_of
 from tests.benchmarks.stages import UNIT_REPEATS, unit_product
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-IMPORTS = "import plateviz.cli_fit, solver.fit, solver.io.result"
+IMPORTS = "import plateviz.cli.fit, solver.fit, solver.io.result"
 
 
 def main() -> None:
@@ -89,7 +89,16 @@ def timings(folder: Path, repeat: int) -> Iterator[tuple[str, tuple[float, float
 
 
 def fit(cache: Path, folder: Path) -> tuple[str, tuple[float, float]]:
-    command = ["-m", "plateviz.cli", "fit", "OBS.fits", "REF.fits", "-o", "RESULT.fits", "--json"]
+    command = [
+        "-m",
+        "plateviz.cli.main",
+        "fit",
+        "OBS.fits",
+        "REF.fits",
+        "-o",
+        "RESULT.fits",
+        "--json",
+    ]
     return run(command, folder, {"JAX_COMPILATION_CACHE_DIR": str(cache)})
 
 

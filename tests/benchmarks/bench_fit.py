@@ -19,19 +19,19 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 # Before NumPy, as in the program: it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
-from solver.exclusions import Exclusions
+from solver.data.exclusions import Exclusions
 from solver.fit import fit_orbit
-from solver.gauss_newton import Mode, find_mode
-from solver.instrument import MINI_MOCK
-from solver.leverage import covariances, residuals
-from solver.memory import keep_memory
-from solver.normal import accumulate
-from solver.objective import gradient
-from solver.orbit import OrbitData
-from solver.problem import Problem, build_problem, rebuilt
-from solver.schur import reduce
-from solver.settings import FitSettings
-from solver.svi import blocks, start_state
+from solver.engines.gauss_newton import Mode, find_mode
+from solver.data.instrument import MINI_MOCK
+from solver.linear.leverage import covariances, residuals
+from solver.runtime.memory import keep_memory
+from solver.linear.normal_equations import accumulate
+from solver.linear.chi2 import gradient
+from solver.data.orbit import OrbitData
+from solver.problem.problem import Problem, build_problem, rebuilt
+from solver.linear.source_elimination import eliminate_sources
+from solver.data.settings import FitSettings
+from solver.engines.svi import blocks, start_state
 from tests.benchmarks.machine import device, machine, peak_memory_mib, time_of, write
 from tests.benchmarks.orbits import simulated_orbit, survey_of
 from tests.benchmarks.stages import (
@@ -90,7 +90,7 @@ def stages(
     mode = find_mode(problem, settings)
     theta, sources = mode.theta, mode.sources
     equations = accumulate(problem, theta, sources)
-    reduced = reduce(equations, problem.priors)
+    reduced = eliminate_sources(equations, problem.priors)
     if reduced is None:
         sys.exit("the simulated orbit has no solution")
     covariance = covariances(reduced)
@@ -99,7 +99,7 @@ def stages(
         "rebuilt, for other settings": lambda: rebuilt(problem, MINI_MOCK, settings),
         "accumulate, one linearisation pass": lambda: accumulate(problem, theta, sources),
         "gradient, one pass": lambda: gradient(problem, theta, sources),
-        "reduce": lambda: reduce(equations, problem.priors),
+        "reduce": lambda: eliminate_sources(equations, problem.priors),
         "marginal covariances of the sources": lambda: marginal_sigmas(reduced),
         "all covariances": lambda: covariances(reduced),
         "residuals with leverage": lambda: residuals(problem, theta, sources, covariance),

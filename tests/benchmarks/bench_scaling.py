@@ -24,13 +24,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import solver  # noqa: F401, I001
 
 from solver.fit import fit_orbit
-from solver.gauss_newton import find_mode
-from solver.instrument import MINI_MOCK
+from solver.engines.gauss_newton import find_mode
+from solver.data.instrument import MINI_MOCK
 from solver.io.survey import read_survey_orbit
-from solver.normal import accumulate
-from solver.problem import build_problem
-from solver.schur import reduce
-from solver.settings import FitSettings
+from solver.linear.normal_equations import accumulate
+from solver.problem.problem import build_problem
+from solver.linear.source_elimination import eliminate_sources
+from solver.data.settings import FitSettings
 from solver.simulate.survey import simulate_survey
 from tests.benchmarks.machine import device, machine, peak_memory_mib, time_of, write
 from tests.benchmarks.orbits import (
@@ -111,7 +111,7 @@ def measure(directory: Path, stars: int, repeat: int) -> tuple[Row, str]:
         "unit": time_of(unit_product(problem), UNIT_REPEATS),
         "prepare": time_of(lambda: build_problem(data, MINI_MOCK, settings), repeat),
         "linearise": time_of(lambda: accumulate(problem, mode.theta, mode.sources), repeat),
-        "reduce": time_of(lambda: reduce(mode.equations, problem.priors), repeat),
+        "reduce": time_of(lambda: eliminate_sources(mode.equations, problem.priors), repeat),
         "fit": time_of(lambda: fit_with_sigmas(problem, settings), repeat),
         "what_if": time_of(what_if(data, settings, OTHER_PRIOR), repeat),
         "tables": time_of(lambda: fit_orbit(data, MINI_MOCK, settings), repeat),

@@ -21,9 +21,9 @@ import pandas as pd
 import pyarrow as pa
 from pyarrow import parquet
 
-from plateviz.history import HISTORY_FILE, MOTIONS_FILE, SurveyRun, rows_of_a_group
-from plateviz.runs import Run
-from solver.survey_schema import HISTORY, MOTIONS
+from plateviz.runs.queries import HISTORY_FILE, MOTIONS_FILE, SurveyRun, rows_of_a_group
+from plateviz.runs.run import Run
+from solver.data.survey_schema import HISTORY, MOTIONS
 from tests.benchmarks.machine import machine, time_of, write
 
 _FIRST_ID = 4_040_000_000_000_000_000

@@ -24,12 +24,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 # Before NumPy, as in the program: it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
-from plateviz.history import SurveyRun
-from plateviz.runs import Run
-from solver.instrument import MINI_MOCK
+from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
+from solver.data.instrument import MINI_MOCK
 from solver.io.survey import read_survey_orbit
-from solver.problem import build_problem
-from solver.settings import FitSettings
+from solver.problem.problem import build_problem
+from solver.data.settings import FitSettings
 from tests.benchmarks.machine import machine, time_of, write
 from tests.benchmarks.stages import UNIT_REPEATS, unit_product
 
@@ -79,7 +79,7 @@ def parse_arguments() -> argparse.Namespace:
 
 
 def command(*words: object) -> list[str]:
-    return [sys.executable, "-m", "plateviz.cli", *map(str, words)]
+    return [sys.executable, "-m", "plateviz.cli.main", *map(str, words)]
 
 
 def seconds_of(*words: object) -> float:

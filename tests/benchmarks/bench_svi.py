@@ -20,13 +20,13 @@ import solver  # noqa: F401, I001
 
 import numpy as np
 
-from solver.gauss_newton import find_mode
-from solver.instrument import MINI_MOCK
-from solver.leverage import covariances
-from solver.memory import keep_memory
-from solver.problem import Problem, build_problem
-from solver.settings import FitSettings
-from solver.svi import SviState, variational
+from solver.engines.gauss_newton import find_mode
+from solver.data.instrument import MINI_MOCK
+from solver.linear.leverage import covariances
+from solver.runtime.memory import keep_memory
+from solver.problem.problem import Problem, build_problem
+from solver.data.settings import FitSettings
+from solver.engines.svi import SviState, variational
 from tests.benchmarks.machine import machine, write
 from tests.benchmarks.orbits import simulated_orbit, survey_of
 

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from solver.instrument import MINI_MOCK
-from solver.orbit import OrbitData
+from solver.data.instrument import MINI_MOCK
+from solver.data.orbit import OrbitData
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.measure import measure_orbit
 from solver.simulate.settings import SurveySettings

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.gauss_newton import Mode, find_mode
-from solver.instrument import MINI_MOCK
-from solver.orbit import OrbitData
-from solver.problem import Problem
-from solver.schur import Reduced
-from solver.selection import Selection
-from solver.settings import FitSettings
-from solver.what_if import linearised, re_solve
+from solver.data.instrument import MINI_MOCK
+from solver.data.orbit import OrbitData
+from solver.data.settings import FitSettings
+from solver.engines.gauss_newton import Mode, find_mode
+from solver.engines.what_if import linearised, solve_what_if
+from solver.linear.source_elimination import ReducedSystem
+from solver.problem.problem import Problem
+from solver.problem.problem_cache import ProblemCache
 
 UNIT_REPEATS = 5
 
@@ -39,20 +39,20 @@ def what_if(
     ----------
     made_ready : from which the worker starts instead, as it prepares it while nobody waits
     """
-    selection = Selection(data, MINI_MOCK)
+    selection = ProblemCache(data, MINI_MOCK)
     _, solved = selection.choose(before)
     mode = find_mode(solved, before)
     if made_ready is not None:
         _, near = selection.choose(made_ready)
-        found = re_solve(mode, solved, near, made_ready) or find_mode(near, made_ready)
+        found = solve_what_if(mode, solved, near, made_ready) or find_mode(near, made_ready)
         mode, solved = linearised(near, found), near
     _, changed = selection.choose(after)
-    is_same = changed.observed is solved.observed
+    is_same = changed.measurements is solved.measurements
 
     def work() -> object:
         # The tiles of the same measurements are laid, and those of others are not.
         asked = changed if is_same else _as_new(changed)
-        reduced = _re_solved(mode, solved, asked, after).reduced
+        reduced = _what_if(mode, solved, asked, after).reduced
         return None if reduced is None else marginal_sigmas(reduced)
 
     return work
@@ -60,15 +60,15 @@ def what_if(
 
 def _as_new(problem: Problem) -> Problem:
     """Return a problem whose tiles are still to be laid."""
-    return replace(problem, observed=replace(problem.observed))
+    return replace(problem, measurements=replace(problem.measurements))
 
 
-def _re_solved(mode: Mode, solved: Problem, changed: Problem, settings: FitSettings) -> Mode:
-    found = re_solve(mode, solved, changed, settings)
+def _what_if(mode: Mode, solved: Problem, changed: Problem, settings: FitSettings) -> Mode:
+    found = solve_what_if(mode, solved, changed, settings)
     if found is None:
         sys.exit(f"no re-solution for {settings}")
     return found
 
 
-def marginal_sigmas(reduced: Reduced) -> object:
+def marginal_sigmas(reduced: ReducedSystem) -> object:
     return reduced.marginal_covariance()

@@ -9,11 +9,11 @@ from astropy.io import fits
 from astropy.table import Table
 from distributed import Client
 
-from plateviz.cli import main
+from plateviz.cli.main import main
+from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT
 from solver.fit import fit_orbit
 from solver.io.result import write_result
 from solver.io.survey import read_survey_orbit
-from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT
 from tests.docs.pages import REPOSITORY, build_site
 
 
@@ -50,8 +50,8 @@ def command(workplace, monkeypatch):
 
     A survey is fitted by a worker in this process, too, and nothing is served or opened.
     """
-    monkeypatch.setattr("plateviz.survey._client", _worker_here)
-    monkeypatch.setattr("plateviz.cli_serve.run_server", lambda workbench, *_: workbench.close())
+    monkeypatch.setattr("plateviz.runs.fit_survey._client", _worker_here)
+    monkeypatch.setattr("plateviz.cli.serve.run_server", lambda store, *_: store.close())
 
     def run(words):
         monkeypatch.setattr(sys, "argv", words)

@@ -9,7 +9,7 @@ import tomllib
 import pytest
 from typer.main import get_command
 
-from plateviz.cli import app
+from plateviz.cli.main import app
 from tests.docs.pages import DOCS, PAGES, README, REPOSITORY, blocks_of
 
 COMMANDS = get_command(app).commands

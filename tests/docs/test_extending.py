@@ -106,7 +106,7 @@ def test_parameter_group_is_fitted(tree, run_in):
     found, sigma = map(float, re.fullmatch(r"(\S+) ± (\S+) arcsec\n", printed).groups())
     assert found == pytest.approx(5.0, abs=4.0 * sigma)
     assert sigma < 4.0
-    assert "detector_skew" in run_in(tree, "-m", "plateviz.cli", "fit", "--help")
+    assert "detector_skew" in run_in(tree, "-m", "plateviz.cli.main", "fit", "--help")
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import sys
 import pytest
 from PIL import Image
 
-from plateviz.gallery import diagnostics, source_figures, survey_figures
+from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from tests.docs.pages import DOCS, headings_of, section_of
 
 ORBIT, SURVEY = DOCS / "diagnostics.md", DOCS / "survey-diagnostics.md"

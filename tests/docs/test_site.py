@@ -9,13 +9,13 @@ from typer.main import get_command
 import plateviz.plots
 import plateviz.tables
 import solver
-from plateviz.cli import app
-from solver.io import layout
-from solver.parameters import PARAMETERS
-from solver.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, RESULT_TABLES, TRUTH
-from solver.settings import FitSettings, NutsSettings, SviSettings
+from plateviz.cli.main import app
+from solver.data.parameters import PARAMETERS
+from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, RESULT_TABLES, TRUTH
+from solver.data.settings import FitSettings, NutsSettings, SviSettings
+from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
+from solver.io import published as layout
 from solver.simulate.settings import SurveySettings
-from solver.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from tests.docs.pages import DOCS, PAGES
 
 pytestmark = pytest.mark.slow
@@ -117,7 +117,7 @@ def test_every_column_that_is_read_is_described(page, table):
 @pytest.mark.parametrize("table", RESULT_TABLES, ids=lambda table: table.name)
 def test_every_column_of_a_result_is_described(page, table):
     text = page("formats").text
-    kept = [one for one in vars(layout).values() if isinstance(one, layout.Layout)]
+    kept = [one for one in vars(layout).values() if isinstance(one, layout.PublishedTable)]
     (found,) = (one for one in kept if one.table is table)
     assert found.hdu in text
     for column in table:

@@ -10,12 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from plateviz.cli import main
-from solver import mode_schema, schema
-from solver.instrument import MINI_MOCK
-from solver.parameters import CALIBRATION_GROUPS, Group
-from solver.result import FitResult, FitStatus
-from solver.settings import FitSettings
+from plateviz.cli.main import main
+from solver.data import eigenmode_schema as eigenmode_schema
+from solver.data import schema
+from solver.data.instrument import MINI_MOCK
+from solver.data.parameters import CALIBRATION_GROUPS, Group
+from solver.data.result import FitResult, FitStatus
+from solver.data.settings import FitSettings
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 from tests.plateviz.survey_tables import SurveySample, synthetic_survey
@@ -41,7 +42,7 @@ def make_fit_result() -> Callable[[int], tuple[FitResult, pd.DataFrame]]:
 
 @pytest.fixture(scope="session")
 def fit_result() -> FitResult:
-    """About 300 sources, 12 exposures, 4 detectors; complete against `solver.schema`."""
+    """About 300 sources, 12 exposures, 4 detectors; complete against `solver.data.schema`."""
     return synthetic_fit(1)[0]
 
 
@@ -411,10 +412,12 @@ def _modes(random: np.random.Generator, result: FitResult) -> dict[str, pd.DataF
         }
     )
     tables = (modes, parameters, shifts)
-    return {t.name: f[t.names] for t, f in zip(mode_schema.MODE_TABLES, tables, strict=True)}
+    return {
+        t.name: f[t.names] for t, f in zip(eigenmode_schema.EIGENMODE_TABLES, tables, strict=True)
+    }
 
 
 @pytest.fixture(scope="session")
 def survey() -> SurveySample:
-    """A fitted survey of 90 orbits and 72 sources; complete against `solver.survey_schema`."""
+    """A fitted survey of 90 orbits and 72 sources; complete against `solver.data.survey_schema`."""
     return synthetic_survey()

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.sky import offsets_mas
-from solver import schema, survey_schema
-from solver.apparent_motion import julian_year, motion_design
-from solver.astrometry import frames_at, sky_position
-from solver.ephemeris import observer_at
+from solver.data import schema, survey_schema
+from solver.data.survey_schema import MOTION_PARAMETERS
+from solver.model.apparent_motion import julian_year, motion_design
+from solver.model.astrometry import frames_at, sky_position
+from solver.model.ephemeris import observer_at
 from solver.simulate.sky import galactic_to_icrs
-from solver.survey_schema import MOTION_PARAMETERS
 from solver.units import MAS_PER_DEG
 
 FIRST_ID = 4_057_482_027_171_038_209
@@ -25,7 +25,7 @@ _SEASONS = (61841.0, 62007.0, 62206.0, 62372.0, 62571.0, 62737.0)
 
 
 class SurveySample(NamedTuple):
-    """The tables of a fitted survey, as `solver.survey_schema` and `solver.schema` define them."""
+    """The tables of a fitted survey (`solver.data.survey_schema`, `solver.data.schema`)."""
 
     orbits: pd.DataFrame
     motions: pd.DataFrame

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
-from solver.estimate import Estimate
+from solver.data.parameters import CALIBRATION_GROUPS, SOURCES
+from solver.data.settings import FitSettings
+from solver.engines.estimate import Estimate
+from solver.engines.gauss_newton import find_mode
 from solver.fit import fit_orbit
-from solver.forward import predict
-from solver.gauss_newton import find_mode
-from solver.io.read import read_orbit
-from solver.normal import accumulate
-from solver.parameters import CALIBRATION_GROUPS, SOURCES
-from solver.problem import build_problem
-from solver.schur import reduce
-from solver.settings import FitSettings
-from solver.tables import solution_of
-from solver.tiles import CHUNK as WHOLE_CHUNK
+from solver.io.read_orbit import read_orbit
+from solver.linear.normal_equations import accumulate
+from solver.linear.source_elimination import eliminate_sources
+from solver.model.forward import predict
+from solver.problem.problem import build_problem
+from solver.problem.tiles import CHUNK as WHOLE_CHUNK
+from solver.results.tables import solved_problem
 from tests.solver.small_orbit import make_orbit, true_offsets
 
 # Tiles; one length for all, since each costs a compilation. A small orbit fills it twice.
@@ -31,7 +31,7 @@ CHUNK = 16
 def _small_chunks():
     """Linearise a small orbit a little at a time, in more than one chunk."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.tiles.CHUNK", CHUNK)
+        patch.setattr("solver.problem.tiles.CHUNK", CHUNK)
         yield
 
 
@@ -39,7 +39,7 @@ def _small_chunks():
 def _small_patches():
     """Keep the fields of a small orbit apart, though that would save it nothing."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.patches.OF_ONE_BLOCK", 0.0)
+        patch.setattr("solver.problem.source_blocks.OF_ONE_BLOCK", 0.0)
         yield
 
 
@@ -77,11 +77,11 @@ def problem(small_orbit):
 
 
 def solve(orbit, settings=None):
-    """Return the `Solution` of a small orbit."""
+    """Return the `SolvedProblem` of a small orbit."""
     settings = settings or FitSettings()
     problem = build_problem(orbit.data, orbit.instrument, settings)
     mode = find_mode(problem, settings)
-    return solution_of(problem, Estimate(mode), mode.reduced)
+    return solved_problem(problem, Estimate(mode), mode.reduced)
 
 
 @pytest.fixture(scope="package")
@@ -141,7 +141,7 @@ def _dense_jacobian(offsets, geometry, index):
 def dense_jacobian(problem, theta, sources):
     """Return the derivatives of all pixels by all parameters, shape (2 obs, parameters)."""
     offsets = {**problem.layout.scatter(theta), SOURCES.name: sources}
-    blocks = _dense_jacobian(offsets, unpadded(problem), problem.observed.index)
+    blocks = _dense_jacobian(offsets, unpadded(problem), problem.measurements.index)
     n_rows = 2 * problem.n_obs
     jacobian = np.zeros((n_rows, problem.layout.size + sources.size))
     for group in CALIBRATION_GROUPS:
@@ -189,15 +189,15 @@ def make_dense():
     """Return the function that builds the dense posterior of a problem at a point."""
 
     def make(problem, theta, sources):
-        weight = 1.0 / problem.observed.sigma.ravel()
+        weight = 1.0 / problem.measurements.sigma.ravel()
         jacobian = dense_jacobian(problem, theta, sources) * weight[:, None]
         predicted = _pixels(
-            problem.offsets(theta, sources), problem.geometry, problem.observed.index
+            problem.offsets(theta, sources), problem.geometry, problem.measurements.index
         )
-        residual = (problem.observed.measured - np.asarray(predicted)).ravel() * weight
+        residual = (problem.measurements.measured - np.asarray(predicted)).ravel() * weight
         n_calib = problem.layout.size
         prior = np.zeros((jacobian.shape[1],) * 2)
-        prior[:n_calib, :n_calib] = np.diag(problem.priors.curvature(theta))
+        prior[:n_calib, :n_calib] = np.diag(problem.priors.hessian_diagonal(theta))
         for i, precision in enumerate(problem.priors.precision):
             here = slice(n_calib + 2 * i, n_calib + 2 * i + 2)
             prior[here, here] = precision
@@ -230,7 +230,7 @@ def equations(problem, expansion_point):
 
 @pytest.fixture
 def reduced(problem, equations, expansion_point):
-    return reduce(equations, problem.priors)
+    return eliminate_sources(equations, problem.priors)
 
 
 @pytest.fixture
@@ -249,7 +249,7 @@ def fit_whole():
 
     def run(data, settings=None):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("solver.tiles.CHUNK", WHOLE_CHUNK)
+            patch.setattr("solver.problem.tiles.CHUNK", WHOLE_CHUNK)
             return fit_orbit(data, settings=settings or FitSettings())
 
     return run

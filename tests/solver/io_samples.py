@@ -8,10 +8,10 @@ import pandas as pd
 from astropy.io import fits
 from astropy.table import Table
 
-from solver.parameters import CALIBRATION_GROUPS
-from solver.result import FitResult
-from solver.schema import CALIBRATION, EXPOSURES, RESIDUALS, SOURCES, TRACE, TRUE_PLACES
-from solver.settings import FitSettings
+from solver.data.parameters import CALIBRATION_GROUPS
+from solver.data.result import FitResult
+from solver.data.schema import CALIBRATION, EXPOSURES, RESIDUALS, SOURCES, TRACE, TRUE_PLACES
+from solver.data.settings import FitSettings
 
 FIRST_ID = 4057000000000003911
 N_SOURCES = 6

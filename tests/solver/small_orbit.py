@@ -1,7 +1,7 @@
 """A small orbit with known truth: an observation model of its own, in NumPy and ERFA.
 
 Written from the paper's section "Observation model" and sharing no code with
-`solver.forward`: spherical trigonometry where the solver has unit vectors,
+`solver.model.forward`: spherical trigonometry where the solver has unit vectors,
 `numpy.polynomial.legendre` where it has a recursion, ERFA where it has its own aberration.
 """
 
@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 from numpy.polynomial.legendre import legval, legval2d
 
-from solver.instrument import MINI_MOCK, Instrument
-from solver.orbit import OrbitData
+from solver.data.instrument import MINI_MOCK, Instrument
+from solver.data.orbit import OrbitData
 
 FIRST_ID = 4_057_482_027_171_038_209
 ORBIT_ID = 7

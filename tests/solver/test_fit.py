@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from solver.data.result import FitStatus
+from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import CancelledError, FitError
 from solver.fit import fit_orbit
-from solver.result import FitStatus
-from solver.settings import MAX_ORDER, FitSettings
 from tests.solver.small_orbit import FIRST_ID, make_orbit
 
 MAS = ["offset_ra", "offset_dec", "sigma_ra_marginal", "sigma_dec_marginal"]

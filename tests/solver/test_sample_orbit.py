@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from astropy.table import Table
 
-from solver.settings import FitSettings
+from solver.data.settings import FitSettings
 
 MIN_OBS = 10
 CLASSES = ["non-reference", "artificial"]

@@ -52,7 +52,7 @@ def serving(*arguments, env=None):
     """
     with tempfile.NamedTemporaryFile("a") as said:
         process = subprocess.Popen(
-            [sys.executable, "-m", "plateviz.cli", *arguments, "--no-open"],
+            [sys.executable, "-m", "plateviz.cli.main", *arguments, "--no-open"],
             stdout=said,
             stderr=subprocess.STDOUT,
             env={**os.environ, **(env or {}), "PYTHONUNBUFFERED": "1"},

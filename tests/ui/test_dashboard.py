@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from plateviz.gallery import diagnostics
+from plateviz.plots.gallery import diagnostics
 from tests.ui.conftest import see, serving
 
 expect.set_options(timeout=60_000)

@@ -5,14 +5,14 @@ import re
 
 import pytest
 
-from plateviz.gallery import source_figures, survey_figures
-from plateviz.plots.survey_figure import SourceTables, SurveyTables
+from plateviz.plots.gallery import source_figures, survey_figures
 from plateviz.reports.orbit import orbit_report
 from plateviz.reports.page import page_of
 from plateviz.reports.pdf import print_pdf
 from plateviz.reports.report import Picture, Report
+from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from plateviz.tables.verdict import Verdict
-from solver.instrument import MINI_MOCK
+from solver.data.instrument import MINI_MOCK
 from tests.plateviz.conftest import synthetic_fit
 from tests.plateviz.survey_tables import synthetic_survey
 

@@ -6,7 +6,7 @@ import sys
 import pytest
 from playwright.sync_api import expect
 
-from plateviz.gallery import diagnostics, source_figures, survey_figures
+from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 from tests.ui.conftest import see, serving
@@ -42,7 +42,7 @@ ROWS = f"""() => {{ {_VIEWS}
 BACKGROUNDS = f"""() => {{ {_VIEWS}
   const colour = view => view.model.background_fill_color;
   return Object.fromEntries(figures.map(view => [card(view), colour(view)])); }}"""
-# Where the first point of a figure that leads somewhere is on the screen, and its value.
+# Where the first point of a figure that links somewhere is on the screen, and its value.
 POINT = f"""([name, key]) => {{ {_VIEWS}
   for (const figure of figures.filter(view => card(view) === name))
     for (const renderer of figure.model.renderers) {{
@@ -64,7 +64,15 @@ def simulated(tmp_path_factory, chromium_path):
 
 @pytest.fixture(scope="module")
 def served(simulated):
-    command = [sys.executable, "-m", "plateviz.cli", "survey", str(simulated), "--workers", "1"]
+    command = [
+        sys.executable,
+        "-m",
+        "plateviz.cli.main",
+        "survey",
+        str(simulated),
+        "--workers",
+        "1",
+    ]
     subprocess.run(command, check=True, capture_output=True)
     with serving("serve", str(simulated), "--port", "0") as address:
         yield address

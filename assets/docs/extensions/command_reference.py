@@ -12,7 +12,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from typer.main import get_command
 
-from plateviz.cli import app
+from plateviz.cli.main import app
 
 COMMANDS: dict[str, Any] = get_command(app).commands  # type: ignore[attr-defined]
 _VALUES = {int: "NUMBER", float: "NUMBER", str: "TEXT", Path: "FILE", bool: ""}

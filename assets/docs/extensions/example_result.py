@@ -4,11 +4,11 @@ from functools import cache
 
 import pandas as pd
 
-from solver import schema
-from solver.columns import Column, Table
-from solver.parameters import CALIBRATION_GROUPS
-from solver.result import FitResult
-from solver.settings import FitSettings
+from solver.data import schema
+from solver.data.columns import Column, Table
+from solver.data.parameters import CALIBRATION_GROUPS
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings
 
 _VALUES = {"int64": 0, "float64": 1.0, "bool": True, "str": ""}
 

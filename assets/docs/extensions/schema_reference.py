@@ -2,7 +2,7 @@
 
 | directive            | shows                                                              |
 |----------------------|--------------------------------------------------------------------|
-| `columns MODULE:NAME`| the columns of a table, `solver.schema:MEASUREMENT`                |
+| `columns MODULE:NAME`| the columns of a table, `solver.data.schema:MEASUREMENT`                |
 | `hdu NAME`           | the columns of an HDU of a result file                             |
 | `keywords NAME`      | the header keywords of an HDU                                      |
 | `parameters`         | the parameter groups with their priors                             |
@@ -26,11 +26,12 @@ from markup import code, table
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from solver.columns import Column, Table
-from solver.io import header, layout
-from solver.io.layout import Derived, Layout
-from solver.parameters import PARAMETERS, Group
-from solver.prior_text import format_width
+from solver.data.columns import Column, Table
+from solver.io import header
+from solver.io import published as layout
+from solver.io.published import Derived, PublishedTable
+from solver.data.parameters import PARAMETERS, Group
+from solver.data.prior_text import format_width
 
 _AXES = {"src": "source", "exp": "exposure", "coef": "distortion term", "det": "detector"}
 _DERIVED: dict[str, Callable] = {
@@ -83,7 +84,7 @@ def columns_of(where: str) -> nodes.table:
 
 def hdu(name: str) -> nodes.table:
     """Return the columns of an HDU in the order in which they are written."""
-    kept = next((k for k in vars(layout).values() if isinstance(k, Layout) and k.hdu == name), None)
+    kept = next((k for k in vars(layout).values() if isinstance(k, PublishedTable) and k.hdu == name), None)
     rows = [] if kept is None else [_kept(kept, column) for column in kept.table]
     rows += [_derived(column) for column in _DERIVED.get(name, lambda _: [])(example_result())]
     if not rows:
@@ -167,7 +168,7 @@ def _absent(column: Column) -> str:
     return "may be left out" if column.default is None else f"`{column.default}`"
 
 
-def _kept(kept: Layout, column: Column) -> tuple[str, str, str, str]:
+def _kept(kept: PublishedTable, column: Column) -> tuple[str, str, str, str]:
     name = kept.name(column)
     unit = "" if column.name in kept.unitless else _unit(column)
     renamed = f"`{column.name}`" if name != column.name else ""

@@ -7,8 +7,8 @@ import astropy.units as u
 import pytest
 
 from plateviz.notebook.choices import Choices, settings_with, takes_choices
+from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.settings import FitSettings
 
 PAPER = FitSettings()
 

@@ -99,7 +99,7 @@ def test_files_of_an_orbit_open_and_fit(sample_orbit_dir):
 
 def test_closed_survey_opens_its_solver_again(survey, solution):
     survey.close()
-    assert not survey._bench._open
+    assert not survey._solver._open
     assert survey.orbit(1).fit(order=4).summary["converged"]
 
 
@@ -108,10 +108,10 @@ def test_dashboard_is_a_part_of_a_served_page_and_ends_with_its_session(survey):
     with set_curdoc(document):
         part = survey.dashboard().__panel__()
     assert [type(column).__name__ for column in part] == ["Column", "Column"]
-    assert survey._bench._open
+    assert survey._solver._open
     for end in document.callbacks.session_destroyed_callbacks:
         end(None)
-    assert not survey._bench._open
+    assert not survey._solver._open
 
 
 def test_interrupted_cell_stops_its_job(survey, monkeypatch):
@@ -121,7 +121,7 @@ def test_interrupted_cell_stops_its_job(survey, monkeypatch):
         jobs.append(job)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("plateviz.cli_output.Reporter.follow", interrupt)
+    monkeypatch.setattr("plateviz.solving.progress.Reporter.follow", interrupt)
     with pytest.raises(KeyboardInterrupt):
         survey.orbit(2).fit(order=7)
     jobs[0].wait(30)
@@ -132,10 +132,10 @@ def test_interrupted_cell_stops_its_job(survey, monkeypatch):
 def test_solver_that_dies_is_a_failed_fit(survey, monkeypatch):
     def kill(self, job):
         job.wait_for_news(0, 30)
-        survey._bench.workbench._worker._process.kill()
+        survey._solver.store._worker._process.kill()
         job.wait(30)
 
-    monkeypatch.setattr("plateviz.cli_output.Reporter.follow", kill)
+    monkeypatch.setattr("plateviz.solving.progress.Reporter.follow", kill)
     with pytest.raises(FitError, match="the solver process ended"):
         survey.orbit(2).fit(order=6)
 
@@ -143,7 +143,7 @@ def test_solver_that_dies_is_a_failed_fit(survey, monkeypatch):
 def test_solver_ends_with_the_interpreter(made_survey, tmp_path):
     code = (
         f"import plateviz; survey = plateviz.open({str(made_survey)!r})\n"
-        "bench = survey._bench.workbench; print(bench._worker._process.pid, bench._scratch)"
+        "store = survey._solver.store; print(store._worker._process.pid, store._scratch)"
     )
     environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
     run = subprocess.run(

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from plateviz.job import Job
 from plateviz.notebook import progress
 from plateviz.notebook.progress import CellReporter, notebook_shell, reporting
+from plateviz.solving.job import Job
 
 
 class Shell:

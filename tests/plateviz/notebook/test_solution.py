@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import plateviz
-from plateviz.gallery import diagnostics
 from plateviz.notebook.solution import OpenSolution
 from plateviz.notebook.table import FITTED
+from plateviz.plots.gallery import diagnostics
+from solver.data.schema import RESULT_TABLES
 from solver.errors import InputError
 from solver.io.result import read_result
-from solver.schema import RESULT_TABLES
 
 OF_COMPARISON = {"comparison", "orders"}
 

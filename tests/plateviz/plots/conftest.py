@@ -34,10 +34,16 @@ def orbit_drawings(fit_result, compared, make_fit_result, truth, instrument):
             plots.plot_comparison,
             tables.comparison(fit_result, make_fit_result(2)[0]),
         ),
-        "mode_spectrum": (plots.plot_mode_spectrum, tables.mode_spectrum(fit_result)),
-        "mode_deciders": (plots.plot_mode_deciders, tables.mode_deciders(fit_result)),
-        "mode_groups": (plots.plot_mode_groups, tables.mode_groups(fit_result)),
-        "mode_shifts": (plots.plot_mode_shifts, tables.mode_shifts(fit_result)),
+        "eigenmode_spectrum": (
+            plots.plot_eigenmode_spectrum,
+            tables.eigenmode_spectrum(fit_result),
+        ),
+        "eigenmode_deciders": (
+            plots.plot_eigenmode_deciders,
+            tables.eigenmode_deciders(fit_result),
+        ),
+        "eigenmode_groups": (plots.plot_eigenmode_groups, tables.eigenmode_groups(fit_result)),
+        "eigenmode_shifts": (plots.plot_eigenmode_shifts, tables.eigenmode_shifts(fit_result)),
         "prior_shares": (plots.plot_prior_shares, tables.prior_shares(fit_result)),
     }
 

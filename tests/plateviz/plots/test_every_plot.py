@@ -24,10 +24,10 @@ NAMES_OF_ORBIT = [
     "exposure_chi2",
     "orders",
     "comparison",
-    "mode_spectrum",
-    "mode_deciders",
-    "mode_groups",
-    "mode_shifts",
+    "eigenmode_spectrum",
+    "eigenmode_deciders",
+    "eigenmode_groups",
+    "eigenmode_shifts",
     "prior_shares",
 ]
 NAMES_OF_SURVEY = [

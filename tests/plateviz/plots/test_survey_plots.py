@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 
 from plateviz import plots, tables
-from plateviz.gallery import diagnostics, source_figures, survey_figures
+from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.style import ROW_LIMIT
-from plateviz.plots.survey_figure import SourceTables, SurveyTables
+from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from tests.plateviz.plots.drawn import figures_of, sources_of, subtitle_of
 
 

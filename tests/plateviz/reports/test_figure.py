@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import holoviews as hv
 import pytest
 
-from plateviz.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.diagnostic import Chosen
-from plateviz.plots.survey_figure import SourceTables, SurveyTables
+from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from plateviz.reports.figure import dark_colours, packed_document
+from plateviz.tables.survey_tables import SourceTables, SurveyTables
 
 DIAGNOSTICS = {d.name: d for d in diagnostics()}
 OF_SURVEY = {f.name: f for f in survey_figures()}

@@ -7,12 +7,12 @@ from datetime import UTC, datetime
 import pandas as pd
 import pytest
 
-from plateviz.gallery import diagnostics
+from plateviz.plots.gallery import diagnostics
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.page import page_of
 from plateviz.reports.report import Report
 from plateviz.tables.verdict import Verdict
-from solver.orbit import OrbitData
+from solver.data.orbit import OrbitData
 
 FACTS = {"Report": {"Command": "plateviz report <b>here</b>"}}
 MADE = datetime(2030, 1, 2, 3, 4, 5, tzinfo=UTC)
@@ -104,7 +104,7 @@ def test_selections_are_all_then_each_detector_then_the_farthest_exposures(repor
 
 
 def test_failed_orbit_says_why_and_what_there_is(made_survey):
-    from plateviz.source import SurveyFolder
+    from plateviz.solving.origin import SurveyFolder
 
     data: OrbitData = SurveyFolder(str(made_survey)).read(1)
     report = failed_orbit_report(data, "orbit 1: singular", {})

@@ -1,0 +1,138 @@
+"""`plateviz fit`: read an orbit, solve it with one engine or all of them, write and print."""
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from plateviz.cache import keep_compilations
+from plateviz.cli.output import print_agreement, print_fit, print_json, print_orders
+from plateviz.solving.origin import OrbitFiles
+from plateviz.solving.progress import Reporter, reporting
+from solver.data.settings import COUNTED, ENGINES, FitSettings
+from solver.errors import FitError, InputError
+from solver.io.atomic import require_writable
+from solver.runtime.memory import keep_memory
+
+if TYPE_CHECKING:
+    from solver.data.orbit import OrbitData
+    from solver.data.result import FitResult
+    from solver.fit import OrbitFitter
+
+
+class FitRequest(NamedTuple):
+    """What was asked for on the command line."""
+
+    files: OrbitFiles
+    orbit: int | None
+    settings: FitSettings
+    engines: tuple[str, ...]
+    output: Path
+    checkpoint: Path | None
+
+
+def run_fit(request: FitRequest, as_json: bool) -> None:
+    """Do what was asked for; raises `FitError` where a fit has not converged."""
+    start = time.perf_counter()
+    keep_memory()
+    outputs = {engine: _output(request, engine) for engine in request.engines}
+    for output in outputs.values():
+        require_writable(output)
+    if request.checkpoint is not None and "svi" not in request.engines:
+        raise InputError("--checkpoint: expected the engine svi, which works in blocks of steps")
+    summaries, results = {}, {}
+    with reporting("reading the orbit") as reporter:
+        focal_plane, data = request.files.read_instrument(), request.files.read(request.orbit)
+        read = time.perf_counter() - start
+        reporter.say("loading the solver")
+        keep_compilations()
+        from solver.fit import OrbitFitter
+        from solver.io.result import write_result
+
+        fitter = OrbitFitter(data, focal_plane)
+        for engine, output in outputs.items():
+            result = _fit(fitter, data, request, engine, reporter)
+            reporter.say("writing the result")
+            fitted = time.perf_counter()
+            write_result(result, output)
+            if engine == "svi" and request.checkpoint is not None:
+                request.checkpoint.unlink(missing_ok=True)
+            seconds = {"read": read, **dict(result.summary["seconds"])}
+            seconds["write"] = time.perf_counter() - fitted
+            summaries[engine] = {**result.summary, "seconds": seconds, "output": str(output)}
+            summaries[engine] |= _orders(result)
+            results[engine] = result
+    _report(summaries, results, outputs, as_json)
+
+
+def _output(request: FitRequest, engine: str) -> Path:
+    """Return the file of an engine: that asked for, or beside it where there are several."""
+    output = request.output
+    if engine == request.engines[0]:
+        return output
+    return output.with_name(f"{output.stem}-{engine}{output.suffix}")
+
+
+def _fit(
+    fitter: "OrbitFitter",
+    data: "OrbitData",
+    request: FitRequest,
+    engine: str,
+    reporter: Reporter,
+) -> "FitResult":
+    # What the orders are worth does not depend on the engine.
+    compared = request.settings.compare_orders and engine == request.engines[0]
+    settings = request.settings.with_(engine=engine, compare_orders=compared)
+    resumption = None
+    if engine == "svi" and request.checkpoint is not None:
+        from solver.engines.checkpoint import resume_from
+
+        resumption = resume_from(request.checkpoint, data, settings)
+    return fitter.fit(
+        settings, lambda it: reporter.say(f"{engine}: {COUNTED[engine]} {it.iteration}"), resumption
+    )
+
+
+def _orders(result: "FitResult") -> dict[str, Any]:
+    """Return what the comparison of the orders adds to the summary, if there was one."""
+    from plateviz.tables.orders import order_comparison, order_verdict
+
+    table = order_comparison(result)
+    if table.empty:
+        return {}
+    # JSON knows no NaN.
+    plain = table.astype(object).where(table.notna(), None)
+    return {"orders": plain.to_dict("records"), "preferred_order": order_verdict(table)}
+
+
+def _report(
+    summaries: Mapping[str, dict[str, Any]],
+    results: Mapping[str, "FitResult"],
+    outputs: Mapping[str, Path],
+    as_json: bool,
+) -> None:
+    first = next(iter(summaries.values()))
+    rows = []
+    if len(results) > 1:
+        from solver.results.agreement import compare
+
+        rows = compare(results)
+    if as_json:
+        agreement = [{**row._asdict(), "agrees": row.agrees} for row in rows]
+        more = {"engines": summaries, "agreement": agreement} if rows else {}
+        print_json({**first, **more})
+    else:
+        for engine, summary in summaries.items():
+            print_fit(summary, outputs[engine])
+            if "orders" in summary:
+                print_orders(summary["orders"], summary["preferred_order"])
+        print_agreement(rows)
+    for summary in summaries.values():
+        if not summary["converged"]:
+            raise FitError(
+                f"orbit {summary['orbit']} has not converged by {summary['engine']}: "
+                f"{summary['reason']}"
+            )
+    apart = [f"{row.engine}, {row.what}: {row.found:.3g}" for row in rows if not row.agrees]
+    if apart:
+        raise FitError(f"the engines of {', '.join(ENGINES)} do not agree: {'; '.join(apart)}")

@@ -1,0 +1,173 @@
+"""`plateviz report`: one HTML file of an orbit, a source or a survey."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+from plateviz.runs.run import DEFAULT_RUN
+from solver.errors import InputError
+
+if TYPE_CHECKING:
+    from plateviz.reports.report import Facts, Report
+    from solver.data.result import FitResult
+
+
+class ReportRequest(NamedTuple):
+    """What was asked for on the command line."""
+
+    path: Path
+    orbit: int | None
+    source: int | None
+    survey: bool
+    run: str
+    other: str | None
+    instrument: Path | None
+
+
+def report(
+    path: Annotated[
+        Path, typer.Argument(help="Survey directory, or a result of `fit`.", metavar="DIR|RESULT")
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="File to write (HTML).", metavar="REPORT")
+    ],
+    orbit: Annotated[int | None, typer.Option(help="Report one orbit of the survey.")] = None,
+    source: Annotated[int | None, typer.Option(help="Report one source, by its id.")] = None,
+    survey: Annotated[
+        bool, typer.Option("--survey", help="Report the survey as a whole: the default.")
+    ] = False,
+    run: Annotated[str, typer.Option(help="Name of the run.")] = DEFAULT_RUN,
+    other: Annotated[
+        str | None,
+        typer.Option(help="Solution to compare the orbit with: another run, or another result."),
+    ] = None,
+    instrument: Annotated[
+        Path | None, typer.Option(help="Instrument of a result; the mini-mock's by default.")
+    ] = None,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Print it with Chromium, too.")] = False,
+    pages: Annotated[
+        bool,
+        typer.Option(
+            "--pages", help="Write a folder: the survey as its index, and a page for each orbit."
+        ),
+    ] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Processes for --pages; one for each core by default.", min=1),
+    ] = None,
+) -> None:
+    """Write a report that opens anywhere: one HTML file that needs no network."""
+    request = ReportRequest(path, orbit, source, survey, run, other, instrument)
+    if pages:
+        _write_pages(request, output, pdf, workers)
+    else:
+        _write_page(request, output, pdf)
+
+
+def _write_pages(request: ReportRequest, folder: Path, pdf: bool, workers: int | None) -> None:
+    chosen = (request.orbit, request.source, request.other, request.instrument)
+    if pdf or any(choice is not None for choice in chosen):
+        raise InputError(
+            "--pages: expected a survey directory and --run at most, found a choice for one page"
+        )
+    from plateviz.reports.folder import write_folder
+    from plateviz.runs.queries import open_run
+    from plateviz.solving.progress import reporting
+
+    with reporting("reading") as reporter:
+        run = open_run(request.path, request.run)
+        made, kept = write_folder(run, folder, _facts(request.run), workers, reporter.step)
+    there = f", {kept} were there" if kept else ""
+    typer.echo(f"{folder / 'index.html'}: {made} pages of orbits made{there}")
+
+
+def _write_page(request: ReportRequest, output: Path, pdf: bool) -> None:
+    from plateviz.reports.pdf import find_chromium, print_pdf
+    from plateviz.solving.progress import reporting
+    from solver.io.atomic import require_writable, write_atomically
+
+    printed = output.with_suffix(".pdf")
+    require_writable(output)
+    if pdf:
+        if printed == output:
+            raise InputError(
+                f"{output}: expected a page's name such as R.html, found that of a PDF"
+            )
+        require_writable(printed)
+        find_chromium()
+    with reporting("reading") as reporter:
+        content = _composed(request)
+        reporter.say("drawing")
+        from plateviz.reports.page import page_of
+
+        page = page_of(content, reporter.step)
+        with write_atomically(output) as temporary:
+            temporary.write_text(page, encoding="utf-8")
+        if pdf:
+            reporter.say("printing")
+            print_pdf(output, printed)
+    typer.echo(f"{output}: {content.title}, {output.stat().st_size / 1e6:.1f} MB")
+    if pdf:
+        typer.echo(f"{printed}: printed")
+
+
+def _composed(request: ReportRequest) -> "Report":
+    if not request.path.is_dir():
+        return _of_file(request)
+    chosen = [request.orbit is not None, request.source is not None, request.survey]
+    if sum(chosen) > 1:
+        raise InputError("report: expected one of --orbit, --source and --survey, found several")
+    if request.instrument is not None:
+        raise InputError("--instrument: expected with a result of `plateviz fit`; a survey has one")
+    if request.other is not None and request.orbit is None:
+        raise InputError("--other: expected with --orbit, or with a result of `plateviz fit`")
+    from plateviz.reports.survey import source_report, survey_orbit_report, survey_report
+    from plateviz.runs.queries import open_run
+
+    run, facts = open_run(request.path, request.run), _facts(request.run)
+    if request.source is not None:
+        return source_report(run, request.source, facts)
+    if request.orbit is None:
+        return survey_report(run, facts)
+    return survey_orbit_report(run, request.orbit, facts, _other(request, request.orbit))
+
+
+def _of_file(request: ReportRequest) -> "Report":
+    if request.orbit is not None or request.source is not None or request.survey:
+        raise InputError(
+            f"{request.path}: expected a survey directory with --orbit, --source or --survey, "
+            "found no directory"
+        )
+    from plateviz.reports.orbit import orbit_report
+    from plateviz.reports.report import SOLVED
+    from solver.data.instrument import MINI_MOCK, read_instrument
+    from solver.io.result import read_result, read_versions
+
+    focal_plane = read_instrument(request.instrument) if request.instrument else MINI_MOCK
+    result = read_result(request.path)
+    other = read_result(Path(request.other)) if request.other else None
+    facts = {**_facts(), SOLVED: read_versions(request.path)}
+    return orbit_report(result, focal_plane, facts, other)
+
+
+def _other(request: ReportRequest, orbit: int) -> "FitResult | None":
+    """Return the solution to compare with: of another run, or of a result file."""
+    if request.other is None:
+        return None
+    from plateviz.runs.queries import open_run
+    from solver.io.result import read_result
+
+    path = Path(request.other)
+    return (
+        read_result(path) if path.is_file() else open_run(request.path, request.other).result(orbit)
+    )
+
+
+def _facts(run: str | None = None) -> "Facts":
+    """Return what made the report."""
+    from plateviz.reports.facts import facts_of
+
+    return facts_of(shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]), run)

@@ -1,0 +1,38 @@
+"""`plateviz reproduce`: the paper's survey, made and fitted where it is not there yet."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from plateviz.runs.run import DEFAULT_RUN
+
+
+def reproduce(
+    directory: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Survey directory; the paper's survey is made there if there is none. By "
+            "default one in your cache, of some 5 GB.",
+            metavar="DIR",
+        ),
+    ] = None,
+    run: Annotated[str, typer.Option(help="Name of the run.")] = DEFAULT_RUN,
+    workers: Annotated[
+        int | None,
+        typer.Option(help="Processes on this machine; one for each core by default.", min=1),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON value.")] = False,
+) -> None:
+    """Print the paper's numbers beside those of the 100-orbit survey."""
+    from plateviz.cache import cache_directory
+    from plateviz.cli.output import print_json, print_reproduction
+    from plateviz.solving.reproduction import reproduced
+
+    survey = directory or cache_directory() / "paper-survey"
+    table = reproduced(survey, run, workers)
+    if as_json:
+        rows = table.astype(object).where(table.notna(), None).to_dict("records")
+        print_json({"survey": str(survey), "run": run, "rows": rows})
+    else:
+        print_reproduction(table.to_dict("records"))

@@ -1,0 +1,73 @@
+"""`plateviz serve`: the dashboard over a survey or the files of an orbit, behind a proxy or not."""
+
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from plateviz.cli import options
+
+if TYPE_CHECKING:
+    from plateviz.dashboard.server import Place
+    from plateviz.solving.solution_store import SolutionStore
+
+
+def serve(
+    path: Annotated[
+        Path, typer.Argument(help="Survey directory, or OBS as of `fit`.", metavar="DIR|OBS")
+    ],
+    reference: Annotated[Path | None, options.REFERENCE] = None,
+    truth: options.Truth = None,
+    orbit: options.Orbit = None,
+    instrument: options.Instrument = None,
+    port: options.Port = 5006,
+    address: options.Address = "127.0.0.1",
+    allow_origin: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Host by which browsers reach a proxy before this server, such as "
+            "astro.example.org or astro.example.org:8443; may be repeated.",
+            metavar="HOST[:PORT]",
+        ),
+    ] = None,
+    prefix: Annotated[
+        str,
+        typer.Option(
+            help="Path under which a proxy has the page, such as plateviz.", metavar="PATH"
+        ),
+    ] = "",
+    open_browser: options.OpenBrowser = True,
+) -> None:
+    """Show a survey, or the orbit in some files, in the dashboard."""
+    from plateviz.dashboard.server import Place, check_address, check_origin, check_prefix
+    from plateviz.solving.origin import OrbitFiles, SurveyFolder
+    from plateviz.solving.solution_store import SolutionStore
+    from plateviz.solving.warm_solver import WarmSolver
+
+    origins = tuple(map(check_origin, allow_origin or []))
+    place = Place(check_address(address, port), address, origins, check_prefix(prefix))
+    if reference is None:
+        origin: OrbitFiles | SurveyFolder = SurveyFolder(str(path))
+        origin.orbits()
+    else:
+        origin = OrbitFiles(str(path), str(reference), _text(truth), orbit, _text(instrument))
+        # Read once here, so that what is wrong with the files is said before a page opens.
+        origin.read(orbit)
+    run_server(SolutionStore(origin, WarmSolver()), place, open_browser)
+
+
+def run_server(store: "SolutionStore", place: "Place", open_browser: bool) -> None:
+    """Serve a store at a place until it is interrupted."""
+    from plateviz.dashboard.server import serve as run
+
+    def ready(page: str) -> None:
+        typer.echo(f"plateviz serves on {page} until you press Ctrl-C")
+        if open_browser:
+            webbrowser.open(page)
+
+    run(store, place, ready)
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)

@@ -1,0 +1,4 @@
+"""The dashboard: session state, navigation, views, and the web server that serves them.
+
+Imports `plateviz.reports` and below.
+"""

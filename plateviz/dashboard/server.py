@@ -1,0 +1,136 @@
+"""The web server: one process without JAX, safe by default, over one store."""
+
+import contextlib
+import re
+import socket
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import panel as pn
+
+from plateviz.dashboard.app import build_app
+from plateviz.dashboard.closed_pages import leave_unsaid
+from plateviz.solving.solution_store import SolutionStore
+from solver.errors import InputError
+
+# How long a page may take to load its scripts before its session is given up.
+_PATIENCE_MILLISECONDS = 120_000
+_HOST = re.compile(r"[a-z0-9]([a-z0-9.-]*[a-z0-9])?(:\d{1,5})?")
+_PATH = re.compile(r"[A-Za-z0-9._~-]+(/[A-Za-z0-9._~-]+)*")
+
+
+class Place(NamedTuple):
+    """Where a page is served, and where browsers find it.
+
+    Attributes
+    ----------
+    port : TCP port, as from `check_address`
+    address : of the interface to listen on; other machines reach it only where it is not
+        a loopback address
+    origins : hosts by which browsers reach a proxy before it, as from `check_origin`
+    prefix : path of the page, as from `check_prefix`
+    """
+
+    port: int
+    address: str
+    origins: tuple[str, ...] = ()
+    prefix: str = ""
+
+
+def serve(store: SolutionStore, place: Place, ready: Callable[[str], None]) -> None:
+    """Serve the dashboard until it is interrupted; the store is closed at the end.
+
+    Parameters
+    ----------
+    ready : called with the page's address once it can be opened
+    """
+    pn.extension("tabulator")
+    server = _server(store, place)
+    try:
+        server.start()
+        path = f"{place.prefix}/" if place.prefix else ""
+        ready(f"http://{place.address}:{place.port}/{path}")
+        # Ctrl-C is how a person ends it.
+        with contextlib.suppress(KeyboardInterrupt):
+            server.io_loop.start()
+    finally:
+        server.stop()
+        store.close()
+
+
+def begin(store: SolutionStore, place: Place) -> Any:  # noqa: ANN401 of Bokeh
+    """Return a server that serves on the event loop of this thread, which somebody else runs."""
+    server = _server(store, place)
+    server.start()
+    return server
+
+
+def _server(store: SolutionStore, place: Place) -> Any:  # noqa: ANN401 of Bokeh
+    leave_unsaid()
+    hosts = sorted({place.address, "localhost", "127.0.0.1"})
+    # A thread is what it gives only where it is asked to make one.
+    return pn.serve(
+        lambda: build_app(store),
+        port=place.port,
+        address=place.address,
+        # A websocket from a page of any other host is refused.
+        websocket_origin=[*(f"{host}:{place.port}" for host in hosts), *place.origins],
+        prefix=place.prefix,
+        title=f"plateviz · {store.title}",
+        show=False,
+        start=False,
+        verbose=False,
+        unused_session_lifetime_milliseconds=_PATIENCE_MILLISECONDS,
+    )
+
+
+def check_address(address: str, port: int) -> int:
+    """Return the port to serve on, having found out before any work that it is free.
+
+    Parameters
+    ----------
+    port : 0 for any that is free
+
+    Raises
+    ------
+    InputError
+        If it could not: the port is taken, or the address is not this machine's.
+    """
+    try:
+        with socket.create_server((address, port)) as probe:
+            return int(probe.getsockname()[1])
+    except (OSError, OverflowError) as error:
+        raise InputError(
+            f"expected an address and a port that are free, found {address}:{port}: {error}"
+        ) from error
+
+
+def check_origin(text: str) -> str:
+    """Return a host that browsers may come from, as they send it.
+
+    Raises
+    ------
+    InputError
+        If it is no host, with a port or without.
+    """
+    host = text.strip().lower()
+    if not _HOST.fullmatch(host):
+        raise InputError(
+            "--allow-origin: expected a host such as astro.example.org or "
+            f"astro.example.org:8443, found {text!r}"
+        )
+    return host
+
+
+def check_prefix(text: str) -> str:
+    """Return the path under which a page is served, without slashes around it.
+
+    Raises
+    ------
+    InputError
+        If it cannot stand in an address.
+    """
+    path = text.strip("/")
+    if path and not _PATH.fullmatch(path):
+        raise InputError(f"--prefix: expected a path such as plateviz, found {text!r}")
+    return path

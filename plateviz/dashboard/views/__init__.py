@@ -1,0 +1,1 @@
+"""Views: they connect the session to tables and figures, and compute nothing."""

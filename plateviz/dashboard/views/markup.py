@@ -1,0 +1,47 @@
+"""Small pieces of HTML in the project's style, readable in both themes."""
+
+from html import escape
+from pathlib import Path
+
+import pandas as pd
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.reports.strip import STYLE
+
+_STYLES = [STYLE, (Path(__file__).parent / "style.css").read_text(encoding="utf-8")]
+
+
+def markup_pane() -> pn.pane.HTML:
+    """Return an empty pane that knows the classes of `style.css`."""
+    return pn.pane.HTML("", stylesheets=_STYLES, sizing_mode="stretch_width", margin=0)
+
+
+def paragraph(text: str, css_class: str, theme: str) -> str:
+    """Return a paragraph of plain text."""
+    return themed(f"<p class='{css_class}'>{escape(text)}</p>", theme)
+
+
+def themed(markup: str, theme: str) -> str:
+    """Return markup in the colours of a theme."""
+    return f"<div class='{theme}'>{markup}</div>"
+
+
+def titled(role: str, name: str) -> str:
+    """Return a line that says what is shown below it."""
+    return f"<p class='solution'><span class='muted'>{role}:</span> <b>{escape(name)}</b></p>"
+
+
+def heading(text: str) -> pmui.Typography:
+    """Return the heading of a part of the page or of its sidebar."""
+    return pmui.Typography(text, variant="subtitle1", margin=(10, 10, 4, 10))
+
+
+def numbers(table: pd.DataFrame) -> str:
+    """Return a small table of text, as `tables.headings.in_words` gives it; a dash for nothing."""
+    head = "".join(f"<th>{escape(title)}</th>" for title in table.columns)
+    rows = "".join(
+        f"<tr>{''.join(f'<td>{escape(words) or chr(0x2013)}</td>' for words in row)}</tr>"
+        for row in table.itertuples(index=False)
+    )
+    return f"<table class='numbers'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"

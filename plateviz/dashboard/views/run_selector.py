@@ -1,0 +1,20 @@
+"""Which run of the survey the views show."""
+
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.dashboard.navigation import Navigation
+
+
+def run_selector(navigation: Navigation) -> list[pn.viewable.Viewable]:
+    """Return the control that chooses a run; none where there is no run."""
+    if navigation.run is None:
+        return []
+    selector = pmui.Select.from_param(
+        navigation.param.run_name,
+        label="Run",
+        description="",
+        size="small",
+        sizing_mode="stretch_width",
+    )
+    return [selector]

@@ -1,0 +1,132 @@
+"""SourcePage: one source of a run through all its orbits."""
+
+from functools import partial
+
+import holoviews as hv
+import pandas as pd
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.views.figure import FigureGrid, FigureView
+from plateviz.dashboard.views.markup import (
+    heading,
+    markup_pane,
+    numbers,
+    paragraph,
+    themed,
+    titled,
+)
+from plateviz.dashboard.views.run_selector import run_selector
+from plateviz.dashboard.views.table import DataTable
+from plateviz.plots.gallery import source_figures
+from plateviz.plots.survey_figure import SourceFigure
+from plateviz.reports.strip import strip
+from plateviz.tables import (
+    motion_table,
+    source_class,
+    source_list,
+    source_orbits,
+    source_strip,
+)
+from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE, SOURCES_OF_RUN, in_words
+from plateviz.tables.survey_tables import SourceTables
+
+_INVITATION = (
+    "Write a source's id on the left, choose one below, or tap a point of a figure of the "
+    "Survey or the Orbit view."
+)
+
+
+class SourcePage(pn.viewable.Viewer):
+    """The Source view: the source that was found, else those that there are."""
+
+    def __init__(self, navigation: Navigation, **params: object) -> None:
+        """Follow the source of `navigation`."""
+        super().__init__(**params)
+        self._navigation, self._session = navigation, navigation.session
+        self._head, self._motion = markup_pane(), markup_pane()
+        self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row)
+        self._list = DataTable(SOURCES_OF_RUN, self._open_source, page_size=20)
+        self.figures = FigureGrid([self._figure_view(figure) for figure in source_figures()])
+        self._rest = pmui.Column(
+            heading("Motion"),
+            self._motion,
+            self.figures,
+            heading("Orbits"),
+            self._orbits,
+            sizing_mode="stretch_width",
+        )
+        self._choice = pmui.Column(self._list, sizing_mode="stretch_width")
+        self._column = pmui.Column(
+            self._head, self._rest, self._choice, sizing_mode="stretch_width"
+        )
+        self._entry = pmui.TextInput(
+            label="Source id",
+            size="small",
+            sizing_mode="stretch_width",
+            disabled=not navigation.run,
+        )
+        self.sidebar = pmui.Column(
+            heading("Shown"),
+            *run_selector(navigation),
+            self._entry,
+            sizing_mode="stretch_width",
+            margin=0,
+        )
+        self._entry.param.watch(lambda event: navigation.find_source(event.new), "value")
+        navigation.param.watch(self._list_sources, "run_name")
+        navigation.param.watch(self._show, ["run_name", "found", "message"])
+        self._session.param.watch(self._show, "theme")
+        self._list_sources()
+        self._show()
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the page without its sidebar."""
+        return self._column
+
+    def _figure_view(self, figure: SourceFigure) -> FigureView:
+        links = {"orbit_id": self._open_orbit}
+        return FigureView(figure, partial(self._picture, figure), links=links)
+
+    def _picture(self, figure: SourceFigure, theme: str) -> hv.core.Dimensioned | None:
+        found = self._navigation.found
+        return (
+            None if found is None else figure.draw(SourceTables(found.history, found.motion), theme)
+        )
+
+    def _list_sources(self, *_: object) -> None:
+        run = self._navigation.run
+        if run is not None:
+            self._list.show(source_list(run.counts()))
+
+    def _show(self, *_: object) -> None:
+        theme, found = self._session.theme, self._navigation.found
+        self._rest.visible = found is not None
+        self._choice.visible = found is None and self._navigation.run is not None
+        if found is None:
+            words = self._navigation.why_no_run or self._navigation.message or _INVITATION
+            self._head.object = paragraph(words, "empty", theme)
+            return
+        self._entry.value = str(found.source_id)
+        kind = source_class(found.history)
+        title = titled(f"{kind.capitalize()} source", str(found.source_id))
+        items = strip(source_strip(found.history, found.motion))
+        self._head.object = themed(title + items, theme)
+        if found.motion is None:
+            words = "Motions are fitted when all orbits of the run are there."
+            self._motion.object = paragraph(words, "caption", theme)
+        else:
+            table = motion_table(found.motion)
+            self._motion.object = themed(numbers(in_words(table, MOTION)), theme)
+        self._orbits.show(source_orbits(found.history), theme)
+        self.figures.change(theme)
+
+    def _open_row(self, row: pd.Series) -> None:
+        self._open_orbit(str(row["orbit_id"]))
+
+    def _open_orbit(self, orbit: str) -> None:
+        self._navigation.open_orbit(int(orbit))
+
+    def _open_source(self, row: pd.Series) -> None:
+        self._navigation.find_source(str(row["id"]))

@@ -1,0 +1,86 @@
+"""SurveyPage: every orbit of a run and how its fit is, then what the orbits say together."""
+
+from functools import partial
+
+import holoviews as hv
+import pandas as pd
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.views.figure import FigureGrid, FigureView
+from plateviz.dashboard.views.markup import heading, markup_pane, paragraph, themed, titled
+from plateviz.dashboard.views.run_selector import run_selector
+from plateviz.dashboard.views.table import DataTable
+from plateviz.plots.gallery import survey_figures
+from plateviz.plots.survey_figure import SurveyFigure
+from plateviz.reports.strip import strip
+from plateviz.runs.survey_tables import survey_tables
+from plateviz.tables import orbit_list, orbit_states, run_strip
+from plateviz.tables.headings import ORBITS_OF_RUN
+from plateviz.tables.survey_tables import SurveyTables
+
+
+class SurveyPage(pn.viewable.Viewer):
+    """The Survey view of the run that is chosen."""
+
+    def __init__(self, navigation: Navigation, **params: object) -> None:
+        """Follow the run of `navigation`."""
+        super().__init__(**params)
+        self._navigation, self._session = navigation, navigation.session
+        self._tables: SurveyTables | None = None
+        self._orbits = self._motions = pd.DataFrame()
+        self._head = markup_pane()
+        self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=15)
+        self.figures = FigureGrid([self._figure_view(figure) for figure in survey_figures()])
+        self._rest = pmui.Column(
+            heading("Orbits"), self._table, self.figures, sizing_mode="stretch_width"
+        )
+        self._column = pmui.Column(self._head, self._rest, sizing_mode="stretch_width")
+        self.sidebar = pmui.Column(
+            heading("Shown"), *run_selector(navigation), sizing_mode="stretch_width", margin=0
+        )
+        navigation.param.watch(self._read, "run_name")
+        self._session.param.watch(self._show, "theme")
+        self._read()
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the page without its sidebar."""
+        return self._column
+
+    def _figure_view(self, figure: SurveyFigure) -> FigureView:
+        links = {"id": self._navigation.open_source, "orbit_id": self._open_orbit}
+        return FigureView(figure, partial(self._picture, figure), links=links)
+
+    def _picture(self, figure: SurveyFigure, theme: str) -> hv.core.Dimensioned | None:
+        run = self._navigation.run
+        if run is None:
+            return None
+        if self._tables is None:
+            self._tables = survey_tables(run)
+        return figure.draw(self._tables, theme)
+
+    def _read(self, *_: object) -> None:
+        # The figures' tables take longer, and wait for the first figure.
+        self._tables = None
+        run = self._navigation.run
+        if run is not None:
+            self._orbits, self._motions = run.orbits(), run.motions()
+        self._show()
+
+    def _show(self, *_: object) -> None:
+        theme, words = self._session.theme, self._navigation.why_no_run
+        self._rest.visible = not words
+        if words:
+            self._head.object = paragraph(words, "empty", theme)
+            return
+        title = titled("Run", self._navigation.run_name)
+        self._head.object = themed(title + strip(run_strip(self._orbits, self._motions)), theme)
+        self._table.show(orbit_list(self._orbits), theme, orbit_states(self._orbits))
+        self.figures.change(theme)
+
+    def _open_row(self, row: pd.Series) -> None:
+        self._open_orbit(str(row["orbit_id"]))
+
+    def _open_orbit(self, orbit: str) -> None:
+        self._navigation.open_orbit(int(orbit))

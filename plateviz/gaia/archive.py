@@ -1,0 +1,240 @@
+"""Stars of Gaia DR3 for the simulator: asked for once, then kept with the query."""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from astropy.io import votable
+from astropy.io.votable.tree import Info
+from astropy.table import Column, Table
+
+from plateviz.cache import cache_directory
+from plateviz.gaia.tap_query import answer_to, service_name
+from solver.data import columns
+from solver.errors import InputError
+from solver.io.atomic import require_writable, write_atomically
+from solver.io.read_orbit import find_catalogue
+from solver.io.table_check import conform
+from solver.simulate.gaia import GAIA
+from solver.simulate.settings import SurveySettings
+from solver.simulate.sky import galactic_to_icrs
+
+# The archive gives nobody more without a log-in; a field with as many is cut off.
+MOST_STARS = 3_000_000
+_WHOLE_TURN_DEG = 360.0
+_LARGEST_CIRCLE_DEG = 90.0
+
+# What is fetched: what the simulator takes, and the magnitude for people.
+ARCHIVE = columns.Table(
+    "gaia_source",
+    (
+        *(replace(column, required=True, default=None) for column in GAIA),
+        columns.Column("phot_g_mean_mag", "float64", "mag", "mean magnitude in G", may_be_nan=True),
+    ),
+    key=GAIA.key,
+)
+
+
+@dataclass(frozen=True)
+class StarQuery:
+    """Which stars to ask for.
+
+    Attributes
+    ----------
+    l_deg, b_deg : limits in Galactic longitude, which may run through zero, and latitude
+    parallax_over_error : what the parallax exceeds, in units of its error
+    """
+
+    l_deg: tuple[float, float]
+    b_deg: tuple[float, float]
+    parallax_over_error: float
+
+    def __post_init__(self) -> None:
+        """Refuse what is no field on the sky; `InputError` says what is wrong."""
+        for name, (low, high) in (("l", self.l_deg), ("b", self.b_deg)):
+            if not low < high or not np.isfinite([low, high]).all():
+                raise InputError(f"--{name}: expected limits from low to high, found {low} {high}")
+        if self.l_deg[1] - self.l_deg[0] > _WHOLE_TURN_DEG:
+            raise InputError(
+                f"--l: expected at most {_WHOLE_TURN_DEG:g} deg, found "
+                f"{self.l_deg[1] - self.l_deg[0]:g}"
+            )
+        if self.b_deg[0] < -90.0 or self.b_deg[1] > 90.0:
+            raise InputError(f"--b: expected latitudes from -90 to 90, found {self.b_deg}")
+
+    @property
+    def query(self) -> str:
+        """The selection in ADQL, on one line; the same selection gives the same words."""
+        conditions = [*self._circle(), self._longitudes()]
+        conditions += [
+            f"b BETWEEN {self.b_deg[0]:.10g} AND {self.b_deg[1]:.10g}",
+            f"parallax_over_error > {self.parallax_over_error:.10g}",
+        ]
+        return (
+            f"SELECT TOP {MOST_STARS} {', '.join(ARCHIVE.names)} FROM gaiadr3.gaia_source "
+            f"WHERE {' AND '.join(filter(None, conditions))} ORDER BY source_id"
+        )
+
+    def _longitudes(self) -> str:
+        if self.l_deg[1] - self.l_deg[0] >= _WHOLE_TURN_DEG:
+            return ""
+        # The archive counts from 0 to 360.
+        low, high = (limit % _WHOLE_TURN_DEG for limit in self.l_deg)
+        joint = "AND" if low < high else "OR"
+        return f"(l >= {low:.10g} {joint} l <= {high:.10g})"
+
+    def _circle(self) -> list[str]:
+        """Return a circle about the field: services find stars by an index of circles."""
+        halves = [(high - low) / 2.0 for low, high in (self.l_deg, self.b_deg)]
+        # Along a meridian, then along a parallel, no corner is farther.
+        radius = sum(halves)
+        if radius > _LARGEST_CIRCLE_DEG:
+            return []
+        l_deg, b_deg = (np.array([sum(limits) / 2.0]) for limits in (self.l_deg, self.b_deg))
+        ra, dec = (float(value[0]) for value in galactic_to_icrs(l_deg, b_deg))
+        return [
+            f"1 = CONTAINS(POINT('ICRS', ra, dec), CIRCLE('ICRS', {ra:.6f}, {dec:.6f}, "
+            f"{radius + 1e-5:.6f}))"
+        ]
+
+
+class Stars(NamedTuple):
+    """Fetched stars, columns `ARCHIVE`, and whether they came from the cache.
+
+    The table's `meta` holds QUERY, SERVICE and DATE, the time of the answer in UTC.
+    """
+
+    table: Table
+    from_cache: bool
+
+
+def star_query(
+    l_deg: tuple[float, float] | None = None,
+    b_deg: tuple[float, float] | None = None,
+    parallax_over_error: float | None = None,
+) -> StarQuery:
+    """Return a selection; what is not given is that of the mini-mock's extended field."""
+    survey = SurveySettings()
+    margin = survey.field_margin_deg
+    extended = [
+        (low - margin, high + margin) for low, high in (survey.field_l_deg, survey.field_b_deg)
+    ]
+    return StarQuery(
+        l_deg or extended[0],
+        b_deg or extended[1],
+        survey.parallax_over_error if parallax_over_error is None else parallax_over_error,
+    )
+
+
+def fetch_stars(chosen: StarQuery, url: str | None = None, refresh: bool = False) -> Stars:
+    """Return the stars of a selection, from the user's cache where they are in it.
+
+    Parameters
+    ----------
+    url : address of a TAP service with the table gaiadr3.gaia_source; Gaia's by default
+    refresh : ask again even so
+
+    Raises
+    ------
+    InputError
+        If the service cannot be asked, its answer is not whole or not of such a table, or
+        the cache cannot be written.
+    """
+    kept = cached_file(chosen, url)
+    if kept.is_file() and not refresh and (table := _read(kept)) is not None:
+        return Stars(table, from_cache=True)
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{kept.parent}: expected to make the folder, found: {error}") from error
+    require_writable(kept)
+    table = _fetch(chosen.query, url)
+    write_stars(table, kept)
+    return Stars(table, from_cache=False)
+
+
+def cached_file(chosen: StarQuery, url: str | None = None) -> Path:
+    """Return where the stars of a selection are kept; the file need not exist."""
+    digest = hashlib.sha256(f"{url or ''}\n{chosen.query}".encode()).hexdigest()
+    return cache_directory() / "gaia" / f"{digest[:32]}.parquet"
+
+
+def require_format(path: Path) -> None:
+    """Raise InputError unless stars can be written to `path`, now and in its format."""
+    if path.suffix.lower() not in _WRITERS:
+        raise InputError(
+            f"{path}: expected a suffix out of {', '.join(_WRITERS)}, found {path.suffix!r}"
+        )
+    require_writable(path)
+
+
+def write_stars(table: Table, path: Path) -> None:
+    """Write fetched stars, with query, service and date, in the format of the suffix.
+
+    Raises
+    ------
+    InputError
+        If there is no such format or the file cannot be written.
+    """
+    require_format(path)
+    with write_atomically(path) as temporary:
+        _WRITERS[path.suffix.lower()](table, temporary)
+
+
+def _read(kept: Path) -> Table | None:
+    """Return kept stars; none where the file is damaged, for then they are fetched anew."""
+    try:
+        return find_catalogue(kept).table
+    except InputError:
+        return None
+
+
+def _fetch(query: str, url: str | None) -> Table:
+    name = service_name(url)
+    raw = answer_to(query, url)
+    if not 0 < len(raw) < MOST_STARS:
+        raise InputError(
+            f"{name}: expected from 1 to {MOST_STARS - 1} stars, found {len(raw)} of {query}"
+        )
+    for column in raw.itercols():
+        if column.dtype.kind == "f" and np.ma.is_masked(column):
+            raw[column.name] = column.filled(np.nan)
+    stars = conform(raw, ARCHIVE, name)
+    date = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S")
+    table = Table(meta={"QUERY": query, "SERVICE": name, "DATE": date})
+    for column in ARCHIVE:
+        table[column.name] = Column(
+            stars[column.name].to_numpy(), unit=column.unit or None, description=column.meaning
+        )
+    return table
+
+
+def _write_fits(table: Table, path: Path) -> None:
+    table.write(path, format="fits", overwrite=True)
+
+
+def _write_ecsv(table: Table, path: Path) -> None:
+    table.write(path, format="ascii.ecsv", overwrite=True)
+
+
+def _write_parquet(table: Table, path: Path) -> None:
+    table.write(path, format="parquet", overwrite=True)
+
+
+def _write_votable(table: Table, path: Path) -> None:
+    document = votable.from_table(table)
+    for key, value in table.meta.items():
+        document.resources[0].infos.append(Info(name=key, value=value))
+    document.to_xml(str(path))
+
+
+_WRITERS: dict[str, Callable[[Table, Path], None]] = {
+    ".fits": _write_fits,
+    ".ecsv": _write_ecsv,
+    ".vot": _write_votable,
+    ".parquet": _write_parquet,
+}

@@ -1,0 +1,229 @@
+"""A survey fitted orbit by orbit by many workers, and what the orbits say together.
+
+Workers are processes of Dask, on this machine or wherever a scheduler has them; all must see
+the survey's directory. Each has one thread. An orbit is whole in its directory or not there, so
+that work stopped at any moment goes on where it was.
+"""
+
+import logging
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import dask.config
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from distributed import Client, Future, LocalCluster, as_completed
+from pyarrow import parquet
+
+from plateviz.runs.dask_worker import Outcome, fit_survey_orbit
+from plateviz.runs.fitted_orbit import remove_unfinished
+from plateviz.runs.queries import (
+    ERRORS_FILE,
+    MOTIONS_FILE,
+    gather_history,
+)
+from plateviz.runs.run import Run, begin_run
+from solver.data.settings import FitSettings
+from solver.data.survey_schema import ERRORS_BY_COUNT, MOTIONS
+from solver.errors import InputError
+from solver.io.atomic import write_atomically
+from solver.io.parquet import write_parquet
+from solver.io.survey import survey_orbits
+from solver.model.apparent_motion import julian_year
+from solver.results.time_series import errors_by_count, motion_table
+
+# Rows of the history that are worked on at once: some 200 MB with all draws.
+_ROWS_AT_ONCE = 100_000
+# Dask watches its workers closely: a hundred times a second it looks where each of them is. With
+# as many workers as cores that was measured to take a twelfth of these.
+_QUIETLY = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
+# How long a scheduler may take to answer.
+_PATIENCE = "20s"
+
+
+class Progress(NamedTuple):
+    """How far a run is: orbits done of those asked for, and the last one."""
+
+    done: int
+    total: int
+    last: Outcome | None
+
+
+class Report(NamedTuple):
+    """What a call did: orbits fitted now, fitted before, and failed, by orbit."""
+
+    run: Run
+    fitted: list[int]
+    kept: list[int]
+    failed: dict[int, str]
+    seconds: float
+
+
+def fit_survey(
+    survey: Path,
+    name: str,
+    settings: FitSettings,
+    orbits: list[int] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[Progress], None] = lambda _: None,
+) -> Report:
+    """Fit orbits of a survey that a run does not hold yet, and gather what they say together.
+
+    Parameters
+    ----------
+    name : of the run
+    settings : of every fit
+    orbits : those to fit; all by default
+    workers : processes on this machine; one for each of its cores by default
+    scheduler : address of a Dask scheduler to use instead
+    progress : called after every orbit
+
+    Raises
+    ------
+    InputError
+        If the survey, the run or an orbit is not there as asked for, or no scheduler answers.
+    """
+    start = time.perf_counter()
+    wanted = _wanted(survey, orbits)
+    run = begin_run(survey, name, settings)
+    remove_unfinished(run.directory)
+    there = set(run.complete_orbits())
+    missing = [orbit for orbit in wanted if orbit not in there]
+    failed: dict[int, str] = {}
+    progress(Progress(0, len(missing), None))
+    if missing:
+        with _client(min(workers or cores(), len(missing)), scheduler) as client:
+            for done, outcome in enumerate(_outcomes(client, run, missing), start=1):
+                if outcome.message:
+                    failed[outcome.orbit] = outcome.message
+                progress(Progress(done, len(missing), outcome))
+    _gather(run)
+    fitted = [orbit for orbit in missing if orbit not in failed]
+    kept = [orbit for orbit in wanted if orbit in there]
+    return Report(run, fitted, kept, failed, time.perf_counter() - start)
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:
+    there = survey_orbits(survey)
+    if orbits is None:
+        return there
+    absent = sorted(set(orbits) - set(there))
+    if absent:
+        raise InputError(
+            f"{survey}: expected orbits of the survey, {there[0]} to {there[-1]}, "
+            f"found {', '.join(map(str, absent[:5]))}"
+        )
+    return sorted(set(orbits))
+
+
+@contextmanager
+def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=_PATIENCE)
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"--scheduler: expected the address of a Dask scheduler, found {scheduler}: {error}"
+            ) from error
+        with client:
+            yield client
+        return
+    with (
+        dask.config.set(_QUIETLY),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            # Without a page of its own, and any port that is free for what it serves all the same.
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            # The limit of memory is the machine's.
+            memory_limit=0,
+            # A worker that is slow to end is no news.
+            silence_logs=logging.ERROR,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+def _outcomes(client: Client, run: Run, orbits: list[int]) -> Iterator[Outcome]:
+    """Fit orbits, and give what became of each as it is done."""
+    where = str(run.survey.resolve())
+    futures: dict[Future, int] = {
+        client.submit(fit_survey_orbit, where, run.name, orbit, pure=False): orbit
+        for orbit in orbits
+    }
+    for future in as_completed(futures):
+        error = future.exception()
+        if error is None:
+            yield future.result()
+            continue
+        # A fault of ours or of the machine: the other orbits are not to suffer for it.
+        message = f"{type(error).__name__}: {error}"
+        run.keep_failure(futures[future], message)
+        yield Outcome(futures[future], float("nan"), message)
+
+
+def _gather(run: Run) -> None:
+    """Write what the orbits say together, and that the run is complete where it is."""
+    complete = run.complete_orbits()
+    if run.is_complete or not complete:
+        return
+    if run.gathered_orbits() != complete:
+        _write_tables(run)
+        run.mark_gathered(complete)
+    if complete == survey_orbits(run.survey):
+        run.mark_complete()
+
+
+def _write_tables(run: Run) -> None:
+    history = parquet.ParquetFile(gather_history(run))
+    epochs = np.unique(_column(history, "epoch"))
+    epoch = float(julian_year(epochs).mean())
+    motions, artificial = [], []
+    for rows in _whole_sources(history):
+        motions.append(motion_table(rows, epoch))
+        artificial.append(rows[rows["is_artificial"] & rows["true_offset_ra"].notna()])
+    _write(run.directory / MOTIONS_FILE, pd.concat(motions)[MOTIONS.names])
+    averaged = pd.concat(artificial, ignore_index=True)
+    most = int(averaged.groupby("source_id").size().max()) if len(averaged) else 0
+    errors = errors_by_count(averaged, list(range(1, most + 1)))
+    _write(run.directory / ERRORS_FILE, errors[ERRORS_BY_COUNT.names])
+
+
+def _whole_sources(history: parquet.ParquetFile) -> Iterator[pd.DataFrame]:
+    """Give the history piece by piece, each source whole."""
+    rest: list[pa.RecordBatch] = []
+    for batch in history.iter_batches(batch_size=_ROWS_AT_ONCE):
+        table = pa.Table.from_batches([*rest, batch]).to_pandas()
+        last = table["source_id"] == table["source_id"].iloc[-1]
+        rest = pa.Table.from_pandas(table[last], preserve_index=False).to_batches()
+        if not last.all():
+            yield table[~last].reset_index(drop=True)
+    if rest:
+        yield pa.Table.from_batches(rest).to_pandas()
+
+
+def _column(history: parquet.ParquetFile, name: str) -> np.ndarray:
+    return history.read([name])[name].to_numpy()
+
+
+def _write(path: Path, table: pd.DataFrame) -> None:
+    with write_atomically(path) as temporary:
+        write_parquet(pa.Table.from_pandas(table, preserve_index=False), temporary)

@@ -1,0 +1,256 @@
+"""The store of a fitted survey: questions across its orbits, answered from files by DuckDB.
+
+Each orbit's directory holds its part of the history. When orbits were added the parts are
+gathered into one file in order of source, in which a source is found without reading the rest.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+
+import duckdb
+import numpy as np
+import pandas as pd
+
+from plateviz.runs.fitted_orbit import read_fitted_orbit, read_summary
+from plateviz.runs.run import Run, runs_of
+from solver.data.result import FitResult
+from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
+from solver.errors import InputError
+from solver.io.atomic import write_atomically
+from solver.io.survey import survey_orbits
+
+HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE = (
+    "history.parquet",
+    "motions.parquet",
+    "errors_by_count.parquet",
+)
+# Rows of a group in the gathered file: a source is sought in one or two of them, but what is
+# known of each group is read first.
+_SMALLEST_GROUP = 8192
+_MOST_GROUPS = 1000
+
+# Of the class of a source as `plateviz.tables.sources` has it.
+_CLASSES = """
+WITH rows AS (
+    SELECT *, count(*) OVER (PARTITION BY source_id) AS n_orbits,
+        CASE WHEN is_reference THEN 'reference' WHEN is_artificial THEN 'artificial'
+             ELSE 'non-reference' END AS source_class,
+        pow(offset_ra - true_offset_ra, 2) + pow(offset_dec - true_offset_dec, 2) AS square
+    FROM read_parquet(?)
+)
+SELECT source_class,
+    sqrt(avg(square) / 2) AS rms_deviation,
+    sqrt(avg(pow(prior_sigma_ra, 2) + pow(prior_sigma_dec, 2)) / 2) AS rms_prior_sigma,
+    sqrt(avg(n_obs * pow(sigma_ra_conditional, 2))) AS sigma_single,
+    median(sigma_ra_marginal) FILTER (n_orbits > ?) AS sigma_often
+FROM rows GROUP BY source_class ORDER BY source_class
+"""
+
+
+class SurveyRun:
+    """One run of a survey, asked across its orbits; reads files, keeps nothing large."""
+
+    def __init__(self, run: Run) -> None:
+        """Take a run, complete or not."""
+        self._run = run
+
+    @property
+    def name(self) -> str:
+        """Name of the run."""
+        return self._run.name
+
+    @property
+    def survey(self) -> Path:
+        """The survey's directory."""
+        return self._run.survey
+
+    @property
+    def directory(self) -> Path:
+        """Where the run is kept."""
+        return self._run.directory
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every orbit of the survey is there."""
+        return self._run.is_complete
+
+    def header(self) -> Mapping[str, object]:
+        """Return what the run was begun with: `settings`, `versions`, hashes of the `inputs`."""
+        return self._run.header()
+
+    def failures(self) -> dict[int, str]:
+        """Return why orbits have no solution, by orbit."""
+        return self._run.failures()
+
+    def has_fitted(self, orbit: int) -> bool:
+        """Return whether the run has a solution of an orbit."""
+        return orbit in self._run.complete_orbits()
+
+    def orbits(self) -> pd.DataFrame:
+        """Return `survey_schema.RUN_ORBITS`, a row per orbit of the survey."""
+        complete, failures = set(self._run.complete_orbits()), self._run.failures()
+        rows = []
+        for orbit in survey_orbits(self.survey):
+            row: dict[str, object] = {"orbit_id": orbit, "status": "missing", "message": ""}
+            if orbit in complete:
+                row |= {"status": "complete", **self._figures(orbit)}
+            elif orbit in failures:
+                row |= {"status": "failed", "message": failures[orbit]}
+            rows.append(row)
+        return _typed(pd.DataFrame(rows, columns=RUN_ORBITS.names))
+
+    def motions(self) -> pd.DataFrame:
+        """Return `survey_schema.MOTIONS`; no rows while nothing has been gathered."""
+        path = self.directory / MOTIONS_FILE
+        return pd.read_parquet(path) if path.is_file() else pd.DataFrame(columns=MOTIONS.names)
+
+    def motion(self, source_id: int) -> pd.Series | None:
+        """Return the row of one source in `motions`, or None."""
+        path = self.directory / MOTIONS_FILE
+        if not path.is_file():
+            return None
+        # An id of a table is a NumPy integer, which DuckDB does not take.
+        found = self._ask(
+            "SELECT * FROM read_parquet(?) WHERE source_id = ?", str(path), int(source_id)
+        )
+        # Row by row pandas would turn ids into floating-point numbers.
+        return None if found.empty else found.astype(object).iloc[0]
+
+    def errors_by_count(self) -> pd.DataFrame | None:
+        """Return `survey_schema.ERRORS_BY_COUNT` of the artificial sources, or None."""
+        path = self.directory / ERRORS_FILE
+        return pd.read_parquet(path)[ERRORS_BY_COUNT.names] if path.is_file() else None
+
+    def history(self, source_id: int) -> pd.DataFrame:
+        """Return `survey_schema.HISTORY` of one source by epoch; no rows if it is unknown."""
+        if not self._has_history:
+            return pd.DataFrame(columns=HISTORY.names)
+        return self._ask(
+            f"SELECT {', '.join(HISTORY.names)} FROM read_parquet(?) "
+            "WHERE source_id = ? ORDER BY epoch",
+            self._history_files,
+            int(source_id),
+        )
+
+    def counts(self) -> pd.DataFrame:
+        """Return source_id, is_reference, is_artificial, n_orbits and n_obs of every source."""
+        names = ["source_id", "is_reference", "is_artificial", "n_orbits", "n_obs"]
+        motions = self.directory / MOTIONS_FILE
+        if motions.is_file():
+            return pd.read_parquet(motions, columns=names)
+        if not self._has_history:
+            return pd.DataFrame(columns=names)
+        return self._ask(
+            "SELECT source_id, any_value(is_reference) AS is_reference, "
+            "any_value(is_artificial) AS is_artificial, count(*) AS n_orbits, "
+            "sum(n_obs)::BIGINT AS n_obs FROM read_parquet(?) "
+            "GROUP BY source_id ORDER BY source_id",
+            self._history_files,
+        )
+
+    def classes(self, often: int) -> pd.DataFrame:
+        """Return what the orbits say of each class of sources, by `source_class`.
+
+        Parameters
+        ----------
+        often : orbits that a source is to exceed for `sigma_often`
+
+        Returns
+        -------
+        `rms_deviation` from the truth and `rms_prior_sigma` in one coordinate, `sigma_single`
+        (rms conditional sigma times sqrt(n_obs)) and `sigma_often` (median marginal sigma in
+        RA of sources measured often), mas
+        """
+        return self._ask(_CLASSES, self._history_files, often).set_index("source_class")
+
+    def exposure_residuals(self, orbit: int, field: int, plate: int) -> pd.DataFrame:
+        """Return `schema.RESIDUALS` of one exposure."""
+        path = self._run.orbit_directory(orbit) / "residuals.parquet"
+        return self._ask(
+            "SELECT * FROM read_parquet(?) WHERE field_id = ? AND plate_id = ?",
+            str(path),
+            field,
+            plate,
+        )
+
+    def result(self, orbit: int) -> FitResult:
+        """Return one fitted orbit; InputError if it is not there."""
+        return read_fitted_orbit(self._run.orbit_directory(orbit))
+
+    @cached_property
+    def _has_history(self) -> bool:
+        return (self.directory / HISTORY_FILE).is_file() or bool(self._run.complete_orbits())
+
+    @property
+    def _history_files(self) -> str:
+        gathered = self.directory / HISTORY_FILE
+        return str(gathered if gathered.is_file() else self.directory / "orbit=*" / HISTORY_FILE)
+
+    def _figures(self, orbit: int) -> dict[str, object]:
+        summary = read_summary(self._run.orbit_directory(orbit))
+        figures = {name: summary.get(name) for name in RUN_ORBITS.names if name in summary}
+        seconds = sum(float(value) for value in summary["seconds"].values())
+        return {**figures, "epoch": summary["epoch_mjd"], "seconds": seconds}
+
+    def _ask(self, question: str, *values: object) -> pd.DataFrame:
+        try:
+            with duckdb.connect() as connection:
+                return connection.execute(question, list(values)).df()
+        except duckdb.Error as error:
+            message = f"{self.directory}: expected the tables of a run, found: {error}"
+            raise InputError(message) from error
+
+
+def survey_runs(survey: Path) -> list[SurveyRun]:
+    """Return the runs of a survey directory, by name."""
+    return [SurveyRun(run) for run in runs_of(survey)]
+
+
+def open_run(survey: Path, name: str) -> SurveyRun:
+    """Return a run of a survey.
+
+    Raises
+    ------
+    InputError
+        If the survey has no run of that name.
+    """
+    for run in survey_runs(survey):
+        if run.name == name:
+            return run
+    names = ", ".join(run.name for run in survey_runs(survey)) or "none"
+    raise InputError(
+        f"{survey}: expected a run {name!r}, found {names}; `plateviz survey` makes one"
+    )
+
+
+def rows_of_a_group(n_rows: int) -> int:
+    """Return how many rows a group of a gathered history of so many rows has."""
+    return max(_SMALLEST_GROUP, n_rows // _MOST_GROUPS)
+
+
+def gather_history(run: Run) -> Path:
+    """Write the history of all orbits that are there in order of source and epoch; the file."""
+    target = run.directory / HISTORY_FILE
+    parts = [str(run.orbit_directory(orbit) / HISTORY_FILE) for orbit in run.complete_orbits()]
+    with write_atomically(target) as temporary, duckdb.connect() as connection:
+        # One thread writes the same bytes every time.
+        connection.execute("SET threads = 1")
+        found = connection.execute("SELECT count(*) FROM read_parquet(?)", [parts]).fetchone()
+        group = rows_of_a_group(0 if found is None else int(found[0]))
+        connection.execute(
+            "COPY (SELECT * FROM read_parquet(?, hive_partitioning = false) "
+            "ORDER BY source_id, epoch) "
+            f"TO {_quoted(temporary)} (FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE {group})",
+            [parts],
+        )
+    return target
+
+
+def _quoted(path: Path) -> str:
+    return "'" + str(path).replace("'", "''") + "'"
+
+
+def _typed(table: pd.DataFrame) -> pd.DataFrame:
+    kinds = {c.name: np.float64 for c in RUN_ORBITS if c.dtype == "float64"}
+    return table.astype({**kinds, "orbit_id": np.int64})

@@ -1,0 +1,187 @@
+"""Runs: every orbit of a survey fitted with one choice of settings, as a directory.
+
+    runs/NAME/run.toml                    settings, versions, hashes of the inputs; written first
+    runs/NAME/orbit=0000/                 one fitted orbit (`plateviz.runs.fitted_orbit`)
+    runs/NAME/failed/orbit=0000.json      why an orbit has no solution
+    runs/NAME/history.parquet             all orbits in order of source (`plateviz.runs.queries`)
+    runs/NAME/motions.parquet, ...        what follows from it
+    runs/NAME/gathered.json               the orbits that these tables hold; written after them
+    runs/NAME/COMPLETE                    written last, when every orbit of the survey is there
+
+No user interface and no JAX. What is there is never edited: a run that was interrupted goes on
+with the orbits that are missing, and only with the choices with which it was begun.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from plateviz.runs.fitted_orbit import is_complete, write_fitted_orbit
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+from solver.io.atomic import sha256_of, write_atomically
+from solver.io.survey import (
+    EXPOSURES,
+    HEADER,
+    REFERENCE,
+    TRUTH_FILE,
+    read_header,
+    section,
+    survey_orbits,
+    write_header,
+)
+from solver.runtime.versions import versions_of
+
+DEFAULT_RUN = "default"
+_HEADER = "run.toml"
+_COMPLETE = "COMPLETE"
+_GATHERED = "gathered.json"
+_FAILED = "failed"
+_PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+_ORBIT = re.compile(r"orbit=(\d{4,})")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a survey.
+
+    Attributes
+    ----------
+    survey : the survey's directory
+    name : of the run
+    """
+
+    survey: Path
+    name: str
+
+    @property
+    def directory(self) -> Path:
+        """Where the run is kept."""
+        return self.survey / "runs" / self.name
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every orbit of the survey is there, and what follows from them."""
+        return (self.directory / _COMPLETE).is_file()
+
+    def orbit_directory(self, orbit: int) -> Path:
+        """Return where a fitted orbit is kept."""
+        return self.directory / f"orbit={orbit:04d}"
+
+    def complete_orbits(self) -> list[int]:
+        """Return the orbits that are there, in order."""
+        found = (_ORBIT.fullmatch(path.name) for path in self.directory.glob("orbit=*"))
+        numbers = sorted(int(match[1]) for match in found if match)
+        return [number for number in numbers if is_complete(self.orbit_directory(number))]
+
+    def failures(self) -> dict[int, str]:
+        """Return why orbits have no solution, by orbit."""
+        reasons = {}
+        for path in sorted((self.directory / _FAILED).glob("orbit=*.json")):
+            content = json.loads(path.read_text(encoding="utf-8"))
+            reasons[int(content["orbit"])] = str(content["message"])
+        return reasons
+
+    def settings(self) -> FitSettings:
+        """Return the settings of all its fits."""
+        return FitSettings.from_dict(section(self.header(), "settings"))
+
+    def header(self) -> Mapping[str, object]:
+        """Return what the run was begun with: `settings`, `versions`, hashes of the `inputs`."""
+        return read_header(self.directory, _HEADER)
+
+    def keep(self, orbit: int, result: FitResult, history: pd.DataFrame) -> None:
+        """Write a fitted orbit, with what it adds to the history of its sources."""
+        write_fitted_orbit(self.orbit_directory(orbit), result, {"history": history})
+        self._failure_path(orbit).unlink(missing_ok=True)
+
+    def keep_failure(self, orbit: int, message: str) -> None:
+        """Write why an orbit has no solution."""
+        path = self._failure_path(orbit)
+        path.parent.mkdir(exist_ok=True)
+        with write_atomically(path) as temporary:
+            content = json.dumps({"orbit": orbit, "message": message})
+            temporary.write_text(content, encoding="utf-8")
+
+    def gathered_orbits(self) -> list[int]:
+        """Return the orbits whose history has been gathered, with all that follows from it."""
+        path = self.directory / _GATHERED
+        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
+
+    def mark_gathered(self, orbits: list[int]) -> None:
+        """Say which orbits have been gathered; written after all that follows from them."""
+        with write_atomically(self.directory / _GATHERED) as temporary:
+            temporary.write_text(json.dumps(orbits), encoding="utf-8")
+
+    def mark_complete(self) -> None:
+        """Say that nothing is missing; the run is not changed from then on."""
+        with write_atomically(self.directory / _COMPLETE):
+            pass
+
+    def _failure_path(self, orbit: int) -> Path:
+        return self.directory / _FAILED / f"orbit={orbit:04d}.json"
+
+
+def runs_of(survey: Path) -> list[Run]:
+    """Return the runs of a survey, by name."""
+    folder = Path(survey) / "runs"
+    names = sorted(path.parent.name for path in folder.glob(f"*/{_HEADER}"))
+    return [Run(Path(survey), name) for name in names]
+
+
+def begin_run(survey: Path, name: str, settings: FitSettings) -> Run:
+    """Make a run, or take up the one that is there.
+
+    Raises
+    ------
+    InputError
+        If the directory is no survey, the name cannot be that of a folder, or a run of that
+        name was begun with other settings, versions or inputs.
+    """
+    survey_orbits(survey)
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            f"--run: expected a name of letters, digits, '.', '-' and '_', found {name!r}"
+        )
+    run, content = Run(Path(survey), name), _content(Path(survey), settings)
+    path = run.directory / _HEADER
+    if path.is_file():
+        _check_same(path, read_header(run.directory, _HEADER), content)
+        return run
+    if run.directory.is_dir() and any(run.directory.iterdir()):
+        raise InputError(f"{run.directory}: expected a run, found a folder without {_HEADER}")
+    try:
+        run.directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{run.directory}: expected to make a folder, found: {error}") from error
+    write_header(run.directory, content, _HEADER)
+    return run
+
+
+def _content(survey: Path, settings: FitSettings) -> dict[str, object]:
+    inputs = [survey / name for name in (HEADER, REFERENCE, TRUTH_FILE, EXPOSURES)]
+    return {
+        "versions": versions_of(_PACKAGES),
+        "inputs": {path.name: sha256_of(path) for path in inputs if path.is_file()},
+        "settings": settings.to_dict(),
+    }
+
+
+def _check_same(path: Path, found: Mapping[str, object], wanted: Mapping[str, object]) -> None:
+    different = [
+        f"{title} ({name})"
+        for title in wanted
+        for name in sorted({**section(wanted, title), **section(found, title)})
+        if section(wanted, title).get(name) != section(found, title).get(name)
+    ]
+    if different:
+        raise InputError(
+            f"{path}: expected the choices with which this run was begun, found other "
+            f"{', '.join(different)}; another --run NAME keeps both"
+        )

@@ -1,0 +1,90 @@
+"""Where orbits come from: a survey directory, or the files of one orbit.
+
+A origin is described by plain values, so that the web process, which never loads
+measurements, can hand an orbit to the worker process, which does.
+"""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from solver.data.instrument import MINI_MOCK, Instrument, parse_instrument, read_instrument
+from solver.data.orbit import OrbitData
+from solver.io.read_orbit import read_orbit
+from solver.io.survey import HEADER, read_header, read_survey_orbit, survey_orbits
+
+
+@dataclass(frozen=True)
+class OrbitFiles:
+    """The files of one orbit, as on the command line.
+
+    Attributes
+    ----------
+    observations, reference, truth, instrument : paths; the last two may be None
+    orbit : orbit_id, or None where the file holds one orbit only
+    """
+
+    observations: str
+    reference: str
+    truth: str | None = None
+    orbit: int | None = None
+    instrument: str | None = None
+
+    @property
+    def title(self) -> str:
+        """What people call this origin."""
+        return Path(self.observations).name
+
+    def orbits(self) -> list[int | None]:
+        """Return the orbits that can be shown."""
+        return [self.orbit]
+
+    def read(self, orbit: int | None) -> OrbitData:
+        """Read and check one orbit; InputError says what is wrong with the files."""
+        truth = Path(self.truth) if self.truth else None
+        return read_orbit(Path(self.observations), Path(self.reference), truth, orbit)
+
+    def read_instrument(self) -> Instrument:
+        """Return the instrument that took the orbit."""
+        return read_instrument(Path(self.instrument)) if self.instrument else MINI_MOCK
+
+
+@dataclass(frozen=True)
+class SurveyFolder:
+    """A survey directory, as `plateviz simulate` writes it."""
+
+    directory: str
+
+    @property
+    def title(self) -> str:
+        """What people call this origin."""
+        return Path(self.directory).resolve().name
+
+    def orbits(self) -> list[int | None]:
+        """Return the orbits that can be shown."""
+        return list(survey_orbits(Path(self.directory)))
+
+    def read(self, orbit: int | None) -> OrbitData:
+        """Read and check one orbit; InputError says what is wrong with the files."""
+        if orbit is None:
+            raise ValueError("an orbit of a survey is chosen by its number, got None")
+        return read_survey_orbit(Path(self.directory), orbit)
+
+    def read_instrument(self) -> Instrument:
+        """Return the instrument that took the orbits."""
+        directory = Path(self.directory)
+        return parse_instrument(str(read_header(directory)["instrument"]), directory / HEADER)
+
+
+Origin = OrbitFiles | SurveyFolder
+
+
+def origin_to_dict(origin: Origin) -> dict[str, object]:
+    """Return a origin as plain values; `origin_from_dict` reads them back."""
+    return {"kind": type(origin).__name__, **asdict(origin)}
+
+
+def origin_from_dict(values: dict[str, object]) -> Origin:
+    """Return the origin that `origin_to_dict` wrote."""
+    kinds = {kind.__name__: kind for kind in (OrbitFiles, SurveyFolder)}
+    rest = {name: value for name, value in values.items() if name != "kind"}
+    return kinds[str(values["kind"])](**rest)  # type: ignore[arg-type]

@@ -1,0 +1,95 @@
+"""SolutionStore: one source of orbits, one worker, and every solution made so far.
+
+It belongs to the server and is shared by all its sessions; solutions are files in a
+scratch folder, found again by what was asked for.
+"""
+
+import hashlib
+import json
+import shutil
+import tempfile
+import threading
+from functools import lru_cache
+from pathlib import Path
+
+from plateviz.runs.fitted_orbit import is_complete, read_fitted_orbit
+from plateviz.runs.queries import SurveyRun, survey_runs
+from plateviz.solving.job import Job, JobStatus
+from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
+from plateviz.solving.warm_solver import WarmSolver
+from solver.data.instrument import Instrument
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings
+
+
+class SolutionStore:
+    """Fits orbits of one source on request and keeps their results."""
+
+    def __init__(self, origin: Origin, worker: WarmSolver) -> None:
+        """Serve `origin` with `worker`, which is closed with the store."""
+        self.origin = origin
+        self.orbits = origin.orbits()
+        self.instrument: Instrument = origin.read_instrument()
+        self._worker = worker
+        self._lock = threading.Lock()
+        self._jobs: dict[Path, Job] = {}
+        self._scratch = Path(tempfile.mkdtemp(prefix="plateviz-"))
+        self._read = lru_cache(maxsize=16)(read_fitted_orbit)
+
+    @property
+    def title(self) -> str:
+        """What people call the origin."""
+        return self.origin.title
+
+    def runs(self) -> list[SurveyRun]:
+        """Return the runs of the survey as they are now; none where the origin is files."""
+        origin = self.origin
+        return survey_runs(Path(origin.directory)) if isinstance(origin, SurveyFolder) else []
+
+    def request(self, orbit: int | None, settings: FitSettings, what_if: bool = False) -> Job:
+        """Ask for an orbit fitted with `settings`; the same question gives the same job.
+
+        Parameters
+        ----------
+        what_if : whether a step from the last fit will do, where that can tell
+        """
+        directory = self._directory(orbit, settings, what_if)
+        with self._lock:
+            job = self._jobs.get(directory)
+            if job is None or job.status in (JobStatus.FAILED, JobStatus.CANCELLED):
+                job = self._worker.submit(Job(self._request(orbit, settings, what_if, directory)))
+                self._jobs[directory] = job
+            return job
+
+    def cancel(self, job: Job) -> None:
+        """Stop a job that is waiting or running."""
+        self._worker.cancel(job)
+
+    def result(
+        self, orbit: int | None, settings: FitSettings, what_if: bool = False
+    ) -> FitResult | None:
+        """Return a solution that was asked for before and is whole, else None."""
+        directory = self._directory(orbit, settings, what_if)
+        return self._read(directory) if is_complete(directory) else None
+
+    def close(self) -> None:
+        """Stop the worker and remove the scratch folder."""
+        self._worker.close()
+        shutil.rmtree(self._scratch, ignore_errors=True)
+
+    def _request(
+        self, orbit: int | None, settings: FitSettings, what_if: bool, directory: Path
+    ) -> dict[str, object]:
+        return {
+            "do": "fit",
+            "origin": origin_to_dict(self.origin),
+            "orbit": orbit,
+            "settings": settings.to_dict(),
+            "what_if": what_if,
+            "directory": str(directory),
+        }
+
+    def _directory(self, orbit: int | None, settings: FitSettings, what_if: bool) -> Path:
+        question = json.dumps([orbit, settings.to_dict(), what_if], sort_keys=True)
+        name = hashlib.sha256(question.encode()).hexdigest()[:16]
+        return self._scratch / f"orbit={'file' if orbit is None else f'{orbit:04d}'}-{name}"

@@ -1,0 +1,182 @@
+"""The solver process: reads requests from standard input, writes events to standard output.
+
+One JSON object a line, both ways. It is the only process of a served plateviz that
+imports JAX, it stays warm between fits, and it ends with its standard input. An unexpected
+exception ends it with a traceback on standard error; `plateviz.solving.warm_solver` reports that
+and starts another.
+
+Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory"},
+{"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
+"directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}.
+Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
+"""
+
+import json
+import os
+import queue
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import TextIO
+
+from plateviz.runs.fitted_orbit import write_fitted_orbit
+from plateviz.solving.origin import origin_from_dict
+from solver.data.settings import COUNTED, FitSettings
+from solver.engines.gauss_newton import Iteration
+from solver.errors import CancelledError, FitError, InputError
+from solver.fit import OrbitFitter
+from solver.runtime.memory import keep_memory
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
+
+Request = dict
+Send = Callable[[dict], None]
+# Work that makes the next request quicker, for when none waits.
+Later = Iterator[None]
+# What is likely to be asked next is made ready when nothing was for so long.
+_QUIET_S = 0.3
+
+
+class _Cancellations:
+    """Which jobs somebody has asked to stop."""
+
+    def __init__(self) -> None:
+        self._jobs: set[str] = set()
+
+    def add(self, job: str) -> None:
+        self._jobs.add(job)
+
+    def check(self, job: str) -> None:
+        if job in self._jobs:
+            raise CancelledError(job)
+
+
+def main() -> None:
+    """Serve requests until standard input ends."""
+    keep_memory()
+    send = _sender()
+    requests: queue.Queue[Request | None] = queue.Queue()
+    cancellations = _Cancellations()
+    reader = threading.Thread(target=_read, args=(sys.stdin, requests, cancellations), daemon=True)
+    reader.start()
+    send({"event": "ready"})
+    later: Later = iter(())
+    while (request := _next(requests, later)) is not None:
+        later = _serve(request, send, cancellations)
+
+
+def _next(requests: queue.Queue[Request | None], later: Later) -> Request | None:
+    """Wait for a request, and make ready meanwhile what may be asked of the last one."""
+    try:
+        # A page that hears of a solution needs the cores, and may ask again at once.
+        return requests.get(timeout=_QUIET_S)
+    except queue.Empty:
+        pass
+    for _ in later:
+        if not requests.empty():
+            break
+    return requests.get()
+
+
+def _sender() -> Send:
+    """Keep the real standard output for events; what libraries print goes to standard error."""
+    channel = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8", buffering=1)
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    lock = threading.Lock()
+
+    def send(event: dict) -> None:
+        with lock:
+            channel.write(json.dumps(event) + "\n")
+
+    return send
+
+
+def _read(
+    lines: TextIO, requests: "queue.Queue[Request | None]", cancellations: _Cancellations
+) -> None:
+    for line in lines:
+        request = json.loads(line)
+        if request["do"] == "cancel":
+            cancellations.add(request["job"])
+        else:
+            requests.put(request)
+    # Nobody is left to read a result: stop at once, even in the middle of a fit.
+    os._exit(0)
+
+
+def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later:
+    job = request["job"]
+    work = {"fit": _fit, "simulate": _simulate, "survey": _survey}[request["do"]]
+
+    def progress(**values: object) -> None:
+        cancellations.check(job)
+        send({"event": "progress", "job": job, **values})
+
+    try:
+        cancellations.check(job)
+        later = work(request, progress)
+        send({"event": "done", "job": job})
+        return later
+    except CancelledError:
+        send({"event": "cancelled", "job": job})
+    except (InputError, FitError) as error:
+        is_input = isinstance(error, InputError)
+        send({"event": "failed", "job": job, "message": str(error), "is_input_error": is_input})
+    return iter(())
+
+
+def _fit(request: Request, progress: Callable[..., None]) -> Later:
+    progress(stage="reading the orbit")
+    fitter = _fitter(json.dumps(request["origin"], sort_keys=True), request["orbit"])
+    settings = FitSettings.from_dict(request["settings"])
+
+    def on_iteration(iteration: Iteration) -> None:
+        stage = f"{COUNTED[settings.engine]} {iteration.iteration}"
+        progress(stage=stage, **iteration._asdict())
+
+    progress(stage="linearising")
+    result = fitter.what_if(settings) if request["what_if"] else None
+    if result is None:
+        result = fitter.fit(settings, on_iteration)
+    progress(stage="writing the result")
+    write_fitted_orbit(Path(request["directory"]), result)
+    return fitter.get_ready(settings.order)
+
+
+def _simulate(request: Request, progress: Callable[..., None]) -> Later:
+    settings = SurveySettings.from_dict(request["settings"])
+    catalogue = request.get("catalogue")
+    simulate_survey(
+        Path(request["directory"]),
+        settings,
+        catalogue=None if catalogue is None else Path(catalogue),
+        progress=lambda done, total: progress(stage="simulating", done=done, total=total),
+    )
+    return iter(())
+
+
+def _survey(request: Request, progress: Callable[..., None]) -> Later:
+    # Dask, which no other work needs, takes half a second to import.
+    from plateviz.runs.fit_survey import fit_survey
+
+    fit_survey(
+        Path(request["directory"]),
+        request["run"],
+        FitSettings.from_dict(request["settings"]),
+        request["orbits"],
+        request["workers"],
+        progress=lambda now: progress(stage="fitting orbits", done=now.done, total=now.total),
+    )
+    return iter(())
+
+
+@lru_cache(maxsize=4)
+def _fitter(origin: str, orbit: int | None) -> OrbitFitter:
+    found = origin_from_dict(json.loads(origin))
+    return OrbitFitter(found.read(orbit), found.read_instrument())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""WarmSolver: keeps one solver process warm, gives it jobs, and can always stop it.
+
+The process is started afresh when it dies or does not stop on request; the job that it
+was at is reported as failed or cancelled, the ones that wait go on.
+"""
+
+import contextlib
+import json
+import subprocess
+import sys
+import tempfile
+import threading
+from collections import deque
+from typing import IO
+
+from plateviz.cache import keep_compilations
+from plateviz.solving.job import Job
+
+# A fit looks for a cancellation between iterations, well under a second apart.
+_GRACE_SECONDS = 3.0
+
+
+class WarmSolver:
+    """One solver process and the jobs that wait for it, first come, first served."""
+
+    def __init__(self) -> None:
+        """Start the process; it warms up while the caller goes on."""
+        keep_compilations()
+        self._lock = threading.RLock()
+        self._jobs: deque[Job] = deque()
+        self._process: subprocess.Popen[str] | None = None
+        self._start()
+
+    def submit(self, job: Job) -> Job:
+        """Put a job at the end of the queue and return it."""
+        with self._lock:
+            self._jobs.append(job)
+            if len(self._jobs) == 1:
+                self._send(job.request)
+        return job
+
+    def cancel(self, job: Job) -> None:
+        """Stop a job: at its next report, or with its process if it does not report."""
+        with self._lock:
+            if job not in self._jobs:
+                return
+            if job is not self._jobs[0]:
+                self._jobs.remove(job)
+                job.cancel()
+                return
+            self._send({"do": "cancel", "job": job.id})
+        timer = threading.Timer(_GRACE_SECONDS, self._kill_at, args=(job,))
+        timer.daemon = True
+        timer.start()
+
+    def close(self) -> None:
+        """End the process; jobs that are not over are cancelled."""
+        with self._lock:
+            for job in self._jobs:
+                job.cancel()
+            self._jobs.clear()
+            process = self._process
+            if process is not None:
+                process.kill()
+        if process is not None:
+            process.wait()
+
+    def _start(self) -> subprocess.Popen[str]:
+        errors = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 read when it ends
+        process = subprocess.Popen(
+            [sys.executable, "-m", "plateviz.solving.solver_process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            encoding="utf-8",
+            # Ctrl-C, or a notebook's interrupt, is for who waits for a job, who will cancel it.
+            start_new_session=True,
+        )
+        self._process = process
+        threading.Thread(target=self._listen, args=(process, errors), daemon=True).start()
+        return process
+
+    def _send(self, request: dict) -> None:
+        """Hand a request to the process, to a new one where the last has ended."""
+        process = self._process or self._start()
+        if process.stdin is not None:
+            # A process that dies just now is reported by its listener.
+            with contextlib.suppress(BrokenPipeError):
+                process.stdin.write(json.dumps(request) + "\n")
+                process.stdin.flush()
+
+    def _listen(self, process: subprocess.Popen[str], errors: IO[str]) -> None:
+        if process.stdout is not None:
+            for line in process.stdout:
+                self._take(json.loads(line))
+        process.wait()
+        with errors:
+            errors.seek(0)
+            last_words = errors.read().strip().splitlines()[-1:] or ["no message"]
+        with self._lock:
+            self._process = None
+            for stream in (process.stdin, process.stdout):
+                if stream is not None:
+                    # A request may be left in it that the process died too soon to read.
+                    with contextlib.suppress(BrokenPipeError):
+                        stream.close()
+            if self._jobs:
+                reason = f"the solver process ended (exit {process.returncode}): {last_words[0]}"
+                self._jobs[0].fail(reason)
+                self._next()
+
+    def _take(self, event: dict) -> None:
+        with self._lock:
+            if event["event"] == "ready" or not self._jobs or self._jobs[0].id != event["job"]:
+                return
+            self._jobs[0].take(event)
+            if self._jobs[0].status.is_over:
+                self._next()
+
+    def _next(self) -> None:
+        """Leave the first job behind and begin the one after it."""
+        self._jobs.popleft()
+        if self._jobs:
+            self._send(self._jobs[0].request)
+
+    def _kill_at(self, job: Job) -> None:
+        with self._lock:
+            if self._jobs and self._jobs[0] is job and self._process is not None:
+                job.cancel()
+                self._process.kill()

@@ -1,0 +1,133 @@
+"""Tables of the modes: the combinations of calibration parameters, and what decides them."""
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.labels import id_strings
+from plateviz.tables.sky import mean_direction, offsets_arcmin
+from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS
+from solver.data.result import FitResult
+
+DATA, REFERENCES, SOURCES, CALIBRATION = (
+    "measurements",
+    "reference sources",
+    "priors of other sources",
+    "priors of the calibration",
+)
+DECIDERS = (DATA, REFERENCES, SOURCES, CALIBRATION)
+_COLUMNS = {DATA: "data_share", REFERENCES: "reference_share", SOURCES: "source_share"}
+_MAS_PER_ARCMIN = 60_000.0
+_LEAST = 0.1
+_SPECTRUM = ["mode", "name", *_COLUMNS.values(), "calibration_share", "relative_information"]
+
+
+def eigenmode_spectrum(result: FitResult) -> pd.DataFrame:
+    """Return all modes, the weakest first; no rows of a result without them.
+
+    Returns
+    -------
+    The columns of `solver.data.schema`'s table of modes and `is_weak`, whether it is one of
+    those that are told in full
+    """
+    if result.modes is None:
+        return pd.DataFrame(columns=[*_SPECTRUM, "is_weak"])
+    return result.modes[_SPECTRUM].assign(is_weak=result.modes["name"] != "")
+
+
+def eigenmode_deciders(result: FitResult) -> pd.DataFrame:
+    """Return what decides each weak mode, in the order of `DECIDERS`, as parts of a bar.
+
+    Returns
+    -------
+    `mode`, `name`, `decider` (of `DECIDERS`), `what` (words; the calibration's priors by
+    group), `share`, and `left` and `right`, the shares added up; parts of no share have
+    no row
+    """
+    columns = ["mode", "name", "decider", "what", "share", "left", "right"]
+    if result.modes is None or result.mode_parameters is None:
+        return pd.DataFrame(columns=columns)
+    weak = result.modes[result.modes["name"] != ""]
+    parts = [
+        weak[["mode", "name"]].assign(decider=decider, what=decider, share=weak[column])
+        for decider, column in _COLUMNS.items()
+    ]
+    by_group = result.mode_parameters.groupby(["mode", "group"])["prior_share"].sum()
+    for group in CALIBRATION_GROUPS:
+        share = weak["mode"].map(by_group.xs(group.name, level="group"))
+        part = {"decider": CALIBRATION, "what": f"prior of {group.label}", "share": share}
+        parts.append(weak[["mode", "name"]].assign(**part))
+    table = pd.concat(parts, ignore_index=True).sort_values("mode", kind="stable")
+    right = table.groupby("mode")["share"].cumsum()
+    table = table.assign(left=right - table["share"], right=right)
+    return table.loc[table["share"] > 0.0, columns].reset_index(drop=True)
+
+
+def eigenmode_groups(result: FitResult) -> pd.DataFrame:
+    """Return how much of each weak mode is in each parameter group.
+
+    Returns
+    -------
+    `mode`, `name`, `group` (label), `share` (of the squares of moves over conditional
+    sigmas), `move` (rms of the group's elements with one sigma of the mode), `unit`; and
+    `shift_mas`, the rms shift of the sources, the same in all rows of a mode
+    """
+    columns = ["mode", "name", "group", "share", "move", "unit", "shift_mas"]
+    if result.modes is None or result.mode_parameters is None:
+        return pd.DataFrame(columns=columns)
+    rows = result.mode_parameters.assign(square=result.mode_parameters["move"] ** 2)
+    table = (
+        rows.groupby(["mode", "group"], sort=False)
+        .agg(share=("share", "sum"), move=("square", "mean"), unit=("unit", "first"))
+        .reset_index()
+    )
+    return table.assign(
+        move=np.sqrt(table["move"]),
+        unit=table["unit"].str.replace("um", "µm"),
+        name=table["mode"].map(result.modes.set_index("mode")["name"]),
+        group=[BY_NAME[name].label for name in table["group"]],
+        shift_mas=table["mode"].map(_shift_rms(result)),
+    )[columns]
+
+
+def eigenmode_shifts(result: FitResult, *, most: int | None = None) -> pd.DataFrame:
+    """Return what weak modes would do on the sky, a row per mode and source.
+
+    Parameters
+    ----------
+    result : the fit
+    most : at most so many modes, those that shift the sources most and not ten times
+        less than the first of them; None for all
+
+    Returns
+    -------
+    `mode`, `name`, `id`, tail `x`, `y` in arcmin from the centre of the field (ra
+    cos(dec), East positive), shift `u`, `v` in arcmin with one sigma of the mode,
+    `shift_ra_mas`, `shift_dec_mas`
+    """
+    columns = ["mode", "name", "id", "x", "y", "u", "v", "shift_ra_mas", "shift_dec_mas"]
+    if result.modes is None or result.mode_shifts is None:
+        return pd.DataFrame(columns=columns)
+    rms = _shift_rms(result)
+    largest = (rms if most is None else rms[rms >= _LEAST * rms.max()].nlargest(most)).index
+    rows = result.mode_shifts[result.mode_shifts["mode"].isin(largest)]
+    rows = rows.merge(result.sources[["source_id", "ra", "dec"]], on="source_id", how="left")
+    centre = mean_direction(result.sources["ra"].to_numpy(), result.sources["dec"].to_numpy())
+    x, y = offsets_arcmin(rows["ra"], rows["dec"], *centre)
+    return rows.assign(
+        name=rows["mode"].map(result.modes.set_index("mode")["name"]),
+        id=id_strings(rows["source_id"]),
+        x=x,
+        y=y,
+        u=rows["shift_ra"] / _MAS_PER_ARCMIN,
+        v=rows["shift_dec"] / _MAS_PER_ARCMIN,
+        shift_ra_mas=rows["shift_ra"],
+        shift_dec_mas=rows["shift_dec"],
+    )[columns]
+
+
+def _shift_rms(result: FitResult) -> pd.Series:
+    """Return the rms length of the shifts of all sources by mode, mas."""
+    if result.mode_shifts is None:
+        return pd.Series(dtype=float)
+    squares = result.mode_shifts["shift_ra"] ** 2 + result.mode_shifts["shift_dec"] ** 2
+    return np.sqrt(squares.groupby(result.mode_shifts["mode"]).mean())

@@ -1,1 +1,0 @@
-"""Views: they connect the session to the pictures, and compute nothing themselves."""

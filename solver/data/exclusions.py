@@ -1,0 +1,151 @@
+"""Exclusions: sources, exposures and detectors whose measurements a fit is not to use."""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.data.orbit import OrbitData
+from solver.errors import InputError
+
+_EXCLUSION = re.compile(r"(source|detector)=(-?\d+)|(exposure)=(-?\d+)/(-?\d+)")
+
+
+@dataclass(frozen=True)
+class Exclusions:
+    """What is left out.
+
+    Attributes
+    ----------
+    sources : source_id
+    exposures : (field_id, plate_id)
+    detectors : detector_id
+    """
+
+    sources: frozenset[int] = frozenset()
+    exposures: frozenset[tuple[int, int]] = frozenset()
+    detectors: frozenset[int] = frozenset()
+
+    def __bool__(self) -> bool:
+        """Whether anything is left out."""
+        return bool(self.sources or self.exposures or self.detectors)
+
+    def without(self, data: OrbitData) -> OrbitData:
+        """Return the orbit without what is left out; row labels stay those of `data`.
+
+        Raises
+        ------
+        InputError
+            If something named was not measured, or nothing would be left.
+        """
+        if not self:
+            return data
+        rows = data.measurements
+        exposure = list(zip(rows["field_id"], rows["plate_id"], strict=True))
+        gone = np.zeros(len(rows), dtype=bool)
+        for kind, excluded, measured in (
+            ("source", self.sources, rows["source_id"].tolist()),
+            ("exposure", self.exposures, exposure),
+            ("detector", self.detectors, rows["detector_id"].tolist()),
+        ):
+            missing = excluded - set(measured)
+            if missing:
+                raise InputError(
+                    f"excluded {kind} {_text(min(missing))}: expected one with measurements in "
+                    f"orbit {data.orbit_id}, found none"
+                )
+            gone |= np.fromiter((value in excluded for value in measured), bool, len(rows))
+        if gone.all():
+            raise InputError(
+                f"exclusions: expected some measurements of orbit {data.orbit_id} to be left, "
+                f"found that all {len(rows)} are excluded"
+            )
+        return of_rows(data, ~gone)
+
+    def names(self) -> list[str]:
+        """Return what is left out in words, in order."""
+        return [
+            *(f"source {number}" for number in sorted(self.sources)),
+            *(f"exposure {_text(pair)}" for pair in sorted(self.exposures)),
+            *(f"detector {number}" for number in sorted(self.detectors)),
+        ]
+
+    def to_dict(self) -> dict[str, list]:
+        """Return plain values; `from_dict` reads them back."""
+        return {
+            "sources": sorted(self.sources),
+            "exposures": [list(pair) for pair in sorted(self.exposures)],
+            "detectors": sorted(self.detectors),
+        }
+
+    @staticmethod
+    def from_dict(values: Mapping[str, Iterable]) -> "Exclusions":
+        """Return what `to_dict` wrote."""
+        return Exclusions(
+            frozenset(values["sources"]),
+            frozenset((field, plate) for field, plate in values["exposures"]),
+            frozenset(values["detectors"]),
+        )
+
+
+def thinned_orbit(data: OrbitData, whole: OrbitData, every: int) -> OrbitData:
+    """Return the orbit with one in so many of its reference sources and of its others.
+
+    Parameters
+    ----------
+    data : the orbit, or what exclusions left of it
+    whole : the orbit, from which the sources are chosen: the same whatever is excluded
+    """
+    if every == 1:
+        return data
+    measured = np.unique(whole.measurements["source_id"].to_numpy())
+    reference = whole.catalogue.set_index("source_id").loc[measured, "is_reference"].to_numpy(bool)
+    kept = np.concatenate([measured[reference][::every], measured[~reference][::every]])
+    return of_rows(data, data.measurements["source_id"].isin(kept).to_numpy())
+
+
+def of_rows(data: OrbitData, chosen: np.ndarray) -> OrbitData:
+    """Return the orbit with some measurements, and the exposures that these are of.
+
+    Parameters
+    ----------
+    chosen : of every measurement, whether to take it
+    """
+    rows = data.measurements[chosen]
+    left = set(zip(rows["field_id"], rows["plate_id"], strict=True))
+    plates = zip(data.exposures["field_id"], data.exposures["plate_id"], strict=True)
+    used = np.fromiter((plate in left for plate in plates), bool, len(data.exposures))
+    exposures = data.exposures[used].reset_index(drop=True)
+    return replace(data, measurements=rows, exposures=exposures)
+
+
+def parse_exclusions(texts: Iterable[str]) -> Exclusions:
+    """Return the exclusions that a person wrote.
+
+    Parameters
+    ----------
+    texts : each "source=ID", "detector=ID" or "exposure=FIELD/PLATE"
+
+    Raises
+    ------
+    InputError
+        If one reads otherwise.
+    """
+    sources, exposures, detectors = set(), set(), set()
+    for text in texts:
+        match = _EXCLUSION.fullmatch(text.strip())
+        if match is None:
+            raise InputError(
+                "exclusion: expected source=ID, detector=ID or exposure=FIELD/PLATE, "
+                f"found {text!r}"
+            )
+        if match[3]:
+            exposures.add((int(match[4]), int(match[5])))
+        else:
+            (sources if match[1] == "source" else detectors).add(int(match[2]))
+    return Exclusions(frozenset(sources), frozenset(exposures), frozenset(detectors))
+
+
+def _text(excluded: int | tuple[int, int]) -> str:
+    return "/".join(map(str, excluded)) if isinstance(excluded, tuple) else str(excluded)

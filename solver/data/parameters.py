@@ -1,0 +1,210 @@
+"""The one table of parameter groups (paper, table "Inputs, Model Parameters, and Priors").
+
+Everything that speaks of a parameter is derived from here: the blocks of the
+Gauss-Newton engine, the priors, the command line's `--prior`, the dashboard's controls,
+the result tables. A new group is one entry here and one term in `solver.model.forward`.
+
+Axes, the words used in array shapes throughout the solver:
+
+| word | one element per                                   |
+|------|---------------------------------------------------|
+| obs  | measurement                                       |
+| src  | source                                            |
+| exp  | exposure                                          |
+| det  | detector                                          |
+| coef | distortion term, of one direction (`distortion.terms`) |
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from solver.units import ARCSEC_PER_DEG, MAS_PER_DEG
+
+Axis = Literal["src", "exp", "coef", "det"]
+Family = Literal["normal", "gamma", "uniform"]
+
+
+@dataclass(frozen=True)
+class Group:
+    """One parameter group.
+
+    Attributes
+    ----------
+    name : key in parameter sets, tables, `--prior` and the dashboard
+    label : words for people
+    symbol : the paper's symbol
+    axis : what there is one value per
+    unit : unit of offsets, sigmas and prior widths
+    value_unit : unit of the whole value in tables
+    family : prior distribution about its centre
+    width : standard deviation of the default prior, in `unit`
+    relative : whether `width` is a fraction of the centre instead
+    origin : where the centre of the prior comes from: the catalogue, a column of the
+        environment table, an attribute of the instrument's detectors, or zero
+    column : that column or attribute
+    """
+
+    name: str
+    label: str
+    symbol: str
+    axis: Axis
+    unit: str
+    value_unit: str
+    family: Family
+    width: float
+    relative: bool = False
+    origin: Literal["catalogue", "environment", "instrument", "zero"] = "zero"
+    column: str = ""
+
+    @property
+    def per_value_unit(self) -> float:
+        """How many of `unit` make one `value_unit`."""
+        return {"deg": {"mas": MAS_PER_DEG, "arcsec": ARCSEC_PER_DEG}, "um": {"um": 1.0}}[
+            self.value_unit
+        ][self.unit]
+
+    @property
+    def width_unit(self) -> str:
+        """Unit in which a person states the prior width; "" for a fraction or a factor."""
+        return "" if self.relative or self.axis == "src" else self.unit
+
+
+# The focal length's prior is written in the paper as a variance of 100 on a scale in
+# um/deg; the simulated scatter (1e-3) fits a standard deviation of 100 um/deg, 1.2e-3.
+_FOCAL_WIDTH_UM = 100.0 * 57.29577951308232
+
+SOURCES = Group(
+    "sources",
+    "source positions",
+    "α_i, δ_i",
+    "src",
+    "mas",
+    "deg",
+    "normal",
+    1.0,  # a factor on the catalogue's own uncertainties
+    origin="catalogue",
+)
+
+PARAMETERS: tuple[Group, ...] = (
+    SOURCES,
+    Group(
+        "pointing_ra",
+        "pointing RA",
+        "α_tel cos δ_tel",
+        "exp",
+        "arcsec",
+        "deg",
+        "normal",
+        3600.0,
+        origin="environment",
+        column="ra_est",
+    ),
+    Group(
+        "pointing_dec",
+        "pointing Dec",
+        "δ_tel",
+        "exp",
+        "arcsec",
+        "deg",
+        "normal",
+        3600.0,
+        origin="environment",
+        column="dec_est",
+    ),
+    Group(
+        "position_angle",
+        "position angle",
+        "θ_tel",
+        "exp",
+        "arcsec",
+        "deg",
+        "uniform",
+        float("inf"),
+        origin="environment",
+        column="pa_est",
+    ),
+    Group(
+        "focal_length",
+        "focal length",
+        "F",
+        "exp",
+        "um",
+        "um",
+        "gamma",
+        _FOCAL_WIDTH_UM,
+        origin="environment",
+        column="focal_length",
+    ),
+    Group("distortion_x", "distortion A", "A_kl", "coef", "um", "um", "normal", 1.0),
+    Group("distortion_y", "distortion B", "B_kl", "coef", "um", "um", "normal", 1.0),
+    Group(
+        "detector_x",
+        "detector x",
+        "X_det",
+        "det",
+        "um",
+        "um",
+        "normal",
+        100.0,
+        origin="instrument",
+        column="x_um",
+    ),
+    Group(
+        "detector_y",
+        "detector y",
+        "Y_det",
+        "det",
+        "um",
+        "um",
+        "normal",
+        100.0,
+        origin="instrument",
+        column="y_um",
+    ),
+    Group(
+        "detector_rotation",
+        "detector rotation",
+        "θ_det",
+        "det",
+        "arcsec",
+        "deg",
+        "normal",
+        360.0,
+        origin="instrument",
+        column="rotation_deg",
+    ),
+    Group(
+        "pitch_x",
+        "pixel pitch x",
+        "δ_x",
+        "det",
+        "um",
+        "um",
+        "normal",
+        0.01,
+        relative=True,
+        origin="instrument",
+        column="pitch_x_um",
+    ),
+    Group(
+        "pitch_y",
+        "pixel pitch y",
+        "δ_y",
+        "det",
+        "um",
+        "um",
+        "normal",
+        0.01,
+        relative=True,
+        origin="instrument",
+        column="pitch_y_um",
+    ),
+)
+
+CALIBRATION_GROUPS = tuple(g for g in PARAMETERS if g.axis != "src")
+BY_NAME = {g.name: g for g in PARAMETERS}
+
+
+def groups_on(axis: Axis) -> tuple[Group, ...]:
+    """Return the groups with one value per element of `axis`, in table order."""
+    return tuple(g for g in PARAMETERS if g.axis == axis)

@@ -1,0 +1,142 @@
+"""Priors in the words that people write: widths, and shifts of the centres."""
+
+import math
+import re
+
+from solver.data.parameters import BY_NAME, Group
+from solver.errors import InputError
+
+_NUMBER = r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\W\d]\w*)?"
+_WIDTH = re.compile(rf"(?P<flat>flat|inf)|{_NUMBER}")
+_SHIFT = re.compile(_NUMBER)
+_SHIFTED = re.compile(r"(?P<group>\w+)\s*(?:\[\s*(?P<element>[^\[\]\s]+)\s*\])?")
+_IN_ARCSEC = {"deg": 3600.0, "arcmin": 60.0, "arcsec": 1.0, "mas": 1e-3, "uas": 1e-6}
+_IN_UM = {"mm": 1e3, "um": 1.0, "µm": 1.0, "micron": 1.0, "nm": 1e-3}
+
+
+def group_named(name: str) -> Group:
+    """Return a parameter group; `InputError` names them all if there is none of that name."""
+    if name not in BY_NAME:
+        raise InputError(f"expected a parameter group out of {', '.join(BY_NAME)}, found {name!r}")
+    return BY_NAME[name]
+
+
+def check_width(name: str, width: float) -> None:
+    """Refuse a width that no prior of the group can have.
+
+    Raises
+    ------
+    InputError
+        If there is no such group, or the width is not positive, or flat for the sources.
+    """
+    group_named(name)
+    if not width > 0 or math.isnan(width):
+        raise InputError(f"expected a positive prior width for {name}, found {width!r}")
+    if name == "sources" and math.isinf(width):
+        raise InputError(
+            "expected a finite factor on the catalogue's uncertainties for sources, found inf: "
+            "without the reference sources nothing fixes the solution on the sky"
+        )
+
+
+def check_shift(name: str, shift: float) -> None:
+    """Refuse a shift of a prior's centre that nothing can be made of.
+
+    Parameters
+    ----------
+    name : as `split_name` reads it
+
+    Raises
+    ------
+    InputError
+        If it is of no group, or not finite, or of the sources without a direction.
+    """
+    group, element = split_name(name)
+    if not math.isfinite(shift):
+        raise InputError(f"expected a finite shift of the prior's centre of {name}, found {shift}")
+    if group.axis == "src" and element not in ("ra", "dec"):
+        raise InputError(
+            f"expected sources[ra] or sources[dec], the whole catalogue, found {name!r}"
+        )
+
+
+def split_name(name: str) -> tuple[Group, str | None]:
+    """Return the group, and the element if one is named, of "GROUP" or "GROUP[ELEMENT]"."""
+    match = _SHIFTED.fullmatch(name.strip())
+    if match is None:
+        raise InputError(f"expected GROUP or GROUP[ELEMENT], found {name!r}")
+    return group_named(match["group"]), match["element"]
+
+
+def parse_width(name: str, text: str) -> float:
+    """Return the prior width that a person wrote for group `name`, in its `width_unit`.
+
+    Parameters
+    ----------
+    text : a number, with a unit if the group has one ("0.5 deg", "2um", "0.01"), or "flat"
+
+    Raises
+    ------
+    InputError
+        If the group, the number or the unit is not usable.
+    """
+    unit = group_named(name).width_unit
+    match = _WIDTH.fullmatch(text.strip())
+    if match is None:
+        raise InputError(
+            f"prior of {name}: expected a width such as {format_width(name, 1.0)!r} or flat, "
+            f"found {text!r}"
+        )
+    if match["flat"]:
+        width = math.inf
+    else:
+        width = float(match["number"]) * _factor(f"prior of {name}", match["unit"], unit)
+    check_width(name, width)
+    return width
+
+
+def format_width(name: str, width: float) -> str:
+    """Return a prior width as `parse_width` reads it."""
+    unit = BY_NAME[name].width_unit
+    return "flat" if math.isinf(width) else f"{width:.6g} {unit}".strip()
+
+
+def parse_shift(text: str) -> tuple[str, float]:
+    """Return what a person wrote of the centre of a prior: which, and its shift.
+
+    Parameters
+    ----------
+    text : "GROUP=SHIFT" or "GROUP[ELEMENT]=SHIFT", such as "detector_x[2]=-5um"
+
+    Raises
+    ------
+    InputError
+        If the group, the number or the unit is not usable.
+    """
+    name, found, value = text.partition("=")
+    match = _SHIFT.fullmatch(value.strip())
+    if not found or match is None:
+        raise InputError(
+            "centre of a prior: expected GROUP=SHIFT or GROUP[ELEMENT]=SHIFT, such as "
+            f"detector_x[2]=-5um, found {text!r}"
+        )
+    group, element = split_name(name)
+    name = group.name if element is None else f"{group.name}[{element}]"
+    shift = float(match["number"]) * _factor(f"centre of {name}", match["unit"], group.unit)
+    check_shift(name, shift)
+    return name, shift
+
+
+def format_shift(name: str, shift: float) -> str:
+    """Return a shift as `parse_shift` reads it."""
+    return f"{name}={shift:+.6g}{split_name(name)[0].unit}"
+
+
+def _factor(what: str, given: str | None, unit: str) -> float:
+    scale = next((s for s in (_IN_ARCSEC, _IN_UM) if unit in s), {})
+    if given is None:
+        return 1.0
+    if given not in scale:
+        expected = f"a unit out of {', '.join(scale)}" if scale else "a number without unit"
+        raise InputError(f"{what}: expected {expected}, found {given!r}")
+    return scale[given] / scale[unit]

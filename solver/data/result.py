@@ -1,0 +1,101 @@
+"""FitResult: the tables and the summary of one fitted orbit. No JAX, no files."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import pandas as pd
+
+from solver.data.parameters import groups_on
+from solver.data.settings import FitSettings
+
+
+class FitStatus(Enum):
+    """How a fit ended; the value is the message for people."""
+
+    CONVERGED = "every step of the last iteration is below the tolerance times its uncertainty"
+    WHAT_IF = "one step of the linearised model, which a refit would confirm"
+    MAX_ITERATIONS = "the limit of iterations was reached before the steps became small"
+    STUCK = "no part of the step made chi2 fall any further, and the steps are not small"
+    AT_REST = "the loss has come to rest, and the linearised problem puts the mode there"
+    SAMPLED = "the chains agree with each other, and none of their steps diverged"
+    UNMIXED = "the chains do not agree with each other yet, or some of their steps diverged"
+    STALLED = "the loss has come to rest, but the linearised problem puts the mode elsewhere"
+    MAX_STEPS = "the limit of steps was reached before the loss came to rest"
+    SINGULAR = "the data and the priors together leave a direction of the solution open"
+    NOT_FINITE = "the residuals are not finite: a start value is far from the truth"
+
+    @property
+    def is_solution(self) -> bool:
+        """Whether the engine ended where it was to."""
+        return self in _SOLUTIONS
+
+
+_SOLUTIONS = (
+    FitStatus.CONVERGED,
+    FitStatus.WHAT_IF,
+    FitStatus.AT_REST,
+    FitStatus.SAMPLED,
+)
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """One fitted orbit; columns and units as in `solver.data.schema`.
+
+    Attributes
+    ----------
+    sources : `schema.SOURCES`, in ascending source_id
+    residuals : `schema.RESIDUALS`, in the row order of the measurements read
+    calibration : `schema.CALIBRATION`, every group of the parameter table but the sources
+    exposures : `schema.EXPOSURES`, in order of (field_id, plate_id)
+    trace : `schema.TRACE`
+    summary : plain numbers and words; keys as written by `solver.fit`
+    settings : the choices that made it
+    provenance : file name -> SHA-256 of the inputs
+    true_places : `schema.TRUE_PLACES`, or None where there is no truth
+    outliers : `schema.OUTLIERS`, or None where none were looked for
+    orders : `schema.ORDERS`, or None where they were not compared
+    losses : `schema.LOSSES`, or None of an engine without a loss
+    modes, mode_parameters, mode_shifts : `schema.MODES` with what the weak ones of them move,
+        or None in a result from before there were any
+    """
+
+    sources: pd.DataFrame
+    residuals: pd.DataFrame
+    calibration: pd.DataFrame
+    exposures: pd.DataFrame
+    trace: pd.DataFrame
+    summary: Mapping[str, Any]
+    settings: FitSettings
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    true_places: pd.DataFrame | None = None
+    losses: pd.DataFrame | None = None
+    outliers: pd.DataFrame | None = None
+    modes: pd.DataFrame | None = None
+    mode_parameters: pd.DataFrame | None = None
+    mode_shifts: pd.DataFrame | None = None
+    orders: pd.DataFrame | None = None
+
+    @property
+    def orbit_id(self) -> int:
+        """The orbit that was fitted."""
+        return int(self.exposures["orbit_id"].iloc[0])
+
+    def values_on(self, axis: str, column: str = "value") -> pd.DataFrame:
+        """Return one column of `calibration` as a wide table.
+
+        Parameters
+        ----------
+        axis : "exp", "det" or "coef"
+        column : a column of `schema.CALIBRATION`
+
+        Returns
+        -------
+        Row per element of the axis in order, a column per group on it.
+        """
+        names = [group.name for group in groups_on(axis)]  # type: ignore[arg-type]
+        rows = self.calibration[self.calibration["group"].isin(names)]
+        wide = rows.pivot(index="element", columns="group", values=column)
+        return wide.reindex(columns=names).sort_index()

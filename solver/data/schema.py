@@ -1,0 +1,300 @@
+"""Every table of the project, written once: column name, type, unit, meaning, aliases.
+
+The input tables carry the names that the published files use (paper, tables
+"Columns of the Ground Truth Catalog" and "Inputs, Model Parameters, and Priors"); the
+result tables carry ours. `solver.io` maps them to and from files.
+"""
+
+from solver.data.columns import Column, Table
+from solver.data.eigenmode_schema import EIGENMODE_TABLES
+from solver.data.order_schema import ORDERS as ORDERS
+
+_EXPOSURE_KEY = ("orbit_id", "field_id", "plate_id")
+_ORBIT = Column("orbit_id", "int64", "", "satellite orbit")
+_FIELD = Column("field_id", "int64", "", "field of the orbit")
+_PLATE = Column("plate_id", "int64", "", "exposure of the field")
+_DETECTOR = Column("detector_id", "int64", "", "detector")
+_SOURCE = Column("source_id", "int64", "", "source")
+_MEASURED = (_ORBIT, _FIELD, _PLATE, _DETECTOR, _SOURCE)
+_OBSTIME = Column(
+    "obstime", "float64", "d", "time of the exposure, MJD in TCB", ("exptime", "time", "mjd")
+)
+
+MEASUREMENT = Table(
+    "measurement",
+    (
+        *_MEASURED,
+        Column("nx", "float64", "pix", "measured x, from the detector centre"),
+        Column("ny", "float64", "pix", "measured y, from the detector centre"),
+        Column("sx", "float64", "pix", "uncertainty of nx", ("sx0",), positive=True),
+        Column("sy", "float64", "pix", "uncertainty of ny", ("sy0",), positive=True),
+    ),
+    key=(*_EXPOSURE_KEY, "detector_id", "source_id"),
+    aliases=("measurements", "obs", "observation"),
+)
+
+ENVIRONMENT = Table(
+    "environment",
+    (
+        _ORBIT,
+        _FIELD,
+        _PLATE,
+        _OBSTIME,
+        Column("ra_est", "float64", "deg", "estimated pointing, RA", ("ra est", "ra_tel", "ra")),
+        Column(
+            "dec_est", "float64", "deg", "estimated pointing, Dec", ("dec est", "dec_tel", "dec")
+        ),
+        Column(
+            "pa_est", "float64", "deg", "estimated position angle", ("pa est", "theta_tel", "pa")
+        ),
+        Column(
+            "focal_length",
+            "float64",
+            "um",
+            "estimated focal length",
+            ("focal length", "foc_tel"),
+            positive=True,
+        ),
+        *(
+            Column(
+                f"satellite_v{axis}",
+                "float64",
+                "km / s",
+                f"geocentric velocity of the satellite, BCRS {axis}",
+                required=False,
+                default=0.0,
+            )
+            for axis in "xyz"
+        ),
+    ),
+    key=_EXPOSURE_KEY,
+    aliases=("exposures", "exposure", "env"),
+)
+
+
+def _correlation(first: str, second: str) -> Column:
+    return Column(
+        f"{first}_{second}_corr",
+        "float64",
+        "",
+        f"correlation of {first} and {second}",
+        required=False,
+        default=0.0,
+    )
+
+
+_ASTROMETRY = ("ra", "dec", "parallax", "pmra", "pmdec")
+
+CATALOGUE = Table(
+    "catalogue",
+    (
+        _SOURCE,
+        Column("ra", "float64", "deg", "right ascension at ref_epoch"),
+        Column("dec", "float64", "deg", "declination at ref_epoch"),
+        Column("ra_error", "float64", "mas", "uncertainty of ra cos(dec)", positive=True),
+        Column("dec_error", "float64", "mas", "uncertainty of dec", positive=True),
+        Column("pmra", "float64", "mas / yr", "proper motion in RA, times cos(dec)"),
+        Column("pmdec", "float64", "mas / yr", "proper motion in Dec"),
+        Column("pmra_error", "float64", "mas / yr", "uncertainty of pmra"),
+        Column("pmdec_error", "float64", "mas / yr", "uncertainty of pmdec"),
+        Column("parallax", "float64", "mas", "parallax"),
+        Column(
+            "parallax_error",
+            "float64",
+            "mas",
+            "uncertainty of parallax",
+            required=False,
+            default=0.0,
+        ),
+        Column("ref_epoch", "float64", "yr", "reference epoch, Julian year in TCB"),
+        Column(
+            "is_reference",
+            "bool",
+            "",
+            "reference source",
+            ("reference_flag", "flag_ref", "is_ref"),
+        ),
+        Column(
+            "is_artificial",
+            "bool",
+            "",
+            "artificial source of a simulation",
+            ("artificial_flag", "flag_test", "flag_art", "test_flag"),
+            required=False,
+            default=False,
+        ),
+        *(
+            _correlation(first, second)
+            for i, first in enumerate(_ASTROMETRY)
+            for second in _ASTROMETRY[i + 1 :]
+        ),
+    ),
+    key=("source_id",),
+    aliases=("reference", "ref", "catalog"),
+)
+
+# The errors of a true catalogue are not used, and its flags repeat the reference's.
+_TRUTH_OPTIONAL = {
+    "ra_error",
+    "dec_error",
+    "pmra_error",
+    "pmdec_error",
+    "is_reference",
+}
+
+TRUTH = Table(
+    "truth",
+    tuple(
+        Column(c.name, c.dtype, c.unit, c.meaning, c.aliases, required=False, default=c.default)
+        if c.name in _TRUTH_OPTIONAL
+        else c
+        for c in CATALOGUE
+        if not c.name.endswith("_corr")
+    ),
+    key=("source_id",),
+    aliases=("ground_truth", "gt"),
+)
+
+SOURCES = Table(
+    "sources",
+    (
+        _SOURCE,
+        Column("is_reference", "bool", "", "reference source"),
+        Column("is_artificial", "bool", "", "artificial source of a simulation"),
+        Column("n_obs", "int64", "", "number of measurements"),
+        Column("ra", "float64", "deg", "estimated RA at the mean epoch, without aberration"),
+        Column("dec", "float64", "deg", "estimated Dec at the mean epoch, without aberration"),
+        Column("sigma_ra_conditional", "float64", "mas", "conditional sigma of ra cos(dec)"),
+        Column("sigma_dec_conditional", "float64", "mas", "conditional sigma of dec"),
+        Column("corr_conditional", "float64", "", "conditional RA-Dec correlation"),
+        Column("sigma_ra_marginal", "float64", "mas", "marginal sigma of ra cos(dec)"),
+        Column("sigma_dec_marginal", "float64", "mas", "marginal sigma of dec"),
+        Column("corr_marginal", "float64", "", "marginal RA-Dec correlation"),
+        Column("prior_ra", "float64", "deg", "prior RA at the mean epoch"),
+        Column("prior_dec", "float64", "deg", "prior Dec at the mean epoch"),
+        Column("prior_sigma_ra", "float64", "mas", "prior sigma of ra cos(dec)"),
+        Column("prior_sigma_dec", "float64", "mas", "prior sigma of dec"),
+        Column("offset_ra", "float64", "mas", "estimate minus prior, ra cos(dec)"),
+        Column("offset_dec", "float64", "mas", "estimate minus prior, dec"),
+        Column("chi2", "float64", "", "sum of squared whitened residuals"),
+        Column("dof", "float64", "", "expected chi2: 2 n_obs less the leverage"),
+    ),
+    key=("source_id",),
+)
+
+RESIDUALS = Table(
+    "residuals",
+    (
+        *_MEASURED,
+        Column("nx", "float64", "pix", "measured x"),
+        Column("ny", "float64", "pix", "measured y"),
+        Column("sx", "float64", "pix", "uncertainty of nx"),
+        Column("sy", "float64", "pix", "uncertainty of ny"),
+        Column("model_x", "float64", "pix", "predicted x"),
+        Column("model_y", "float64", "pix", "predicted y"),
+        Column("residual_x", "float64", "pix", "measured minus predicted x"),
+        Column("residual_y", "float64", "pix", "measured minus predicted y"),
+        Column(
+            "standardised_x",
+            "float64",
+            "",
+            "residual in x over its expected scatter, leverage removed",
+            may_be_nan=True,
+        ),
+        Column(
+            "standardised_y",
+            "float64",
+            "",
+            "residual in y over its expected scatter, leverage removed",
+            may_be_nan=True,
+        ),
+        Column("leverage", "float64", "", "trace of the 2x2 leverage, 0 to 2"),
+        Column("ideal_x", "float64", "um", "undistorted focal-plane x"),
+        Column("ideal_y", "float64", "um", "undistorted focal-plane y"),
+        Column("focal_x", "float64", "um", "distorted focal-plane x"),
+        Column("focal_y", "float64", "um", "distorted focal-plane y"),
+    ),
+)
+
+CALIBRATION = Table(
+    "calibration",
+    (
+        Column("group", "str", "", "parameter group, as in `solver.data.parameters`"),
+        Column("element", "int64", "", "index along the group's axis"),
+        Column("label", "str", "", "the element in words: 'field 0 plate 3', 'A(2,0)'"),
+        Column("value", "float64", "", "estimate, in value_unit"),
+        Column("prior_centre", "float64", "", "centre of the prior, in value_unit"),
+        Column("value_unit", "str", "", "unit of value and prior_centre"),
+        Column("offset", "float64", "", "estimate minus prior centre, in unit"),
+        Column("prior_sigma", "float64", "", "width of the prior, in unit; inf where flat"),
+        Column("sigma_conditional", "float64", "", "sigma with all else held fixed, in unit"),
+        Column("sigma_marginal", "float64", "", "sigma with all else integrated out, in unit"),
+        Column("unit", "str", "", "unit of offset and of the sigmas"),
+        Column("prior_share", "float64", "", "share of the answer that is prior, 0 to 1"),
+    ),
+    key=("group", "element"),
+)
+
+EXPOSURES = Table(
+    "exposures",
+    (
+        _ORBIT,
+        _FIELD,
+        _PLATE,
+        _OBSTIME,
+        Column("n_obs", "int64", "", "number of measurements"),
+        Column("chi2", "float64", "", "sum of squared whitened residuals"),
+        Column("dof", "float64", "", "expected chi2: 2 n_obs less the leverage"),
+    ),
+    key=_EXPOSURE_KEY,
+)
+
+TRACE = Table(
+    "trace",
+    (
+        Column("iteration", "int64", "", "iteration, 0 is the start"),
+        Column("objective", "float64", "", "chi2 of the data plus that of the priors"),
+        Column("chi2", "float64", "", "chi2 of the data"),
+        Column("largest_step", "float64", "", "largest step over its uncertainty", may_be_nan=True),
+        Column("largest_parameter", "str", "", "the parameter of that step"),
+        Column("damping", "float64", "", "share of the step that was not taken, mostly 0"),
+        Column("seconds", "float64", "s", "time since the start of the fit"),
+    ),
+)
+
+OUTLIERS = Table(
+    "outliers",
+    (
+        *_MEASURED,
+        Column("nx", "float64", "pix", "measured x"),
+        Column("ny", "float64", "pix", "measured y"),
+        Column("residual_x", "float64", "pix", "measured minus predicted x"),
+        Column("residual_y", "float64", "pix", "measured minus predicted y"),
+        Column("distance", "float64", "", "residual over its uncertainty, both coordinates"),
+        Column("shift_ra", "float64", "", "shift of the source if used, over its marginal sigma"),
+        Column("shift_dec", "float64", "", "the same in Dec"),
+    ),
+)
+
+LOSSES = Table(
+    "losses",
+    (
+        Column("step", "int64", "", "step of the svi engine, from 1"),
+        Column("loss", "float64", "", "minus the evidence lower bound, of one draw"),
+    ),
+)
+
+TRUE_PLACES = Table(
+    "true_places",
+    (
+        _SOURCE,
+        Column("ra", "float64", "deg", "true RA at the mean epoch, without aberration"),
+        Column("dec", "float64", "deg", "true Dec at the mean epoch, without aberration"),
+        Column("induced_ra", "float64", "mas", "shift that the reference stars' errors cause"),
+        Column("induced_dec", "float64", "mas", "shift that the reference stars' errors cause"),
+    ),
+    key=("source_id",),
+)
+
+_FIT_TABLES = (SOURCES, RESIDUALS, CALIBRATION, EXPOSURES, TRACE, LOSSES, OUTLIERS, TRUE_PLACES)
+RESULT_TABLES = (*_FIT_TABLES, ORDERS, *EIGENMODE_TABLES)

@@ -1,0 +1,135 @@
+"""The posterior of one orbit as a numpyro model, generated from the parameter table.
+
+Paper, Eqs. (method:posterior) and (exp:priors): a prior for every group, and the measurements
+given the observation model. The engines that sample or optimise work in other coordinates
+than the groups' own (`solver.linear.whitening`); `in_coordinates` is the same model in those.
+"""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import numpyro
+import numpyro.distributions as dist
+from jaxtyping import Float
+from numpyro.distributions import constraints
+
+from solver.data.parameters import PARAMETERS, SOURCES, Group
+from solver.linear.chi2 import half_chi2_of_chunks
+from solver.linear.whitening import Coordinates
+from solver.model.forward import AnyArray, Geometry, Index
+from solver.problem.parameter_vector import VectorLayout
+from solver.problem.problem import Problem
+
+# Sites of `in_coordinates`.
+CALIBRATION, FREE_SOURCES = "calibration", "free_sources"
+
+
+class Evidence(eqx.Module):
+    """What the model is given, as arrays that JAX can take: one orbit and its priors.
+
+    Attributes
+    ----------
+    index, measured, weight : as of `solver.problem.tiles.Tiles`
+    width, centre : of the calibration's priors, per group
+    precision : of the sources' priors, mas^-2
+    log_norm : logarithm of the likelihood of measurements with no residual
+    flat : groups without a prior
+    """
+
+    geometry: Geometry
+    index: Index
+    measured: Float[AnyArray, "chunk 2 tile slot"]
+    weight: Float[AnyArray, "chunk 2 tile slot"]
+    width: dict[str, Float[AnyArray, " _"]]
+    centre: dict[str, Float[AnyArray, " _"]]
+    precision: Float[AnyArray, "src 2 2"]
+    log_norm: Float[AnyArray, ""]
+    layout: VectorLayout = eqx.field(static=True)
+    flat: frozenset[str] = eqx.field(static=True)
+
+
+def evidence_of(problem: Problem) -> Evidence:
+    """Return what the model needs of a problem."""
+    layout, priors, tiles = problem.layout, problem.priors, problem.measurements.tiles
+    width = layout.scatter(priors.width)
+    return Evidence(
+        geometry=problem.geometry,
+        index=tiles.index,
+        measured=tiles.measured,
+        weight=tiles.weight,
+        width=width,
+        centre=layout.scatter(priors.centre),
+        precision=priors.precision,
+        log_norm=-np.log(problem.measurements.sigma).sum()
+        - np.array(problem.measurements.sigma.size * _HALF_LOG_2PI),
+        layout=layout,
+        flat=frozenset(name for name, values in width.items() if np.isinf(values).any()),
+    )
+
+
+def plate_analysis(evidence: Evidence) -> None:
+    """Say how the measurements of an orbit come about: the numpyro model."""
+    offsets = {g.name: numpyro.sample(g.name, _prior(evidence, g)) for g in PARAMETERS}
+    half_chi2 = half_chi2_of_chunks(
+        _padded(offsets, evidence.geometry),
+        evidence.geometry,
+        evidence.index,
+        evidence.measured,
+        evidence.weight,
+    )
+    numpyro.factor("measurements", evidence.log_norm - half_chi2)
+
+
+def in_coordinates(evidence: Evidence, coordinates: Coordinates) -> None:
+    """Say the same of other coordinates: the groups' offsets are functions of these."""
+    of_theta = numpyro.sample(CALIBRATION, _improper(evidence.layout.size))
+    of_sources = numpyro.sample(FREE_SOURCES, _improper(2, len(evidence.precision)))
+    theta, sources = coordinates.place(of_theta, of_sources)
+    offsets = {**evidence.layout.scatter(theta), SOURCES.name: sources}
+    with numpyro.handlers.condition(data=offsets):
+        plate_analysis(evidence)
+    numpyro.factor("volume", coordinates.log_volume)
+
+
+_HALF_LOG_2PI = 0.5 * np.log(2.0 * np.pi)
+
+
+def _prior(evidence: Evidence, group: Group) -> dist.Distribution:
+    if group is SOURCES:
+        mean = jnp.zeros((len(evidence.precision), 2))
+        return dist.MultivariateNormal(mean, precision_matrix=evidence.precision).to_event(1)
+    width, centre = evidence.width[group.name], evidence.centre[group.name]
+    if group.name in evidence.flat:
+        return _improper(len(width))
+    return _FAMILIES[group.family](width, centre).to_event(1)
+
+
+def _improper(*shape: int) -> dist.Distribution:
+    return dist.ImproperUniform(constraints.real, (), shape)
+
+
+def _normal(width: Float[AnyArray, " _"], _: Float[AnyArray, " _"]) -> dist.Distribution:
+    return dist.Normal(jnp.zeros_like(width), width)
+
+
+def _gamma(width: Float[AnyArray, " _"], centre: Float[AnyArray, " _"]) -> dist.Distribution:
+    """Return a gamma distribution of the whole value, with that mean and deviation."""
+    whole = dist.Gamma((centre / width) ** 2, centre / width**2)
+    return dist.TransformedDistribution(whole, dist.transforms.AffineTransform(-centre, 1.0))
+
+
+_FAMILIES: dict[str, Callable[[AnyArray, AnyArray], dist.Distribution]] = {
+    "normal": _normal,
+    "gamma": _gamma,
+}
+
+
+def _padded(offsets: dict[str, AnyArray], geometry: Geometry) -> dict[str, AnyArray]:
+    """Return the offsets as long as the geometry is; what is added belongs to nothing."""
+    lengths = {g.name: geometry.sizes.get(g.axis, len(offsets[g.name])) for g in PARAMETERS}
+    return {
+        name: jnp.pad(values, [(0, lengths[name] - len(values)), *[(0, 0)] * (values.ndim - 1)])
+        for name, values in offsets.items()
+    }

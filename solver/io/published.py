@@ -1,0 +1,168 @@
+"""The published result layout as data: which of our columns is which of theirs.
+
+The HDUs RESULT, SAMPLE, TELESCOPE, DETECTOR, DISTORTION and TRACE have the columns of the
+published files under the published names; ours follow them. TELESCOPE, DETECTOR and
+DISTORTION repeat what CALIBRATION says in full, for readers of the published layout.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from solver.data import eigenmode_schema as eigenmode_schema
+from solver.data import schema
+from solver.data.result import FitResult
+from solver.units import MAS_PER_DEG
+
+
+@dataclass(frozen=True)
+class PublishedTable:
+    """How one table of a result is kept in an HDU.
+
+    Attributes
+    ----------
+    hdu : name of the HDU
+    table : the table as we know it
+    published : canonical name -> name in the file, where they differ
+    unitless : canonical names of columns that have no TUNIT in the published files,
+        whose readers would not expect one
+    """
+
+    hdu: str
+    table: schema.Table
+    published: Mapping[str, str] = field(default_factory=dict)
+    unitless: frozenset[str] = frozenset()
+
+    def name(self, column: schema.Column) -> str:
+        """Return the name of `column` in the file."""
+        return self.published.get(column.name, column.name)
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A published column that repeats ours in another form; written, never read.
+
+    Attributes
+    ----------
+    name : name in the file
+    unit : TUNIT; "" for none
+    meaning : one line for people, with the unit
+    values : one per row
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    values: np.ndarray
+
+
+RESULT = PublishedTable(
+    "RESULT",
+    schema.SOURCES,
+    {
+        "ra": "src_a_loc",
+        "dec": "src_d_loc",
+        "prior_ra": "ra_ref",
+        "prior_dec": "dec_ref",
+        "n_obs": "num_measurement",
+        "is_reference": "reference_flag",
+        "corr_marginal": "src_ad_corr",
+    },
+)
+SAMPLE = PublishedTable(
+    "SAMPLE",
+    schema.RESIDUALS,
+    {
+        "model_x": "ij_x",
+        "model_y": "ij_y",
+        "focal_x": "xy_x",
+        "focal_y": "xy_y",
+        "ideal_x": "pq_x",
+        "ideal_y": "pq_y",
+        "sx": "sig_x_loc",
+        "sy": "sig_y_loc",
+    },
+    frozenset(f"{stem}{axis}" for stem in ("n", "model_", "focal_", "ideal_") for axis in "xy"),
+)
+CALIBRATION = PublishedTable("CALIBRATION", schema.CALIBRATION)
+EXPOSURES = PublishedTable("EXPOSURES", schema.EXPOSURES)
+TRUE_PLACES = PublishedTable("TRUE_PLACES", schema.TRUE_PLACES)
+OUTLIERS = PublishedTable("OUTLIERS", schema.OUTLIERS)
+ORDERS = PublishedTable("ORDERS", schema.ORDERS)
+LOSSES = PublishedTable("LOSSES", schema.LOSSES)
+MODES = PublishedTable("MODES", eigenmode_schema.MODES)
+MODE_PARAMETERS = PublishedTable("MODE_PARAMETERS", eigenmode_schema.MODE_PARAMETERS)
+MODE_SHIFTS = PublishedTable("MODE_SHIFTS", eigenmode_schema.MODE_SHIFTS)
+TRACE = PublishedTable("TRACE", schema.TRACE, {"objective": "loss"})
+
+PUBLISHED_ORDER = {
+    "RESULT": (
+        *("source_id", "src_a_loc", "src_a_sig", "src_d_loc", "src_d_sig", "ra_ref", "dec_ref"),
+        *("num_measurement", "reference_flag"),
+        *("src_a_marg", "src_d_marg", "src_ad_corr", "chi2", "dof", "is_artificial"),
+    ),
+    "SAMPLE": (
+        *("source_id", "detector_id", "orbit_id", "field_id", "plate_id", "nx", "ny"),
+        *("ij_x", "ij_y", "xy_x", "xy_y", "pq_x", "pq_y", "sig_x_loc", "sig_y_loc"),
+    ),
+    "TRACE": ("loss",),
+}
+
+
+def source_sigmas(sources: pd.DataFrame) -> list[Derived]:
+    """Return the published sigmas of the sources, in degrees of the coordinate."""
+    cos_dec = np.cos(np.radians(sources["dec"].to_numpy()))
+    columns = []
+    for kind, suffix in (("conditional", "sig"), ("marginal", "marg")):
+        for axis, letter, scale in (("ra", "a", cos_dec), ("dec", "d", 1.0)):
+            sigma = sources[f"sigma_{axis}_{kind}"].to_numpy() / MAS_PER_DEG / scale
+            meaning = f"[deg] {kind} sigma of {axis}, as a coordinate"
+            columns.append(Derived(f"src_{letter}_{suffix}", "deg", meaning, sigma))
+    return columns
+
+
+def telescope(result: FitResult) -> list[Derived]:
+    """Return the columns of TELESCOPE: one row per exposure, in order."""
+    values = result.values_on("exp")
+    exposures = result.exposures.iloc[values.index.to_numpy()]
+    ids = [
+        Derived(name, "", schema.EXPOSURES[name].meaning, exposures[name].to_numpy())
+        for name in schema.EXPOSURES.key
+    ]
+    # One focal length per exposure here; the published files have one per axis.
+    return ids + [
+        Derived(name, unit, f"[{unit}] {words}", values[group].to_numpy())
+        for name, unit, group, words in (
+            ("tel_a_loc", "deg", "pointing_ra", "RA of the optical axis"),
+            ("tel_d_loc", "deg", "pointing_dec", "Dec of the optical axis"),
+            ("tel_t_loc", "deg", "position_angle", "position angle"),
+            ("tel_f_loc_x", "um", "focal_length", "focal length"),
+            ("tel_f_loc_y", "um", "focal_length", "focal length, the same"),
+        )
+    ]
+
+
+def detector(result: FitResult) -> list[Derived]:
+    """Return the columns of DETECTOR: one row per detector, in order."""
+    values = result.values_on("det")
+    return [
+        Derived(name, "", f"[{unit}] {words}", values[group].to_numpy())
+        for name, unit, group, words in (
+            ("det_r_loc", "deg", "detector_rotation", "rotation"),
+            ("det_o_loc_x", "um", "detector_x", "x of the centre"),
+            ("det_o_loc_y", "um", "detector_y", "y of the centre"),
+            ("det_p_loc_x", "um", "pitch_x", "pixel pitch in x"),
+            ("det_p_loc_y", "um", "pitch_y", "pixel pitch in y"),
+        )
+    ]
+
+
+def distortion(result: FitResult) -> list[Derived]:
+    """Return the columns of DISTORTION: one row per term, (2,0), (1,1), (0,2), (3,0)..."""
+    values = result.values_on("coef")
+    return [
+        Derived(f"opt_{axis}_loc", "", f"[um] {axis}_kl", values[group].to_numpy())
+        for axis, group in (("A", "distortion_x"), ("B", "distortion_y"))
+    ]

@@ -1,0 +1,191 @@
+"""Reading an orbit: an observation, a catalogue and perhaps the truth, checked together."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+from astropy.table import Table as RawTable
+
+from solver.data import schema
+from solver.data.orbit import OrbitData
+from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
+from solver.errors import InputError
+from solver.io.atomic import sha256_of
+from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
+from solver.io.formats import has_reader, holds_one_table, place, read_tables
+from solver.io.table_check import conform, refuse
+
+_MOST_ORBITS_LISTED = 10
+
+
+class Located(NamedTuple):
+    """A raw table, the words that tell where it is, and the file it is in."""
+
+    table: RawTable
+    where: str
+    path: Path
+
+
+def read_orbit(
+    obs: Path, reference: Path, truth: Path | None = None, orbit: int | None = None
+) -> OrbitData:
+    """Read one orbit and check its tables, each alone and all together.
+
+    Row order means nothing in any of the files. Exposures without a measurement are
+    dropped; the catalogue keeps all its rows, and so does a truth, which may lack some of
+    the measured sources.
+
+    Parameters
+    ----------
+    obs : a FITS or VOTable file with the tables `measurement` and `environment`; or the
+        measurement table in a file of its own, with a file `environment` beside it; or
+        the folder of two such files
+    reference : the catalogue: the first table with rows of the file
+    truth : the true catalogue, likewise
+    orbit : the `orbit_id` to read, needed if there are several
+
+    Returns
+    -------
+    Tables as in `solver.data.schema`, with the observation first in the provenance and the
+    catalogue second.
+
+    Raises
+    ------
+    InputError
+        If anything is wrong with a file, a table, or what they say of each other.
+    """
+    measured, environment = find_observation(Path(obs))
+    catalogue = find_catalogue(Path(reference))
+    true = None if truth is None else find_catalogue(Path(truth))
+
+    measurements = conform(measured.table, MEASUREMENT, measured.where)
+    exposures = conform(environment.table, ENVIRONMENT, environment.where)
+    stars = conform(catalogue.table, CATALOGUE, catalogue.where)
+    truths = None if true is None else conform(true.table, TRUTH, true.where)
+
+    measurements = _select(measurements, _choose(measurements, orbit, measured.where))
+    found = exposure_problems(measurements, exposures, measured.where, environment.where)
+    found += catalogue_problems(measurements, stars, measured.where, catalogue.where)
+    if truths is not None and true is not None:
+        found += truth_problems(measurements, truths, measured.where, true.where)
+    refuse(found)
+    return OrbitData(
+        measurements=measurements,
+        exposures=_measured(exposures, measurements),
+        catalogue=stars,
+        truth=truths,
+        provenance=_hashes(measured, catalogue, true, environment),
+    )
+
+
+def find_observation(obs: Path) -> tuple[Located, Located]:
+    """Return the raw measurement and environment tables of an observation.
+
+    Raises
+    ------
+    InputError
+        If either is missing, or there are several to choose from.
+    """
+    if obs.is_dir():
+        return _one_table(_file_in(obs, MEASUREMENT)), _one_table(_file_in(obs, ENVIRONMENT))
+    if holds_one_table(obs):
+        return _one_table(obs), _one_table(_file_in(obs.parent, ENVIRONMENT, obs.suffix))
+    tables = read_tables(obs)
+    return _named(obs, tables, MEASUREMENT), _named(obs, tables, ENVIRONMENT)
+
+
+def find_catalogue(path: Path) -> Located:
+    """Return the first raw table of a file that has rows.
+
+    Raises
+    ------
+    InputError
+        If no table has any.
+    """
+    tables = read_tables(path)
+    for name, table in tables.items():
+        if len(table):
+            return Located(table, place(path, name), path)
+    raise InputError(
+        f"{path}: expected a table with at least one row, found "
+        f"{'none in ' + ', '.join(tables) if tables else 'no table'}"
+    )
+
+
+def names_of(table: schema.Table) -> tuple[str, ...]:
+    """Return the names that a table of this kind may have in a file, in lower case."""
+    return (table.name.lower(), *(alias.lower() for alias in table.aliases))
+
+
+def _named(path: Path, tables: dict[str, RawTable], wanted: schema.Table) -> Located:
+    present = {name.lower(): name for name in reversed(tables)}
+    for name in names_of(wanted):
+        if name in present:
+            return Located(tables[present[name]], place(path, present[name]), path)
+    raise InputError(
+        f"{path}: expected a table (HDU) called {wanted.name!r}, "
+        f"found {', '.join(tables) or 'no table at all'}"
+    )
+
+
+def _one_table(path: Path) -> Located:
+    tables = read_tables(path)
+    if len(tables) != 1:
+        raise InputError(f"{path}: expected one table, found {', '.join(tables) or 'none'}")
+    name, table = next(iter(tables.items()))
+    return Located(table, place(path, name), path)
+
+
+def _file_in(folder: Path, wanted: schema.Table, preferred_suffix: str = "") -> Path:
+    files = [p for p in sorted(folder.iterdir()) if has_reader(p) and p.is_file()]
+    for name in names_of(wanted):
+        candidates = [p for p in files if p.stem.lower() == name]
+        same = [p for p in candidates if p.suffix.lower() == preferred_suffix.lower()]
+        if len(same or candidates) > 1:
+            raise InputError(
+                f"{folder}: expected one file with the {wanted.name} table, "
+                f"found {', '.join(p.name for p in same or candidates)}"
+            )
+        if candidates:
+            return (same or candidates)[0]
+    raise InputError(
+        f"{folder}: expected a file called {wanted.name} (.fits, .ecsv, .csv, .parquet or .xml), "
+        f"found {', '.join(p.name for p in files) or 'no table file'}"
+    )
+
+
+def _choose(measurements: pd.DataFrame, orbit: int | None, where: str) -> int:
+    orbits = sorted(int(o) for o in measurements["orbit_id"].unique())
+    listed = ", ".join(str(o) for o in orbits[:_MOST_ORBITS_LISTED])
+    if len(orbits) > _MOST_ORBITS_LISTED:
+        listed += f" and {len(orbits) - _MOST_ORBITS_LISTED} more"
+    if orbit is None and len(orbits) > 1:
+        raise InputError(
+            f"{where}, column orbit_id: expected one orbit, or the one to read to be chosen, "
+            f"found the orbits {listed}"
+        )
+    chosen = orbits[0] if orbit is None else orbit
+    if chosen not in orbits:
+        raise InputError(f"{where}, column orbit_id: expected orbit {chosen}, found only {listed}")
+    return chosen
+
+
+def _select(measurements: pd.DataFrame, orbit: int) -> pd.DataFrame:
+    return measurements[measurements["orbit_id"] == orbit].reset_index(drop=True)
+
+
+def _measured(exposures: pd.DataFrame, measurements: pd.DataFrame) -> pd.DataFrame:
+    key = list(ENVIRONMENT.key)
+    return exposures.merge(measurements[key].drop_duplicates(), on=key, validate="1:1")
+
+
+def _hashes(
+    measured: Located, catalogue: Located, truth: Located | None, environment: Located
+) -> dict[str, str]:
+    files = [measured.path, catalogue.path, *([truth.path] if truth else []), environment.path]
+    hashes: dict[str, str] = {}
+    for path in dict.fromkeys(file.resolve() for file in files):
+        # Files of the same name in different folders keep the folder's name as well.
+        name = path.name if path.name not in hashes else f"{path.parent.name}/{path.name}"
+        hashes[name] = sha256_of(path)
+    return hashes

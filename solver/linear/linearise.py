@@ -1,0 +1,184 @@
+"""Whitened residuals and exact Jacobians of the observation model.
+
+Each measurement touches one source, one exposure and one detector, so the derivative by
+a whole group is one forward-mode pass with every element of the group moved at once.
+The distortion coefficients are shared by all measurements, but act only through the
+displacement they add: its derivative and the basis stand for theirs.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from solver.data.parameters import SOURCES
+from solver.model.forward import (
+    DIRECTING,
+    AnyArray,
+    Directions,
+    Geometry,
+    Index,
+    Offsets,
+    Pair,
+    Prediction,
+    directions,
+    ideal_position,
+    image,
+)
+from solver.problem.parameter_vector import LOCAL_GROUPS
+
+
+class Linearised(NamedTuple):
+    """A run of tiles, linearised; all but `prediction` divided by sigma, x and y apart.
+
+    `residual` is measured minus predicted. The others are derivatives of the prediction:
+    by the source's two offsets (mas^-1), by the groups of `LOCAL_GROUPS` (per group unit),
+    and by a displacement on the focal plane (um^-1).
+    """
+
+    residual: Pair
+    source: list[Pair]
+    local: list[Pair]
+    displacement: list[Pair]
+    prediction: Prediction
+
+    def with_terms(self, n_coef: int) -> "Linearised":
+        """Return the same with that many distortion terms."""
+        kept = self.prediction._replace(basis=self.prediction.basis[:n_coef])
+        return self._replace(prediction=kept)
+
+
+class Imaged(NamedTuple):
+    """The prediction of a run of tiles, and how its pixels move with the ideal positions.
+
+    `along` holds the derivatives of `prediction.pixel` by x and by y, pixel/um.
+    """
+
+    prediction: Prediction
+    along: list[Pair]
+
+
+class Turning(NamedTuple):
+    """The directions and how they turn, which is the same for all chunks.
+
+    Attributes
+    ----------
+    at : at the offsets
+    source : derivatives of `at.source` by a source's two offsets, mas^-1
+    axes : group name -> derivative of `at.axes`, per group unit
+    """
+
+    at: Directions
+    source: list[tuple[Float[AnyArray, " src"], ...]]
+    axes: dict[str, Float[AnyArray, "exp 3 3"]]
+
+
+@jax.jit
+def turning(offsets: Offsets, geometry: Geometry) -> Turning:
+    """Return the directions at `offsets`, and their derivatives."""
+
+    def by_group(name: str, tangent: Float[Array, "..."]) -> Directions:
+        def moved(values: Float[Array, "..."]) -> Directions:
+            return directions({**offsets, name: values}, geometry)
+
+        return jax.jvp(moved, (jnp.asarray(offsets[name]),), (tangent,))[1]
+
+    east = jnp.zeros_like(offsets[SOURCES.name]).at[:, 0].set(1.0)
+    return Turning(
+        directions(offsets, geometry),
+        [by_group(SOURCES.name, tangent).source for tangent in (east, 1.0 - east)],
+        {name: by_group(name, jnp.ones_like(offsets[name])).axes for name in DIRECTING},
+    )
+
+
+def linearise(
+    turn: Turning,
+    offsets: Offsets,
+    geometry: Geometry,
+    index: Index,
+    measured: Float[AnyArray, "2 tile slot"],
+    weight: Float[AnyArray, "2 tile slot"],
+) -> Linearised:
+    """Linearise the model at `offsets`.
+
+    Parameters
+    ----------
+    turn : as from `turning`, at the same offsets
+    measured : pixels
+    weight : 1/sigma, pixel^-1; zero removes a coordinate
+    """
+    # Compiled apart: within one program XLA would make these anew for each of the twenty
+    # derivatives that are chained to them, which was measured to double its work.
+    at = _imaged(turn, offsets, geometry, index)
+    residual, source, local, displacement = _derivatives(
+        turn, offsets, geometry, index, measured, weight, at
+    )
+    return Linearised(residual, source, local, displacement, at.prediction)
+
+
+@jax.jit
+def _imaged(turn: Turning, offsets: Offsets, geometry: Geometry, index: Index) -> Imaged:
+    ideal = ideal_position(turn.at, offsets, geometry, index)
+    along = _by_axes(lambda moved: image(moved, offsets, geometry, index).pixel, ideal)
+    return Imaged(image(ideal, offsets, geometry, index), along)
+
+
+@jax.jit
+def _derivatives(
+    turn: Turning,
+    offsets: Offsets,
+    geometry: Geometry,
+    index: Index,
+    measured: Float[AnyArray, "2 tile slot"],
+    weight: Float[AnyArray, "2 tile slot"],
+    imaged: Imaged,
+) -> tuple[Pair, list[Pair], list[Pair], list[Pair]]:
+    """Return all of `Linearised` but the prediction, of which this would make a copy."""
+    prediction, (along_x, along_y) = imaged
+    ideal = prediction.ideal
+
+    def of_plane(shift: Pair) -> Pair:
+        """Chain a derivative through the ideal plane, where both stages are narrow."""
+        return tuple(along_x[i] * shift[0] + along_y[i] * shift[1] for i in (0, 1))
+
+    def turned(part: str, tangent: AnyArray) -> Pair:
+        """Return the derivative by what turns a part of the directions."""
+
+        def moved(values: AnyArray) -> Pair:
+            return ideal_position(turn.at._replace(**{part: values}), offsets, geometry, index)
+
+        return of_plane(jax.jvp(moved, (getattr(turn.at, part),), (tangent,))[1])
+
+    def by_group(name: str) -> Pair:
+        if name in turn.axes:
+            return whiten(*turned("axes", turn.axes[name]))
+        values, one = jnp.asarray(offsets[name]), jnp.ones_like(offsets[name])
+        on_plane, on_detector = (
+            jax.jvp(stage, (values,), (one,))[1]
+            for stage in (
+                lambda moved: ideal_position(turn.at, {**offsets, name: moved}, geometry, index),
+                lambda moved: image(ideal, {**offsets, name: moved}, geometry, index).pixel,
+            )
+        )
+        return whiten(*jax.tree.map(jnp.add, of_plane(on_plane), on_detector))
+
+    def whiten(x: Float[Array, "*#obs"], y: Float[Array, "*#obs"]) -> Pair:
+        return weight[0] * x, weight[1] * y
+
+    def displaced(moved: Pair) -> Pair:
+        return image(ideal, offsets, geometry, index, moved).pixel
+
+    x, y = prediction.pixel
+    residual = whiten(measured[0] - x, measured[1] - y)
+    source = [whiten(*turned("source", tangent)) for tangent in turn.source]
+    local = [by_group(g.name) for g in LOCAL_GROUPS]
+    displacement = [whiten(*by) for by in _by_axes(displaced, jax.tree.map(jnp.zeros_like, ideal))]
+    return residual, source, local, displacement
+
+
+def _by_axes(of: Callable[[Pair], Pair], at: Pair) -> list[Pair]:
+    """Return the derivatives of a function by the two components of its argument."""
+    one, zero = jnp.ones_like(at[0]), jnp.zeros_like(at[0])
+    return [jax.jvp(of, (at,), (unit,))[1] for unit in ((one, zero), (zero, one))]

@@ -1,0 +1,287 @@
+"""Normal equations of one orbit, accumulated from the data alone.
+
+With calibration theta and sources s, half the data's chi2 has the Hessian blocks
+U (theta, theta), W (theta, source) and V (source, source). V is block-diagonal, 2 x 2
+for each source, since a measurement belongs to one source: this makes the sources cheap to
+eliminate (`solver.linear.source_elimination`). Priors are added there, so that these blocks
+stay valid when the priors change.
+"""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import cache
+
+import jax
+import numpy as np
+import scipy.sparse as sp
+from jaxtyping import Float, Int
+from threadpoolctl import ThreadpoolController
+
+from solver.linear.chi2 import Gradient
+from solver.linear.linearise import Linearised, linearise, turning
+from solver.linear.products import Rows, one_by_one, rows_of
+from solver.linear.tile_sums import N_LOCAL, TileSums
+from solver.model.forward import Index
+from solver.problem.parameter_vector import LOCAL_GROUPS, PER_DETECTOR, PER_EXPOSURE, VectorLayout
+from solver.problem.problem import Problem
+from solver.problem.source_blocks import SourceBlocks
+from solver.problem.tiles import Gathering
+
+
+@dataclass(frozen=True)
+class DetectorSums:
+    """What the measurements on each detector add to g, chi2_0 and the blocks.
+
+    Of W it is the rows of the distortion alone: the others are each of one detector. Its sources
+    are in the order of the patches here, too.
+    """
+
+    chi2: Float[np.ndarray, " det"]
+    by_theta: Float[np.ndarray, "det calib"]
+    by_source: Float[np.ndarray, "det 2 src"]
+    theta: Float[np.ndarray, "det calib calib"]
+    source: Float[np.ndarray, "det 2 2 src"]
+    coefficients: Float[np.ndarray, "det two_coef 2 src"]
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """Half of chi2 = chi2_0 - 2 g.d + d.H.d in the blocks of its gradient and Hessian.
+
+    Attributes
+    ----------
+    at : where the model was linearised, calibration and sources
+    gradient : g, with chi2_0
+    theta : U
+    source : V
+    source_blocks : in whose order the sources of W stand
+    cross : W
+    by_detector : of what they are the sums; None where some of it was taken out
+    """
+
+    at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
+    gradient: Gradient
+    theta: Float[np.ndarray, "calib calib"]
+    source: Float[np.ndarray, "src 2 2"]
+    source_blocks: SourceBlocks
+    cross: Float[np.ndarray, "calib 2 src"]
+    by_detector: DetectorSums | None
+
+
+def chunks(
+    problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
+) -> Iterator[Linearised]:
+    """Linearise the measurements a chunk of tiles at a time.
+
+    The next chunk is under way in JAX while the caller works on this one.
+    """
+    n_chunks = len(problem.measurements.tiles.measured)
+    # Once, and not with every chunk.
+    offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
+    turn = turning(offsets, geometry)
+
+    def start(i: int) -> Linearised:
+        chunk = linearise(turn, offsets, geometry, *problem.measurements.tiles.chunk(i))
+        return chunk.with_terms(problem.layout.n_coef)
+
+    ahead = start(0)
+    for i in range(n_chunks):
+        current = ahead
+        if i + 1 < n_chunks:
+            ahead = start(i + 1)
+        yield jax.tree.map(np.asarray, current)
+
+
+def one_blas_thread() -> AbstractContextManager[object]:
+    """Keep BLAS to one thread while many small products are made.
+
+    Its threads wait in a busy loop between products; beside JAX or a browser, on few
+    cores, that was measured to make a pass up to twenty times slower.
+    """
+    return _thread_pools().limit(limits=1, user_api="blas")
+
+
+@cache
+def _thread_pools() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
+def accumulate(
+    problem: Problem,
+    theta: Float[np.ndarray, " calib"],
+    sources: Float[np.ndarray, "src 2"],
+    coefficients: Float[np.ndarray, "det 2 coef 2 coef"] | None = None,
+) -> NormalEquations:
+    """Accumulate the normal equations of the data at one point.
+
+    Parameters
+    ----------
+    coefficients : the blocks between the distortion's own terms, of each detector, where they are
+        known: they depend on where the sources are seen, and not on how far each is displaced
+    """
+    layout, n_src, index = problem.layout, problem.n_src, problem.measurements.tiles.index
+    n_det, n_coef = layout.n_det, layout.n_coef
+    cross = np.zeros((layout.size, 2, n_src))
+    source, by_source = np.zeros((n_det, 2, 2, n_src)), np.zeros((n_det, 2, n_src))
+    is_known = coefficients is not None
+    of_terms = coefficients if is_known else np.zeros((n_det, 2, n_coef, 2, n_coef))
+    sums = TileSums.empty(index.source.shape, n_coef)
+    with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
+        under_way = helper.submit(lambda: None)
+        for i, chunk in enumerate(chunks(problem, theta, sources)):
+            here, rows = Index(*(part[i] for part in index)), rows_of(chunk)
+            sums.keep_slots(chunk, rows, i)
+            # One chunk at a time: they are large.
+            under_way.result()
+            summed = None if is_known else of_terms
+            under_way = helper.submit(_sum_in_tiles, rows, i, here.detector, sums, summed)
+            by_row = one_by_one(rows.local, rows.source)
+            _add_sources(here, rows.source, by_row[-1], source, by_source)
+            in_order = here._replace(source=problem.source_blocks.position[here.source])
+            _add_cross_local(in_order, by_row, layout, cross)
+        under_way.result()
+        of_coefficients = np.empty((n_det, 2 * n_coef, 2, n_src))
+        some, others = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)
+        # Made here, or both threads would make it.
+        places = problem.measurements.by_source
+        under_way = helper.submit(_cross_coefficients, places, sums, some, of_coefficients)
+        hessian, by_theta, chi2 = _assemble(index, layout, sums, of_terms)
+        _cross_coefficients(places, sums, others, of_coefficients)
+        under_way.result()
+    np.sum(of_coefficients, axis=0, out=cross[layout.coefficients()])
+    own = DetectorSums(chi2, by_theta, by_source, hessian, source, of_coefficients)
+    gradient = Gradient(float(chi2.sum()), by_theta.sum(axis=0), by_source.sum(axis=0).T.copy())
+    of_sources = source.sum(axis=0).transpose(2, 0, 1).copy()
+    at, of_theta = (theta, sources), hessian.sum(axis=0)
+    return NormalEquations(at, gradient, of_theta, of_sources, problem.source_blocks, cross, own)
+
+
+def _sum_in_tiles(
+    rows: Rows,
+    i: int,
+    detector: Int[np.ndarray, "tile 1"],
+    sums: TileSums,
+    coefficients: Float[np.ndarray, "det 2 coef 2 coef"] | None,
+) -> None:
+    """Sum the products of chunk `i` that are of a whole tile, and add those between the terms."""
+    sums.sum_local(rows, i)
+    sums.sum_mixed(rows, i)
+    if coefficients is not None:
+        _add_coefficients(detector, rows.displacement, sums.basis[i], coefficients)
+
+
+def _add_coefficients(
+    detector: Int[np.ndarray, "tile 1"],
+    displacement: Float[np.ndarray, "tile 2 2 slot"],
+    basis: Float[np.ndarray, "tile slot coef"],
+    hessian: Float[np.ndarray, "det 2 coef 2 coef"],
+) -> None:
+    n_det, n_coef = len(hessian), basis.shape[-1]
+    on_detector = (np.arange(n_det)[:, None] == detector.T).astype(np.float64)
+    weight = one_by_one(displacement, displacement)
+    weighted, of_tiles = np.empty(basis.shape), np.empty((len(basis), n_coef, n_coef))
+    for i, j in ((0, 0), (0, 1), (1, 1)):
+        np.multiply(weight[i, j, :, :, None], basis, out=weighted)
+        np.matmul(weighted.swapaxes(1, 2), basis, out=of_tiles)
+        sums = on_detector @ of_tiles.reshape(len(basis), n_coef * n_coef)
+        hessian[:, i, :, j] += sums.reshape(n_det, n_coef, n_coef)
+    hessian[:, 1, :, 0] = hessian[:, 0, :, 1].swapaxes(1, 2)
+
+
+def _add_sources(
+    index: Index,
+    rows: Float[np.ndarray, "tile 2 2 slot"],
+    by_residual: Float[np.ndarray, "2 tile slot"],
+    hessian: Float[np.ndarray, "det 2 2 src"],
+    gradient: Float[np.ndarray, "det 2 src"],
+) -> None:
+    n_det, _, n_src = gradient.shape
+    pair = (index.detector * n_src + index.source).ravel()
+
+    def sums(values: Float[np.ndarray, "tile slot"]) -> Float[np.ndarray, "det src"]:
+        return np.bincount(pair, values.ravel(), n_det * n_src).reshape(n_det, n_src)
+
+    squares = one_by_one(rows, rows)
+    for a in range(2):
+        gradient[:, a] += sums(by_residual[a])
+        for b in range(a + 1):
+            hessian[:, a, b] += sums(squares[a, b])
+    hessian[:, 0, 1] = hessian[:, 1, 0]
+
+
+def _add_cross_local(
+    index: Index,
+    by_row: Float[np.ndarray, "local 2 tile slot"],
+    layout: VectorLayout,
+    cross: Float[np.ndarray, "calib 2 src"],
+) -> None:
+    """Add the blocks between the sources and what each of their measurements touches."""
+    n_src, flat = cross.shape[-1], cross.reshape(-1)
+    for number, groups in ((index.exposure, PER_EXPOSURE), (index.detector, PER_DETECTOR)):
+        for group in groups:
+            row = layout.columns(group)[number]
+            for a in range(2):
+                place = (2 * row + a) * n_src + index.source
+                np.add.at(flat, place.ravel(), by_row[LOCAL_GROUPS.index(group), a].ravel())
+
+
+def _cross_coefficients(
+    places: Gathering,
+    sums: TileSums,
+    detectors: slice,
+    cross: Float[np.ndarray, "det two_coef 2 src"],
+) -> None:
+    """Fill in the blocks between sources and distortion, shared by all measurements.
+
+    They are sums over the measurements of a source of a 2 x 2 matrix times the basis: a
+    sparse matrix that gathers them, times the dense basis.
+    """
+    n_src, n_coef, found = cross.shape[-1], sums.basis.shape[-1], cross[detectors]
+    # Its rows are the values of each source, detector after detector.
+    begin = 4 * n_src * detectors.indices(len(cross))[0]
+    first = places.first[begin : begin + 4 * n_src * len(found) + 1]
+    entries = slice(first[0], first[-1])
+    weight = np.take(sums.shared.reshape(-1), places.value[entries])
+    basis = sums.basis.reshape(sums.shared[0, 0].size, n_coef)
+    gather = sp.csr_array(
+        (weight, places.slot[entries], first - first[0]), shape=(len(first) - 1, len(basis))
+    )
+    summed = (gather @ basis).reshape(len(found), n_src, 2, 2, n_coef)
+    found.reshape(len(found), 2, n_coef, 2, n_src)[...] = summed.transpose(0, 2, 4, 3, 1)
+
+
+def _assemble(
+    index: Index,
+    layout: VectorLayout,
+    sums: TileSums,
+    coefficients: Float[np.ndarray, "det 2 coef 2 coef"],
+) -> tuple[
+    Float[np.ndarray, "det calib calib"], Float[np.ndarray, "det calib"], Float[np.ndarray, " det"]
+]:
+    """Return Hessian, gradient and chi2 of the calibration, of each detector."""
+    size, n_det, shared, own = layout.size, layout.n_det, layout.coefficients(), slice(N_LOCAL)
+    detector = index.detector[..., 0]
+    columns = layout.touched(index.exposure[..., 0], detector)
+    # Where the vectors of the detectors stand one after the other.
+    first = size * detector[..., None]
+    rows = size * (first + columns)[..., :, None]
+    n_values = n_det * size * size
+    hessian = _sum_at(rows + columns[..., None, :], sums.local[..., own, own], n_values)
+    hessian += _sum_at(rows + np.arange(size)[shared], sums.mixed[..., own, :], n_values)
+    hessian = hessian.reshape(n_det, size, size)
+    hessian[:, shared, :] = hessian[:, :, shared].swapaxes(1, 2)
+    hessian[:, shared, shared] = coefficients.reshape(n_det, 2 * layout.n_coef, 2 * layout.n_coef)
+    gradient = _sum_at(first + columns, sums.local[..., -1, own], n_det * size)
+    gradient += _sum_at(first + np.arange(size)[shared], sums.mixed[..., -1, :], n_det * size)
+    chi2 = _sum_at(detector, sums.local[..., -1, -1], n_det)
+    return hessian, gradient.reshape(n_det, size), chi2
+
+
+def _sum_at(
+    places: Int[np.ndarray, "..."], values: Float[np.ndarray, "..."], length: int
+) -> Float[np.ndarray, " _"]:
+    """Return the sums of the values that fall on each place."""
+    # Of nothing at all NumPy counts integers.
+    return np.bincount(places.ravel(), values.ravel(), length).astype(np.float64, copy=False)

@@ -1,0 +1,57 @@
+"""Sums of products within each tile, before it is known where they belong."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from solver.linear.linearise import Linearised
+from solver.linear.products import Rows, in_tiles, one_by_one
+from solver.problem.parameter_vector import LOCAL_GROUPS
+
+N_LOCAL = len(LOCAL_GROUPS)
+
+
+@dataclass(frozen=True)
+class TileSums:
+    """What the measurements of each tile add up to, and what is kept of each slot.
+
+    Attributes
+    ----------
+    local : products of the derivatives by `LOCAL_GROUPS` and, last, the residual
+    mixed : those with the distortion's two directions, times the terms
+    basis : of each slot, the distortion terms
+    shared : of each slot, the products of a displacement with the source
+    """
+
+    local: Float[np.ndarray, "chunk tile local local"]
+    mixed: Float[np.ndarray, "chunk tile local two_coef"]
+    basis: Float[np.ndarray, "chunk tile slot coef"]
+    shared: Float[np.ndarray, "2 2 chunk tile slot"]
+
+    @classmethod
+    def empty(cls, shape: tuple[int, ...], n_coef: int) -> "TileSums":
+        """Return room for the sums of chunks, tiles and slots of some shape."""
+        tiles, rows = shape[:2], N_LOCAL + 1
+        return cls(
+            np.empty((*tiles, rows, rows)),
+            np.empty((*tiles, rows, 2 * n_coef)),
+            np.empty((*shape, n_coef)),
+            np.empty((2, 2, *shape)),
+        )
+
+    def keep_slots(self, chunk: Linearised, rows: Rows, i: int) -> None:
+        """Fill in what is kept of each slot of chunk `i`."""
+        for term, values in enumerate(chunk.prediction.basis):
+            self.basis[i, :, :, term] = values
+        self.shared[:, :, i] = one_by_one(rows.displacement, rows.source)
+
+    def sum_local(self, rows: Rows, i: int) -> None:
+        """Fill in `local` of chunk `i`."""
+        flat = rows.local.reshape(len(rows.local), N_LOCAL + 1, -1)
+        np.matmul(flat, flat.swapaxes(1, 2), out=self.local[i])
+
+    def sum_mixed(self, rows: Rows, i: int) -> None:
+        """Fill in `mixed` of chunk `i`, whose slots are kept."""
+        mixed = in_tiles(rows.local, rows.displacement) @ self.basis[i]
+        self.mixed[i] = mixed.reshape(self.mixed[i].shape)

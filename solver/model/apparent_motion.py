@@ -1,0 +1,71 @@
+"""The apparent motion of a source: proper motion and parallax, as offsets on the sky."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from solver.model.ephemeris import observer_at
+from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000
+
+N_PARAMETERS = 5
+
+# An array for an array, a scalar for a scalar.
+AnyFloat = Any
+
+
+def julian_year(mjd: np.ndarray | pd.Series | float) -> AnyFloat:
+    """Return the Julian years of MJDs, both in TCB."""
+    return 2000.0 + (np.asarray(mjd, dtype=float) - MJD_J2000) / DAYS_PER_JULIAN_YEAR
+
+
+def mjd_of(year: np.ndarray | float) -> AnyFloat:
+    """Return the MJDs of Julian years, both in TCB."""
+    return MJD_J2000 + (np.asarray(year, dtype=float) - 2000.0) * DAYS_PER_JULIAN_YEAR
+
+
+def parallax_factors(
+    ra: np.ndarray | float, dec: np.ndarray | float, observer: np.ndarray
+) -> tuple[AnyFloat, AnyFloat]:
+    """Return the parallax factors in ra cos(dec) and dec, mas per mas of parallax.
+
+    The columns of Eqs. (exp:survey:alpha_p) and (exp:survey:delta_p) that the parallax
+    multiplies: minus east and north, times the observer's position.
+
+    Parameters
+    ----------
+    ra, dec : deg, one or shape (n,)
+    observer : barycentric position, au, shape (3,) or (n, 3)
+    """
+    a, d = np.radians(ra), np.radians(dec)
+    x, y, z = np.moveaxis(np.asarray(observer), -1, 0)
+    east = -np.sin(a) * x + np.cos(a) * y
+    north = np.cos(d) * z - np.sin(d) * (np.cos(a) * x + np.sin(a) * y)
+    return -east, -north
+
+
+def motion_design(
+    ra: np.ndarray | float, dec: np.ndarray | float, mjd: np.ndarray, epoch: float
+) -> np.ndarray:
+    """Return how its five parameters move a source at some times.
+
+    Parameters
+    ----------
+    ra, dec : of one source, or of that of each time, deg
+    mjd : times, MJD in TCB, shape (n,)
+    epoch : of the parameters, Julian year
+
+    Returns
+    -------
+    Shape (n, 2, 5): offsets in ra cos(dec) and dec, mas, by one unit of each of
+    `survey_schema.MOTION_PARAMETERS`
+    """
+    # Many sources share the times of few orbits.
+    times, which = np.unique(mjd, return_inverse=True)
+    observer = observer_at(times).position[which]
+    years = julian_year(mjd) - epoch
+    design = np.zeros((len(years), 2, N_PARAMETERS))
+    design[:, 0, 0] = design[:, 1, 1] = 1.0
+    design[:, :, 2] = np.stack(parallax_factors(ra, dec, observer), axis=-1)
+    design[:, 0, 3] = design[:, 1, 4] = years
+    return design

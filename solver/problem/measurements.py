@@ -1,0 +1,115 @@
+"""Measurements: the measurements of one orbit as arrays, in the order that the engines work in.
+
+Measurements are sorted by exposure, detector and source, so that those which share a run of
+calibration parameters lie together. No setting is in here: all problems of the same
+measurements share what is laid out of them.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Bool, Float, Int
+
+from solver.data.instrument import Instrument
+from solver.errors import InputError
+from solver.model.forward import Index
+from solver.problem.source_blocks import FieldSets, field_sets
+from solver.problem.tiles import Gathering, Tiles, lay_tiles
+
+KEY = ["field_id", "plate_id"]
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """The measurements of an orbit.
+
+    Attributes
+    ----------
+    index : source, exposure and detector of each measurement
+    measured : pixels from the detector's centre
+    sigma : pixels
+    row : row of each measurement in the input table
+    label : of that row, the same in a table from which others were taken out
+    n_det : number of detectors, measured on or not
+    sets : the sources by the fields that have seen them
+    """
+
+    index: Index
+    measured: Float[np.ndarray, "obs 2"]
+    sigma: Float[np.ndarray, "obs 2"]
+    row: Int[np.ndarray, " obs"]
+    label: Int[np.ndarray, " obs"]
+    n_det: int
+    sets: FieldSets
+
+    @cached_property
+    def tiles(self) -> Tiles:
+        """The measurements in tiles."""
+        return lay_tiles(self.index, self.measured, self.sigma)
+
+    @cached_property
+    def by_source(self) -> Gathering:
+        """How a 2 x 2 matrix of each slot is gathered by its detector and place in a patch."""
+        return self.tiles.by_source(self.sets.position, self.n_det, 4)
+
+    def of_rows(self, chosen: Bool[np.ndarray, " obs"]) -> "Measurements":
+        """Return some of the measurements, with the sources as they are."""
+        return replace(
+            self,
+            index=Index(*(column[chosen] for column in self.index)),
+            measured=self.measured[chosen],
+            sigma=self.sigma[chosen],
+            row=self.row[chosen],
+            label=self.label[chosen],
+        )
+
+    def of_sources(self, keep: Bool[np.ndarray, " src"], exposures: pd.DataFrame) -> "Measurements":
+        """Return the measurements of some sources alone, and no other source."""
+        part = self.of_rows(keep[self.index.source])
+        index = part.index._replace(source=(np.cumsum(keep) - 1)[part.index.source])
+        return replace(part, index=index, sets=field_sets(index, exposures, int(keep.sum())))
+
+
+def sort_measurements(
+    measurements: pd.DataFrame,
+    exposures: pd.DataFrame,
+    source_ids: Int[np.ndarray, " src"],
+    instrument: Instrument,
+) -> Measurements:
+    """Put the measurements in order.
+
+    Parameters
+    ----------
+    exposures : in ascending order of `KEY`
+    source_ids : of all that were measured, ascending
+
+    Raises
+    ------
+    InputError
+        If a detector is not part of the instrument.
+    """
+    source = np.searchsorted(source_ids, measurements["source_id"].to_numpy())
+    keys = pd.MultiIndex.from_frame(exposures[KEY])
+    exposure = keys.get_indexer(pd.MultiIndex.from_frame(measurements[KEY]))
+    detector = instrument.index_of(measurements["detector_id"].to_numpy())
+    if (detector < 0).any():
+        unknown = sorted(set(measurements["detector_id"].to_numpy()[detector < 0].tolist()))
+        known = [d.detector_id for d in instrument.detectors]
+        raise InputError(
+            f"column detector_id of the measurements: expected detectors of the instrument "
+            f"{instrument.name!r} ({known}), found {unknown}"
+        )
+    row = np.lexsort((source, detector, exposure))
+    index = Index(source[row], exposure[row], detector[row])
+    table = measurements.iloc[row]
+    return Measurements(
+        index=index,
+        measured=table[["nx", "ny"]].to_numpy(),
+        sigma=table[["sx", "sy"]].to_numpy(),
+        row=row,
+        label=table.index.to_numpy(),
+        n_det=len(instrument.detectors),
+        sets=field_sets(index, exposures, len(source_ids)),
+    )

@@ -1,0 +1,83 @@
+"""Where the priors are centred: the inputs' own values, shifted as the settings ask."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from solver.data.instrument import Instrument
+from solver.data.parameters import CALIBRATION_GROUPS, SOURCES, Axis, Group
+from solver.data.prior_text import split_name
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+from solver.model.distortion import terms
+from solver.problem.parameter_vector import VectorLayout
+
+
+def calibration_centres(
+    exposures: pd.DataFrame, instrument: Instrument, layout: VectorLayout, settings: FitSettings
+) -> dict[str, Float[np.ndarray, " _"]]:
+    """Return the prior centres of every calibration group, in the group's unit.
+
+    Raises
+    ------
+    InputError
+        If the settings shift the centre of an element that there is not.
+    """
+    centres = {}
+    elements = _elements(exposures, instrument, settings.order)
+    # A shift of the pointing in RA is one on the sky.
+    stretch = {"pointing_ra": 1.0 / np.cos(np.radians(exposures["dec_est"].to_numpy()))}
+    for group in CALIBRATION_GROUPS:
+        if group.origin == "environment":
+            values = exposures[group.column].to_numpy(dtype=np.float64)
+        elif group.origin == "instrument":
+            values = np.array([getattr(d, group.column) for d in instrument.detectors], float)
+        else:
+            values = np.zeros(len(layout.columns(group)))
+        shift = _shift(group, elements[group.axis], settings.prior_shifts)
+        centres[group.name] = values * group.per_value_unit + shift * stretch.get(group.name, 1.0)
+    return centres
+
+
+def catalogue_shift(settings: FitSettings) -> Float[np.ndarray, " 2"]:
+    """Return the shift of all sources' prior positions, (alpha*, delta), mas."""
+    return _shift(SOURCES, ["ra", "dec"], settings.prior_shifts)
+
+
+def _elements(exposures: pd.DataFrame, instrument: Instrument, order: int) -> dict[Axis, list[str]]:
+    """Return the names of the elements of each axis, as a person writes them."""
+    plates = zip(exposures["field_id"], exposures["plate_id"], strict=True)
+    return {
+        "exp": [f"{field}/{plate}" for field, plate in plates],
+        "coef": [f"{k}/{j}" for k, j in terms(order)],
+        "det": [str(detector.detector_id) for detector in instrument.detectors],
+    }
+
+
+def _shift(
+    group: Group, elements: list[str], shifts: Mapping[str, float]
+) -> Float[np.ndarray, " _"]:
+    """Return the shifts of a group's centres, in its unit."""
+    total = np.zeros(len(elements))
+    for name, shift in shifts.items():
+        shifted, element = split_name(name)
+        if shifted.name != group.name:
+            continue
+        if element is None:
+            total += shift
+        elif element in elements:
+            total[elements.index(element)] += shift
+        else:
+            raise InputError(
+                f"centre of the prior of {name}: expected an element out of "
+                f"{_listed(elements)}, found {element!r}"
+            )
+    return total
+
+
+def _listed(elements: list[str]) -> str:
+    if len(elements) <= 8:
+        return ", ".join(elements) or "none"
+    return f"{', '.join(elements[:3])} ... {elements[-1]}"

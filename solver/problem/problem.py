@@ -1,0 +1,264 @@
+"""Problem: one orbit under one set of settings: measurements, origins and priors as arrays.
+
+Shapes are padded to few sizes, because each new one costs JAX a compilation.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Bool, Float
+
+from solver.data.instrument import Instrument
+from solver.data.orbit import OrbitData
+from solver.data.parameters import CALIBRATION_GROUPS, PARAMETERS, SOURCES
+from solver.data.settings import MAX_ORDER, FitSettings
+from solver.errors import InputError
+from solver.model.astrometry import propagate, sky_position
+from solver.model.distortion import terms
+from solver.model.ephemeris import observer_at
+from solver.model.forward import Geometry
+from solver.model.projection import displace, tangent_frame
+from solver.problem.measurements import KEY, Measurements, sort_measurements
+from solver.problem.parameter_vector import VectorLayout
+from solver.problem.prior_centres import calibration_centres, catalogue_shift
+from solver.problem.priors import Priors, group_widths
+from solver.problem.source_blocks import SourceBlocks
+from solver.units import ARCSEC_PER_DEG, RAD_PER_MAS
+
+# The terms of lower orders are computed with coefficients of zero: one compilation does for all.
+_LEAST_ORDER = 5
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One orbit, ready to be solved.
+
+    Attributes
+    ----------
+    order : highest degree of the distortion
+    geometry : origins of all parameters, padded along src, exp and coef
+    measurements : the measurements
+    sources : catalogue rows of the measured sources, in ascending source_id
+    exposures : environment rows, in order of (field_id, plate_id)
+    priors : in offsets from the origins
+    layout : columns of the calibration parameters
+    epoch : mean epoch, MJD in TCB
+    """
+
+    order: int
+    geometry: Geometry
+    measurements: Measurements
+    sources: pd.DataFrame
+    exposures: pd.DataFrame
+    priors: Priors
+    layout: VectorLayout
+    epoch: float
+
+    @property
+    def n_obs(self) -> int:
+        """Number of measurements, two coordinates each."""
+        return len(self.measurements.row)
+
+    @property
+    def n_src(self) -> int:
+        """Number of measured sources."""
+        return len(self.sources)
+
+    @cached_property
+    def source_blocks(self) -> SourceBlocks:
+        """The sources in source_blocks, with the columns that each touches."""
+        return self.measurements.sets.touching(self.layout)
+
+    def offsets(
+        self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
+    ) -> dict[str, Float[np.ndarray, "..."]]:
+        """Return the parameters as `solver.model.forward.predict` takes them, padded."""
+        values = {**self.layout.scatter(theta), SOURCES.name: sources}
+        return {g.name: pad(values[g.name], g.axis, self.geometry.sizes) for g in PARAMETERS}
+
+    def gathered(
+        self, offsets: Mapping[str, Float[np.ndarray, "..."]]
+    ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
+        """Return calibration and sources of what `offsets` gives: its inverse."""
+        sizes = {"exp": self.layout.n_exp, "coef": self.layout.n_coef}
+        values = {g.name: offsets[g.name][: sizes.get(g.axis)] for g in CALIBRATION_GROUPS}
+        return self.layout.gather(values), offsets[SOURCES.name][: self.n_src]
+
+
+def of_rows(problem: Problem, chosen: Bool[np.ndarray, " obs"]) -> Problem:
+    """Return the problem with some of its measurements, and all of its parameters."""
+    return replace(problem, measurements=problem.measurements.of_rows(chosen))
+
+
+def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
+    """Return the problem with the measurements of some sources alone.
+
+    Its arrays in JAX have the shapes of the whole problem's, so that nothing is compiled anew.
+    """
+    frames = problem.geometry.source_frame
+    kept_first = np.argsort(~np.pad(keep, (0, len(frames) - len(keep))), kind="stable")
+    return replace(
+        problem,
+        geometry=replace(problem.geometry, source_frame=frames[kept_first]),
+        measurements=problem.measurements.of_sources(keep, problem.exposures),
+        sources=problem.sources[keep].reset_index(drop=True),
+        priors=problem.priors._replace(precision=problem.priors.precision[keep]),
+    )
+
+
+def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings) -> Problem:
+    """Turn the tables of one orbit into a problem to solve.
+
+    Raises
+    ------
+    InputError
+        If a detector is not part of the instrument, or the measurements cannot hold the
+        distortion order asked for.
+    """
+    exposures = data.exposures.sort_values(KEY, ignore_index=True)
+    measured_ids = np.unique(data.measurements["source_id"].to_numpy())
+    sources = data.catalogue.set_index("source_id").loc[measured_ids].reset_index()
+    measurements = sort_measurements(data.measurements, exposures, measured_ids, instrument)
+    return _build(measurements, sources, exposures, instrument, settings)
+
+
+def rebuilt(problem: Problem, instrument: Instrument, settings: FitSettings) -> Problem:
+    """Return the problem of the same measurements under other settings.
+
+    Raises
+    ------
+    InputError
+        If the measurements cannot hold the distortion order asked for.
+    """
+    return _build(problem.measurements, problem.sources, problem.exposures, instrument, settings)
+
+
+def _build(
+    measurements: Measurements,
+    sources: pd.DataFrame,
+    exposures: pd.DataFrame,
+    instrument: Instrument,
+    settings: FitSettings,
+) -> Problem:
+    layout = VectorLayout(len(exposures), len(terms(settings.order)), measurements.n_det)
+    _check_freedom(len(measurements.row), len(sources), layout, settings.order)
+    epoch = float(exposures["obstime"].mean())
+    places = propagate(sources, epoch, observer_at(np.array([epoch])).position[0])
+    centres = calibration_centres(exposures, instrument, layout, settings)
+    frame = _shifted(places.frame, catalogue_shift(settings))
+    return Problem(
+        order=settings.order,
+        geometry=_geometry(frame, exposures, centres, instrument, settings),
+        measurements=measurements,
+        sources=sources,
+        exposures=exposures,
+        priors=_priors(places.covariance, centres, settings, layout),
+        layout=layout,
+        epoch=epoch,
+    )
+
+
+def _check_freedom(n_obs: int, n_src: int, layout: VectorLayout, order: int) -> None:
+    """Refuse a distortion order for which there are more parameters than data."""
+    possible = orders_held(n_obs, n_src, layout)
+    if order in possible:
+        return
+    hint = f"the highest order they can hold is {max(possible)}" if possible else "no order fits"
+    raise InputError(
+        f"distortion order {order}: expected more than {2 * n_src + layout.size} coordinates "
+        f"measured for as many parameters, found {2 * n_obs} ({n_obs} measurements); {hint}"
+    )
+
+
+def _shifted(
+    frame: Float[np.ndarray, "src 3 3"], shift: Float[np.ndarray, " 2"]
+) -> Float[np.ndarray, "src 3 3"]:
+    """Return the frames with all directions shifted by so many mas."""
+    if not shift.any():
+        return frame
+    east, north = np.broadcast_to(RAD_PER_MAS * shift, (len(frame), 2)).T
+    return tangent_frame(*sky_position(np.asarray(displace(frame, east, north))))
+
+
+def orders_held(n_obs: int, n_src: int, layout: VectorLayout) -> list[int]:
+    """Return the distortion orders, of any, that leave fewer parameters than data.
+
+    Parameters
+    ----------
+    layout : of an order that need not be one of them
+    """
+    others = 2 * n_src + layout.size - 2 * layout.n_coef
+    return [n for n in range(MAX_ORDER + 1) if 2 * n_obs > others + 2 * len(terms(n))]
+
+
+def _geometry(
+    source_frame: Float[np.ndarray, "src 3 3"],
+    exposures: pd.DataFrame,
+    centres: dict[str, Float[np.ndarray, " _"]],
+    instrument: Instrument,
+    settings: FitSettings,
+) -> Geometry:
+    satellite = exposures[[f"satellite_v{axis}" for axis in "xyz"]].to_numpy()
+    observer = observer_at(exposures["obstime"].to_numpy(), satellite)
+    pointing = tangent_frame(
+        centres["pointing_ra"] / ARCSEC_PER_DEG, centres["pointing_dec"] / ARCSEC_PER_DEG
+    )
+    order = max(settings.order, _LEAST_ORDER)
+    sizes = {
+        "src": _rounded_up(len(source_frame), 1024),
+        "exp": _rounded_up(len(exposures), 16),
+        "coef": len(terms(order)),
+    }
+    return Geometry(
+        source_frame=pad(source_frame, "src", sizes),
+        pointing_frame=pad(pointing, "exp", sizes),
+        origin={
+            group.name: pad(centres[group.name], group.axis, sizes)
+            for group in CALIBRATION_GROUPS
+            if not group.name.startswith("pointing")
+        },
+        velocity=pad(observer.velocity * settings.aberration, "exp", sizes),
+        sun_distance=pad(observer.sun_distance, "exp", sizes),
+        distortion_scale=np.array(instrument.distortion_scale_um),
+        order=order,
+    )
+
+
+def _priors(
+    covariance: Float[np.ndarray, "src 2 2"],
+    centres: dict[str, Float[np.ndarray, " _"]],
+    settings: FitSettings,
+    layout: VectorLayout,
+) -> Priors:
+    is_gamma = {
+        g.name: np.full(
+            len(centres[g.name]), g.family == "gamma" and np.isfinite(settings.width(g.name))
+        )
+        for g in CALIBRATION_GROUPS
+    }
+    return Priors(
+        centre=layout.gather(centres),
+        width=layout.gather(group_widths(settings, centres)),
+        is_gamma=layout.gather(is_gamma).astype(bool),
+        precision=np.linalg.inv(covariance * settings.width(SOURCES.name) ** 2),
+    )
+
+
+def pad(
+    values: Float[np.ndarray, "n ..."], axis: str, sizes: Mapping[str, int]
+) -> Float[np.ndarray, "m ..."]:
+    """Return `values` lengthened to the size of their axis, where that has one.
+
+    What is added belongs to no measurement, and repeats the last row; but a coefficient acts
+    on all measurements, and is zero.
+    """
+    missing = max(sizes.get(axis, 0) - len(values), 0)
+    more = np.zeros(missing) if axis == "coef" else np.repeat(values[-1:], missing, axis=0)
+    return np.concatenate([values, more])
+
+
+def _rounded_up(length: int, step: int) -> int:
+    return -(-length // step) * step

@@ -1,0 +1,211 @@
+"""Choosing the order of the distortion: what evidence and reserved sources say of each.
+
+Every order is the highest one with the coefficients above it held at zero, so that one
+compiled model and one set of tiles serve all, and the solution of each is where the next
+lower one begins.
+
+With H the Hessian of half the posterior's chi2 and X its value at the mode, both over the
+same measurements and priors for every order, the log evidence in Laplace's approximation is
+
+    log Z = log prior density at its centre - sum log(sigma sqrt(2 pi)) - (X + log |H / 2 pi|) / 2.
+
+A share of the sources is reserved, and judged by the calibration that the others leave. For
+their whitened measurements y, with J_s, J_t the Jacobians by the reserved sources and by the
+calibration, P the catalogue's covariance and C the calibration's, integrated over all that
+the others leave open, the prediction's covariance is M = I + J_s P J_s' + J_t C J_t'. With the
+subscripts of all measurements and of those of the others,
+
+    chi2 = (y - f)' M^-1 (y - f) = X_all - X_rest,
+    log p(y | rest) = log Z_all - log Z_rest,
+
+the identities of a linear model, which need no M. So every reserved source's own position is
+free, within its catalogue's errors, and what the reserved ones have in common through the
+calibration is accounted for. If model and sigmas are right, chi2 has twice as many degrees
+of freedom as there are reserved measurements, whatever the order: too low an order raises
+it, a needless term does not, since M knows how far it leaves the prediction open. That is
+what the density pays for, by its log |M|: it is highest for the order that predicts best.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Bool, Float, Int
+
+from solver.data.schema import ORDERS
+from solver.data.settings import FitSettings
+from solver.engines.gauss_newton import Iteration, Mode, find_mode, objective
+from solver.engines.what_if import solve_what_if
+from solver.linear.chi2 import gradient
+from solver.linear.leverage import covariances
+from solver.model.distortion import terms
+from solver.problem.parameter_vector import PER_COEFFICIENT
+from solver.problem.problem import Problem, thinned
+from solver.results.diagnostics import effective_parameters, log_evidence
+
+# Of the sources that are no reference ones so many are reserved, the same for every order.
+_SHARE = 0.1
+_SEED = 0
+# Prior width of a coefficient that is held, um: its share in the evidence is then one.
+_HELD = 1e-12
+# With every step below so many sigmas, and the last one taken, the evidence is known to some
+# thousandths.
+_TOLERANCE = 0.03
+
+
+class HeldOut(NamedTuple):
+    """How well the others predict the reserved measurements; see the module.
+
+    `chi2` is to be about `dof`; NaN where nothing can be said.
+    """
+
+    chi2: float
+    dof: int
+    log_density: float
+
+
+def compare_orders(
+    problem: Problem,
+    settings: FitSettings,
+    progress: Callable[[Iteration], None] = lambda _: None,
+) -> pd.DataFrame:
+    """Solve every order up to that of a problem by gauss-newton.
+
+    Parameters
+    ----------
+    problem : of the highest order, as `solver.problem.problem.orders_held` says which can be
+    settings : of the engine; its order is not looked at
+    progress : called after every iteration; what it raises stops the comparison
+
+    Returns
+    -------
+    `schema.ORDERS`, from order 0 on
+    """
+    settings = settings.with_(tolerance=max(settings.tolerance, _TOLERANCE))
+    reserved = reserved_sources(problem)
+    rows: list[dict[str, object]] = []
+    here, mode = problem, _evaluated(problem, find_mode(problem, settings, progress))
+    for order in range(problem.order, -1, -1):
+        if rows and len(terms(order)) == len(terms(order + 1)):
+            rows.append({**rows[-1], "order": order})
+            continue
+        if order < problem.order:
+            lower = at_order(problem, order)
+            mode = _solve_from(mode, here, lower, settings, progress)
+            here = lower
+        held_out = judge_reserved(here, mode, reserved, settings, progress)
+        rows.append({"order": order, **_figures(here, mode, settings), **_columns(held_out)})
+        rows[-1]["n_reserved"] = int(reserved.sum())
+    table = pd.DataFrame(rows[::-1])
+    return table[ORDERS.names].astype({column.name: column.dtype for column in ORDERS})
+
+
+def at_order(problem: Problem, order: int) -> Problem:
+    """Return a problem whose distortion has no terms above some order."""
+    width = problem.priors.width.copy()
+    width[_above(problem, order)] = _HELD
+    return replace(problem, priors=problem.priors._replace(width=width))
+
+
+def reserved_sources(problem: Problem) -> Bool[np.ndarray, " src"]:
+    """Return which sources are reserved: a share of those that are no reference ones."""
+    others = np.flatnonzero(~problem.sources["is_reference"].to_numpy(bool))
+    chosen = np.random.default_rng(_SEED).permutation(others)
+    reserved = np.zeros(problem.n_src, dtype=bool)
+    reserved[chosen[: int(np.ceil(_SHARE * len(others)))]] = True
+    return reserved
+
+
+def judge_reserved(
+    problem: Problem,
+    mode: Mode,
+    reserved: Bool[np.ndarray, " src"],
+    settings: FitSettings,
+    progress: Callable[[Iteration], None] = lambda _: None,
+) -> HeldOut:
+    """Judge the measurements of reserved sources by the solution of all others.
+
+    Parameters
+    ----------
+    mode : of the whole problem; the last row of its trace is that of its point
+    """
+    dof = 2 * int(reserved[problem.measurements.index.source].sum())
+    if dof == 0 or not mode.status.is_solution:
+        return HeldOut(np.nan, dof, np.nan)
+    others = thinned(problem, ~reserved)
+    rest = solve_what_if(mode, problem, others, settings)
+    if rest is None:
+        start = mode._replace(sources=mode.sources[~reserved])
+        rest = find_mode(others, settings, progress, start=start)
+    if not rest.status.is_solution:
+        return HeldOut(np.nan, dof, np.nan)
+    rest = _evaluated(others, rest)
+    chi2 = mode.trace[-1].objective - rest.trace[-1].objective
+    return HeldOut(chi2, dof, _log_evidence(problem, mode) - _log_evidence(others, rest))
+
+
+def _above(problem: Problem, order: int) -> Int[np.ndarray, " above"]:
+    """Return the columns of the coefficients above some order."""
+    layout, kept = problem.layout, len(terms(order))
+    return np.concatenate([layout.columns(group)[kept:] for group in PER_COEFFICIENT])
+
+
+def _solve_from(
+    mode: Mode,
+    solved: Problem,
+    lower: Problem,
+    settings: FitSettings,
+    progress: Callable[[Iteration], None],
+) -> Mode:
+    """Return the mode of a lower order, from that of the one above it.
+
+    One step leads near it where the terms that are dropped were small, and is no help where
+    they were not. The Jacobians are made anew, for the evidence to be that of its own point.
+    """
+    near = solve_what_if(mode, solved, lower, settings) if mode.status.is_solution else None
+    return _evaluated(lower, find_mode(lower, settings, progress, start=near))
+
+
+def _evaluated(problem: Problem, mode: Mode) -> Mode:
+    """Return a mode with the objective of its very point, not that before the last step."""
+    at = gradient(problem, mode.theta, mode.sources)
+    total = objective(problem, mode.theta, mode.sources, at)
+    return mode._replace(trace=[mode.trace[-1]._replace(objective=total, chi2=at.chi2)])
+
+
+def _log_evidence(problem: Problem, mode: Mode) -> float:
+    log_sigma = float(np.log(problem.measurements.sigma).sum())
+    return log_evidence(mode, problem.priors, log_sigma, 2 * problem.n_obs)
+
+
+def _figures(problem: Problem, mode: Mode, settings: FitSettings) -> dict[str, object]:
+    """Return the columns of `schema.ORDERS` that all measurements together give."""
+    figures: dict[str, object] = {
+        "n_terms": int(2 * problem.layout.n_coef - _n_held(problem.priors.width)),
+        "converged": mode.status.is_solution,
+        **dict.fromkeys(("chi2", "dof", "effective_parameters", "log_evidence"), np.nan),
+    }
+    if mode.reduced is None or not mode.status.is_solution:
+        return figures
+    prior_hessian = problem.priors.hessian_diagonal(mode.theta)
+    parameters = effective_parameters(problem.priors, prior_hessian, covariances(mode.reduced))
+    figures |= {
+        "chi2": mode.trace[-1].chi2,
+        "dof": 2 * problem.n_obs - parameters,
+        "effective_parameters": parameters,
+    }
+    # A flat prior has no density: each of its terms would change the evidence by what unit
+    # it happens to be written in.
+    if all(np.isfinite(settings.width(group.name)) for group in PER_COEFFICIENT):
+        figures["log_evidence"] = _log_evidence(problem, mode)
+    return figures
+
+
+def _n_held(width: Float[np.ndarray, " calib"]) -> int:
+    return int((width == _HELD).sum())
+
+
+def _columns(held_out: HeldOut) -> dict[str, object]:
+    return {f"held_out_{name}": value for name, value in held_out._asdict().items()}

@@ -1,0 +1,77 @@
+"""Shared errors: what the catalogue's errors do to an orbit, the same in every orbit.
+
+The catalogue errs by the same in all orbits, so that what follows from its errors does not
+average out. How far the shifts of one source in two orbits agree depends on the fields of
+both. So errors of the catalogue are drawn, for a star the same ones in every orbit, and their
+shifts kept: any mean or fit over orbits, made of these shifts, shows what it inherits.
+"""
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from solver.data.parameters import SOURCES
+from solver.data.settings import FitSettings
+from solver.data.survey_schema import ERROR_BUDGET, N_DRAWS, SHARED_ERRORS
+from solver.linear.leverage import Covariances
+from solver.linear.source_elimination import ReducedSystem
+from solver.model.astrometry import catalogue_covariance, jacobian_at, years_since_epoch
+from solver.model.correlation import square_roots
+from solver.model.ephemeris import observer_at
+from solver.model.projection import tangent_frame
+from solver.problem.problem import Problem
+from solver.results.diagnostics import error_budget, induced_shift
+from solver.results.tables import uncertainties
+
+# Part of the seed of each star's draws; the rest is its id.
+_SEED = 20290
+
+
+def error_budget_table(
+    problem: Problem, reduced: ReducedSystem, covariance: Covariances
+) -> pd.DataFrame:
+    """Return `survey_schema.ERROR_BUDGET`: each source's covariance by what repeats.
+
+    What the centres of the calibration's priors cause is counted with the noise: it is small,
+    and most of those centres are another orbit's no more.
+    """
+    budget = error_budget(reduced, problem.priors, covariance)
+    columns = {"source_id": problem.sources["source_id"].to_numpy()}
+    columns |= uncertainties("noise", budget.noise + budget.calibration)
+    columns |= uncertainties("catalogue", budget.catalogue)
+    return pd.DataFrame(columns)[ERROR_BUDGET.names]
+
+
+def shared_error_table(
+    problem: Problem, reduced: ReducedSystem, settings: FitSettings
+) -> pd.DataFrame:
+    """Return `survey_schema.SHARED_ERRORS`: the shifts of all sources in each draw."""
+    error = np.zeros((N_DRAWS, problem.n_src, 2))
+    is_reference = problem.sources["is_reference"].to_numpy(bool)
+    drawn = _drawn_errors(problem.sources[is_reference], problem.epoch)
+    error[:, is_reference] = drawn * settings.width(SOURCES.name)
+    shift = induced_shift(reduced, problem.priors, error).astype(np.float32)
+    names = SHARED_ERRORS.names[1:]
+    values = shift.transpose(2, 0, 1).reshape(len(names), -1)
+    ids = {"source_id": problem.sources["source_id"].to_numpy()}
+    return pd.DataFrame(ids | dict(zip(names, values, strict=True)))
+
+
+def draws_of(table: pd.DataFrame) -> Float[np.ndarray, "row draw 2"]:
+    """Return the shifts of `survey_schema.SHARED_ERRORS` as one array, mas."""
+    values = table[SHARED_ERRORS.names[1:]].to_numpy(np.float64)
+    return values.reshape(len(table), 2, N_DRAWS).swapaxes(1, 2)
+
+
+def _drawn_errors(references: pd.DataFrame, epoch: float) -> Float[np.ndarray, "draw src 2"]:
+    """Return errors of catalogue positions at an epoch, those of a star from its id alone."""
+    root = square_roots(catalogue_covariance(references))
+    normal = np.stack([_normal(int(number)) for number in references["source_id"]])
+    frame = tangent_frame(references["ra"].to_numpy(), references["dec"].to_numpy())
+    observer = observer_at(np.array([epoch])).position[0]
+    jacobian = jacobian_at(frame, years_since_epoch(references, epoch), observer)
+    return np.einsum("sip,spq,sdq->dsi", jacobian, root, normal)
+
+
+def _normal(source_id: int) -> Float[np.ndarray, "draw 5"]:
+    return np.random.default_rng([_SEED, source_id]).standard_normal((N_DRAWS, 5))

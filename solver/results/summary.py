@@ -1,0 +1,134 @@
+"""The summary of a fit: plain numbers and words, the same in files, `--json` and dashboard."""
+
+import numpy as np
+import pandas as pd
+
+from solver.data.settings import FitSettings
+from solver.results.diagnostics import (
+    effective_parameters,
+    log_evidence,
+    mean_covariance,
+    normalised_deviation,
+)
+from solver.results.tables import SolvedProblem
+
+
+def summarise(
+    solution: SolvedProblem, settings: FitSettings, seconds: dict[str, float]
+) -> dict[str, object]:
+    """Return the summary of one fit; lengths in mas or pixels as the names say.
+
+    Parameters
+    ----------
+    seconds : time taken by each part of the work
+    """
+    problem, mode, residuals = solution.problem, solution.mode, solution.residuals
+    is_reference = problem.sources["is_reference"].to_numpy(bool)
+    whitened = residuals.whitened
+    chi2 = float(np.vdot(whitened, whitened))
+    prior_hessian = problem.priors.hessian_diagonal(mode.theta)
+    parameters = effective_parameters(problem.priors, prior_hessian, solution.covariance)
+    dof = whitened.size - parameters
+    scatter = np.sqrt(np.mean((whitened * problem.measurements.sigma) ** 2, axis=0))
+    return {
+        "converged": mode.status.is_solution,
+        "reason": mode.status.value,
+        "engine": settings.engine,
+        "order": settings.order,
+        "iterations": mode.trace[-1].iteration,
+        "orbit": int(problem.exposures["orbit_id"].iloc[0]),
+        "epoch_mjd": problem.epoch,
+        "n_measurements": problem.n_obs,
+        "n_sources": problem.n_src,
+        "n_reference": int(is_reference.sum()),
+        "n_exposures": len(problem.exposures),
+        "n_parameters": problem.layout.size + 2 * problem.n_src,
+        "effective_parameters": parameters,
+        "chi2": chi2,
+        "dof": dof,
+        "chi2_per_dof": chi2 / dof,
+        "log_evidence": log_evidence(
+            mode, problem.priors, float(np.log(problem.measurements.sigma).sum()), whitened.size
+        ),
+        "residual_rms_x": float(scatter[0]),
+        "residual_rms_y": float(scatter[1]),
+        **_reference_figures(solution, is_reference),
+        **_common_error(solution, ~is_reference),
+        "seconds": seconds,
+    }
+
+
+def truth_summary(sources: pd.DataFrame, places: pd.DataFrame) -> dict[str, dict[str, float | int]]:
+    """Return deviations from the truth per class of sources with 10 or more measurements.
+
+    Parameters
+    ----------
+    sources : `schema.SOURCES`
+    places : `schema.TRUE_PLACES`
+
+    Returns
+    -------
+    class -> figures; means and rms in mas, pulls with the marginal sigmas. `induced_*` is
+    the mean shift that the errors of the reference stars explain.
+    """
+    joined = sources.merge(places, on="source_id", suffixes=("", "_true"))
+    joined = joined[joined["n_obs"] >= MIN_OBS]
+    cos_dec = np.cos(np.radians(joined["dec"]))
+    # Wrapped, so that a field across 0h does not deviate by a turn.
+    joined["deviation_ra"] = (
+        ((joined["ra"] - joined["ra_true"] + 180.0) % 360.0 - 180.0) * cos_dec * 3.6e6
+    )
+    joined["deviation_dec"] = (joined["dec"] - joined["dec_true"]) * 3.6e6
+    return {
+        name: _deviation_figures(joined[member])
+        for name, member in class_members(joined).items()
+        if member.any()
+    }
+
+
+MIN_OBS = 10
+
+
+def class_members(sources: pd.DataFrame) -> dict[str, pd.Series]:
+    """Return which sources are reference, non-reference and artificial ones."""
+    reference = sources["is_reference"].astype(bool)
+    artificial = sources["is_artificial"].astype(bool) & ~reference
+    return {
+        "reference": reference,
+        "non-reference": ~reference & ~artificial,
+        "artificial": artificial,
+    }
+
+
+def _deviation_figures(rows: pd.DataFrame) -> dict[str, float | int]:
+    figures: dict[str, float] = {"n": len(rows)}
+    for axis in ("ra", "dec"):
+        deviation = rows[f"deviation_{axis}"]
+        pull = deviation / rows[f"sigma_{axis}_marginal"]
+        figures |= {
+            f"mean_{axis}": float(deviation.mean()),
+            f"rms_{axis}": float(np.sqrt((deviation**2).mean())),
+            f"pull_sd_{axis}": float(pull.std(ddof=0)),
+            f"induced_{axis}": float(rows[f"induced_{axis}"].mean()),
+        }
+    return figures
+
+
+def _reference_figures(solution: SolvedProblem, is_reference: np.ndarray) -> dict[str, float]:
+    variances = np.diagonal(np.linalg.inv(solution.problem.priors.precision), axis1=1, axis2=2)
+    marginal = np.diagonal(solution.covariance.source, axis1=1, axis2=2)
+    deviation = normalised_deviation(solution.mode.sources, variances, marginal, is_reference)
+    return {
+        f"{kind}normalised_deviation_{axis}": float(values[i])
+        for kind, values in (("", deviation.measured), ("expected_", deviation.expected))
+        for i, axis in enumerate(("ra", "dec"))
+    }
+
+
+def _common_error(solution: SolvedProblem, members: np.ndarray) -> dict[str, float]:
+    """Return the standard deviation of the mean error of the non-reference sources, mas."""
+    covariance = mean_covariance(solution.reduced, members)
+    return {
+        f"mean_error_{axis}": float(np.sqrt(covariance[i, i]))
+        for i, axis in enumerate(("ra", "dec"))
+    }

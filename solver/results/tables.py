@@ -1,0 +1,271 @@
+"""The result tables of `solver.data.schema`, made from where an engine ended."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from solver.data.instrument import Instrument
+from solver.data.parameters import CALIBRATION_GROUPS, Group
+from solver.data.schema import (
+    CALIBRATION,
+    EXPOSURES,
+    LOSSES,
+    RESIDUALS,
+    SOURCES,
+    TRACE,
+    TRUE_PLACES,
+    Table,
+)
+from solver.engines.estimate import Estimate
+from solver.engines.gauss_newton import Mode
+from solver.linear.leverage import Covariances, Residuals, covariances, residuals
+from solver.linear.source_elimination import ReducedSystem
+from solver.model.astrometry import frames_at, sky_position
+from solver.model.distortion import terms
+from solver.model.ephemeris import observer_at
+from solver.model.projection import displace
+from solver.problem.problem import Problem
+from solver.results.diagnostics import induced_shift
+from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
+
+
+class SolvedProblem(NamedTuple):
+    """A mode with what follows from it, from which all tables are made.
+
+    `covariance` holds those of the linearised problem; what the tables say of the sources is
+    `conditional`, with the calibration held fixed, and `marginal` (both mas^2), and of the
+    calibration `theta_variance`: the engine's own where it has them.
+    """
+
+    problem: Problem
+    mode: Mode
+    reduced: ReducedSystem
+    covariance: Covariances
+    residuals: Residuals
+    conditional: Float[np.ndarray, "src 2 2"]
+    marginal: Float[np.ndarray, "src 2 2"]
+    theta_variance: Float[np.ndarray, " calib"]
+
+
+def solved_problem(problem: Problem, found: Estimate, reduced: ReducedSystem) -> SolvedProblem:
+    """Return an estimate with all covariances and the residuals.
+
+    Parameters
+    ----------
+    reduced : the problem linearised at the estimate
+    """
+    covariance = covariances(reduced)
+    theta, sources = found.mode.theta, found.mode.sources
+    conditional, marginal, calibration = found.conditional, found.marginal, found.calibration
+    return SolvedProblem(
+        problem,
+        found.mode,
+        reduced,
+        covariance,
+        residuals(problem, theta, sources, covariance),
+        reduced.conditional_covariance() if conditional is None else conditional,
+        covariance.source if marginal is None else marginal,
+        np.diag(covariance.theta if calibration is None else calibration),
+    )
+
+
+def source_table(solution: SolvedProblem) -> pd.DataFrame:
+    """Return `schema.SOURCES`."""
+    problem, sources = solution.problem, solution.problem.sources
+    frame = source_frame(problem)
+    ra, dec = sky_position(_displaced(frame, solution.mode.sources, RAD_PER_MAS))
+    prior_ra, prior_dec = sky_position(frame[:, 0])
+    n_src, index = problem.n_src, problem.measurements.index.source
+    chi2 = (solution.residuals.whitened**2).sum(axis=1)
+    prior_sigma = _sigmas(np.linalg.inv(problem.priors.precision))
+    columns = {
+        "source_id": sources["source_id"].to_numpy(),
+        "is_reference": sources["is_reference"].to_numpy(bool),
+        "is_artificial": sources["is_artificial"].to_numpy(bool),
+        "n_obs": np.bincount(index, minlength=n_src),
+        "ra": ra,
+        "dec": dec,
+        **uncertainties("conditional", solution.conditional),
+        **uncertainties("marginal", solution.marginal),
+        "prior_ra": prior_ra,
+        "prior_dec": prior_dec,
+        "prior_sigma_ra": prior_sigma[:, 0],
+        "prior_sigma_dec": prior_sigma[:, 1],
+        "offset_ra": solution.mode.sources[:, 0],
+        "offset_dec": solution.mode.sources[:, 1],
+        "chi2": np.bincount(index, chi2, n_src),
+        "dof": np.bincount(index, 2.0 - solution.residuals.trace, n_src),
+    }
+    return _frame(columns, SOURCES)
+
+
+def residual_table(solution: SolvedProblem, measurements: pd.DataFrame) -> pd.DataFrame:
+    """Return `schema.RESIDUALS`, in the row order of `measurements`."""
+    problem, residuals = solution.problem, solution.residuals
+    input_order = np.empty_like(problem.measurements.row)
+    input_order[problem.measurements.row] = np.arange(problem.n_obs)
+    pairs = {
+        "model_": residuals.pixel,
+        "residual_": residuals.whitened * problem.measurements.sigma,
+        "standardised_": residuals.standardised,
+        "ideal_": residuals.ideal,
+        "focal_": residuals.focal,
+    }
+    columns = {c: measurements[c].to_numpy() for c in RESIDUALS.names if c in measurements}
+    columns["leverage"] = residuals.trace[input_order]
+    for name, values in pairs.items():
+        for axis, letter in enumerate("xy"):
+            columns[name + letter] = values[input_order, axis]
+    return _frame(columns, RESIDUALS)
+
+
+def exposure_table(solution: SolvedProblem) -> pd.DataFrame:
+    """Return `schema.EXPOSURES`."""
+    problem, residuals = solution.problem, solution.residuals
+    n_exp, index = len(problem.exposures), problem.measurements.index.exposure
+    columns = {name: problem.exposures[name].to_numpy() for name in EXPOSURES.names[:4]}
+    columns["n_obs"] = np.bincount(index, minlength=n_exp)
+    columns["chi2"] = np.bincount(index, (residuals.whitened**2).sum(axis=1), n_exp)
+    columns["dof"] = np.bincount(index, 2.0 - residuals.trace, n_exp)
+    return _frame(columns, EXPOSURES)
+
+
+def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.DataFrame:
+    """Return `schema.CALIBRATION`: every group of the parameter table but the sources."""
+    problem, theta = solution.problem, solution.mode.theta
+    priors = problem.priors
+    marginal = solution.theta_variance
+    of_columns = {
+        "offset": theta,
+        "prior_sigma": priors.width,
+        "sigma_conditional": 1.0 / np.sqrt(np.diag(solution.reduced.theta)),
+        "sigma_marginal": np.sqrt(marginal),
+        "prior_share": priors.hessian_diagonal(theta) * marginal,
+    }
+    pointing = _pointing(problem, theta)
+    parts = []
+    for group in CALIBRATION_GROUPS:
+        columns = problem.layout.columns(group)
+        centre = priors.centre[columns] / group.per_value_unit
+        value = pointing.get(group.name, centre + theta[columns] / group.per_value_unit)
+        part = {
+            "group": np.full(len(columns), group.name),
+            "element": np.arange(len(columns)),
+            "label": np.array(_labels(group, problem, instrument), dtype=object),
+            "value": value,
+            "prior_centre": centre,
+            "value_unit": np.full(len(columns), group.value_unit),
+            "unit": np.full(len(columns), group.unit),
+            **{name: values[columns] for name, values in of_columns.items()},
+        }
+        parts.append(_frame(part, CALIBRATION))
+    return pd.concat(parts, ignore_index=True)
+
+
+def trace_table(mode: Mode) -> pd.DataFrame:
+    """Return `schema.TRACE`."""
+    return pd.DataFrame(mode.trace, columns=TRACE.names)
+
+
+def loss_table(losses: Float[np.ndarray, " step"] | None) -> pd.DataFrame | None:
+    """Return `schema.LOSSES`, of an engine that has a loss."""
+    if losses is None:
+        return None
+    return _frame({"step": np.arange(1, len(losses) + 1), "loss": losses}, LOSSES)
+
+
+def true_places(solution: SolvedProblem, truth: pd.DataFrame | None) -> pd.DataFrame | None:
+    """Return `schema.TRUE_PLACES` of the measured sources that `truth` holds."""
+    if truth is None:
+        return None
+    problem = solution.problem
+    known = problem.sources["source_id"].isin(truth["source_id"]).to_numpy()
+    ids = problem.sources["source_id"].to_numpy()[known]
+    observer = observer_at(np.array([problem.epoch])).position[0]
+    rows = truth.set_index("source_id").loc[ids].reset_index()
+    direction = frames_at(rows, problem.epoch, observer)[:, 0]
+    ra, dec = sky_position(direction)
+    error = np.zeros((problem.n_src, 2))
+    error[known] = separation(source_frame(problem)[known], direction)
+    error[~problem.sources["is_reference"].to_numpy(bool)] = 0.0
+    induced = induced_shift(solution.reduced, problem.priors, error)[known]
+    columns = {
+        "source_id": ids,
+        "ra": ra,
+        "dec": dec,
+        "induced_ra": induced[:, 0],
+        "induced_dec": induced[:, 1],
+    }
+    return _frame(columns, TRUE_PLACES)
+
+
+def source_frame(problem: Problem) -> Float[np.ndarray, "src 3 3"]:
+    """Return the frames at the sources' prior positions, without padding."""
+    return np.asarray(problem.geometry.source_frame)[: problem.n_src]
+
+
+def separation(
+    frame: Float[np.ndarray, "src 3 3"], direction: Float[np.ndarray, "src 3"]
+) -> Float[np.ndarray, "src 2"]:
+    """Return prior minus true position in the frame of the prior, mas.
+
+    Parameters
+    ----------
+    frame : of the prior position
+    direction : of the true one
+    """
+    return -np.einsum("sij,sj->si", frame[:, 1:], direction) / RAD_PER_MAS
+
+
+def _displaced(
+    frame: Float[np.ndarray, "n 3 3"], offset: Float[np.ndarray, "n 2"], unit: float
+) -> Float[np.ndarray, "n 3"]:
+    return np.asarray(displace(frame, unit * offset[:, 0], unit * offset[:, 1]))
+
+
+def _pointing(
+    problem: Problem, theta: Float[np.ndarray, " calib"]
+) -> dict[str, Float[np.ndarray, " exp"]]:
+    """Return the pointings in degrees; their offsets lie in the tangent plane."""
+    values = problem.layout.scatter(theta)
+    offset = np.stack([values["pointing_ra"], values["pointing_dec"]], axis=-1)
+    frame = np.asarray(problem.geometry.pointing_frame)[: len(offset)]
+    ra, dec = sky_position(_displaced(frame, offset, RAD_PER_ARCSEC))
+    return {"pointing_ra": ra, "pointing_dec": dec}
+
+
+def _labels(group: Group, problem: Problem, instrument: Instrument) -> list[str]:
+    if group.axis == "exp":
+        rows = zip(problem.exposures["field_id"], problem.exposures["plate_id"], strict=True)
+        return [f"field {f} plate {p}" for f, p in rows]
+    if group.axis == "det":
+        return [f"detector {d.detector_id}" for d in instrument.detectors]
+    letter = group.symbol[0]
+    return [f"{letter}({k},{j})" for k, j in terms(problem.order)]
+
+
+def _sigmas(covariance: Float[np.ndarray, "src 2 2"]) -> Float[np.ndarray, "src 2"]:
+    return np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+
+
+def uncertainties(
+    kind: str, covariance: Float[np.ndarray, "src 2 2"]
+) -> dict[str, Float[np.ndarray, " src"]]:
+    """Return sigmas and correlation of each source as columns named by the kind."""
+    sigma = _sigmas(covariance)
+    product = sigma[:, 0] * sigma[:, 1]
+    # What has no variance is correlated with nothing.
+    correlation = np.divide(
+        covariance[:, 0, 1], product, out=np.zeros(len(product)), where=product > 0.0
+    )
+    return {
+        f"sigma_ra_{kind}": sigma[:, 0],
+        f"sigma_dec_{kind}": sigma[:, 1],
+        f"corr_{kind}": correlation,
+    }
+
+
+def _frame(columns: dict[str, np.ndarray], table: Table) -> pd.DataFrame:
+    return pd.DataFrame({name: columns[name] for name in table.names})

@@ -1,0 +1,213 @@
+"""The command line: exit codes, messages, and what it prints for machines."""
+
+import json
+import socket
+
+import pytest
+
+from plateviz.solving.origin import SurveyFolder
+from solver.io.result import read_result
+
+
+@pytest.fixture
+def sample(sample_orbit_dir):
+    return [sample_orbit_dir / f"sample_{name}.fits" for name in ("obs", "ref", "truth")]
+
+
+def test_fit_prints_one_object_and_writes_the_result(run, sample, tmp_path):
+    obs, ref, truth = sample
+    output = tmp_path / "r.fits"
+    code, out, _ = run("fit", obs, ref, "--truth", truth, "-o", output, "--json")
+    summary = json.loads(out)
+    assert code == 0
+    assert summary["converged"]
+    assert summary["output"] == str(output)
+    assert (summary["n_measurements"], summary["n_reference"]) == (36_312, 58)
+    assert {"read", "prepare", "fit", "write"} <= set(summary["seconds"])
+    assert {"reason", "engine", "iterations", "n_sources", "chi2_per_dof"} <= set(summary)
+    assert len(read_result(output).sources) == 814
+
+
+def test_fit_prints_a_summary_for_people(run, sample, tmp_path):
+    code, out, _ = run("fit", *sample[:2], "-o", tmp_path / "r.fits", "--order", "3")
+    assert code == 0
+    assert "converged: every step" in out
+    assert "gauss-newton, " in out
+    assert "36312 measurements of 814 sources (58 reference)" in out
+
+
+@pytest.mark.slow
+def test_svi_that_was_stopped_goes_on_from_its_file(run, sample, tmp_path):
+    """At its limit of steps it is no solution, and says so; its file is gone all the same."""
+    output, kept = tmp_path / "r.fits", tmp_path / "run.npz"
+    options = ["--engine", "svi", "--steps", "50", "--thin", "20", "--checkpoint", kept]
+    code, out, err = run("fit", *sample[:2], "-o", output, *options, "--json")
+    summary = json.loads(out)
+    assert code == 1
+    assert "the limit of steps was reached" in err
+    assert (summary["engine"], summary["iterations"]) == ("svi", 100)
+    assert not kept.exists()
+    assert len(read_result(output).losses) == 100
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--order", "12"], "expected a distortion order from 0 to 9, found 12"),
+        (["--engine", "magic"], "found 'magic'"),
+        (["--engine", "svi", "--compat", "pyro"], "expected warpfield"),
+        (["--checkpoint", "run.npz"], "--checkpoint: expected the engine svi"),
+        (["--prior", "distortion_x"], "expected GROUP=VALUE, found 'distortion_x'"),
+        (["--prior", "nothing=1"], "found 'nothing'"),
+        (["--centre", "detector_x[2]"], "expected GROUP=SHIFT"),
+        (["--centre", "detector_x[7]=1um"], "expected an element out of 0, 1, 2, 3, found '7'"),
+        (["--prior", "distortion_x=1deg"], "prior of distortion_x: expected a unit out of"),
+        (["--orbit", "99"], "99"),
+        (["--instrument", "none.toml"], "none.toml: expected an instrument in TOML"),
+    ],
+    ids=[
+        "order",
+        "engine",
+        "compat",
+        "checkpoint",
+        "no value",
+        "group",
+        "no shift",
+        "element",
+        "unit",
+        "orbit",
+        "instrument",
+    ],
+)
+def test_a_mistake_ends_with_two_and_one_message(run, sample, tmp_path, options, message):
+    code, out, err = run("fit", *sample[:2], "-o", tmp_path / "r.fits", *options)
+    assert code == 2
+    assert message in err
+    assert "Traceback" not in out + err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_not_there_is_named(run, sample, tmp_path):
+    code, _, err = run("fit", tmp_path / "none.fits", sample[1], "-o", tmp_path / "r.fits")
+    assert code == 2
+    assert "none.fits" in err
+
+
+def test_an_output_that_cannot_be_written_is_said_before_the_fit(run, sample, tmp_path):
+    code, _, err = run("fit", *sample[:2], "-o", tmp_path / "no" / "r.fits")
+    assert code == 2
+    assert "expected to write into a folder" in err
+
+
+def test_inspect_says_what_files_are(run, sample):
+    code, out, _ = run("inspect", sample[0], sample[1])
+    assert code == 0
+    assert "36312 rows" in out
+    assert "source_id" in out
+
+
+def test_inspect_of_something_else_ends_with_two(run, tmp_path):
+    (tmp_path / "x.fits").write_text("no table")
+    code, out, _ = run("inspect", tmp_path / "x.fits", "--json")
+    assert code == 2
+    assert json.loads(out)[0]["problems"]
+
+
+def test_a_folder_that_is_no_survey_is_not_served(run, tmp_path):
+    code, _, err = run("serve", tmp_path, "--port", "0", "--no-open")
+    assert code == 2
+    assert "survey.toml" in err
+
+
+def test_a_port_in_use_is_said_before_any_work(run, tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        code, _, err = run("serve", tmp_path, "--port", taken.getsockname()[1], "--no-open")
+    assert code == 2
+    assert "expected an address and a port that are free" in err
+
+
+SMALL = ("--orbits", "1", "--stars", "2000")
+
+
+def test_simulate_makes_a_survey_whose_orbit_can_be_read(run, tmp_path):
+    folder = tmp_path / "survey"
+    code, out, _ = run("simulate", folder, *SMALL, "--json")
+    assert code == 0
+    assert json.loads(out) | {"seconds": 0} == {"output": str(folder), "orbits": 1, "seconds": 0}
+    made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert {"survey.toml", "reference.parquet", "truth.parquet", "exposures.parquet"} <= made
+    assert "measurements/orbit=0000.parquet" in made
+    data = SurveyFolder(str(folder)).read(0)
+    assert len(data.measurements) > 0
+    assert data.truth is not None
+
+
+def test_simulate_says_what_it_made_to_people(run, tmp_path):
+    code, out, _ = run("simulate", tmp_path / "survey", *SMALL)
+    assert code == 0
+    assert "a survey of 1 orbits" in out
+
+
+def test_simulate_does_not_go_on_with_another_survey(run, tmp_path):
+    run("simulate", tmp_path / "survey", *SMALL)
+    before = (tmp_path / "survey" / "survey.toml").read_bytes()
+    code, _, err = run("simulate", tmp_path / "survey", *SMALL, "--seed", "5")
+    assert code == 2
+    assert "expected no survey there yet, found a finished one" in err
+    assert (tmp_path / "survey" / "survey.toml").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--orbits", "0"], "--orbits"),
+        (["--stars", "none"], "--stars"),
+        (["--catalog", "none.fits"], "none.fits"),
+    ],
+    ids=["no-orbits", "no-number", "no-catalogue"],
+)
+def test_simulate_refuses_and_writes_nothing(run, tmp_path, options, message):
+    code, _, err = run("simulate", tmp_path / "survey", *options)
+    assert code == 2
+    assert message in err
+    assert not (tmp_path / "survey" / "survey.toml").exists()
+
+
+def test_simulate_into_a_file_is_refused(run, tmp_path):
+    (tmp_path / "survey").write_text("a letter")
+    code, _, err = run("simulate", tmp_path / "survey", *SMALL)
+    assert code == 2
+    assert str(tmp_path / "survey") in err
+    assert (tmp_path / "survey").read_text() == "a letter"
+
+
+def test_demo_with_a_port_in_use_makes_no_survey(run, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        code, _, err = run("demo", "--port", taken.getsockname()[1], "--no-open")
+    assert code == 2
+    assert "port" in err
+    assert list(tmp_path.rglob("survey.toml")) == []
+
+
+def test_excluded_measurements_are_not_used(run, sample, tmp_path):
+    output = tmp_path / "r.fits"
+    code, out, _ = run("fit", *sample[:2], "-o", output, "--exclude", "detector=1", "--json")
+    assert code == 0
+    assert 0 < json.loads(out)["n_measurements"] < 36_312
+    assert 1 not in set(read_result(output).residuals["detector_id"])
+
+
+def test_orders_are_compared_on_demand(run, sample, tmp_path, compared, monkeypatch):
+    monkeypatch.setattr("solver.fit.compare_orders", lambda *_: compared.orders)
+    output = tmp_path / "r.fits"
+    code, out, _ = run("fit", *sample[:2], "-o", output, "--compare-orders", "--json")
+    summary = json.loads(out)
+    assert code == 0
+    assert [row["order"] for row in summary["orders"]] == list(range(10))
+    best = [row["order"] for row in summary["orders"] if row["evidence_below_best"] == 0.0]
+    assert best == [5]
+    assert "Order 5 has the highest evidence" in summary["preferred_order"]
+    assert read_result(output).orders.equals(compared.orders)

@@ -1,0 +1,154 @@
+"""`plateviz report`: what it writes, and what it refuses."""
+
+import json
+import shutil
+
+import pytest
+
+from plateviz.runs.fitted_orbit import write_fitted_orbit
+from plateviz.runs.run import Run, begin_run
+from solver.data.settings import FitSettings
+from solver.io.result import write_result
+
+
+@pytest.fixture
+def run_dir(survey_folder, fit_result):
+    """A survey with a run of which orbit 0 is there and orbit 1 has failed."""
+    run = begin_run(survey_folder, "default", FitSettings())
+    write_fitted_orbit(run.orbit_directory(0), fit_result)
+    run.keep_failure(1, "orbit 1: the data leave a direction open")
+    return survey_folder
+
+
+def test_result_file_becomes_a_page(run, fit_result, tmp_path):
+    write_result(fit_result, tmp_path / "r.fits")
+    code, out, _ = run("report", tmp_path / "r.fits", "-o", tmp_path / "r.html")
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert code == 0
+    assert "Orbit 7" in out
+    assert page.endswith("</html>") or page.endswith("</html>\n")
+    assert "Values (CSV)" in page
+    assert "<dt>jax</dt>" in page[page.index("Versions that solved it") :]
+
+
+def test_failed_orbit_has_a_report(run, run_dir, tmp_path):
+    code, _, _ = run("report", run_dir, "--orbit", 1, "-o", tmp_path / "r.html")
+    assert code == 0
+    assert "leave a direction open" in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+def test_two_results_are_compared(run, fit_result, tmp_path):
+    for name in ("a", "b"):
+        write_result(fit_result, tmp_path / f"{name}.fits")
+    arguments = ["--other", tmp_path / "b.fits", "-o", tmp_path / "r.html"]
+    code, _, _ = run("report", tmp_path / "a.fits", *arguments)
+    assert code == 0
+    assert 'id="figure-comparison"' in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--orbit", "9"], "expected an orbit 9, found none of that number"),
+        (["--orbit", "2"], "expected a complete run, found no COMPLETE file"),
+        (["--orbit", "0", "--survey"], "expected one of --orbit, --source and --survey"),
+        (["--run", "other"], "expected a run 'other', found default"),
+        (["--survey"], "found 1 of 3 orbits missing"),
+        (["--other", "b"], "--other: expected with --orbit"),
+        (["--orbit", "0", "--instrument", "i.toml"], "--instrument: expected with a result"),
+    ],
+    ids=["no-orbit", "missing", "several", "no-run", "incomplete", "other-of-survey", "instrument"],
+)
+def test_mistake_is_one_message_and_no_file(run, run_dir, tmp_path, options, message):
+    code, _, err = run("report", run_dir, *options, "-o", tmp_path / "r.html")
+    assert code == 2
+    assert message in err
+    assert err.strip().count("\n") == 0
+    assert not list(tmp_path.glob("r.html*"))
+
+
+def test_page_is_not_written_where_its_print_goes(run, run_dir, tmp_path):
+    code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.pdf", "--pdf")
+    assert code == 2
+    assert "expected a page's name such as R.html" in err
+    assert not (tmp_path / "r.pdf").exists()
+
+
+def test_page_of_an_orbit_tells_what_solved_it(run, run_dir, tmp_path):
+    run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html")
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    solved = page.index("Versions that solved it")
+    assert "<dt>jax</dt>" in page[solved:]
+
+
+def test_run_of_a_newer_version_is_refused(run, run_dir, tmp_path):
+    head = Run(run_dir, "default").orbit_directory(0) / "result.json"
+    head.write_text(json.dumps({**json.loads(head.read_text()), "format": 99}))
+    code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html")
+    assert code == 2
+    assert "written by a newer plateviz" in err
+
+
+def test_place_that_cannot_be_written_is_refused_before_anything_is_drawn(run, run_dir, tmp_path):
+    target = tmp_path / "no" / "such" / "r.html"
+    code, _, err = run("report", run_dir, "--orbit", 0, "-o", target)
+    assert code == 2
+    assert str(target) in err
+
+
+def test_result_file_has_no_orbits_to_choose_from(run, fit_result, tmp_path):
+    write_result(fit_result, tmp_path / "r.fits")
+    code, _, err = run("report", tmp_path / "r.fits", "--orbit", 7, "-o", tmp_path / "r.html")
+    assert code == 2
+    assert "expected a survey directory" in err
+
+
+def test_without_chromium_nothing_is_printed(run, run_dir, tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html", "--pdf")
+    assert code == 2
+    assert "--pdf: expected one of chromium" in err
+    assert not (tmp_path / "r.html").exists()
+
+
+@pytest.fixture
+def whole_run(run_dir, fit_result):
+    """A run of which two orbits are there, and one has failed."""
+    write_fitted_orbit(Run(run_dir, "default").orbit_directory(2), fit_result)
+    return run_dir
+
+
+def test_folder_has_a_page_for_each_orbit_and_goes_on_where_it_was(run, whole_run, tmp_path):
+    folder = tmp_path / "pages"
+    code, out, _ = run("report", whole_run, "--pages", "-o", folder)
+    assert code == 0
+    assert "3 pages of orbits made" in out
+    names = sorted(path.name for path in folder.iterdir())
+    pages = [f"orbit-{number:04d}.html" for number in range(3)]
+    assert names == ["index.html", *pages, "report.json"]
+    index = (folder / "index.html").read_text(encoding="utf-8")
+    assert all(f'<a href="{page}">' in index for page in pages)
+    middle = (folder / pages[1]).read_text(encoding="utf-8")
+    assert all(f'<a href="{page}">' in middle for page in ("index.html", pages[0], pages[2]))
+    before = (folder / pages[2]).read_bytes()
+    (folder / pages[0]).unlink()
+    _, out, _ = run("report", whole_run, "--pages", "-o", folder)
+    assert "1 pages of orbits made, 2 were there" in out
+    assert (folder / pages[2]).read_bytes() == before
+
+
+def test_folder_of_something_else_is_left_as_it_is(run, whole_run, tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    code, _, err = run("report", whole_run, "--pages", "-o", tmp_path)
+    assert code == 2
+    assert "expected an empty folder" in err
+    assert [path.name for path in tmp_path.iterdir() if path.name != "survey"] == ["mine.txt"]
+
+
+def test_folder_of_another_run_is_left_as_it_is(run, whole_run, tmp_path):
+    folder = tmp_path / "pages"
+    folder.mkdir()
+    (folder / "report.json").write_text('{"run": "other"}')
+    code, _, err = run("report", whole_run, "--pages", "-o", folder)
+    assert code == 2
+    assert "expected pages of this run and version, found others" in err

@@ -1,0 +1,237 @@
+"""Which view is on the screen, of which run and which source: rules without a browser."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.session import Session, Stage
+from plateviz.solving.origin import OrbitFiles, SurveyFolder
+from plateviz.solving.solution_store import SolutionStore
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+from tests.plateviz.dashboard.test_session import FakeStore
+
+
+class FakeRun:
+    """A run of two orbits, the second not fitted; `settings` are those of the first."""
+
+    def __init__(self, name, survey, result, settings=None, is_complete=True):
+        self.name, self.is_complete = name, is_complete
+        self._survey = survey
+        self._result = replace(result, settings=settings or FitSettings())
+        self.read = []
+
+    def has_fitted(self, orbit):
+        return orbit == 0
+
+    def result(self, orbit):
+        self.read.append(orbit)
+        return self._result
+
+    def history(self, source_id):
+        rows = self._survey.history
+        return rows[rows["source_id"] == source_id].reset_index(drop=True)
+
+    def motion(self, source_id):
+        rows = self._survey.motions
+        found = rows[rows["source_id"] == source_id]
+        return None if found.empty else found.astype(object).iloc[0]
+
+
+class SurveyStore(FakeStore):
+    """A store over a survey with runs."""
+
+    source = SurveyFolder("sky")
+
+    def __init__(self, result, runs):
+        super().__init__(result)
+        self._runs = runs
+
+    def runs(self):
+        return self._runs
+
+
+@pytest.fixture
+def run(survey, fit_result):
+    return FakeRun("default", survey, fit_result)
+
+
+@pytest.fixture
+def navigation(fit_result, run):
+    return Navigation(Session(SurveyStore(fit_result, [run])))
+
+
+def asked(navigation):
+    return [(orbit, settings) for orbit, settings, _ in navigation.session.store.asked]
+
+
+def test_a_survey_that_was_fitted_is_begun_with_its_run(navigation, run):
+    navigation.begin({})
+    assert (navigation.view, navigation.run) == (View.SURVEY, run)
+    assert asked(navigation) == []
+
+
+@pytest.mark.parametrize(
+    ("origin", "words"),
+    [(SurveyFolder("sky"), "`plateviz survey sky`"), (OrbitFiles("o", "r"), "one orbit")],
+    ids=["survey", "files"],
+)
+def test_without_a_run_the_orbit_is_shown_and_what_to_do_is_said(fit_result, origin, words):
+    store = SurveyStore(fit_result, [])
+    store.origin = origin
+    navigation = Navigation(Session(store))
+    navigation.begin({"view": "orbit"})
+    assert (navigation.view, navigation.run) == (View.ORBIT, None)
+    assert words in navigation.why_no_run
+    assert asked(navigation) == [(0, FitSettings())]
+
+
+def test_the_whole_run_is_preferred(fit_result, survey):
+    runs = [FakeRun("a", survey, fit_result, is_complete=False), FakeRun("b", survey, fit_result)]
+    assert Navigation(Session(SurveyStore(fit_result, runs))).run is runs[1]
+
+
+def test_an_orbit_is_read_from_the_run(navigation, run):
+    navigation.open_orbit(0)
+    session = navigation.session
+    assert (navigation.view, session.stage) == (View.ORBIT, Stage.READY)
+    assert (session.shown.orbit, session.shown.result) == (0, run.result(0))
+    assert session.solutions == [session.shown]
+    assert asked(navigation) == []
+
+
+def test_an_orbit_that_the_run_has_not_is_fitted(navigation):
+    navigation.open_orbit(1)
+    assert asked(navigation) == [(1, FitSettings())]
+
+
+def test_the_orbit_view_asks_for_its_orbit_when_it_is_first_seen(navigation, run):
+    navigation.turn_to(View.ORBIT)
+    navigation.turn_to(View.SURVEY)
+    navigation.turn_to(View.ORBIT)
+    assert run.read == [0]
+    assert asked(navigation) == []
+
+
+def test_an_orbit_is_chosen_with_the_settings_on_the_screen(navigation):
+    session = navigation.session
+    navigation.open_orbit(0)
+    session.choices.what_if_at_once = False
+    session.choices.order = 3
+    session.refit()
+    session.job.take({"event": "done"})
+    session.poll()
+    navigation.choose_orbit(0)
+    assert asked(navigation)[-1] == (0, FitSettings(order=3))
+
+
+def test_an_orbit_of_the_run_takes_its_settings(fit_result, survey):
+    run = FakeRun("third", survey, fit_result, FitSettings(order=3))
+    navigation = Navigation(Session(SurveyStore(fit_result, [run])))
+    navigation.open_orbit(0)
+    assert navigation.session.choices.order == 3
+    assert navigation.session.job is None
+
+
+def test_opening_an_orbit_again_keeps_what_was_made_of_it(navigation):
+    navigation.open_orbit(0)
+    shown = navigation.session.shown
+    navigation.open_orbit(0)
+    assert navigation.session.shown is shown
+
+
+def test_an_orbit_stops_the_fit_of_another(navigation):
+    navigation.open_orbit(1)
+    job = navigation.session.job
+    navigation.open_orbit(0)
+    assert navigation.session.store.cancelled == [job]
+    assert (navigation.session.job, navigation.session.selection.orbit) == (None, 0)
+
+
+def test_a_run_that_cannot_be_read_says_so(navigation, run):
+    def fail(orbit):
+        raise InputError("orbit=0000: expected a complete run")
+
+    run.result = fail
+    navigation.open_orbit(0)
+    assert navigation.session.stage is Stage.FAILED
+    assert navigation.session.message == "orbit=0000: expected a complete run"
+    assert asked(navigation) == []
+
+
+def test_a_source_is_found_by_its_id(navigation, survey):
+    history, motion = survey.source("reference")
+    navigation.open_source(f" {motion['source_id']} ")
+    found = navigation.found
+    assert (navigation.view, navigation.message) == (View.SOURCE, "")
+    assert found.source_id == motion["source_id"]
+    assert len(found.history) == len(history)
+    assert found.motion["n_orbits"] == motion["n_orbits"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("17", "Run 'default' has no source 17."),
+        ("Vega", "Expected the id of a source, a whole number, found 'Vega'."),
+        ("99999999999999999999", "a whole number"),
+        ("9999999999999999999", "a whole number"),
+        ("1e3", "a whole number"),
+    ],
+    ids=["unknown", "name", "too-long", "too-large", "float"],
+)
+def test_a_source_that_is_not_there_is_said_in_one_message(navigation, text, words):
+    navigation.find_source(text)
+    assert navigation.found is None
+    assert words in navigation.message
+
+
+def test_nothing_sought_is_no_mistake(navigation):
+    navigation.find_source("Vega")
+    navigation.find_source("")
+    assert (navigation.found, navigation.message) == (None, "")
+
+
+def test_another_run_is_asked_for_the_same_source(fit_result, survey):
+    empty = SimpleNamespace(history=survey.history.iloc[:0], motions=survey.motions.iloc[:0])
+    runs = [FakeRun("full", survey, fit_result), FakeRun("thin", empty, fit_result)]
+    navigation = Navigation(Session(SurveyStore(fit_result, runs)))
+    navigation.find_source(str(survey.motions["source_id"].iloc[0]))
+    assert navigation.found is not None
+    navigation.run_name = "thin"
+    assert navigation.found is None
+    assert navigation.message.startswith("Run 'thin' has no source")
+
+
+def test_the_address_brings_back_what_was_on_the_screen(fit_result, survey):
+    runs = [FakeRun("a", survey, fit_result), FakeRun("b", survey, fit_result)]
+    first, second = (Navigation(Session(SurveyStore(fit_result, runs))) for _ in range(2))
+    first.run_name = "b"
+    first.open_orbit(0)
+    first.open_source(str(survey.motions["source_id"].iloc[3]))
+    second.begin(first.address())
+    assert (second.view, second.run_name) == (View.SOURCE, "b")
+    assert second.found.source_id == first.found.source_id
+    assert second.session.selection.orbit == 0
+
+
+def test_an_address_with_a_selection_alone_is_of_the_orbit_view(navigation):
+    navigation.begin({"orbit": "0", "field": "1"})
+    assert (navigation.view, navigation.session.shown.orbit) == (View.ORBIT, 0)
+
+
+def test_an_address_of_nonsense_is_not_looked_at(navigation):
+    navigation.begin({"view": "moon", "run": "../../etc", "source": "\x00", "who": "me"})
+    assert (navigation.view, navigation.run_name) == (View.SURVEY, "default")
+    assert navigation.found is None
+
+
+def test_files_have_no_runs_and_a_folder_those_that_are_there(tmp_path, made_survey):
+    runs = {
+        origin: SolutionStore.runs(SimpleNamespace(origin=origin))
+        for origin in (OrbitFiles("o.fits", "r.fits"), SurveyFolder(str(Path(made_survey))))
+    }
+    assert list(runs.values()) == [[], []]

@@ -1,0 +1,358 @@
+"""The session's rules, with a store whose jobs end when the test says so."""
+
+import pytest
+
+from plateviz.dashboard.session import Session, Stage
+from plateviz.dashboard.state import ALL, FitChoices, Selection, default_widths, describe
+from plateviz.solving.job import Job
+from solver.data.instrument import MINI_MOCK
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+
+
+class FakeStore:
+    """A store without a solver: what it is asked for is kept, and given when told."""
+
+    orbits = (0, 1)
+    instrument = MINI_MOCK
+    title = "store"
+
+    def __init__(self, result):
+        self._result = result
+        self.asked, self.cancelled = [], []
+
+    def request(self, orbit, settings, what_if=False):
+        self.asked.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
+        return self.asked[-1][2]
+
+    def cancel(self, job):
+        self.cancelled.append(job)
+        job.cancel()
+
+    def result(self, orbit, settings, what_if=False):
+        return self._result
+
+
+@pytest.fixture
+def session(fit_result):
+    made = Session(FakeStore(fit_result))
+    made.choices.what_if_at_once = False
+    made.show_orbit(0)
+    return made
+
+
+@pytest.fixture
+def live(session):
+    """A session with the first solution on the screen, that tries out every change."""
+    finish(session)
+    session.choices.what_if_at_once = True
+    return session
+
+
+def finish(session):
+    session.job.take({"event": "done"})
+    session.poll()
+
+
+def test_the_first_orbit_is_asked_for_with_the_papers_settings(session):
+    assert session.stage is Stage.LOADING
+    assert session.store.asked[0][:2] == (0, FitSettings())
+    finish(session)
+    assert session.stage is Stage.READY
+    assert session.shown.settings == FitSettings()
+    assert session.other is None
+
+
+def test_the_old_solution_stays_until_the_new_one_is_whole(session):
+    finish(session)
+    before = session.shown
+    session.choices.order = 3
+    session.refit()
+    assert session.stage is Stage.STALE
+    assert session.shown is before
+    session.poll()
+    assert session.shown is before
+    finish(session)
+    assert session.shown.settings.order == 3
+    assert session.other is before
+    assert len(session.solutions) == 2
+
+
+def test_a_cancelled_refit_leaves_the_old_solution(session):
+    finish(session)
+    before = session.shown
+    session.choices.order = 3
+    session.refit()
+    session.cancel()
+    session.poll()
+    assert session.shown is before
+    assert session.stage is Stage.FAILED
+    assert "cancelled" in session.message
+    assert session.job is None
+
+
+def test_a_failed_refit_says_why_and_leaves_the_old_solution(session):
+    finish(session)
+    before = session.shown
+    session.refit()
+    session.job.take({"event": "failed", "message": "no reference star"})
+    session.poll()
+    assert session.shown is before
+    assert session.message == "no reference star"
+
+
+def test_a_prior_that_cannot_be_used_asks_for_nothing(session):
+    finish(session)
+    session.choices.widths = {**session.choices.widths, "distortion_x": "wide"}
+    session.refit()
+    assert session.stage is Stage.FAILED
+    assert "distortion_x" in session.message
+    assert len(session.store.asked) == 1
+
+
+def test_a_new_request_cancels_the_one_under_way(session):
+    first = session.job
+    session.refit()
+    assert session.store.cancelled == [first]
+
+
+def test_progress_is_said_in_words(session):
+    report = {"event": "progress", "stage": "iteration 2", "largest_step": 7.14}
+    session.job.take(report)
+    session.poll()
+    assert session.message.startswith("iteration 2, largest step 7.1 sigma")
+    session.job.take({**report, "stage": "iteration 0", "largest_step": float("nan")})
+    session.poll()
+    assert session.message.startswith("iteration 0 (")
+
+
+def test_bringing_up_an_older_solution_compares_with_the_newer(session):
+    finish(session)
+    session.choices.order = 3
+    session.refit()
+    finish(session)
+    newer, older = session.shown, session.other
+    session.bring_up(older)
+    assert (session.shown, session.other) == (older, newer)
+    assert session.choices.order == 5
+
+
+def test_a_change_is_asked_at_once(live):
+    first = live.shown
+    live.choices.order = 4
+    assert live.stage is Stage.STALE
+    assert live.job.request["what_if"]
+    finish(live)
+    assert (live.shown.settings.order, live.shown.is_what_if) == (4, True)
+    assert live.shown.label == "what if: order 4"
+    assert live.other is first
+    assert live.solutions == [first]
+
+
+def test_several_changes_made_at_once_are_one_what_if(live):
+    asked = len(live.store.asked)
+    live.choices.take(FitSettings(order=4, aberration=False))
+    assert [s for _, s, _ in live.store.asked[asked:]] == [FitSettings(order=4, aberration=False)]
+
+
+def test_the_next_trial_is_compared_with_what_was_fitted(live):
+    first = live.shown
+    for order in (4, 3):
+        live.choices.order = order
+        finish(live)
+    assert (live.shown.settings.order, live.other) == (3, first)
+
+
+def test_only_the_last_of_the_changes_made_meanwhile_is_asked(live):
+    live.choices.order = 4
+    for order in (3, 2, 1):
+        live.choices.order = order
+    finish(live)
+    finish(live)
+    assert [settings.order for _, settings, _ in live.store.asked] == [5, 4, 1]
+    assert live.store.cancelled == []
+    assert live.job is None
+
+
+def test_a_change_taken_back_brings_back_what_was_fitted(live):
+    first = live.shown
+    live.choices.order = 4
+    finish(live)
+    live.choices.order = 5
+    assert (live.shown, live.other, live.job) == (first, None, None)
+
+
+def test_a_trial_can_be_kept(live):
+    live.choices.order = 4
+    finish(live)
+    live.keep()
+    assert not live.shown.is_what_if
+    assert [s.settings.order for s in live.solutions] == [5, 4]
+    live.choices.order = 3
+    finish(live)
+    assert live.other.settings.order == 4
+
+
+def test_a_trial_that_is_fitted_is_no_trial_any_more(live):
+    first = live.shown
+    live.choices.order = 4
+    finish(live)
+    live.refit()
+    assert not live.job.request["what_if"]
+    finish(live)
+    assert (live.shown.is_what_if, live.other) == (False, first)
+    assert len(live.solutions) == 2
+
+
+def test_a_trial_that_is_cancelled_drops_what_waits_for_it(live):
+    live.choices.order = 4
+    live.choices.order = 3
+    live.cancel()
+    live.poll()
+    assert live.job is None
+    assert len(live.store.asked) == 2
+
+
+def test_nothing_is_asked_with_an_engine_that_takes_long(live):
+    live.choices.engine = "svi"
+    live.choices.order = 4
+    assert live.job is None
+
+
+def test_a_change_that_cannot_be_used_is_said_at_once(live):
+    live.choices.exclusions = "detector 1"
+    assert live.stage is Stage.FAILED
+    assert "expected source=ID" in live.message
+    assert live.job is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "kept"),
+    [({"order": 4}, True), ({"order": 4, "aberration": False}, False)],
+    ids=["order-alone", "more"],
+)
+def test_a_trial_keeps_the_comparison_of_the_orders_where_it_holds(session, changes, kept):
+    session.choices.compare_orders = True
+    session.refit()
+    finish(session)
+    session.choices.param.update(what_if_at_once=True, **changes)
+    settings = session.store.asked[-1][1]
+    assert settings == FitSettings(**changes, compare_orders=kept)
+
+
+def test_a_comparison_that_was_not_made_waits_for_the_fit(live):
+    live.choices.compare_orders = True
+    assert live.job is None
+    live.choices.order = 4
+    assert not live.store.asked[-1][1].compare_orders
+    live.refit()
+    assert live.store.asked[-1][1] == FitSettings(order=4, compare_orders=True)
+
+
+def test_what_is_left_out_comes_back_as_it_is_written(session):
+    session.choices.exclusions = "detector=1, exposure=0/3 source=77"
+    settings = session.choices.settings()
+    assert settings.exclusions.names() == ["source 77", "exposure 0/3", "detector 1"]
+    session.choices.take(settings)
+    assert session.choices.settings() == settings
+
+
+def test_another_orbit_forgets_the_solutions_of_the_last(session):
+    finish(session)
+    session.show_orbit(1)
+    assert session.solutions == []
+    assert session.store.asked[-1][:2] == (1, FitSettings())
+    finish(session)
+    assert session.other is None
+
+
+def test_the_selection_offers_what_the_solution_holds(fit_result):
+    selection = Selection()
+    selection.fit_to(fit_result, [0, 1, 2, 3])
+    assert selection.field == "0"
+    assert selection.exposures_of(fit_result) == [(0, 0)]
+    selection.field = ALL
+    selection.plates = (0, 1)
+    assert len(selection.exposures_of(fit_result)) == 8
+    assert selection.detector_id == 0
+    selection.detector = ALL
+    assert selection.detector_id is None
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("plates", (0, 99)), ("detector", "17"), ("field", "9")]
+)
+def test_the_selection_refuses_what_is_not_there(fit_result, name, value):
+    selection = Selection()
+    selection.fit_to(fit_result, [0, 1, 2, 3])
+    with pytest.raises(ValueError, match=name):
+        setattr(selection, name, value)
+
+
+@pytest.mark.parametrize("order", [-1, 10, 3.5])
+def test_the_order_is_bounded_on_the_server(order):
+    with pytest.raises(ValueError, match="order"):
+        FitChoices(order=order)
+
+
+def test_choices_become_settings_that_name_only_what_was_changed():
+    choices = FitChoices()
+    assert choices.settings() == FitSettings()
+    choices.widths = {**default_widths(), "pointing_ra": "1 arcmin", "pitch_x": "flat"}
+    assert choices.settings().prior_widths == {"pointing_ra": 60.0, "pitch_x": float("inf")}
+    choices.shifts = "detector_x[2]=-5um, focal_length=0.1mm"
+    assert choices.settings().prior_shifts == {"detector_x[2]": -5.0, "focal_length": 100.0}
+    choices.compare_orders = True
+    assert choices.settings().compare_orders
+    again = FitChoices()
+    again.take(choices.settings())
+    assert again.settings() == choices.settings()
+
+
+def test_choices_that_cannot_be_used_say_which():
+    choices = FitChoices()
+    choices.widths = {**default_widths(), "detector_x": "-3"}
+    with pytest.raises(InputError, match="detector_x"):
+        choices.settings()
+
+
+def test_solutions_are_described_by_what_departs_from_the_paper():
+    assert describe(FitSettings()) == "order 5"
+    changed = FitSettings(order=3, aberration=False, prior_widths={"distortion_x": 0.5})
+    assert describe(changed) == "order 3, distortion_x 0.5 um, no aberration"
+    assert describe(FitSettings(compare_orders=True)) == "order 5, orders compared"
+
+
+def test_address_brings_back_the_selection(fit_result):
+    numbers = [d.detector_id for d in MINI_MOCK.detectors]
+    first, second = Selection(), Selection()
+    first.fit_to(fit_result, numbers)
+    last = first.param["plates"].bounds[1]
+    first.param.update(field=ALL, detector=str(numbers[-1]), plates=(last, last))
+    second.want(first.address())
+    second.fit_to(fit_result, numbers)
+    assert second.address() == first.address()
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        {"field": "99", "detector": "none", "plates": "many", "orbit": "7", "unknown": "x"},
+        {"plates": "3", "field": ""},
+    ],
+    ids=["nonsense", "half"],
+)
+def test_address_that_makes_no_sense_is_not_looked_at(fit_result, address):
+    selection = Selection()
+    selection.want(address)
+    selection.fit_to(fit_result, [1, 2])
+    assert selection.plates[0] == selection.param["plates"].bounds[0]
+    assert selection.field in selection.param["field"].objects
+    assert selection.orbit is None
+
+
+def test_address_asks_for_an_orbit_of_the_workbench(fit_result):
+    session = Session(FakeStore(fit_result))
+    session.selection.want({"orbit": "1"})
+    assert session.selection.orbit == 1
+    assert session.selection.address()["orbit"] == "1"

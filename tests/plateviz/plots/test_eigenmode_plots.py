@@ -1,0 +1,138 @@
+"""The pictures of the modes: what is marked, worded and drawn to scale."""
+
+from dataclasses import replace
+
+import holoviews as hv
+import numpy as np
+import pytest
+
+from plateviz import plots, tables
+from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.eigenmode_groups import _amount
+from plateviz.plots.gallery import diagnostics
+from tests.plateviz.plots.drawn import shafts_of
+
+NAMES = [
+    "eigenmode-spectrum",
+    "weak-directions",
+    "eigenmode-groups",
+    "eigenmode-shifts",
+    "prior-shares",
+]
+MAS_PER_ARCMIN = 60_000.0
+
+
+def of_kind(drawing, kind):
+    return [element for element in drawing if isinstance(element, kind)]
+
+
+def words_of(drawing):
+    return [str(w) for e in of_kind(drawing, hv.Labels) for w in e.dimension_values(2)]
+
+
+def test_weak_modes_are_marked_in_the_spectrum(fit_result):
+    panel = next(iter(plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result))))
+    rest, weak = of_kind(panel, hv.Points)
+    assert weak.dimension_values("mode").tolist() == [1, 2, 3]
+    assert len(rest) + len(weak) == len(fit_result.modes)
+
+
+def test_both_panels_of_the_spectrum_have_all_modes(fit_result):
+    for panel in plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result)):
+        assert sum(map(len, of_kind(panel, hv.Points))) == len(fit_result.modes)
+
+
+def test_every_weak_mode_is_named_beside_its_bar(fit_result):
+    words = words_of(plots.plot_eigenmode_deciders(tables.eigenmode_deciders(fit_result)))
+    assert set(fit_result.modes["name"].head(3)) <= set(words)
+    assert "prior of detector x 25 %" not in words
+    assert "prior of detector x 100 %" in words
+
+
+def test_what_decides_nothing_is_not_in_the_legend(fit_result):
+    drawing = plots.plot_eigenmode_deciders(tables.eigenmode_deciders(fit_result))
+    labels = {bars.label for bars in of_kind(drawing, hv.Rectangles)}
+    assert labels == {"measurements", "reference sources", "priors of the calibration"}
+
+
+def test_bars_are_as_long_as_the_shares(fit_result):
+    table = tables.eigenmode_deciders(fit_result)
+    drawing = plots.plot_eigenmode_deciders(table)
+    length = sum(
+        (bars.dimension_values("right") - bars.dimension_values("left")).sum()
+        for bars in of_kind(drawing, hv.Rectangles)
+    )
+    assert length == pytest.approx(table["share"].sum())
+
+
+def test_cells_have_words_only_where_the_share_counts(fit_result):
+    table = tables.eigenmode_groups(fit_result)
+    words = words_of(plots.plot_eigenmode_groups(table))
+    told = int((table["share"] >= 0.005).sum())
+    assert len(words) == 2 * told + table["mode"].nunique()
+
+
+@pytest.mark.parametrize(
+    ("move", "unit", "words"),
+    [
+        (120.4, "arcsec", "120 arcsec"),
+        (1.9, "arcsec", "1.9 arcsec"),
+        (1.1e-4, "arcsec", "110 µas"),
+        (0.0018, "µm", "1.8 nm"),
+        (4e-10, "µm", "0.00040 pm"),
+        (0.0, "µm", "0 µm"),
+    ],
+)
+def test_moves_are_told_in_the_unit_that_suits_them(move, unit, words):
+    assert _amount(move, unit) == words
+
+
+def test_shifts_of_all_modes_are_drawn_to_one_scale(fit_result):
+    table = tables.eigenmode_shifts(fit_result)
+    stretches = []
+    for panel, mode in zip(plots.plot_eigenmode_shifts(table), (1, 2, 3), strict=True):
+        shafts = shafts_of(panel)
+        rows = table[table["mode"] == mode]
+        drawn = (shafts["x_end"] - shafts["x"]).mean()
+        stretches.append(drawn * MAS_PER_ARCMIN / rows["shift_ra_mas"].mean())
+    assert np.allclose(stretches, stretches[0])
+
+
+def test_key_of_the_shifts_is_as_long_as_it_says(fit_result):
+    panel = next(iter(plots.plot_eigenmode_shifts(tables.eigenmode_shifts(fit_result))))
+    key = next(e for e in panel if e.label == "key").dframe().iloc[0]
+    shafts = shafts_of(panel)
+    (text,) = (e.data[2] for e in panel if isinstance(e, hv.Text))
+    number, unit = text.split()
+    scale = (shafts["x_end"] - shafts["x"]).mean() / 1e-4
+    drawn = abs(key["x_end"] - key["x"]) / abs(scale)
+    assert drawn == pytest.approx(float(number) * {"µas": 1e-3, "mas": 1.0}[unit], rel=1e-3)
+
+
+def test_few_sources_have_an_arrow_each(fit_result):
+    table = tables.eigenmode_shifts(fit_result).groupby("mode").head(50)
+    panel = next(iter(plots.plot_eigenmode_shifts(table)))
+    tails = next(e for e in panel if e.label == "tails")
+    assert tails.dimension_values("id").tolist() == table["id"].head(50).tolist()
+
+
+def test_every_parameter_has_a_point_of_its_prior_share(fit_result):
+    drawing = plots.plot_prior_shares(tables.prior_shares(fit_result))
+    (points,) = of_kind(drawing, hv.Points)
+    assert len(points) == len(fit_result.calibration)
+    assert words_of(drawing).count("flat") == 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_diagnostics_are_in_the_gallery(fit_result, instrument, name, theme):
+    (diagnostic,) = [d for d in diagnostics() if d.name == name]
+    assert hv.render(diagnostic.draw(Chosen(fit_result, instrument), theme), backend="bokeh")
+
+
+@pytest.mark.parametrize("name", NAMES[:-1])
+def test_a_result_without_modes_is_drawn_as_a_message(fit_result, instrument, name):
+    old = replace(fit_result, modes=None, mode_parameters=None, mode_shifts=None)
+    (diagnostic,) = [d for d in diagnostics() if d.name == name]
+    drawing = diagnostic.draw(Chosen(old, instrument), "light")
+    assert any(element.data[2].startswith("No ") for element in of_kind(drawing, hv.Text))

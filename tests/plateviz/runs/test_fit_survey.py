@@ -1,0 +1,249 @@
+"""A small survey fitted for real: by one worker and by two, interrupted, and with a fault."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+from distributed import LocalCluster
+
+from plateviz.cli.survey import parse_orbits
+from plateviz.runs.fit_survey import fit_survey
+from plateviz.runs.queries import SurveyRun, open_run, survey_runs
+from plateviz.runs.run import Run, begin_run
+from plateviz.solving.reproduction import reproduced
+from solver.data.settings import FitSettings
+from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
+from solver.errors import InputError
+from solver.io.survey import measurement_path
+
+pytestmark = pytest.mark.slow
+
+SETTINGS = FitSettings()
+
+
+def contents(run):
+    """Return the bytes of every file of a run, but of those that hold times."""
+    paths = sorted(path for path in run.directory.rglob("*") if path.is_file())
+    return {
+        str(path.relative_to(run.directory)): path.read_bytes()
+        for path in paths
+        if path.name != "timings.json"
+    }
+
+
+@pytest.fixture(scope="module")
+def report(fitted_survey):
+    return fit_survey(fitted_survey, "one", SETTINGS, workers=1)
+
+
+@pytest.fixture(scope="module")
+def run(report):
+    return SurveyRun(report.run)
+
+
+def test_every_orbit_is_fitted(report):
+    assert report.fitted == [0, 1, 2]
+    assert (report.kept, report.failed) == ([], {})
+    assert report.run.is_complete
+
+
+def test_results_do_not_depend_on_the_number_of_workers(report, fitted_survey):
+    other = fit_survey(fitted_survey, "two", SETTINGS, workers=2)
+    one, two = contents(report.run), contents(other.run)
+    assert one.keys() == two.keys()
+    assert [name for name in one if one[name] != two[name]] == []
+
+
+def test_complete_run_is_not_touched(report, fitted_survey):
+    before = {p: p.stat().st_mtime_ns for p in report.run.directory.rglob("*")}
+    again = fit_survey(fitted_survey, "one", SETTINGS)
+    assert (again.fitted, again.kept) == ([], [0, 1, 2])
+    assert {p: p.stat().st_mtime_ns for p in report.run.directory.rglob("*")} == before
+
+
+def test_orbits_in_parts_make_the_same_run(report, fitted_survey):
+    seen = []
+    first = fit_survey(fitted_survey, "parts", SETTINGS, [2], 1, progress=seen.append)
+    assert not first.run.is_complete
+    assert [step.done for step in seen] == [0, 1]
+    assert len(SurveyRun(first.run).motions()) > 0
+    rest = fit_survey(fitted_survey, "parts", SETTINGS, workers=1)
+    assert (rest.fitted, rest.kept) == ([0, 1], [2])
+    assert contents(rest.run) == contents(report.run)
+
+
+def test_orbit_that_fails_stops_no_other(fitted_survey):
+    path = measurement_path(fitted_survey, 1)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:1000])
+    try:
+        broken = fit_survey(fitted_survey, "broken", SETTINGS, workers=1)
+        assert broken.fitted == [0, 2]
+        assert list(broken.failed) == [1]
+        assert "orbit=0001.parquet" in broken.failed[1]
+        assert not broken.run.is_complete
+        table = SurveyRun(broken.run).orbits().set_index("orbit_id")
+        assert table["status"].tolist() == ["complete", "failed", "complete"]
+        has_fitted = [SurveyRun(broken.run).has_fitted(orbit) for orbit in table.index]
+        assert has_fitted == [True, False, True]
+        assert "orbit=0001.parquet" in table.loc[1, "message"]
+    finally:
+        path.write_bytes(whole)
+    mended = fit_survey(fitted_survey, "broken", SETTINGS, workers=1)
+    assert (mended.fitted, mended.kept) == ([1], [0, 2])
+    assert mended.run.is_complete
+
+
+def test_killed_run_goes_on_with_what_is_missing(report, fitted_survey):
+    command = [sys.executable, "-m", "plateviz.cli.main", "survey", str(fitted_survey)]
+    process = subprocess.Popen([*command, "--run", "killed"], start_new_session=True)
+    killed = Run(fitted_survey, "killed")
+    deadline = time.monotonic() + 120.0
+    while not killed.complete_orbits() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    there = killed.complete_orbits()
+    resumed = fit_survey(fitted_survey, "killed", SETTINGS)
+    assert resumed.kept == there
+    assert there
+    assert contents(killed) == contents(report.run)
+
+
+def test_run_killed_before_its_orbits_were_gathered_is_made_whole(report, fitted_survey):
+    late = fit_survey(fitted_survey, "late", SETTINGS, [0], 1).run
+    for orbit in (1, 2):
+        shutil.copytree(report.run.orbit_directory(orbit), late.orbit_directory(orbit))
+    assert fit_survey(fitted_survey, "late", SETTINGS).fitted == []
+    assert late.is_complete
+    assert contents(late) == contents(report.run)
+
+
+def test_orbits_table_is_that_of_the_schema(run):
+    table = run.orbits()
+    assert list(table.columns) == RUN_ORBITS.names
+    assert (table["status"] == "complete").all()
+    assert (np.abs(table["chi2_per_dof"] - 1.0) < 6.0 * np.sqrt(2.0 / table["dof"])).all()
+
+
+def test_history_of_a_source_is_what_its_orbits_say(run):
+    counts = run.counts()
+    often = int(counts.loc[counts["n_orbits"].idxmax(), "source_id"])
+    history = run.history(often)
+    assert list(history.columns) == HISTORY.names
+    assert len(history) == counts["n_orbits"].max()
+    assert history["epoch"].is_monotonic_increasing
+    for row in history.itertuples():
+        sources = run.result(row.orbit_id).sources.set_index("source_id")
+        assert sources.loc[often, "ra"] == row.ra
+    assert run.history(1).empty
+
+
+def test_a_source_is_found_by_the_id_that_a_table_has(run):
+    found = run.motions()["source_id"].iloc[0]
+    assert isinstance(found, np.integer)
+    assert set(run.history(found)["source_id"]) == {found}
+    assert run.motion(found)["source_id"] == found
+
+
+def test_motions_hold_every_source(run):
+    motions, counts = run.motions(), run.counts()
+    assert list(motions.columns) == MOTIONS.names
+    pd.testing.assert_frame_equal(motions[counts.columns.tolist()], counts)
+    row = run.motion(int(counts["source_id"].iloc[3]))
+    assert row["source_id"] == counts["source_id"].iloc[3]
+    assert run.motion(1) is None
+
+
+def test_errors_by_count_are_of_the_artificial_sources(run):
+    errors = run.errors_by_count()
+    assert list(errors.columns) == ERRORS_BY_COUNT.names
+    assert errors["n_orbits"].iloc[0] == 1
+
+
+def test_classes_scatter_as_their_sources_do(run):
+    classes, motions = run.classes(often=2), run.motions()
+    others = motions[~motions["is_reference"] & ~motions["is_artificial"]]
+    squares = others["n_orbits"] * others["rms_truth_2d"] ** 2
+    expected = np.sqrt(squares.sum() / others["n_orbits"].sum() / 2.0)
+    assert classes.loc["non-reference", "rms_deviation"] == pytest.approx(expected)
+    assert classes.loc["non-reference", "sigma_single"] == pytest.approx(4.0, rel=1e-3)
+
+
+def test_paper_is_reproduced_from_a_run_that_is_there(run, fitted_survey):
+    before = contents(Run(fitted_survey, run.name))
+    table = reproduced(fitted_survey, run.name, None).set_index("quantity")
+    assert table.loc["uncertainty times sqrt(N)", "ratio"] == pytest.approx(1.0, abs=1e-3)
+    assert table.loc["time per orbit", "ratio"] < 1.0
+    assert contents(Run(fitted_survey, run.name)) == before
+
+
+def test_residuals_of_an_exposure_are_found(run):
+    whole = run.result(0).residuals
+    field, plate = (int(whole[name].iloc[0]) for name in ("field_id", "plate_id"))
+    part = run.exposure_residuals(0, field, plate)
+    here = whole[(whole["field_id"] == field) & (whole["plate_id"] == plate)]
+    assert len(part) == len(here) > 0
+
+
+def test_runs_are_found_by_name(run, fitted_survey):
+    assert open_run(fitted_survey, "one").directory == run.directory
+    assert "one" in [found.name for found in survey_runs(fitted_survey)]
+    with pytest.raises(InputError, match=r"expected a run 'none', found .*one"):
+        open_run(fitted_survey, "none")
+
+
+def test_table_that_cannot_be_read_is_told(fitted_survey):
+    torn = begin_run(fitted_survey, "torn", SETTINGS)
+    (torn.directory / "history.parquet").write_bytes(b"PAR1")
+    with pytest.raises(InputError, match="torn: expected the tables of a run, found"):
+        SurveyRun(torn).history(1)
+
+
+def test_run_that_has_nothing_yet_is_empty(fitted_survey):
+    empty = SurveyRun(begin_run(fitted_survey, "empty", SETTINGS))
+    assert empty.history(1).empty
+    assert empty.counts().empty
+    assert empty.motions().empty
+    assert empty.errors_by_count() is None
+    assert empty.motion(1) is None
+    assert (empty.orbits()["status"] == "missing").all()
+
+
+def test_orbit_that_is_not_there_is_refused(fitted_survey):
+    with pytest.raises(InputError, match="expected orbits of the survey, 0 to 2, found 7"):
+        fit_survey(fitted_survey, "one", SETTINGS, [1, 7])
+
+
+def test_workers_of_a_scheduler_make_the_same_run(report, fitted_survey):
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0
+    ) as cluster:
+        address = cluster.scheduler_address
+        other = fit_survey(fitted_survey, "cluster", SETTINGS, scheduler=address)
+    assert contents(other.run) == contents(report.run)
+
+
+def test_scheduler_that_does_not_answer_is_refused(fitted_survey, monkeypatch):
+    monkeypatch.setattr("plateviz.runs.fit_survey._PATIENCE", "1s")
+    with pytest.raises(InputError, match="--scheduler: expected the address"):
+        fit_survey(fitted_survey, "nowhere", SETTINGS, scheduler="tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize(
+    ("text", "orbits"), [(None, None), ("3", [3]), ("0-2,7", [0, 1, 2, 7])], ids=str
+)
+def test_orbits_are_told_by_ranges(text, orbits):
+    assert parse_orbits(text) == orbits
+
+
+@pytest.mark.parametrize("text", ["", "a", "3-1", "1-2-3", "1,,2"])
+def test_text_that_tells_no_orbits_is_refused(text):
+    with pytest.raises(InputError, match="--orbits: expected numbers and ranges"):
+        parse_orbits(text)

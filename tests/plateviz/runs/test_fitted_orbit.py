@@ -1,0 +1,65 @@
+"""Runs on disk: whole or not there, and read back as they were."""
+
+import json
+
+import pandas as pd
+import pytest
+
+from plateviz.runs.fitted_orbit import FORMAT, is_complete, read_fitted_orbit, write_fitted_orbit
+from solver.data.schema import RESULT_TABLES
+from solver.errors import InputError
+
+
+def test_a_run_is_read_back_as_it_was(fit_result, tmp_path):
+    write_fitted_orbit(tmp_path / "run", fit_result)
+    back = read_fitted_orbit(tmp_path / "run")
+    for table in RESULT_TABLES:
+        before, after = getattr(fit_result, table.name), getattr(back, table.name)
+        if before is None:
+            assert after is None
+        else:
+            pd.testing.assert_frame_equal(
+                before.reset_index(drop=True), after, check_dtype=False, check_exact=True
+            )
+    assert back.settings == fit_result.settings
+    assert back.summary == json.loads(json.dumps(fit_result.summary))
+    assert back.sources["source_id"].dtype == "int64"
+
+
+def test_a_run_keeps_the_orders_compared(compared, tmp_path):
+    write_fitted_orbit(tmp_path / "run", compared)
+    pd.testing.assert_frame_equal(read_fitted_orbit(tmp_path / "run").orders, compared.orders)
+
+
+def test_a_run_that_is_there_is_never_changed(fit_result, make_fit_result, tmp_path):
+    write_fitted_orbit(tmp_path / "run", fit_result)
+    before = {p.name: p.read_bytes() for p in (tmp_path / "run").iterdir()}
+    write_fitted_orbit(tmp_path / "run", make_fit_result(2)[0])
+    assert {p.name: p.read_bytes() for p in (tmp_path / "run").iterdir()} == before
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_an_interrupted_write_leaves_nothing(fit_result, tmp_path, monkeypatch):
+    def stop(*_, **__):
+        raise OSError("no space left")
+
+    monkeypatch.setattr("plateviz.runs.fitted_orbit._flush", stop)
+    with pytest.raises(OSError, match="no space"):
+        write_fitted_orbit(tmp_path / "run", fit_result)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_without_its_last_file_is_refused(fit_result, tmp_path):
+    write_fitted_orbit(tmp_path / "run", fit_result)
+    (tmp_path / "run" / "COMPLETE").unlink()
+    assert not is_complete(tmp_path / "run")
+    with pytest.raises(InputError, match=r"run: expected a complete run, found no COMPLETE"):
+        read_fitted_orbit(tmp_path / "run")
+
+
+def test_a_run_of_a_newer_version_is_refused(fit_result, tmp_path):
+    write_fitted_orbit(tmp_path / "run", fit_result)
+    head = json.loads((tmp_path / "run" / "result.json").read_text())
+    (tmp_path / "run" / "result.json").write_text(json.dumps({**head, "format": FORMAT + 1}))
+    with pytest.raises(InputError, match="written by a newer plateviz"):
+        read_fitted_orbit(tmp_path / "run")

@@ -1,0 +1,69 @@
+"""Runs of a survey: begun once, gone on with, never edited."""
+
+import pytest
+
+from plateviz.runs.run import begin_run, runs_of
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+
+ODD = FitSettings(
+    prior_widths={"position_angle": float("inf")}, prior_shifts={"detector_x[2]": -5.0}
+)
+
+
+def test_run_keeps_its_settings(survey_folder):
+    run = begin_run(survey_folder, "odd", ODD)
+    assert run.settings() == ODD
+    assert begin_run(survey_folder, "odd", ODD) == run
+    assert not run.is_complete
+    assert run.complete_orbits() == []
+    assert run in runs_of(survey_folder)
+
+
+def test_run_of_other_settings_is_refused(survey_folder):
+    begin_run(survey_folder, "one", FitSettings())
+    with pytest.raises(InputError, match=r"run\.toml: expected .* found other settings \(order\)"):
+        begin_run(survey_folder, "one", FitSettings(order=4))
+
+
+def test_run_of_other_inputs_is_refused(survey_folder):
+    begin_run(survey_folder, "inputs", FitSettings())
+    with (survey_folder / "survey.toml").open("a", encoding="utf-8") as header:
+        header.write("# changed\n")
+    with pytest.raises(InputError, match=r"found other inputs \(survey\.toml\)"):
+        begin_run(survey_folder, "inputs", FitSettings())
+
+
+@pytest.mark.parametrize("name", ["", "../up", ".hidden", "a b", "a/b"])
+def test_name_that_is_no_folder_is_refused(survey_folder, name):
+    with pytest.raises(InputError, match="--run: expected a name"):
+        begin_run(survey_folder, name, FitSettings())
+
+
+def test_folder_that_is_no_run_is_left_alone(survey_folder):
+    (survey_folder / "runs" / "mine").mkdir(parents=True)
+    (survey_folder / "runs" / "mine" / "notes.txt").write_text("keep", encoding="utf-8")
+    with pytest.raises(InputError, match="expected a run, found a folder without"):
+        begin_run(survey_folder, "mine", FitSettings())
+
+
+def test_folder_that_is_no_survey_has_no_runs(tmp_path):
+    assert runs_of(tmp_path) == []
+    with pytest.raises(InputError, match=r"expected a survey with a file survey\.toml"):
+        begin_run(tmp_path, "one", FitSettings())
+
+
+def test_failure_is_told_until_the_orbit_is_there(survey_folder, fit_result):
+    run = begin_run(survey_folder, "failing", FitSettings())
+    run.keep_failure(1, "orbit 1: no light")
+    assert run.failures() == {1: "orbit 1: no light"}
+    run.keep(1, fit_result, fit_result.sources)
+    assert run.failures() == {}
+    assert run.complete_orbits() == [1]
+
+
+def test_half_an_orbit_is_none(survey_folder):
+    run = begin_run(survey_folder, "half", FitSettings())
+    run.orbit_directory(0).mkdir()
+    (run.orbit_directory(0) / "history.parquet").touch()
+    assert run.complete_orbits() == []

@@ -1,0 +1,80 @@
+"""Jobs: what they report, and that what is over stays over."""
+
+import threading
+
+import pytest
+
+from plateviz.solving.job import Job, JobStatus
+from solver.errors import CancelledError, FitError, InputError
+
+
+def test_a_job_keeps_what_it_reported():
+    job = Job({"do": "fit"})
+    assert job.status is JobStatus.QUEUED
+    job.take({"event": "progress", "stage": "reading"})
+    assert job.status is JobStatus.RUNNING
+    job.take({"event": "progress", "stage": "iteration 1"})
+    job.take({"event": "done"})
+    assert job.status is JobStatus.DONE
+    assert [report["stage"] for report in job.progress] == ["reading", "iteration 1"]
+
+
+@pytest.mark.parametrize(
+    ("event", "status"),
+    [("done", JobStatus.DONE), ("cancelled", JobStatus.CANCELLED), ("failed", JobStatus.FAILED)],
+)
+def test_what_is_over_stays_over(event, status):
+    job = Job({"do": "fit"})
+    job.take({"event": event, "message": "because"})
+    job.take({"event": "progress", "stage": "too late"})
+    job.cancel()
+    assert job.status is status
+    assert job.progress == []
+    assert job.message == ("because" if event == "failed" else "")
+
+
+def test_a_cancelled_job_does_not_take_the_blame_of_its_process():
+    job = Job({"do": "fit"})
+    job.cancel()
+    job.fail("the solver process ended")
+    assert (job.status, job.message) == (JobStatus.CANCELLED, "")
+
+
+def test_the_clock_stops_with_the_job():
+    job = Job({"do": "fit"})
+    job.take({"event": "done"})
+    assert job.seconds == job.seconds
+
+
+def test_waiting_ends_when_another_thread_ends_the_job():
+    job = Job({"do": "fit"})
+    threading.Timer(0.05, job.cancel).start()
+    assert job.wait(timeout=10) is JobStatus.CANCELLED
+
+
+def test_every_job_has_its_own_id_in_its_request():
+    first, second = Job({"do": "fit"}), Job({"do": "fit"})
+    assert first.id != second.id
+    assert first.request == {"do": "fit", "job": first.id}
+
+
+@pytest.mark.parametrize(
+    ("event", "error", "words"),
+    [
+        ({"event": "failed", "message": "bad", "is_input_error": True}, InputError, "bad"),
+        ({"event": "failed", "message": "open", "is_input_error": False}, FitError, "open"),
+        ({"event": "cancelled"}, CancelledError, "stopped"),
+    ],
+    ids=["input", "fit", "cancelled"],
+)
+def test_a_job_that_was_not_done_raises_why(event, error, words):
+    job = Job({"do": "fit"})
+    job.take(event)
+    with pytest.raises(error, match=words):
+        job.require_done()
+
+
+def test_a_job_that_was_done_raises_nothing():
+    job = Job({"do": "fit"})
+    job.take({"event": "done"})
+    job.require_done()

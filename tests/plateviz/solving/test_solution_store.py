@@ -1,0 +1,151 @@
+"""The real solver process behind the store: fits, cancels, dies, and comes back."""
+
+import pytest
+
+from plateviz.solving.job import Job, JobStatus
+from plateviz.solving.origin import OrbitFiles, SurveyFolder, origin_from_dict, origin_to_dict
+from plateviz.solving.solution_store import SolutionStore
+from plateviz.solving.warm_solver import WarmSolver
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+
+LONG = 120
+
+
+@pytest.fixture(scope="module")
+def store(small_survey):
+    store = SolutionStore(SurveyFolder(str(small_survey)), WarmSolver())
+    yield store
+    store.close()
+
+
+def test_an_orbit_is_fitted_and_kept(store):
+    job = store.request(0, FitSettings())
+    assert job.wait(LONG) is JobStatus.DONE, job.message
+    result = store.result(0, FitSettings())
+    assert result.summary["converged"]
+    assert result.true_places is not None
+    stages = [report["stage"] for report in job.progress]
+    assert stages[0] == "reading the orbit"
+    assert "iteration 1" in stages
+
+
+def test_the_same_question_is_asked_once(store):
+    first = store.request(0, FitSettings())
+    assert store.request(0, FitSettings()) is first
+    assert store.request(1, FitSettings()) is not first
+
+
+def test_other_settings_give_another_solution(store):
+    settings = FitSettings(order=3, prior_widths={"distortion_x": 10.0})
+    assert store.result(0, settings) is None
+    assert store.request(0, settings).wait(LONG) is JobStatus.DONE
+    other = store.result(0, settings)
+    assert other.settings == settings
+    assert other.summary["chi2"] > store.result(0, FitSettings()).summary["chi2"]
+
+
+def test_what_is_wrong_with_the_input_is_reported(tmp_path, sample_orbit_dir):
+    files = OrbitFiles(str(sample_orbit_dir / "sample_obs.fits"), str(tmp_path / "none.fits"))
+    store = SolutionStore(files, WarmSolver())
+    try:
+        job = store.request(None, FitSettings())
+        assert job.wait(LONG) is JobStatus.FAILED
+        assert "none.fits" in job.message
+    finally:
+        store.close()
+
+
+def test_a_cancelled_fit_ends_and_can_be_asked_for_again(store):
+    settings = FitSettings(order=7)
+    job = store.request(1, settings)
+    job.wait_for_news(0, timeout=LONG)
+    store.cancel(job)
+    assert job.wait(LONG) is JobStatus.CANCELLED
+    assert store.result(1, settings) is None
+    again = store.request(1, settings)
+    assert again is not job
+    assert again.wait(LONG) is JobStatus.DONE
+
+
+def test_a_waiting_job_is_cancelled_without_being_begun(store):
+    first = store.request(0, FitSettings(order=4))
+    waiting = store.request(0, FitSettings(order=2))
+    store.cancel(waiting)
+    assert waiting.status is JobStatus.CANCELLED
+    assert waiting.progress == []
+    assert first.wait(LONG) is JobStatus.DONE
+
+
+def test_what_is_asked_of_a_process_that_has_just_died_is_reported(store):
+    worker = store._worker
+    # While the lock is held nobody can have taken note of it.
+    with worker._lock:
+        worker._process.kill()
+        worker._process.wait()
+        job = store.request(0, FitSettings(order=1))
+    assert job.wait(LONG) is JobStatus.FAILED
+    assert "the solver process ended" in job.message
+    assert store.request(0, FitSettings(order=1)).wait(LONG) is JobStatus.DONE
+
+
+def test_a_process_that_dies_is_reported_and_replaced(store):
+    job = store.request(1, FitSettings(order=6))
+    job.wait_for_news(0, timeout=LONG)
+    store._worker._process.kill()
+    assert job.wait(LONG) is JobStatus.FAILED
+    assert "the solver process ended" in job.message
+    assert store.request(1, FitSettings(order=6)).wait(LONG) is JobStatus.DONE
+
+
+def test_closing_cancels_and_removes_everything(small_survey):
+    store = SolutionStore(SurveyFolder(str(small_survey)), WarmSolver())
+    job = store.request(0, FitSettings())
+    scratch = store._scratch
+    store.close()
+    assert job.status is JobStatus.CANCELLED
+    assert not scratch.exists()
+
+
+def test_a_fault_of_ours_does_not_hang_the_queue(small_survey):
+    worker = WarmSolver()
+    try:
+        broken = worker.submit(Job({"do": "nothing of the kind"}))
+        assert broken.wait(LONG) is JobStatus.FAILED
+        assert "KeyError" in broken.message
+    finally:
+        worker.close()
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        OrbitFiles("obs.fits", "ref.fits", orbit=3, instrument="camera.toml"),
+        SurveyFolder("somewhere"),
+    ],
+    ids=["files", "survey"],
+)
+def test_origins_are_plain_values_and_back(origin):
+    assert origin_from_dict(origin_to_dict(origin)) == origin
+
+
+def test_a_folder_that_is_no_survey_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"survey\.toml"):
+        SurveyFolder(str(tmp_path)).orbits()
+
+
+def test_a_what_if_is_a_step_from_the_last_fit(store):
+    assert store.request(0, FitSettings()).wait(LONG) is JobStatus.DONE
+    settings = FitSettings(prior_widths={"sources": 2.0})
+    # The fitter of an orbit starts from its own last fit.
+    job = store.request(0, settings, what_if=True)
+    assert job.wait(LONG) is JobStatus.DONE, job.message
+    assert store.result(0, settings) is None
+    assert store.result(0, settings, what_if=True).summary["converged"]
+
+
+def test_a_what_if_that_a_step_cannot_tell_is_fitted(store):
+    settings = FitSettings(order=6)
+    assert store.request(0, settings, what_if=True).wait(LONG) is JobStatus.DONE
+    result = store.result(0, settings, what_if=True)
+    assert result.summary["reason"].startswith("every step of the last iteration")

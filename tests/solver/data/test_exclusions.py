@@ -1,0 +1,100 @@
+import numpy as np
+import pytest
+
+from solver.data.exclusions import Exclusions, parse_exclusions, thinned_orbit
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+
+
+@pytest.fixture
+def measurements(small_orbit):
+    return small_orbit.data.measurements
+
+
+def test_nothing_excluded_is_the_orbit_itself(small_orbit):
+    assert Exclusions().without(small_orbit.data) is small_orbit.data
+
+
+@pytest.mark.parametrize("column", ["source_id", "detector_id"])
+def test_excluded_value_is_measured_no_more(small_orbit, measurements, column):
+    value = int(measurements[column].iloc[0])
+    name = {"source_id": "sources", "detector_id": "detectors"}[column]
+    left = Exclusions(**{name: frozenset([value])}).without(small_orbit.data).measurements
+    expected = measurements[measurements[column] != value]
+    np.testing.assert_array_equal(left.index, expected.index)
+
+
+def test_excluded_exposure_loses_its_environment_too(small_orbit, measurements):
+    plate = tuple(measurements[["field_id", "plate_id"]].iloc[0].tolist())
+    left = Exclusions(exposures=frozenset([plate])).without(small_orbit.data)
+    for table in (left.measurements, left.exposures):
+        assert plate not in set(zip(table["field_id"], table["plate_id"], strict=True))
+    assert len(left.exposures) == len(small_orbit.data.exposures) - 1
+
+
+@pytest.mark.parametrize(
+    ("exclusions", "named"),
+    [
+        (Exclusions(sources=frozenset([-5])), "source -5"),
+        (Exclusions(detectors=frozenset([77])), "detector 77"),
+        (Exclusions(exposures=frozenset([(9, 99)])), "exposure 9/99"),
+    ],
+    ids=["source", "detector", "exposure"],
+)
+def test_what_was_not_measured_cannot_be_excluded(small_orbit, exclusions, named):
+    with pytest.raises(InputError, match=f"excluded {named}: expected one with measurements"):
+        exclusions.without(small_orbit.data)
+
+
+def test_not_everything_can_be_excluded(small_orbit, measurements):
+    everything = Exclusions(detectors=frozenset(measurements["detector_id"].tolist()))
+    with pytest.raises(InputError, match="expected some measurements"):
+        everything.without(small_orbit.data)
+
+
+def test_exclusions_are_read_as_written_by_a_person():
+    found = parse_exclusions(["source=12", " detector=3", "exposure=1/20", "source=-4"])
+    assert found == Exclusions(frozenset([12, -4]), frozenset([(1, 20)]), frozenset([3]))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "source", "source=x", "exposure=3", "plate=1/2", "source=1.5"]
+)
+def test_anything_else_is_refused(text):
+    with pytest.raises(InputError, match="expected source=ID, detector=ID or exposure=FIELD/PLATE"):
+        parse_exclusions([text])
+
+
+def test_settings_keep_exclusions_as_plain_values():
+    settings = FitSettings(exclusions=parse_exclusions(["source=12", "exposure=1/20"]))
+    assert FitSettings.from_dict(settings.to_dict()) == settings
+
+
+def test_settings_written_before_there_were_exclusions_are_read():
+    values = FitSettings().to_dict()
+    del values["exclusions"]
+    assert FitSettings.from_dict(values) == FitSettings()
+
+
+def test_exclusions_have_names_for_people():
+    found = parse_exclusions(["source=12", "exposure=1/20", "detector=3"]).names()
+    assert found == ["source 12", "exposure 1/20", "detector 3"]
+
+
+def test_thinned_orbit_keeps_a_share_of_each_class(small_orbit):
+    data = small_orbit.data
+    is_reference = data.catalogue.set_index("source_id")["is_reference"]
+
+    def counts(orbit):
+        return np.bincount(is_reference.loc[orbit.measurements["source_id"].unique()], minlength=2)
+
+    thinned = thinned_orbit(data, data, 3)
+    np.testing.assert_array_equal(counts(thinned), -(-counts(data) // 3))
+    assert thinned_orbit(data, data, 1) is data
+
+
+def test_thinned_orbit_keeps_the_same_sources_whatever_is_excluded(small_orbit):
+    data = small_orbit.data
+    kept = thinned_orbit(data, data, 3).measurements["source_id"].unique()
+    left = Exclusions(sources=frozenset([int(kept[0])])).without(data)
+    assert set(thinned_orbit(left, data, 3).measurements["source_id"]) == set(kept[1:])

@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS, PARAMETERS, groups_on
+
+
+def test_names_are_unique():
+    assert len(BY_NAME) == len(PARAMETERS)
+
+
+def test_every_group_but_the_sources_is_calibration():
+    assert {g.name for g in PARAMETERS} - {g.name for g in CALIBRATION_GROUPS} == {"sources"}
+
+
+def test_axes_partition_the_table():
+    axes = [groups_on(axis) for axis in ("src", "exp", "coef", "det")]
+    assert sorted(g.name for groups in axes for g in groups) == sorted(BY_NAME)
+
+
+@pytest.mark.parametrize(
+    ("name", "width"),
+    [
+        ("pointing_ra", 3600.0),
+        ("pointing_dec", 3600.0),
+        ("distortion_x", 1.0),
+        ("distortion_y", 1.0),
+        ("detector_x", 100.0),
+        ("detector_y", 100.0),
+        ("detector_rotation", 360.0),
+        ("pitch_x", 0.01),
+        ("pitch_y", 0.01),
+    ],
+)
+def test_default_widths_are_those_of_the_papers_table(name, width):
+    assert BY_NAME[name].width == width
+
+
+def test_position_angle_is_flat_and_focal_length_gamma():
+    assert np.isinf(BY_NAME["position_angle"].width)
+    assert BY_NAME["position_angle"].family == "uniform"
+    assert BY_NAME["focal_length"].family == "gamma"
+
+
+def test_focal_length_width_is_a_hundred_um_per_degree():
+    assert BY_NAME["focal_length"].width == pytest.approx(100.0 * np.degrees(1.0))
+
+
+@pytest.mark.parametrize("group", PARAMETERS, ids=lambda g: g.name)
+def test_units_convert(group):
+    factors = {"mas": 3.6e6, "arcsec": 3600.0, "um": 1.0}
+    assert group.per_value_unit == factors[group.unit]
+
+
+@pytest.mark.parametrize("group", PARAMETERS, ids=lambda g: g.name)
+def test_widths_that_are_fractions_or_factors_have_no_unit(group):
+    assert (group.width_unit == "") == (group.relative or group.name == "sources")

@@ -1,0 +1,133 @@
+import json
+
+import numpy as np
+import pytest
+
+from solver.data.parameters import PARAMETERS
+from solver.data.settings import (
+    WARPFIELD,
+    FitSettings,
+    NutsSettings,
+    SviSettings,
+    svi_settings,
+)
+from solver.errors import InputError
+
+
+def test_defaults_are_the_papers():
+    settings = FitSettings()
+    assert settings.order == 5
+    assert settings.aberration
+    assert {g.name: settings.width(g.name) for g in PARAMETERS} == {
+        g.name: g.width for g in PARAMETERS
+    }
+
+
+@pytest.mark.parametrize("order", [-1, 10, 5.0, "5", None, True], ids=repr)
+def test_order_that_is_none_is_refused(order):
+    with pytest.raises(InputError, match="distortion order from 0 to 9"):
+        FitSettings(order=order)
+
+
+def test_unknown_engine_is_refused():
+    with pytest.raises(InputError, match="gauss-newton.*'magic'"):
+        FitSettings(engine="magic")
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, float("nan")], ids=str)
+def test_width_that_is_not_positive_is_refused(width):
+    with pytest.raises(InputError, match="positive prior width for detector_x"):
+        FitSettings(prior_widths={"detector_x": width})
+
+
+def test_unknown_group_is_refused_with_the_known_ones():
+    with pytest.raises(InputError, match="pointing_ra.*'detector_z'"):
+        FitSettings(prior_widths={"detector_z": 1.0})
+
+
+def test_flat_prior_is_allowed_on_the_calibration_and_not_on_the_sources():
+    assert np.isinf(FitSettings(prior_widths={"pitch_x": np.inf}).width("pitch_x"))
+    with pytest.raises(InputError, match="finite factor.*sources"):
+        FitSettings(prior_widths={"sources": np.inf})
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan")], ids=str)
+def test_tolerance_that_no_step_can_meet_is_refused(tolerance):
+    with pytest.raises(InputError, match="tolerance"):
+        FitSettings(tolerance=tolerance)
+
+
+@pytest.mark.parametrize("limit", [0, -1, 2.5], ids=str)
+def test_limit_of_iterations_that_is_none_is_refused(limit):
+    with pytest.raises(InputError, match="max_iterations"):
+        FitSettings(max_iterations=limit)
+
+
+def test_settings_survive_json():
+    settings = FitSettings(order=3, aberration=False, prior_widths={"pitch_x": 0.1}, tolerance=0.01)
+    assert FitSettings.from_dict(json.loads(json.dumps(settings.to_dict()))) == settings
+
+
+def test_copy_with_changes_is_checked_too():
+    settings = FitSettings(order=3)
+    assert settings.with_(order=4) == FitSettings(order=4)
+    with pytest.raises(InputError, match="order"):
+        settings.with_(order=99)
+
+
+def test_widths_given_are_not_shared():
+    widths = {"pitch_x": 0.1}
+    settings = FitSettings(prior_widths=widths)
+    widths["pitch_x"] = -5.0
+    assert settings.width("pitch_x") == 0.1
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: SviSettings(steps=0), "svi steps to be 1 or more, found 0"),
+        (lambda: SviSettings(patience=2.5), "svi patience to be 1 or more, found 2.5"),
+        (lambda: SviSettings(max_steps=100), r"not to be below steps \(1500\), found 100"),
+        (lambda: SviSettings(last_rate=1e5), "rates that fall and are positive"),
+        (lambda: SviSettings(last_rate=0.0), "rates that fall and are positive"),
+        (lambda: SviSettings(tolerance=0.0), "positive svi tolerance, found 0.0"),
+        (lambda: SviSettings(seed=-1), "svi seed to be 0 or more, found -1"),
+        (lambda: NutsSettings(chains=0), "nuts chains to be 1 or more, found 0"),
+        (lambda: NutsSettings(samples=3), "nuts samples to be 4 or more, found 3"),
+        (lambda: FitSettings(thin=0), "thin to be 1 or more, found 0"),
+        (lambda: svi_settings("pyro", None, 0), "expected warpfield .* found 'pyro'"),
+    ],
+)
+def test_what_no_engine_can_use_is_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_choices_of_the_engines_come_back():
+    settings = FitSettings(
+        engine="svi", thin=3, svi=svi_settings("warpfield", 500, 7), nuts=NutsSettings(samples=9)
+    )
+    plain = json.loads(json.dumps(settings.to_dict()))
+    assert FitSettings.from_dict(plain) == settings
+
+
+def test_published_rates_are_the_papers():
+    chosen = svi_settings("warpfield", 500, 7)
+    assert (chosen.first_rate, chosen.last_rate, chosen.patience) == (1e-3, 1e-10, 10_000)
+    assert not chosen.conditioned
+    assert (chosen.steps, chosen.max_steps, chosen.seed) == (500, 1000, 7)
+    assert svi_settings("warpfield", None, 0) == WARPFIELD
+    assert svi_settings(None, None, 4) == SviSettings(seed=4)
+
+
+def test_every_engine_knows_when_it_is_there():
+    assert FitSettings().step_tolerance == FitSettings().tolerance
+    assert FitSettings(engine="svi").step_tolerance == SviSettings().tolerance
+
+
+def test_orders_are_compared_when_asked_for_and_old_results_never_asked():
+    settings = FitSettings(compare_orders=True)
+    plain = json.loads(json.dumps(settings.to_dict()))
+    assert FitSettings.from_dict(plain) == settings
+    del plain["compare_orders"]
+    assert FitSettings.from_dict(plain) == FitSettings()

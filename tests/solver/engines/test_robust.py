@@ -1,0 +1,143 @@
+"""Outliers: found, listed, left out, and without a trace in what is left."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from solver.data import schema
+from solver.data.exclusions import Exclusions
+from solver.data.settings import FitSettings
+from solver.errors import CancelledError
+from solver.fit import OrbitFitter, fit_orbit
+
+ROBUST = FitSettings(robust=True)
+SHARE, SIGMAS = 0.01, 50.0
+
+
+def disturbed(data, share, sigmas, seed=1):
+    """Return the orbit with a share of its measurements moved, and their rows."""
+    rng = np.random.default_rng(seed)
+    rows = data.measurements.copy()
+    bad = rng.choice(len(rows), round(share * len(rows)), replace=False)
+    angle = rng.uniform(0.0, 2.0 * np.pi, len(bad))
+    for column, way in (("nx", np.cos(angle)), ("ny", np.sin(angle))):
+        place = rows.columns.get_loc(column)
+        rows.iloc[bad, place] += sigmas * rows[f"s{column[1]}"].to_numpy()[bad] * way
+    return replace(data, measurements=rows), bad
+
+
+@pytest.fixture(scope="module")
+def clean(sample_orbit, fit_whole):
+    return fit_whole(sample_orbit)
+
+
+@pytest.fixture(scope="module")
+def found(sample_orbit, fit_whole):
+    data, bad = disturbed(sample_orbit, SHARE, SIGMAS)
+    return fit_whole(data, ROBUST), data, bad
+
+
+@pytest.fixture(scope="module")
+def plain(found, fit_whole):
+    """The disturbed orbit as if there were no outliers."""
+    return fit_whole(found[1])
+
+
+def shifts(found, clean, axis):
+    """Return the shifts of the sources without a disturbed measurement, in sigmas."""
+    result, data, bad = found
+    both = result.sources.merge(clean.sources, on="source_id", suffixes=("", "_clean"))
+    touched = data.measurements["source_id"].iloc[bad]
+    both = both[~both["source_id"].isin(touched)]
+    assert len(both) > 400
+    moved = both[f"offset_{axis}"] - both[f"offset_{axis}_clean"]
+    return moved / both[f"sigma_{axis}_marginal_clean"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", ["ra", "dec"])
+def test_the_other_sources_are_not_biased(found, clean, axis):
+    moved = shifts(found, clean, axis)
+    assert abs(moved.mean()) < 0.1
+    assert np.sqrt((moved**2).mean()) < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", ["ra", "dec"])
+def test_without_it_they_are_far_off(plain, found, clean, axis):
+    moved = shifts((plain, *found[1:]), clean, axis)
+    assert np.sqrt((moved**2).mean()) > 0.5
+
+
+@pytest.mark.slow
+def test_all_of_them_and_no_others_are_listed(found):
+    result, data, bad = found
+    expected = data.measurements.iloc[bad]
+    listed = result.outliers
+    key = ["field_id", "plate_id", "detector_id", "source_id"]
+    assert set(listed[key].itertuples(index=False)) == set(expected[key].itertuples(index=False))
+    assert list(listed.columns) == schema.OUTLIERS.names
+    assert listed["distance"].is_monotonic_decreasing
+    assert listed["distance"].between(SIGMAS - 6.0, SIGMAS + 6.0).all()
+
+
+@pytest.mark.slow
+def test_what_is_left_is_a_good_fit(found):
+    result, data, bad = found
+    assert result.summary["n_outliers"] == len(bad)
+    assert result.summary["n_measurements"] == len(data.measurements) - len(bad)
+    assert result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.slow
+def test_it_says_how_far_each_would_move_its_source(found, fit_whole):
+    """As a fit of all the others and that one does."""
+    result, data, _ = found
+    worst = next(result.outliers.itertuples())
+    key = ["field_id", "plate_id", "detector_id", "source_id"]
+    rows = data.measurements
+    is_outlier = pd.MultiIndex.from_frame(rows[key]).isin(
+        pd.MultiIndex.from_frame(result.outliers[key].iloc[1:])
+    )
+    used = fit_whole(replace(data, measurements=rows[~is_outlier]))
+    before, after = (r.sources.set_index("source_id").loc[worst.source_id] for r in (result, used))
+    for axis in ("ra", "dec"):
+        moved = (after[f"offset_{axis}"] - before[f"offset_{axis}"]) / before[
+            f"sigma_{axis}_marginal"
+        ]
+        assert getattr(worst, f"shift_{axis}") == pytest.approx(moved, abs=0.3)
+
+
+@pytest.mark.slow
+def test_good_measurements_are_left_alone(sample_orbit, clean, fit_whole):
+    result = fit_whole(sample_orbit, ROBUST)
+    assert result.summary["n_outliers"] == 0
+    pd.testing.assert_frame_equal(result.sources, clean.sources)
+
+
+@pytest.mark.slow
+def test_nothing_is_looked_for_unless_asked(clean):
+    assert clean.outliers is None
+    assert "n_outliers" not in clean.summary
+
+
+def test_what_if_leaves_the_same_outliers_out(small_orbit):
+    data, bad = disturbed(small_orbit.data, 0.01, 200.0)
+    fitter = OrbitFitter(data, small_orbit.instrument)
+    fitted = fitter.fit(ROBUST)
+    assert len(fitted.outliers) >= len(bad)
+    source = int(fitted.sources["source_id"].iloc[0])
+    changed = fitter.what_if(ROBUST.with_(exclusions=Exclusions(sources=frozenset([source]))))
+    pd.testing.assert_frame_equal(changed.outliers, fitted.outliers)
+    assert changed.summary["n_measurements"] < fitted.summary["n_measurements"]
+    assert fitter.what_if(FitSettings()) is None
+
+
+def test_search_can_be_cancelled(small_orbit):
+    def cancel(row):
+        raise CancelledError("now")
+
+    with pytest.raises(CancelledError):
+        fit_orbit(small_orbit.data, small_orbit.instrument, ROBUST, cancel)

@@ -1,0 +1,306 @@
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pandas as pd
+import pytest
+
+from solver.data.exclusions import Exclusions
+from solver.data.result import FitStatus
+from solver.data.settings import FitSettings
+from solver.engines import what_if
+from solver.fit import OrbitFitter, fit_orbit
+from solver.linear.normal_equations import accumulate
+from solver.linear.update import update_equations
+from solver.problem.problem import build_problem
+from tests.solver.small_orbit import make_orbit
+
+# What a refit has to confirm, in sigmas.
+AGREEMENT = 1e-3
+
+
+@pytest.fixture(scope="module")
+def orbit():
+    return make_orbit()
+
+
+@pytest.fixture(scope="module")
+def fitter(orbit):
+    return fitted(OrbitFitter(orbit.data, orbit.instrument))
+
+
+@pytest.fixture(scope="module")
+def sample_fitter(sample_orbit):
+    return fitted(OrbitFitter(sample_orbit))
+
+
+def fitted(fitter):
+    fitter.fit(FitSettings(order=6))
+    return fitter
+
+
+def first(data, *columns):
+    return tuple(data.measurements[list(columns)].iloc[0].tolist())
+
+
+CHANGES = {
+    "nothing": lambda data: {},
+    "detectors-held": lambda data: {"prior_widths": {"detector_x": 10.0, "pitch_x": 1e-3}},
+    "sources-loose": lambda data: {"prior_widths": {"sources": 3.0}},
+    "pointing-held": lambda data: {"prior_widths": {"pointing_ra": 600.0, "pointing_dec": 600.0}},
+    "distortion-held": lambda data: {"prior_widths": {"distortion_x": 0.1}},
+    "centres-shifted": lambda data: {
+        "prior_shifts": {
+            "detector_x": 20.0,
+            "detector_y[2]": -30.0,
+            "pointing_dec": 20.0,
+            "pointing_ra[0/1]": -40.0,
+            "focal_length": 500.0,
+            "position_angle[0/2]": 5.0,
+            "distortion_x[3/0]": 1.0,
+            "sources[ra]": 0.4,
+        }
+    },
+    "lower-order": lambda data: {"order": 5},
+    "no-source": lambda data: {"exclusions": Exclusions(frozenset(first(data, "source_id")))},
+    "no-exposure": lambda data: {
+        "exclusions": Exclusions(exposures=frozenset([first(data, "field_id", "plate_id")]))
+    },
+    "no-detector": lambda data: {
+        "exclusions": Exclusions(detectors=frozenset(first(data, "detector_id")))
+    },
+}
+
+
+@pytest.fixture(scope="module", params=CHANGES)
+def pair(request, sample_orbit, sample_fitter):
+    """The sample orbit re-solved and fitted again, under changed settings."""
+    settings = FitSettings(**{"order": 6, **CHANGES[request.param](sample_orbit)})
+    return sample_fitter.what_if(settings), fit_orbit(sample_orbit, settings=settings)
+
+
+def test_refit_confirms_the_positions_and_their_uncertainties(pair):
+    found, expected = pair
+    assert found.summary["reason"] == FitStatus.WHAT_IF.value
+    assert list(found.sources["source_id"]) == list(expected.sources["source_id"])
+    for axis in ("ra", "dec"):
+        sigma = expected.sources[f"sigma_{axis}_marginal"]
+        moved = found.sources[f"offset_{axis}"] - expected.sources[f"offset_{axis}"]
+        assert np.abs(moved / sigma).max() < AGREEMENT
+        for kind in ("marginal", "conditional"):
+            column = f"sigma_{axis}_{kind}"
+            np.testing.assert_allclose(
+                found.sources[column], expected.sources[column], rtol=AGREEMENT
+            )
+
+
+def test_refit_confirms_the_diagnostics(pair):
+    found, expected = pair
+    for axis in "xy":
+        column = f"standardised_{axis}"
+        np.testing.assert_allclose(
+            found.residuals[column], expected.residuals[column], atol=5e-3, rtol=2e-3
+        )
+    for key in ("chi2_per_dof", "effective_parameters", "mean_error_ra", "normalised_deviation_ra"):
+        assert found.summary[key] == pytest.approx(expected.summary[key], rel=1e-3)
+    assert list(found.calibration["label"]) == list(expected.calibration["label"])
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [FitSettings(order=7), FitSettings(order=6, aberration=False)],
+    ids=["higher-order", "other-model"],
+)
+def test_what_the_fit_did_not_hold_needs_a_refit(fitter, settings):
+    assert fitter.what_if(settings) is None
+
+
+PREPARED = {
+    "lower-order": lambda data: {"order": 5},
+    "lower-order-held": lambda data: {"order": 5, "prior_widths": {"detector_x": 10.0}},
+}
+
+
+@pytest.mark.parametrize("change", PREPARED)
+def test_what_was_made_ready_is_not_linearised_again(
+    change, sample_orbit, sample_fitter, monkeypatch
+):
+    settings = FitSettings(**{"order": 6, **PREPARED[change](sample_orbit)})
+    expected = sample_fitter.what_if(settings)
+    ready = fitted(OrbitFitter(sample_orbit))
+    assert len(list(ready.get_ready(6))) > 4
+
+    def refuse(*_):
+        raise AssertionError("linearised again")
+
+    monkeypatch.setattr("solver.linear.update.accumulate", refuse)
+    found = ready.what_if(settings)
+    step = found.sources["offset_ra"] - expected.sources["offset_ra"]
+    assert np.abs(step / expected.sources["sigma_ra_marginal"]).max() < 1e-3
+    for name in ("sigma_dec_marginal", "chi2"):
+        np.testing.assert_allclose(found.sources[name], expected.sources[name], rtol=1e-3)
+
+
+def test_what_was_interrupted_is_made_ready_later_and_once(orbit):
+    ready = fitted(OrbitFitter(orbit.data, orbit.instrument))
+    next(ready.get_ready(6))
+    rest = len(list(ready.get_ready(6)))
+    assert rest > 0
+    assert list(ready.get_ready(6)) == []
+
+
+def test_lower_order_without_a_term_whose_prior_is_shifted_is_not_made_ready(orbit):
+    fitter = OrbitFitter(orbit.data, orbit.instrument)
+    settings = FitSettings(order=2, prior_shifts={"distortion_x[2/0]": 1.0})
+    fitter.fit(settings)
+    list(fitter.get_ready(2))
+    assert fitter.what_if(settings) is not None
+
+
+def test_every_lower_order_is_made_ready(sample_orbit):
+    """That of which only a fit can tell, too."""
+    asked = [FitSettings(order=order) for order in (4, 1)]
+    ready = fitted(OrbitFitter(sample_orbit))
+    assert ready.what_if(asked[-1]) is None
+    list(ready.get_ready(6))
+    for settings in asked:
+        found, expected = ready.what_if(settings), fit_orbit(sample_orbit, settings=settings)
+        moved = found.sources["offset_ra"] - expected.sources["offset_ra"]
+        assert np.abs(moved / expected.sources["sigma_ra_marginal"]).max() < AGREEMENT
+        assert found.summary["chi2"] == pytest.approx(expected.summary["chi2"], rel=1e-6)
+
+
+def test_lower_order_compiles_nothing(orbit, caplog):
+    def compiled(order):
+        caplog.clear()
+        with jax.log_compiles():
+            fitter.fit(FitSettings(order=order))
+        return [record.args[0] for record in caplog.records if "Compiling" in record.msg]
+
+    fitter = OrbitFitter(orbit.data, orbit.instrument)
+    jax.clear_caches()
+    assert any("derivatives" in name for name in compiled(5))
+    assert compiled(3) == compiled(0) == []
+
+
+def test_orbit_that_was_not_fitted_needs_a_fit(orbit):
+    assert OrbitFitter(orbit.data, orbit.instrument).what_if(FitSettings()) is None
+
+
+def test_change_too_large_for_a_linear_model_needs_a_refit(orbit, fitter):
+    """A distortion of the fifth order that is to be of the fourth: the stars would have to move."""
+    assert fitter.what_if(FitSettings(order=4)) is None
+
+
+@pytest.mark.parametrize(
+    ("steps", "is_solved"),
+    [
+        ((0.7, 1e-4), True),
+        # What is held in the second step follows in the third.
+        ((0.7, 1.5e-3, 8e-3, 1e-5), True),
+        ((0.7, 0.1, 0.05, 1e-4), True),
+        ((0.7, 0.8), False),
+        ((0.7, 1.5e-3, 0.8), False),
+        ((0.7, 1.5e-3, 8e-3, 9e-3), False),
+        ((0.7, 0.6, 0.5, 0.4, 0.3, 1e-4), False),
+    ],
+)
+def test_steps_of_a_nearly_linear_model_become_shorter(orbit, monkeypatch, steps, is_solved):
+    """Of the solution that is given, the last step is below the tolerance."""
+    fitter, taken = fitted(OrbitFitter(orbit.data, orbit.instrument)), iter(steps)
+    monkeypatch.setattr(what_if, "largest_step", lambda *_: (next(taken), "detector x [0]"))
+    found = fitter.what_if(FitSettings(order=6, prior_widths={"sources": 3.0}))
+    assert (found is not None) == is_solved
+
+
+def test_what_if_starts_from_the_fit_and_not_from_another(fitter):
+    before = fitter.what_if(FitSettings(order=6))
+    fitter.what_if(FitSettings(order=6, prior_widths={"sources": 3.0}))
+    after = fitter.what_if(FitSettings(order=6))
+    np.testing.assert_array_equal(before.sources["ra"], after.sources["ra"])
+
+
+LEFT_OUT = {
+    "a-detector": lambda data: Exclusions(detectors=frozenset(first(data, "detector_id"))),
+    "detectors": lambda data: Exclusions(
+        detectors=frozenset(data.measurements["detector_id"].unique().tolist()[:2])
+    ),
+    "a-source": lambda data: Exclusions(frozenset(first(data, "source_id"))),
+    "an-exposure": lambda data: Exclusions(
+        exposures=frozenset([first(data, "field_id", "plate_id")])
+    ),
+    "detector-and-source": lambda data: Exclusions(
+        frozenset(first(data, "source_id")), detectors=frozenset(first(data, "detector_id"))
+    ),
+}
+
+
+@pytest.mark.parametrize("left_out", LEFT_OUT)
+def test_blocks_without_some_measurements_are_those_of_the_others(
+    left_out, orbit, problem, expansion_point
+):
+    """The blocks are sums, so that what is taken out is what would not be added."""
+    equations = accumulate(problem, *expansion_point)
+    fewer = without(LEFT_OUT[left_out](orbit.data), orbit)
+    compare_blocks(update_equations(equations, problem, fewer), fewer)
+
+
+def test_blocks_without_a_detector_are_at_hand(orbit, problem, expansion_point, monkeypatch):
+    equations = accumulate(problem, *expansion_point)
+    monkeypatch.setattr("solver.linear.contribution.accumulate", None)
+    for left_out in ("a-detector", "detectors"):
+        fewer = without(LEFT_OUT[left_out](orbit.data), orbit)
+        assert update_equations(equations, problem, fewer) is not None
+
+
+def test_blocks_without_a_detector_that_saw_what_another_did(orbit):
+    """Where they overlap, both measure a star in one exposure."""
+    table = orbit.data.measurements
+    others = table[table["detector_id"] != first(orbit.data, "detector_id")[0]].head(50)
+    twice = others.assign(detector_id=first(orbit.data, "detector_id")[0])
+    table = pd.concat([table, twice], ignore_index=True)
+    both = orbit._replace(data=replace(orbit.data, measurements=table))
+    problem = build_problem(both.data, orbit.instrument, FitSettings())
+    origin = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
+    equations = accumulate(problem, *origin)
+    fewer = without(LEFT_OUT["a-detector"](orbit.data), both)
+    compare_blocks(update_equations(equations, problem, fewer), fewer)
+
+
+@pytest.mark.parametrize("left_out", [None, "a-detector"])
+def test_blocks_of_a_lower_order_are_those_made_anew(left_out, orbit, problem, expansion_point):
+    """Those between its own terms too, which are taken from the higher order."""
+    settings = FitSettings(order=problem.order - 1, prior_shifts={"detector_x": 1.0})
+    exclusions = LEFT_OUT[left_out](orbit.data) if left_out else Exclusions()
+    lower = without(exclusions, orbit, settings)
+    compare_blocks(update_equations(accumulate(problem, *expansion_point), problem, lower), lower)
+
+
+def test_blocks_between_the_terms_of_a_lower_order_are_at_hand(
+    orbit, problem, expansion_point, monkeypatch
+):
+    equations = accumulate(problem, *expansion_point)
+    monkeypatch.setattr("solver.linear.normal_equations._add_coefficients", None)
+    lower = without(Exclusions(), orbit, FitSettings(order=problem.order - 1))
+    assert update_equations(equations, problem, lower) is not None
+
+
+def without(exclusions, orbit, settings=None):
+    return build_problem(
+        exclusions.without(orbit.data), orbit.instrument, settings or FitSettings()
+    )
+
+
+def compare_blocks(found, problem):
+    expected = accumulate(problem, *found.at)
+    for name in ("theta", "source", "cross"):
+        values = getattr(expected, name)
+        np.testing.assert_allclose(getattr(found, name), values, atol=1e-9 * np.abs(values).max())
+    for part, values in zip(found.gradient, expected.gradient, strict=True):
+        np.testing.assert_allclose(part, values, rtol=1e-6, atol=1e-6 * np.abs(values).max())
+
+
+def test_more_measurements_cannot_be_carried_over(problem, expansion_point):
+    measurements = replace(problem.measurements, label=problem.measurements.label + 1)
+    fewer = replace(problem, measurements=measurements)
+    assert update_equations(accumulate(problem, *expansion_point), problem, fewer) is None

@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+from scipy import stats
+
+from solver.data.settings import FitSettings
+from solver.linear.leverage import covariances, residuals
+from solver.linear.normal_equations import accumulate
+from solver.linear.source_elimination import eliminate_sources
+from solver.problem.problem import build_problem
+from solver.results.diagnostics import effective_parameters
+
+
+@pytest.fixture
+def at_point(problem, reduced, expansion_point):
+    return residuals(problem, *expansion_point, covariances(reduced))
+
+
+@pytest.fixture(scope="package")
+def hat(dense):
+    """The 2 x 2 leverage of every measurement, from the dense posterior."""
+    jacobian = dense.jacobian.reshape(-1, 2, dense.jacobian.shape[1])
+    return jacobian @ dense.covariance @ np.swapaxes(jacobian, 1, 2)
+
+
+def test_covariances_are_the_dense_ones(reduced, dense, problem):
+    found, n = covariances(reduced), dense.n_calib
+    sigma = np.sqrt(np.diag(dense.covariance))
+    theta = dense.covariance[:n, :n] / np.outer(sigma[:n], sigma[:n])
+    np.testing.assert_allclose(found.theta / np.outer(sigma[:n], sigma[:n]), theta, atol=1e-8)
+    scale = sigma[:n, None, None]
+    cross = dense.covariance[:n, n:].reshape(n, problem.n_src, 2).swapaxes(1, 2) / scale
+    in_order = found.cross[:, :, found.source_blocks.position]
+    np.testing.assert_allclose(in_order / scale, cross, atol=1e-8 * sigma[n:].max())
+
+
+def test_leverage_is_the_dense_one(at_point, hat):
+    np.testing.assert_allclose(at_point.trace, np.trace(hat, axis1=1, axis2=2), atol=1e-8)
+
+
+def test_leverage_lies_between_nothing_and_two(at_point):
+    assert (at_point.trace > 0.0).all()
+    assert (at_point.trace < 2.0).all()
+
+
+def test_leverages_add_up_to_the_effective_parameters(at_point, problem, reduced, expansion_point):
+    prior_hessian = problem.priors.hessian_diagonal(expansion_point[0])
+    expected = effective_parameters(problem.priors, prior_hessian, covariances(reduced))
+    assert at_point.trace.sum() == pytest.approx(expected, rel=1e-8)
+
+
+def test_whitened_residuals_are_the_dense_ones(at_point, dense):
+    np.testing.assert_allclose(at_point.whitened.ravel(), dense.residual, atol=1e-6)
+
+
+def test_standardised_residuals_are_freed_of_the_dense_leverage(at_point, dense, hat):
+    whitened = dense.residual.reshape(-1, 2)
+    values, vectors = np.linalg.eigh(np.eye(2) - hat)
+    root = vectors @ (values[:, :, None] ** -0.5 * np.swapaxes(vectors, 1, 2))
+    expected = (root @ whitened[:, :, None])[:, :, 0]
+    usable = values.min(axis=1) > 1e-4
+    assert usable.mean() > 0.9
+    np.testing.assert_allclose(at_point.standardised[usable], expected[usable], atol=1e-5)
+
+
+def test_standardised_residuals_scatter_by_one(mocks):
+    values = np.concatenate([s.residuals.standardised.ravel() for _, s in mocks])
+    # They are correlated within an orbit, by which only the spread's own error grows.
+    limit = 4.0 / np.sqrt(2.0 * len(values) / 2.0)
+    assert np.std(values) == pytest.approx(1.0, abs=limit)
+
+
+def test_whitened_residuals_scatter_by_less(mocks):
+    values = np.concatenate([s.residuals.whitened.ravel() for _, s in mocks])
+    expected = np.mean([(2.0 - s.residuals.trace).mean() for _, s in mocks]) / 2.0
+    assert np.mean(values**2) == pytest.approx(expected, rel=4.0 * np.sqrt(2.0 / len(values)))
+    assert np.std(values) < 0.95
+
+
+def test_expected_chi2_is_that_of_the_mocks(mocks):
+    """Sum over the mocks of chi2 and of 2 n_obs less the leverage."""
+    chi2 = sum((s.residuals.whitened**2).sum() for _, s in mocks)
+    dof = sum((2.0 - s.residuals.trace).sum() for _, s in mocks)
+    assert stats.chi2(dof).cdf(chi2) == pytest.approx(0.5, abs=0.499)
+
+
+def test_measurement_that_decides_its_own_prediction_has_no_standardised_residual(small_orbit):
+    """A source measured once and all but free otherwise: its residual is nothing but rounding."""
+    settings = FitSettings(prior_widths={"sources": 1e5})
+    problem = build_problem(small_orbit.data, small_orbit.instrument, settings)
+    rows = np.bincount(problem.measurements.index.source, minlength=problem.n_src)
+    free = ~problem.sources["is_reference"].to_numpy(bool)
+    alone = np.flatnonzero((rows == 1) & free)
+    assert len(alone) > 0
+    theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
+    reduced = at_origin(problem, theta, sources)
+    found = residuals(problem, theta, sources, covariances(reduced))
+    here = np.isin(problem.measurements.index.source, alone)
+    assert np.isnan(found.standardised[here]).all()
+    assert np.isfinite(found.standardised[~here]).all()
+    np.testing.assert_allclose(found.trace[here], 2.0, atol=1e-5)
+
+
+def test_leverage_rounded_above_one_leaves_no_standardised_residual(
+    problem, reduced, expansion_point, hat
+):
+    """As if all covariances were too large; both axes above one have a positive determinant."""
+    found = covariances(reduced)
+    parts = ("source", "theta", "cross")
+    tripled = found._replace(**{name: 3.0 * getattr(found, name) for name in parts})
+    found = residuals(problem, *expansion_point, tripled)
+    above = np.linalg.eigvalsh(3.0 * hat).min(axis=1) > 1.0
+    assert above.any()
+    assert np.isnan(found.standardised[above]).all()
+
+
+def at_origin(problem, theta, sources):
+    return eliminate_sources(accumulate(problem, theta, sources), problem.priors)

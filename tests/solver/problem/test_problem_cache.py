@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+
+from solver.data.exclusions import Exclusions
+from solver.data.settings import FitSettings
+from solver.problem.priors import Priors
+from solver.problem.problem import build_problem
+from solver.problem.problem_cache import ProblemCache
+
+DEFAULT = FitSettings(order=3)
+
+
+@pytest.fixture
+def selection(small_orbit):
+    return ProblemCache(small_orbit.data, small_orbit.instrument)
+
+
+def without(orbit, rank):
+    ids = np.unique(orbit.data.measurements["source_id"])
+    return FitSettings(order=3, exclusions=Exclusions(sources=frozenset([int(ids[rank])])))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        FitSettings(order=2),
+        FitSettings(order=4),
+        FitSettings(order=3, prior_widths={"sources": 3.0, "detector_x": 7.0}),
+        FitSettings(order=3, prior_shifts={"detector_x[1]": 5.0, "focal_length": 1.0}),
+        FitSettings(order=3, aberration=False),
+    ],
+    ids=["lower", "higher", "widths", "centres", "aberration"],
+)
+def test_problem_of_the_same_measurements_is_as_if_built_from_the_tables(
+    selection, small_orbit, settings
+):
+    _, first = selection.choose(DEFAULT)
+    data, found = selection.choose(settings)
+    assert data is small_orbit.data
+    assert found.measurements is first.measurements
+    expected = build_problem(data, small_orbit.instrument, settings)
+    for name in ("order", "layout", "epoch"):
+        assert getattr(found, name) == getattr(expected, name)
+    for name in Priors._fields:
+        values = getattr(expected.priors, name)
+        np.testing.assert_array_equal(getattr(found.priors, name), values, err_msg=name)
+    np.testing.assert_array_equal(found.geometry.source_frame, expected.geometry.source_frame)
+    np.testing.assert_array_equal(found.geometry.velocity, expected.geometry.velocity)
+    for name, values in expected.geometry.origin.items():
+        np.testing.assert_array_equal(found.geometry.origin[name], values, err_msg=name)
+    assert len(found.source_blocks.blocks) == len(expected.source_blocks.blocks)
+    for part, other in zip(found.source_blocks.blocks, expected.source_blocks.blocks, strict=True):
+        assert part.places == other.places
+        np.testing.assert_array_equal(part.columns, other.columns)
+
+
+def test_what_leaves_out_something_else_is_chosen_anew(selection, small_orbit):
+    settings = [DEFAULT, *(without(small_orbit, rank) for rank in range(3))]
+    settings.append(FitSettings(order=3, thin=2))
+    for chosen in settings:
+        data, problem = selection.choose(chosen)
+        expected = build_problem(
+            chosen.exclusions.without(small_orbit.data), small_orbit.instrument, chosen
+        )
+        if chosen.thin == 1:
+            np.testing.assert_array_equal(problem.measurements.label, expected.measurements.label)
+        else:
+            assert problem.n_obs < expected.n_obs
+        np.testing.assert_array_equal(
+            np.sort(data.measurements.index), np.sort(problem.measurements.label)
+        )
+
+
+def test_outliers_of_one_fit_are_not_taken_for_those_of_another(selection, small_orbit):
+    rows = small_orbit.data.measurements
+    _, none = selection.choose(DEFAULT)
+    for outliers in (rows.iloc[:3], rows.iloc[3:4]):
+        _, problem = selection.choose(DEFAULT, outliers)
+        left = rows.index.difference(outliers.index)
+        np.testing.assert_array_equal(np.sort(problem.measurements.label), left)
+    _, again = selection.choose(DEFAULT)
+    assert again.n_obs == none.n_obs == len(rows)
+
+
+def test_only_the_last_choices_are_kept(selection, small_orbit):
+    _, first = selection.choose(DEFAULT)
+    _, second = selection.choose(without(small_orbit, 0))
+    assert selection.choose(DEFAULT)[1].measurements is first.measurements
+    _, third = selection.choose(without(small_orbit, 1))
+    assert selection.choose(without(small_orbit, 1))[1].measurements is third.measurements
+    assert selection.choose(without(small_orbit, 0))[1].measurements is second.measurements
+    assert selection.choose(DEFAULT)[1].measurements is not first.measurements

@@ -1,0 +1,252 @@
+"""Choosing the order of the distortion, against a dense posterior and a known truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.data.exclusions import of_rows
+from solver.data.settings import MAX_ORDER, FitSettings
+from solver.engines.gauss_newton import find_mode
+from solver.errors import CancelledError
+from solver.fit import OrbitFitter, fit_orbit
+from solver.model.distortion import terms
+from solver.problem.parameter_vector import VectorLayout
+from solver.problem.problem import build_problem, orders_held
+from solver.results.diagnostics import log_evidence
+from solver.results.orders import at_order, compare_orders, judge_reserved, reserved_sources
+from tests.solver.small_orbit import make_orbit
+
+TRUE_ORDER = 5
+# One needless order; those above cost compilations and say the same.
+HIGHEST = 6
+# An orbit near its nominal calibration, and priors so narrow that a covariance of its data has
+# all digits.
+NEAR = {"scatter": 0.01, "pointing_error": 0.1}
+EXACT = FitSettings(
+    prior_widths={
+        **{"pointing_ra": 0.1, "pointing_dec": 0.1, "position_angle": 0.1, "focal_length": 1e-5},
+        **{"detector_x": 1.0, "detector_y": 1.0, "detector_rotation": 3.0},
+        **{"pitch_x": 1e-4, "pitch_y": 1e-4},
+    },
+    tolerance=1e-7,
+)
+
+
+@pytest.fixture(scope="module")
+def orders():
+    """An orbit whose distortion is of the fifth order, compared up to the sixth."""
+    orbit = make_orbit()
+    settings = FitSettings(order=HIGHEST)
+    return compare_orders(build_problem(orbit.data, orbit.instrument, settings), settings)
+
+
+@pytest.mark.slow
+def test_every_order_is_there_and_has_converged(orders):
+    assert orders["order"].tolist() == list(range(HIGHEST + 1))
+    assert orders["n_terms"].tolist() == [2 * len(terms(n)) for n in range(HIGHEST + 1)]
+    assert orders["converged"].all()
+
+
+@pytest.mark.slow
+def test_evidence_and_reserved_sources_choose_the_true_order(orders):
+    assert int(orders["log_evidence"].argmax()) == TRUE_ORDER
+    assert int(orders["held_out_log_density"].argmax()) == TRUE_ORDER
+
+
+@pytest.mark.slow
+def test_chi2_of_the_reserved_sources_falls_to_the_true_order_and_stays(orders):
+    ratio = (orders["held_out_chi2"] / orders["held_out_dof"]).to_numpy()
+    scatter = np.sqrt(2.0 / orders["held_out_dof"].iloc[0])
+    assert ratio[TRUE_ORDER] == pytest.approx(1.0, abs=3.0 * scatter)
+    assert (ratio[:TRUE_ORDER] > 1.0 + 10.0 * scatter).all()
+    np.testing.assert_allclose(ratio[TRUE_ORDER:], ratio[TRUE_ORDER], atol=2.0 * scatter)
+
+
+@pytest.mark.slow
+def test_chi2_of_all_can_only_fall_with_the_order(orders):
+    """Nearly: what the priors of new terms add is no part of it."""
+    assert (np.diff(orders["chi2"].to_numpy()) < 1.0).all()
+
+
+@pytest.mark.slow
+def test_effective_parameters_grow_with_the_terms_and_by_no_more(orders):
+    grown = np.diff(orders["effective_parameters"].to_numpy())
+    assert (grown[TRUE_ORDER:] > 0.0).all()
+    assert (grown <= np.diff(orders["n_terms"]) + 1e-3).all()
+
+
+@pytest.mark.slow
+def test_orders_without_terms_are_the_same(orders):
+    first, second = (orders.drop(columns="order").iloc[n] for n in (0, 1))
+    assert first.equals(second)
+
+
+@pytest.mark.slow
+def test_figures_are_those_of_a_fit_of_that_order(orders, result):
+    """In which the terms above are not there, rather than held at zero."""
+    row = orders.iloc[TRUE_ORDER]
+    for name in ("chi2", "dof", "effective_parameters"):
+        assert row[name] == pytest.approx(result.summary[name], rel=1e-5)
+    assert row["log_evidence"] == pytest.approx(result.summary["log_evidence"], abs=0.01)
+
+
+class LinearModel:
+    """The linear model of a problem at its mode, with the sources and all else integrated out.
+
+    `mean` and `covariance` are those of the whitened data, in working order; a model without
+    the calibration's and the sources' posterior, and without any elimination.
+    """
+
+    def __init__(self, problem, make_dense, settings):
+        mode = find_mode(problem, settings)
+        self.mode = find_mode(problem, settings, start=mode)
+        dense = make_dense(problem, self.mode.theta, self.mode.sources)
+        n, jacobian = dense.n_calib, dense.jacobian
+        prior = np.zeros_like(dense.prior)
+        prior[:n, :n] = np.diag(problem.priors.width**2)
+        prior[n:, n:] = np.linalg.inv(dense.prior[n:, n:])
+        point = np.concatenate([self.mode.theta, self.mode.sources.ravel()])
+        self.data = dense.residual + jacobian @ point
+        self.covariance = np.eye(len(self.data)) + jacobian @ prior @ jacobian.T
+
+    def log_density(self, sigma):
+        """Return the log density of the data, in pixels."""
+        _, log_det = np.linalg.slogdet(self.covariance)
+        chi2 = self.data @ np.linalg.solve(self.covariance, self.data)
+        return -0.5 * (chi2 + log_det + sigma.size * np.log(2 * np.pi)) - np.log(sigma).sum()
+
+    def prediction(self, held, sigma):
+        """Return chi2 and log density of some data given the others."""
+        rest = ~held
+        cross = self.covariance[np.ix_(held, rest)]
+        gain = np.linalg.solve(self.covariance[np.ix_(rest, rest)], cross.T).T
+        left = self.data[held] - gain @ self.data[rest]
+        spread = self.covariance[np.ix_(held, held)] - gain @ cross.T
+        _, log_det = np.linalg.slogdet(spread)
+        chi2 = left @ np.linalg.solve(spread, left)
+        count = held.sum() * np.log(2 * np.pi)
+        return chi2, -0.5 * (chi2 + log_det + count) - np.log(sigma.ravel()[held]).sum()
+
+
+@pytest.fixture(scope="module", params=[3, TRUE_ORDER], ids=["too-low", "true"])
+def linear(request, make_dense):
+    """A problem of some order out of one of the fifth, all its priors normal, and its model."""
+    orbit = make_orbit(max_degree=TRUE_ORDER, **NEAR)
+    whole = build_problem(orbit.data, orbit.instrument, EXACT)
+    normal = whole.priors._replace(is_gamma=np.zeros_like(whole.priors.is_gamma))
+    problem = at_order(replace(whole, priors=normal), request.param)
+    return problem, LinearModel(problem, make_dense, EXACT)
+
+
+def test_evidence_is_the_density_of_the_data(linear):
+    """With every normalisation of every prior, to the last digits of a number of thousands."""
+    problem, model = linear
+    log_sigma = float(np.log(problem.measurements.sigma).sum())
+    found = log_evidence(model.mode, problem.priors, log_sigma, problem.measurements.sigma.size)
+    assert found == pytest.approx(model.log_density(problem.measurements.sigma), abs=1e-6)
+
+
+def test_reserved_sources_are_judged_by_their_predictive_density(linear):
+    problem, model = linear
+    reserved = reserved_sources(problem)
+    found = judge_reserved(problem, model.mode, reserved, EXACT)
+    held = np.repeat(reserved[problem.measurements.index.source], 2)
+    chi2, log_density = model.prediction(held, problem.measurements.sigma)
+    assert found.dof == held.sum()
+    assert found.chi2 == pytest.approx(chi2, rel=1e-4)
+    assert found.log_density == pytest.approx(log_density, abs=1e-2)
+
+
+def test_a_tenth_of_the_sources_that_are_no_reference_is_reserved(problem):
+    reserved = reserved_sources(problem)
+    is_reference = problem.sources["is_reference"].to_numpy(bool)
+    assert reserved.sum() == np.ceil(0.1 * (~is_reference).sum())
+    assert not (reserved & is_reference).any()
+    np.testing.assert_array_equal(reserved, reserved_sources(problem))
+
+
+def test_without_sources_to_reserve_the_evidence_alone_is_left(problem):
+    everyone = replace(problem, sources=problem.sources.assign(is_reference=True))
+    reserved = reserved_sources(everyone)
+    found = judge_reserved(everyone, find_mode(problem, FitSettings()), reserved, FitSettings())
+    assert found.dof == 0
+    assert np.isnan([found.chi2, found.log_density]).all()
+
+
+@pytest.mark.parametrize(
+    ("spare", "highest"), [(1, 0), (7, 2), (37, 5), (1000, MAX_ORDER)], ids=str
+)
+def test_orders_that_the_data_hold_leave_a_coordinate_to_spare(spare, highest):
+    layout, n_src = VectorLayout(8, len(terms(4)), 4), 51
+    bare = 2 * n_src + layout.size - 2 * layout.n_coef
+    n_obs = (bare + spare + 1) // 2
+    assert max(orders_held(n_obs, n_src, layout), default=-1) == max(highest, highest == 0)
+
+
+@pytest.fixture(scope="module")
+def short_orbit():
+    """Two exposures without distortion, which hold as many orders as are compiled here anyway."""
+    orbit = make_orbit(max_degree=1)
+    rows = orbit.data.measurements
+    kept = rows["field_id"].eq(0) & rows["plate_id"].le(1)
+    return orbit._replace(data=of_rows(orbit.data, kept.to_numpy()))
+
+
+COMPARED = FitSettings(order=HIGHEST, compare_orders=True)
+
+
+@pytest.fixture(scope="module")
+def fitter(short_orbit):
+    return OrbitFitter(short_orbit.data, short_orbit.instrument)
+
+
+@pytest.fixture(scope="module")
+def compared(fitter):
+    return fitter.fit(COMPARED)
+
+
+@pytest.mark.slow
+def test_orders_that_the_data_cannot_hold_are_left_out(compared):
+    assert compared.orders["order"].tolist() == list(range(HIGHEST + 1))
+
+
+@pytest.mark.slow
+def test_the_fit_itself_is_that_without_a_comparison(short_orbit, compared):
+    alone = fit_orbit(short_orbit.data, short_orbit.instrument, FitSettings(order=HIGHEST))
+    assert alone.orders is None
+    assert compared.sources.equals(alone.sources)
+    without_times = {**compared.summary, "seconds": {}}
+    assert without_times == {**alone.summary, "seconds": {}}
+    assert set(compared.summary["seconds"]) - set(alone.summary["seconds"]) == {"orders"}
+
+
+@pytest.mark.slow
+def test_a_change_of_the_order_alone_keeps_the_comparison(fitter, compared):
+    changed = fitter.what_if(COMPARED.with_(order=5))
+    assert changed.orders.equals(compared.orders)
+
+
+@pytest.mark.slow
+def test_any_other_change_has_no_comparison(fitter, compared):
+    assert compared.orders is not None
+    changed = fitter.what_if(COMPARED.with_(prior_widths={"distortion_x": 0.5}))
+    assert changed is not None
+    assert changed.orders is None
+
+
+def test_a_flat_prior_of_the_distortion_leaves_the_predictions_alone(short_orbit):
+    flat = FitSettings(order=HIGHEST, prior_widths={"distortion_y": np.inf})
+    problem = build_problem(short_orbit.data, short_orbit.instrument, flat)
+    orders = compare_orders(problem, flat)
+    assert orders["log_evidence"].isna().all()
+    assert orders["held_out_log_density"].notna().all()
+
+
+def test_comparison_can_be_cancelled(short_orbit):
+    def cancel(row):
+        raise CancelledError("now")
+
+    problem = build_problem(short_orbit.data, short_orbit.instrument, COMPARED)
+    with pytest.raises(CancelledError):
+        compare_orders(problem, COMPARED, cancel)

@@ -11,13 +11,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 
-from plateviz.runs.queries import SurveyRun, open_run
-from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from plateviz.runs.fit_survey import fit_survey
+from plateviz.runs.queries import SurveyRun, open_run
 from plateviz.runs.survey_tables import survey_tables
-from solver.io.survey import measurement_path, read_survey_table, write_survey_table
+from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from solver.data.schema import MEASUREMENT
 from solver.data.settings import FitSettings
+from solver.io.survey import measurement_path, read_survey_table, write_survey_table
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey

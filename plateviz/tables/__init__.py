@@ -25,6 +25,7 @@ from plateviz.tables.prior_separation import prior_separation, prior_separation_
 from plateviz.tables.prior_shares import prior_shares
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
 from plateviz.tables.reference_scatter import reference_scatter, scatter_cells
+from plateviz.tables.reproduction import reproduction
 from plateviz.tables.residuals import (
     ScatterStatistics,
     binned_vectors,
@@ -97,6 +98,7 @@ __all__ = [
     "pull_bins",
     "pull_histogram",
     "reference_scatter",
+    "reproduction",
     "residual_map",
     "residual_scatter",
     "run_strip",

@@ -1,8 +1,8 @@
-"""Results as tidy tables, one function per figure; all numbers on the screen come from here.
+"""Results as tidy tables, one function per figure: the source of every displayed number.
 
 Imports `solver` only. The truth is a frame with `source_id`, `ra` and `dec` (deg, direction at
-the mean epoch of the orbit, without aberration), or None; a table that needs the truth is empty
-without it.
+the mean epoch of the orbit, without aberration), or None. A table that needs the truth is empty
+if it is None.
 """
 
 from plateviz.tables.calibration import calibration_tables, distortion

@@ -1,4 +1,4 @@
-"""Offsets between sky positions, and the sky positions of places on the focal plane."""
+"""Offsets between sky positions, and sky positions of points on the focal plane."""
 
 import numpy as np
 import pandas as pd
@@ -21,11 +21,11 @@ def offsets_deg(
 
     Returns
     -------
-    deg, with the cosine of `dec`; differences are taken before anything is scaled
+    deg, with the cosine of `dec`; the differences are taken before they are scaled
     """
     difference = np.asarray(ra) - ra_0
-    # Whole turns are removed by subtraction, which keeps a difference near zero exact;
-    # the usual (x + 180) % 360 - 180 would round it to the precision of 180 deg.
+    # Subtracting whole turns keeps a difference near zero exact; the usual
+    # (x + 180) % 360 - 180 would round it to the precision of 180 deg.
     difference = difference - 360.0 * np.round(difference / 360.0)
     return difference * np.cos(np.radians(dec)), np.asarray(dec) - dec_0
 
@@ -47,7 +47,7 @@ def offsets_arcmin(
 
 
 def mean_direction(ra: np.ndarray, dec: np.ndarray) -> tuple[float, float]:
-    """Return the direction of the mean of unit vectors, deg; (0, 0) for no direction."""
+    """Return the direction of the mean unit vector, deg; (0, 0) for empty arrays."""
     if len(ra) == 0:
         return 0.0, 0.0
     mean = tangent_frame(ra, dec)[:, 0].mean(axis=0, keepdims=True)
@@ -55,7 +55,7 @@ def mean_direction(ra: np.ndarray, dec: np.ndarray) -> tuple[float, float]:
 
 
 def sky_of_focal_plane(ideal_um: np.ndarray, pointing: pd.Series) -> tuple[np.ndarray, np.ndarray]:
-    """Return the directions seen at places of the ideal focal plane of one exposure.
+    """Return the sky positions of points on the ideal focal plane of one exposure.
 
     Parameters
     ----------

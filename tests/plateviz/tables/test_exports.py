@@ -8,7 +8,7 @@ import pandas as pd
 
 from plateviz import tables
 
-# Helpers that change a table made elsewhere.
+# Helpers that modify a given table.
 SHARED = {"in_words", "ordered_by_class"}
 
 

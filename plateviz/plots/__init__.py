@@ -1,8 +1,8 @@
 """Figures: pure functions from the tables of `plateviz.tables` to HoloViews objects.
 
 Imports `plateviz.tables`. Every `plot_<noun>(table, *, options)` of a module in this folder is
-exported here. It returns an object for the Bokeh backend, an empty and titled one for an empty
-table. Dashboard, notebooks and reports share them.
+exported here. It returns an object for the Bokeh backend; for an empty table, an empty figure with
+a title. Dashboard, notebooks and reports share them.
 """
 
 import importlib

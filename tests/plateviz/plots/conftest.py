@@ -1,4 +1,4 @@
-"""Every plot with a table to draw, and its figures."""
+"""Every plot with an example table, and its Bokeh figures."""
 
 import functools
 
@@ -95,7 +95,7 @@ def survey_drawings(survey, errors_by_count):
 
 @pytest.fixture(scope="module")
 def drawings(orbit_drawings, survey_drawings):
-    """Return the same of all plots."""
+    """Return name -> (draw, table) of all plots."""
     return {**orbit_drawings, **survey_drawings}
 
 

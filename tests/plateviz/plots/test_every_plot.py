@@ -1,4 +1,4 @@
-"""What holds for every plot: titles, units, themes, exact ids, hovers that find their column."""
+"""Properties of every plot: titles, units, themes, exact ids, columns of the hovers."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ from bokeh.models import ColumnDataSource, HoverTool
 
 from plateviz import plots
 from plateviz.plots.theme import THEMES
-from tests.plateviz.plots.drawn import figures_of, sources_of, subtitle_of, titles_of, words_of
+from tests.plateviz.plots.drawn import figures_of, sources_of, subtitle_of, texts_of, titles_of
 
 _LABELLED_UNIT = re.compile(
     r"\(.+\)|per bin|χ² / dof|expected scatter|iteration|in order|N$|σ of A$|"
@@ -57,18 +57,18 @@ def test_every_figure_of_a_survey_has_a_title_and_a_subtitle(figures, name):
 
 
 @with_every_plot
-def test_empty_table_gives_a_titled_figure_that_says_why(drawings, name):
+def test_empty_table_gives_a_titled_figure_with_a_reason(drawings, name):
     draw, table = drawings[name]
     for figure in figures_of(draw(table.head(0))):
-        (words,) = words_of(figure)
+        (text,) = texts_of(figure)
         assert figure.title.text
         assert figure.xaxis.axis_label
-        assert words.startswith("No ")
+        assert text.startswith("No ")
 
 
 @with_every_plot
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_every_word_has_the_colours_of_the_theme(figures, name, theme):
+def test_text_has_the_colours_of_the_theme(figures, name, theme):
     colours = THEMES[theme]
     for figure in figures(name, theme):
         assert figure.background_fill_color == figure.border_fill_color == colours.background
@@ -91,7 +91,7 @@ def test_fonts_are_11_to_13_pixels(figures, name):
 
 @with_every_plot
 def test_no_figure_is_drawn_by_webgl(figures, name):
-    """Which loses the points of a figure that replaces another on a page that stays."""
+    """WebGL loses the points of a figure that replaces another on an open page."""
     assert {figure.output_backend for figure in figures(name)} == {"canvas"}
 
 
@@ -122,7 +122,7 @@ def test_ids_reach_the_browser_as_exact_text(figures, name, fit_result, survey):
 
 
 @with_every_survey_plot
-def test_a_table_is_drawn_alike_twice(drawings, name):
+def test_drawing_a_table_twice_gives_equal_figures(drawings, name):
     draw, table = drawings[name]
     first, second = (
         [str(s.data) for f in figures_of(draw(table)) for s in sources_of(f)] for _ in range(2)

@@ -1,4 +1,4 @@
-"""Figures of a survey and of its sources: what each draws."""
+"""Contents of the plots of a survey and of its sources."""
 
 import holoviews as hv
 import numpy as np

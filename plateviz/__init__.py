@@ -1,7 +1,7 @@
 """plateviz: run Plate Analysis on an orbit, and see whether to trust the solution.
 
 In a notebook, `plateviz.open` opens a survey, an orbit or a solution, and `plateviz.simulate`
-makes a survey. Importing this costs nothing: public names load on first use.
+simulates a survey. The import is fast: public names load on first use.
 """
 
 import importlib

@@ -1,4 +1,4 @@
-"""Where plateviz keeps what it can make again."""
+"""The user's cache directory, and JAX's compilation cache in it."""
 
 import os
 from pathlib import Path
@@ -12,10 +12,10 @@ def cache_directory() -> Path:
 
 
 def keep_compilations() -> None:
-    """Let JAX keep what it compiles between processes; call before JAX is imported.
+    """Make JAX store compiled code in the cache directory; call before JAX is imported.
 
-    Compiling the model takes some seconds, reading it back a tenth of one. A user's own
-    setting of the same variables is left alone.
+    Compiling the model takes some seconds, reading it back a tenth of one. Values that the
+    user has set for the same environment variables are kept.
     """
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(cache_directory() / "compiled"))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.3")

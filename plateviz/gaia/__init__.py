@@ -1,4 +1,4 @@
-"""Stars of Gaia DR3: one query of the archive, kept in the cache with its date.
+"""Stars of Gaia DR3: one query of the archive, cached with its date.
 
 Imports `plateviz.cache` and `solver`.
 """

@@ -1,4 +1,4 @@
-"""Stars of Gaia DR3 for the simulator: asked for once, then kept with the query."""
+"""Stars of Gaia DR3 for the simulator: fetched once, then cached with the query."""
 
 import hashlib
 from collections.abc import Callable
@@ -23,12 +23,12 @@ from solver.simulate.gaia import GAIA
 from solver.simulate.settings import SurveySettings
 from solver.simulate.sky import galactic_to_icrs
 
-# The archive gives nobody more without a log-in; a field with as many is cut off.
+# The archive's row limit without a log-in; an answer with as many rows is truncated.
 MOST_STARS = 3_000_000
 _WHOLE_TURN_DEG = 360.0
 _LARGEST_CIRCLE_DEG = 90.0
 
-# What is fetched: what the simulator takes, and the magnitude for people.
+# The fetched columns: those that the simulator uses, and the magnitude for information.
 ARCHIVE = columns.Table(
     "gaia_source",
     (
@@ -41,12 +41,12 @@ ARCHIVE = columns.Table(
 
 @dataclass(frozen=True)
 class StarQuery:
-    """Which stars to ask for.
+    """The selection of stars to fetch.
 
     Attributes
     ----------
-    l_deg, b_deg : limits in Galactic longitude, which may run through zero, and latitude
-    parallax_over_error : what the parallax exceeds, in units of its error
+    l_deg, b_deg : limits in Galactic longitude, which may include zero, and latitude
+    parallax_over_error : lower limit of the parallax over its error
     """
 
     l_deg: tuple[float, float]
@@ -54,7 +54,7 @@ class StarQuery:
     parallax_over_error: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no field on the sky; `InputError` says what is wrong."""
+        """Raise InputError if the limits are not a field on the sky."""
         for name, (low, high) in (("l", self.l_deg), ("b", self.b_deg)):
             if not low < high or not np.isfinite([low, high]).all():
                 raise InputError(f"--{name}: expected limits from low to high, found {low} {high}")
@@ -68,7 +68,7 @@ class StarQuery:
 
     @property
     def query(self) -> str:
-        """The selection in ADQL, on one line; the same selection gives the same words."""
+        """The selection in ADQL, on one line; equal selections give equal text."""
         conditions = [*self._circle(), self._longitudes()]
         conditions += [
             f"b BETWEEN {self.b_deg[0]:.10g} AND {self.b_deg[1]:.10g}",
@@ -82,15 +82,15 @@ class StarQuery:
     def _longitudes(self) -> str:
         if self.l_deg[1] - self.l_deg[0] >= _WHOLE_TURN_DEG:
             return ""
-        # The archive counts from 0 to 360.
+        # Longitudes of the archive are from 0 to 360.
         low, high = (limit % _WHOLE_TURN_DEG for limit in self.l_deg)
         joint = "AND" if low < high else "OR"
         return f"(l >= {low:.10g} {joint} l <= {high:.10g})"
 
     def _circle(self) -> list[str]:
-        """Return a circle about the field: services find stars by an index of circles."""
+        """Return a circle that contains the field, because services index circles."""
         halves = [(high - low) / 2.0 for low, high in (self.l_deg, self.b_deg)]
-        # Along a meridian, then along a parallel, no corner is farther.
+        # The path along a meridian and then a parallel is at least as long as to any corner.
         radius = sum(halves)
         if radius > _LARGEST_CIRCLE_DEG:
             return []
@@ -117,7 +117,7 @@ def star_query(
     b_deg: tuple[float, float] | None = None,
     parallax_over_error: float | None = None,
 ) -> StarQuery:
-    """Return a selection; what is not given is that of the mini-mock's extended field."""
+    """Return a selection; the defaults are those of the mini-mock's extended field."""
     survey = SurveySettings()
     margin = survey.field_margin_deg
     extended = [
@@ -131,18 +131,18 @@ def star_query(
 
 
 def fetch_stars(chosen: StarQuery, url: str | None = None, refresh: bool = False) -> Stars:
-    """Return the stars of a selection, from the user's cache where they are in it.
+    """Return the stars of a selection, from the user's cache if they are in it.
 
     Parameters
     ----------
     url : address of a TAP service with the table gaiadr3.gaia_source; Gaia's by default
-    refresh : ask again even so
+    refresh : query the service even if the stars are in the cache
 
     Raises
     ------
     InputError
-        If the service cannot be asked, its answer is not whole or not of such a table, or
-        the cache cannot be written.
+        If the query fails, its answer is truncated or lacks columns, or the cache cannot be
+        written.
     """
     kept = cached_file(chosen, url)
     if kept.is_file() and not refresh and (table := _read(kept)) is not None:
@@ -150,7 +150,7 @@ def fetch_stars(chosen: StarQuery, url: str | None = None, refresh: bool = False
     try:
         kept.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{kept.parent}: expected to make the folder, found: {error}") from error
+        raise InputError(f"{kept.parent}: expected to create the folder, found: {error}") from error
     require_writable(kept)
     table = _fetch(chosen.query, url)
     write_stars(table, kept)
@@ -158,13 +158,13 @@ def fetch_stars(chosen: StarQuery, url: str | None = None, refresh: bool = False
 
 
 def cached_file(chosen: StarQuery, url: str | None = None) -> Path:
-    """Return where the stars of a selection are kept; the file need not exist."""
+    """Return the cache file of a selection; it need not exist."""
     digest = hashlib.sha256(f"{url or ''}\n{chosen.query}".encode()).hexdigest()
     return cache_directory() / "gaia" / f"{digest[:32]}.parquet"
 
 
 def require_format(path: Path) -> None:
-    """Raise InputError unless stars can be written to `path`, now and in its format."""
+    """Raise InputError if `path` is not writable or its suffix is not a known format."""
     if path.suffix.lower() not in _WRITERS:
         raise InputError(
             f"{path}: expected a suffix out of {', '.join(_WRITERS)}, found {path.suffix!r}"
@@ -178,7 +178,7 @@ def write_stars(table: Table, path: Path) -> None:
     Raises
     ------
     InputError
-        If there is no such format or the file cannot be written.
+        If the suffix is not a known format or the file cannot be written.
     """
     require_format(path)
     with write_atomically(path) as temporary:
@@ -186,7 +186,7 @@ def write_stars(table: Table, path: Path) -> None:
 
 
 def _read(kept: Path) -> Table | None:
-    """Return kept stars; none where the file is damaged, for then they are fetched anew."""
+    """Return cached stars; None if the file is damaged, so that they are fetched again."""
     try:
         return find_catalogue(kept).table
     except InputError:

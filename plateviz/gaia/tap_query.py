@@ -1,7 +1,7 @@
-"""One query to a TAP service, by astroquery: the whole answer, or one message why there is none.
+"""One query to a TAP service with astroquery: the whole answer, or one error message.
 
-astroquery is optional, takes long to import and asks Gaia's archive for its notices while it
-is imported; so only a query imports it.
+astroquery is optional, slow to import, and requests notices from Gaia's archive on import;
+therefore it is imported only for a query.
 """
 
 import importlib
@@ -21,21 +21,21 @@ from solver.errors import InputError
 from solver.io.failures import reading
 
 _PACKAGE = "astroquery"
-# A service that has said nothing for so long will not; the queue is asked in short requests.
+# Timeout of each connection; the state of a queued job is polled in short requests.
 _TIMEOUT_S = 180.0
-# What astroquery lets through: sockets and its HTTP errors, an address or an answer that it
-# cannot take apart, a reply without the place of the job.
+# Exceptions that astroquery does not catch: socket and HTTP errors, an address or an answer that
+# it cannot parse, a reply without the location of the job.
 _FAILURES = (OSError, HTTPException, ValueError, AttributeError)
 _LONGEST_REASON = 300
 
 
 def service_name(url: str | None) -> str:
-    """Return what messages and files call a service; None is the archive of Gaia."""
+    """Return the name of a service in messages and files; None is the archive of Gaia."""
     return url or "the archive of Gaia"
 
 
 def answer_to(query: str, url: str | None) -> Table:
-    """Return the table with which a TAP service answers, columns and units as it names them.
+    """Return the answer of a TAP service to a query, with its column names and units.
 
     Parameters
     ----------
@@ -45,16 +45,16 @@ def answer_to(query: str, url: str | None) -> Table:
     Raises
     ------
     InputError
-        If astroquery is not installed, the service cannot be reached, refuses the query,
-        or answers with anything but a whole table.
+        If astroquery is not installed, the service cannot be reached or rejects the query,
+        or the answer is not a whole table.
     """
     name = service_name(url)
     with tempfile.TemporaryDirectory(prefix="plateviz-") as folder:
         path = Path(folder) / "answer.vot"
-        # It prints notices and errors, but what is printed here is one result or one message.
-        with _patience(), redirect_stdout(io.StringIO()):
+        # astroquery prints notices and errors; plateviz prints one result or one message only.
+        with _timeout(), redirect_stdout(io.StringIO()):
             try:
-                refusal = _carry_out(query, url, path)
+                failure = _run_job(query, url, path)
             except ImportError as error:
                 raise InputError(
                     f"plateviz gaia: expected the package {_PACKAGE}, which the extra 'gaia' of "
@@ -65,8 +65,8 @@ def answer_to(query: str, url: str | None) -> Table:
                     f"{name}: expected an answer to the query, found {type(error).__name__}: "
                     f"{_short(str(error))}"
                 ) from error
-        if refusal:
-            raise InputError(f"{name}: expected the query to be carried out, found {refusal}")
+        if failure:
+            raise InputError(f"{name}: expected the query to be completed, found {failure}")
         with reading(name, "an answer that is a VOTable"):
             document = votable.parse(path, verify="ignore")
             table = document.get_first_table().to_table(use_names_over_ids=True)
@@ -74,9 +74,9 @@ def answer_to(query: str, url: str | None) -> Table:
     return table
 
 
-def _carry_out(query: str, url: str | None, path: Path) -> str:
-    """Save the answer to `path`; return in words why the service has none, else nothing."""
-    # Not the synchronous way, which ends after a minute and which astroquery cuts to 2,000 rows.
+def _run_job(query: str, url: str | None, path: Path) -> str:
+    """Save the answer to `path`; return the reason if there is none, otherwise an empty text."""
+    # A synchronous query would end after a minute, and astroquery limits it to 2,000 rows.
     job = _service(url).launch_job_async(query, output_format="votable", background=True)
     _, phase = job.wait_for_job_end()
     if phase != "COMPLETED":
@@ -93,14 +93,14 @@ def _service(url: str | None) -> Any:  # noqa: ANN401
 
 
 def _check_whole(document: votable.tree.VOTableFile, rows: int, name: str) -> None:
-    """Refuse an answer that the service has cut off; TAP says so behind the table."""
+    """Raise InputError if the service truncated its answer, which TAP states after the table."""
     for resource in document.resources:
         for info in resource.infos:
             if info.name == "QUERY_STATUS" and info.value.upper() != "OK":
                 raise InputError(
                     f"{name}: expected a whole answer, found {info.value} after {rows} rows"
                     f"{': ' + _short(info.content) if info.content else ''}; "
-                    f"a smaller field has fewer"
+                    f"choose a smaller field"
                 )
 
 
@@ -109,8 +109,8 @@ def _short(reason: str) -> str:
 
 
 @contextmanager
-def _patience() -> Iterator[None]:
-    """Let no connection that is made inside the block wait for ever."""
+def _timeout() -> Iterator[None]:
+    """Set a timeout for all connections opened inside the block."""
     before = socket.getdefaulttimeout()
     socket.setdefaulttimeout(_TIMEOUT_S)
     try:

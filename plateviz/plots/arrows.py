@@ -1,6 +1,6 @@
-"""Vectors drawn to a stated scale: shafts, heads, and a key arrow to read them by.
+"""Vectors drawn to a stated scale: shafts, heads, and a key arrow.
 
-`hv.VectorField` normalises lengths by default; segments have the length they are given.
+Segments are used, because `hv.VectorField` normalises lengths by default.
 """
 
 import math
@@ -14,7 +14,7 @@ import pandas as pd
 from plateviz.plots.style import TICK_SIZE, drawn
 from plateviz.plots.theme import theme_of
 
-# The root-mean-square arrow is about this share of the frame's width.
+# Length of the root-mean-square arrow as a share of the frame's width.
 _RMS_SHARE = 0.04
 _HEAD_SHARE = 0.32
 _LARGEST_HEAD = 0.018
@@ -24,11 +24,11 @@ _STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
 class Field(NamedTuple):
-    """The area that vectors are drawn on, in the units of the axes.
+    """The area in which vectors are drawn, in the units of the axes.
 
     Attributes
     ----------
-    x, y : limits of the data; the first may be the larger, for an axis that runs backwards
+    x, y : limits of the data; the first may be the larger, for a reversed axis
     """
 
     x: tuple[float, float]
@@ -41,17 +41,17 @@ class Field(NamedTuple):
 
     @property
     def ylim(self) -> tuple[float, float]:
-        """Limits of the y axis: those of the data and a strip below for the key."""
+        """Limits of the y axis: those of the data, and a strip below for the key."""
         return self.y[0] - _KEY_STRIP * self.width, self.y[1]
 
 
 def round_125(value: float) -> float:
-    """Return the number 1, 2 or 5 times a power of ten nearest to `value` in the logarithm."""
+    """Return the number 1, 2 or 5 times a power of ten that is nearest to `value` in log scale."""
     if not (math.isfinite(value) and value > 0):
         return 1.0
     power = 10.0 ** math.floor(math.log10(value))
     step = min(_STEPS, key=lambda s: abs(math.log(value / (s * power))))
-    # Through text, so that 5 * 10**-3 is the number that prints as 0.005.
+    # The round trip through text makes 5 * 10**-3 the number that prints as 0.005.
     return float(f"{step * power:.12g}")
 
 
@@ -77,20 +77,20 @@ def arrows(
     hover: Sequence[tuple[str, str]],
     extra: list[str],
 ) -> list[hv.Element]:
-    """Return the vectors as strokes and hoverable tails.
+    """Return the vectors as strokes, and their tails as points with hover text.
 
     Parameters
     ----------
     table : tails `x`, `y` and vectors `u`, `v` in the units of the axes, columns `extra`
     scale : drawn length over true length
-    field : the area drawn on; bounds the size of the heads
+    field : the area drawn on; limits the size of the heads
     colour : of the arrows
     hover : label and format of each line of the hover
     extra : columns that the hover needs
 
     Returns
     -------
-    Segments (the shafts, a row per row of `table`, and after them two rows for each head), points
+    Segments (the shafts, a row per row of `table`, then two rows for each head), points
     """
     ends = table.assign(
         x_end=table["x"] + scale * table["u"], y_end=table["y"] + scale * table["v"]
@@ -111,14 +111,14 @@ def arrows(
 
 
 def key(length: float, text: str, *, scale: float, field: Field, theme: str) -> list[hv.Element]:
-    """Return a key arrow of true length `length`, with its meaning beside it.
+    """Return a key arrow of true length `length`, with text beside it.
 
     Parameters
     ----------
     length : in the units of the axes, before magnification
-    text : the length in words
-    scale : drawn length over true length, that of the arrows it explains
-    field : the area drawn on; the key stands in the strip below it
+    text : the length with its unit
+    scale : drawn length over true length, the same as of the other arrows
+    field : the area drawn on; the key is in the strip below it
     theme : "light" or "dark"
     """
     colours = theme_of(theme)
@@ -128,15 +128,15 @@ def key(length: float, text: str, *, scale: float, field: Field, theme: str) -> 
     arrow = pd.DataFrame(
         {"x": [x], "y": [y], "x_end": [x + direction * scale * length], "y_end": [y]}
     )
-    words = hv.Text(x + direction * (scale * length + 0.015 * field.width), y, text, halign="left")
+    label = hv.Text(x + direction * (scale * length + 0.015 * field.width), y, text, halign="left")
     return [
         drawn(_strokes(arrow, field, "key"), color=colours.text, line_width=2),
-        drawn(words, text_color=colours.text, text_font_size=TICK_SIZE),
+        drawn(label, text_color=colours.text, text_font_size=TICK_SIZE),
     ]
 
 
 def _strokes(ends: pd.DataFrame, field: Field, label: str) -> hv.Segments:
-    # Shafts and heads are one element: a figure's time to be made is that of its elements.
+    # Shafts and heads are one element, because drawing time grows with the number of elements.
     x, y, tip_x, tip_y = (
         ends[column].to_numpy(dtype=float) for column in ("x", "y", "x_end", "y_end")
     )

@@ -1,4 +1,4 @@
-"""Two fits of the same sources: differences on the sky, and over their uncertainty."""
+"""Differences between two fits of the same sources, on the sky and over their uncertainty."""
 
 import holoviews as hv
 import numpy as np
@@ -74,7 +74,7 @@ def plot_comparison_map(
     theme: str = "light",
     width: int = FRAME_WIDTH,
 ) -> hv.Overlay:
-    """Draw the differences as arrows to a stated scale; means in bins above 2,000.
+    """Draw the differences as arrows to a stated scale; above 2,000, their means in bins.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def plot_comparison_map(
     shown, what = _thinned(_vectors(table), half)
     scale = arrow_scale or automatic_scale(shown, field)
     mas = round_125(2.0 * rms_length(shown) * _MAS_PER_ARCMIN)
-    words = angle_text(mas)
+    length = angle_text(mas)
     single = [("source", "@{id}"), ("class", "@{source_class}")]
     hover = single if "id" in shown else [("sources in the bin", "@{n}")]
     return framed(
@@ -103,10 +103,10 @@ def plot_comparison_map(
                 hover=[*hover, *_HOVER_VALUES],
                 extra=[c for c in ("id", "source_class", "n") if c in shown] + _VALUES,
             ),
-            *key(mas / _MAS_PER_ARCMIN, words, scale=scale, field=field, theme=theme),
+            *key(mas / _MAS_PER_ARCMIN, length, scale=scale, field=field, theme=theme),
         ],
         title=_MAP,
-        subtitle=f"{what}\nDrawn {scale:,g} times enlarged: an arrow of {words}",
+        subtitle=f"{what}\nArrows enlarged {scale:,g} times; key: {length}",
         theme=theme,
         width=width,
         xlim=field.x,
@@ -162,7 +162,7 @@ def _vectors(table: pd.DataFrame) -> pd.DataFrame:
 
 def _thinned(vectors: pd.DataFrame, half: float) -> tuple[pd.DataFrame, str]:
     if len(vectors) <= ARROW_LIMIT:
-        return vectors, f"{len(vectors):,} sources, an arrow each"
+        return vectors, f"{len(vectors):,} sources, one arrow each"
     means = binned_vectors(
         vectors, x_range=(-half, half), y_range=(-half, half), bins=_BINS, least_share=_LEAST_SHARE
     )
@@ -174,7 +174,7 @@ def _thinned(vectors: pd.DataFrame, half: float) -> tuple[pd.DataFrame, str]:
 
 def _draw(chosen: Chosen, theme: str) -> hv.Layout | hv.Overlay:
     if chosen.other is None:
-        return message(_MAP, "Fit again with other choices to compare two solutions.", theme=theme)
+        return message(_MAP, "Fit with other settings to compare two solutions.", theme=theme)
     return plot_comparison(comparison(chosen.other, chosen.result), theme=theme)
 
 
@@ -182,8 +182,9 @@ DIAGNOSTICS = (
     Diagnostic(
         "comparison",
         "Comparison of two solutions",
-        "The solution on the screen (B) minus the one before it (A): positions on the sky, and "
-        "the differences over the uncertainty. Good: what you changed does not matter.",
+        "The current solution (B) minus the previous one (A): positions on the sky, and the "
+        "differences over their uncertainty. Good: differences well below the uncertainty, so "
+        "that the change of settings does not matter.",
         86,
         _draw,
         is_wide=True,

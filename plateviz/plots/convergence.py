@@ -1,4 +1,4 @@
-"""The course of a fit: largest step and objective against iteration."""
+"""Convergence of a fit: largest step and objective against iteration."""
 
 import holoviews as hv
 import pandas as pd
@@ -22,7 +22,7 @@ _HOVER = [
 _LOG_FROM = 20.0
 _MARKERS_UP_TO = 200
 _TICKS_UP_TO = 12
-# A hundredth of what one source's two coordinates add to the loss.
+# A hundredth of the contribution of one source's two coordinates to the loss.
 _LOWEST_EXCESS = 0.01
 
 
@@ -38,7 +38,7 @@ def plot_convergence(
     Parameters
     ----------
     table : `tables.convergence`
-    losses : `tables.loss_excess`; drawn instead of the objective where there are any
+    losses : `tables.loss_excess`; drawn instead of the objective if not empty
     theme : "light" or "dark"
     width : of each panel's frame, screen pixels
     """
@@ -51,12 +51,12 @@ def plot_convergence(
             xlabel=_X.label,
             ylabel="largest step (σ of the parameter)",
         )
-    fallen = (
+    second = (
         _objective(table, theme, width)
         if losses is None or losses.empty
         else _losses(losses, theme, width)
     )
-    return side_by_side([_steps(table, theme, width), fallen], columns=2)
+    return side_by_side([_steps(table, theme, width), second], columns=2)
 
 
 def _steps(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
@@ -64,9 +64,9 @@ def _steps(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
     tolerance = float(table["tolerance"].iloc[0])
     values = pd.concat([rows["largest_step"], table["tolerance"]])
     line = hv.HLine(tolerance)
-    # On the left, where the trace is still far above.
-    words = f" tolerance {tolerance:g} σ"
-    label = hv.Text(_limits(table)[0], tolerance, words, halign="left", valign="bottom")
+    # On the left, where the trace is far above the tolerance.
+    text = f" tolerance {tolerance:g} σ"
+    label = hv.Text(_limits(table)[0], tolerance, text, halign="left", valign="bottom")
     colours = theme_of(theme)
     return framed(
         [
@@ -111,7 +111,7 @@ def _objective(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
 
 
 def _losses(losses: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
-    # Draws scatter about the final loss in the end: below it there is no logarithm.
+    # The last losses scatter about the final level; those below it have no logarithm.
     above = losses[losses["excess"] > _LOWEST_EXCESS]
     last = float(losses["step"].iloc[-1])
     curve = hv.Curve(above, hv.Dimension("step", label="step"), ["excess", "loss"])
@@ -126,7 +126,7 @@ def _losses(losses: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
             )
         ],
         title="Loss above its final level",
-        subtitle=f"minus the evidence lower bound, in the end {losses['loss'].iloc[-1]:,.6g}",
+        subtitle=f"loss: minus the evidence lower bound; final {losses['loss'].iloc[-1]:,.6g}",
         theme=theme,
         width=width,
         height=round(0.75 * width),
@@ -153,7 +153,7 @@ def _last_step(rows: pd.DataFrame, tolerance: float) -> str:
         return "no step taken"
     last = rows.iloc[-1]
     verdict = "below" if last["largest_step"] < tolerance else "above"
-    # The end may be cut off: a source is named by nineteen digits.
+    # The parameter is last, because it may be cut off: source ids have nineteen digits.
     return f"{verdict} tolerance: {last['largest_step']:.2g} σ ({last['largest_parameter']})"
 
 
@@ -187,8 +187,8 @@ DIAGNOSTICS = (
     Diagnostic(
         "convergence",
         "Convergence",
-        "The largest step of any parameter over its uncertainty, and chi2 or svi's loss. "
-        "Good: the last step far below the tolerance.",
+        "The largest step of any parameter over its uncertainty, and the objective or, for svi, "
+        "the loss. Good: the last step is far below the tolerance.",
         90,
         _draw,
         is_wide=True,

@@ -44,7 +44,7 @@ def plot_deviation(
 
     Returns
     -------
-    A layout of the classes in the table; without a truth, a figure that says so
+    A layout of the classes in the table; without a truth, a figure with a message
     """
     if table.empty:
         return message(
@@ -80,7 +80,7 @@ def _panel(rows: pd.DataFrame, statistics: pd.Series, theme: str, width: int) ->
             drawn(_ellipse(statistics, factor), color=line, line_width=1.8),
         ],
         title=f"{rows['source_class'].iloc[0].capitalize()} sources",
-        subtitle=_words(statistics, unit, factor, hidden),
+        subtitle=_subtitle(statistics, unit, factor, hidden),
         theme=theme,
         width=width,
         xlim=(half, -half),
@@ -91,7 +91,7 @@ def _panel(rows: pd.DataFrame, statistics: pd.Series, theme: str, width: int) ->
 
 
 def _half_width(rows: pd.DataFrame, statistics: pd.Series) -> float:
-    """Return half the frame in mas: every point, unless a few lie very far out."""
+    """Return half the frame in mas; it contains every point unless a few lie very far out."""
     largest = float(np.abs(rows[["deviation_ra_mas", "deviation_dec_mas"]].to_numpy()).max())
     typical = max(statistics["rms_ra"], statistics["rms_dec"])
     least = _LEAST_SIGMAS * float(np.sqrt(max(statistics["var_ra"], statistics["var_dec"])))
@@ -111,8 +111,8 @@ def _ellipse(statistics: pd.Series, factor: float) -> hv.Ellipse:
     return hv.Ellipse(0, 0, tuple(axes), orientation=float(np.arctan2(major[1], major[0])))
 
 
-def _words(statistics: pd.Series, unit: str, factor: float, hidden: int) -> str:
-    """Return three lines that fit a narrow panel: panels of unequal height are clipped."""
+def _subtitle(statistics: pd.Series, unit: str, factor: float, hidden: int) -> str:
+    """Return three lines that fit a narrow panel, because panels of unequal height are clipped."""
     rms = factor * max(statistics["rms_ra"], statistics["rms_dec"])
     decimals = min(3, max(0, 2 - math.floor(math.log10(rms)))) if rms > 0 else 0
     mean, spread = (
@@ -141,9 +141,9 @@ DIAGNOSTICS = (
     Diagnostic(
         "deviation",
         "Deviation from the truth",
-        "Estimated minus true position on the sky, for each class of source; only where a "
-        "simulation gives the truth. Good: pulls with a standard deviation of one. A common "
-        "shift is the mean error of the reference stars.",
+        "Estimated minus true position on the sky, for each class of source; only for simulated "
+        "orbits. Good: an rms of deviation / σ of one. A common shift is the mean error of the "
+        "reference sources.",
         50,
         _draw,
         is_wide=True,

@@ -1,8 +1,8 @@
-"""Diagnostic: one picture of a solution, with its title, its caption and what it shows.
+"""Diagnostic: one figure of a solution, with its title, its caption and the function that draws it.
 
-A module of this package that defines `DIAGNOSTICS` is on the Orbit page, and in every
-report, without being named anywhere else (`plateviz.plots.gallery` finds it): a new diagnostic
-is its table in `plateviz.tables` and its plot here.
+`plateviz.plots.gallery` finds every module of this package that defines `DIAGNOSTICS`, and the
+Orbit page and every report show its figures. A new diagnostic needs a table in
+`plateviz.tables` and a plot here.
 """
 
 from collections.abc import Callable
@@ -16,14 +16,14 @@ from solver.data.result import FitResult
 
 @dataclass(frozen=True)
 class Chosen:
-    """What a diagnostic is drawn from.
+    """The solution and the selection that a diagnostic shows.
 
     Attributes
     ----------
     result : the solution
     instrument : that took the orbit
-    exposures : chosen ones as (field_id, plate_id)
-    detector : chosen detector_id, or None for all
+    exposures : selected exposures as (field_id, plate_id)
+    detector : selected detector_id, or None for all
     other : solution to compare with, or None
     """
 
@@ -40,16 +40,16 @@ def _always(_: Chosen) -> bool:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One picture of a solution.
+    """One figure of a solution.
 
     Attributes
     ----------
     name : short and unique, used in addresses and file names
-    title : for people
-    caption : what it shows and what good looks like, in a sentence or two
-    order : place on the page
-    draw : picture of what is chosen, in a theme
-    follows_selection : whether exposures and detector change it
+    title : displayed title
+    caption : what it shows and what a good solution looks like, in a few sentences
+    order : sort key on the page
+    draw : function of a `Chosen` and a theme's name that returns the figure
+    follows_selection : whether the figure depends on the selected exposures and detector
     is_wide : whether it takes the whole width of the page
     has_data : whether there is anything to draw, such as a truth or another solution
     """

@@ -14,7 +14,7 @@ from plateviz.plots.units import angle_text
 from plateviz.tables.calibration import distortion
 from solver.data.instrument import Detector
 
-_TITLE = "Fitted distortion, distorted minus ideal place"
+_TITLE = "Fitted distortion, distorted minus ideal position"
 _LABELS: AxisLabels = {"xlabel": "focal-plane x (mm)", "ylabel": "focal-plane y (mm)"}
 _HOVER = [
     ("at", "@{x}{0.00}, @{y}{0.00} mm"),
@@ -37,7 +37,7 @@ def plot_distortion(
     Parameters
     ----------
     table : `tables.distortion`
-    detectors : outlined where given
+    detectors : detectors to outline
     arrow_scale : drawn length over true length; None for a round number that makes the
         rms arrow about 4 % of the width
     theme : "light" or "dark"
@@ -51,7 +51,7 @@ def plot_distortion(
     rms_um = 1000.0 * rms_length(table)
     length_um = round_125(2.0 * rms_um) if rms_um > 0 else 1.0
     mas = length_um / 1000.0 * float(table["mas_per_unit"].iloc[0])
-    words = f"{length_um:g} µm = {angle_text(mas)}"
+    length = f"{length_um:g} µm = {angle_text(mas)}"
     return framed(
         [
             _outlines(detectors, theme),
@@ -63,11 +63,11 @@ def plot_distortion(
                 hover=_HOVER,
                 extra=["dx_um", "dy_um", "dx_mas", "dy_mas"],
             ),
-            *key(length_um / 1000.0, words, scale=scale, field=field, theme=theme),
+            *key(length_um / 1000.0, length, scale=scale, field=field, theme=theme),
         ],
         title=_TITLE,
         subtitle=f"Zero at the optical centre; rms {rms_um:.3g} µm.\n"
-        f"Drawn {scale:,g} times enlarged: an arrow of {words}",
+        f"Arrows enlarged {scale:,g} times; key: {length}",
         theme=theme,
         width=width,
         xlim=field.x,
@@ -91,7 +91,8 @@ DIAGNOSTICS = (
     Diagnostic(
         "distortion",
         "Distortion",
-        "Displacement on the focal plane by the fitted Legendre terms, zero at the optical centre.",
+        "Displacement on the focal plane by the fitted Legendre terms, zero at the optical centre. "
+        "Good: a smooth pattern without strong growth towards the edges.",
         80,
         _draw,
     ),

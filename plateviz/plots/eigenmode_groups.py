@@ -1,4 +1,4 @@
-"""Which parameters the weak modes of the calibration move, and how far."""
+"""How far each parameter group moves along the weak directions of the calibration."""
 
 import math
 
@@ -13,28 +13,28 @@ from plateviz.plots.units import angle_text
 from plateviz.tables.eigenmodes import eigenmode_groups
 
 _PAGE_WIDTH = 860
-_TITLE = "Which parameters the weak modes move"
+_TITLE = "Which parameters the weak directions move"
 _LABELS: AxisLabels = {
-    "xlabel": "parameter group (rms move with one σ of the mode)",
-    "ylabel": "mode (number)",
+    "xlabel": "parameter group (rms move per σ along the direction)",
+    "ylabel": "weak direction (number)",
 }
 _CELL_HOVER = [
-    ("mode", "@{mode} @{name}"),
+    ("weak direction", "@{mode} @{name}"),
     ("group", "@{group}"),
     ("share", "@{share}{0.0000}"),
-    ("with one σ of the mode", "@{words}"),
+    ("rms move per σ", "@{move_text}"),
 ]
 _SMALL = "10px"
-# Cells with a smaller share have no words.
-_TOLD = 0.005
-# Smaller by a thousand each.
+# Cells with a smaller share have no text.
+_LEAST_LABELLED_SHARE = 0.005
+# Units in steps of a factor of a thousand.
 _UNITS = {"arcsec": ("arcsec", "mas", "µas"), "µm": ("µm", "nm", "pm")}
 
 
 def plot_eigenmode_groups(
     table: pd.DataFrame, *, theme: str = "light", width: int = _PAGE_WIDTH
 ) -> hv.Overlay:
-    """Draw the share of each parameter group in each weak mode, with the move it makes.
+    """Draw the share of each parameter group in each weak direction, with its rms move.
 
     Parameters
     ----------
@@ -43,16 +43,16 @@ def plot_eigenmode_groups(
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(_TITLE, "No weak modes", theme=theme, width=width, **_LABELS)
+        return message(_TITLE, "No weak directions", theme=theme, width=width, **_LABELS)
     groups, modes = list(table["group"].unique()), table["mode"].unique()
-    words = [_amount(move, unit) for move, unit in zip(table["move"], table["unit"], strict=True)]
-    cells = table.assign(column=table["group"].map(groups.index), words=words)
+    moves = [_amount(move, unit) for move, unit in zip(table["move"], table["unit"], strict=True)]
+    cells = table.assign(column=table["group"].map(groups.index), move_text=moves)
     ticks = [*((i, name) for i, name in enumerate(groups)), (len(groups), "shift of sources")]
     return framed(
-        [_cells(cells, theme), *_cell_words(cells, theme), *_shifts(cells, len(groups), theme)],
+        [_cells(cells, theme), *_cell_labels(cells, theme), *_shifts(cells, len(groups), theme)],
         title=_TITLE,
-        subtitle="Above, the group's share of squared moves over conditional sigmas; below, the "
-        "rms move of its elements with one sigma of the mode",
+        subtitle="Upper number: the group's share of squared moves over conditional sigmas; lower "
+        "number: the rms move of its elements per sigma along the direction",
         theme=theme,
         width=width,
         height=32 * len(modes) + 8,
@@ -74,7 +74,7 @@ def _cells(cells: pd.DataFrame, theme: str) -> hv.Rectangles:
             top=cells["mode"] + 0.46,
         ),
         ["left", "bottom", "right", "top"],
-        ["share", "mode", "name", "group", "words"],
+        ["share", "mode", "name", "group", "move_text"],
     )
     colours = theme_of(theme)
     return drawn(
@@ -91,24 +91,24 @@ def _cells(cells: pd.DataFrame, theme: str) -> hv.Rectangles:
     )
 
 
-def _cell_words(cells: pd.DataFrame, theme: str) -> list[hv.Labels]:
-    told = cells[cells["share"] >= _TOLD]
-    shares = [f"{share:.2f}" for share in told["share"]]
+def _cell_labels(cells: pd.DataFrame, theme: str) -> list[hv.Labels]:
+    rows = cells[cells["share"] >= _LEAST_LABELLED_SHARE]
+    shares = [f"{share:.2f}" for share in rows["share"]]
     lines = (
-        hv.Labels((told["column"], told["mode"] - 0.2, shares)),
-        hv.Labels((told["column"], told["mode"] + 0.2, told["words"])),
+        hv.Labels((rows["column"], rows["mode"] - 0.2, shares)),
+        hv.Labels((rows["column"], rows["mode"] + 0.2, rows["move_text"])),
     )
     colour = theme_of(theme).text
     return [drawn(line, text_color=colour, text_font_size=_SMALL) for line in lines]
 
 
 def _shifts(cells: pd.DataFrame, column: int, theme: str) -> list[hv.Element]:
-    """Return the shift of the sources in a column of its own, without the grid."""
+    """Return the shift of the sources as a separate column without grid lines."""
     modes, colours = cells.drop_duplicates("mode"), theme_of(theme)
     rows: Limits = (float(modes["mode"].min()) - 0.5, float(modes["mode"].max()) + 0.5)
     ground = hv.Rectangles([(column - 0.48, rows[0], column + 0.5, rows[1])])
-    words = [angle_text(shift) for shift in modes["shift_mas"]]
-    text = hv.Labels((np.full(len(modes), column), modes["mode"], words))
+    shifts = [angle_text(shift) for shift in modes["shift_mas"]]
+    text = hv.Labels((np.full(len(modes), column), modes["mode"], shifts))
     return [
         drawn(ground, color=colours.background, line_color=None),
         drawn(text, text_color=colours.text, text_font_size=TICK_SIZE),
@@ -116,7 +116,7 @@ def _shifts(cells: pd.DataFrame, column: int, theme: str) -> list[hv.Element]:
 
 
 def _amount(move: float, unit: str) -> str:
-    """Return a move to two digits in the unit that suits it."""
+    """Return a move to two digits in a suitable unit."""
     if move <= 0.0:
         return f"0 {unit}"
     units = _UNITS.get(unit, (unit,))
@@ -133,9 +133,10 @@ def _draw_groups(chosen: Chosen, theme: str) -> hv.Overlay:
 DIAGNOSTICS = (
     Diagnostic(
         "eigenmode-groups",
-        "Which parameters the weak modes move",
-        "How far one sigma of each weak mode moves each parameter group, and the sources with it. "
-        "A mode with large moves of parameters and no shift of the sources does no harm.",
+        "Which parameters the weak directions move",
+        "How far one sigma along each weak direction moves each parameter group, and the sources "
+        "with it. A direction that moves parameters far but does not shift the sources is "
+        "harmless.",
         84,
         _draw_groups,
         is_wide=True,

@@ -1,4 +1,4 @@
-"""What the weak modes would do on the sky, a map of arrows for each."""
+"""Shifts of the sources along the weak directions, a map of arrows for each direction."""
 
 import textwrap
 
@@ -14,6 +14,7 @@ from plateviz.plots.units import angle_text
 from plateviz.tables.eigenmodes import eigenmode_shifts
 from plateviz.tables.residuals import binned_vectors
 
+_TITLE = "What the weak directions do on the sky"
 _LABELS: AxisLabels = {
     "xlabel": "Δα cos δ (arcmin, East to the left)",
     "ylabel": "Δδ (arcmin)",
@@ -31,14 +32,14 @@ _KEY_SHARE = 0.08
 _MAS_PER_ARCMIN = 60_000.0
 # Screen pixels per character of the subtitle's font.
 _PER_CHARACTER = 5.3
-# A line of white space alone would be dropped; this has no width and is none.
+# A zero-width space: Bokeh drops lines of ordinary white space.
 _BLANK = "\u200b"
 
 
 def plot_eigenmode_shifts(
     table: pd.DataFrame, *, theme: str = "light", width: int = _WIDTH
 ) -> hv.Layout | hv.Overlay:
-    """Draw the shifts of the sources by each mode to a stated scale, a panel per mode.
+    """Draw the shifts of the sources along each weak direction to a stated scale, a panel each.
 
     Above 200 sources the mean shift of each bin is drawn.
 
@@ -49,15 +50,14 @@ def plot_eigenmode_shifts(
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        title = "What the weak modes would do on the sky"
-        return message(title, "No weak modes", theme=theme, width=width, **_LABELS)
+        return message(_TITLE, "No weak directions", theme=theme, width=width, **_LABELS)
     names = _even_lines(table.drop_duplicates("mode").set_index("mode")["name"], width)
     half = _MARGIN * float(np.abs(table[["x", "y"]].to_numpy()).max())
     field = Field((half, -half), (-half, half))
-    # One scale for all, so that their lengths compare.
+    # One scale for all panels, so that lengths can be compared.
     scale = automatic_scale(table, field)
     panels = [
-        _panel(rows, f"Mode {mode}", names[mode], scale, field, theme, width)
+        _panel(rows, f"Direction {mode}", names[mode], scale, field, theme, width)
         for mode, rows in table.groupby("mode")
     ]
     return side_by_side(panels, columns=_COLUMNS)
@@ -72,7 +72,7 @@ def _panel(
             rows, x_range=field.y, y_range=field.y, bins=_BINS, least_share=_LEAST_SHARE
         )
     length = round_125(_KEY_SHARE * field.width / scale * _MAS_PER_ARCMIN)
-    words = angle_text(length)
+    length_text = angle_text(length)
     return framed(
         [
             *arrows(
@@ -83,10 +83,10 @@ def _panel(
                 hover=[("source", "@{id}"), *_HOVER] if "id" in shown else [_MEAN, *_HOVER],
                 extra=[c for c in ("id", "n", "shift_ra_mas", "shift_dec_mas") if c in shown],
             ),
-            *key(length / _MAS_PER_ARCMIN, words, scale=scale, field=field, theme=theme),
+            *key(length / _MAS_PER_ARCMIN, length_text, scale=scale, field=field, theme=theme),
         ],
         title=f"{title}: shifts of {angle_text(rms_length(rows) * _MAS_PER_ARCMIN)} rms",
-        subtitle=f"Drawn {scale:,.0f} times enlarged\n{name}",
+        subtitle=f"Arrows enlarged {scale:,.0f} times\n{name}",
         theme=theme,
         width=width,
         xlim=field.x,
@@ -96,7 +96,7 @@ def _panel(
 
 
 def _even_lines(names: pd.Series, width: int) -> pd.Series:
-    """Return the names in as many lines each: panels of unequal height are clipped."""
+    """Return the names with equal numbers of lines, because unequal panels are clipped."""
     lines = names.map(lambda name: textwrap.wrap(name, int(width / _PER_CHARACTER)))
     most = max(map(len, lines))
     return lines.map(lambda parts: "\n".join([*parts, *[_BLANK] * (most - len(parts))]))
@@ -109,10 +109,10 @@ def _draw(chosen: Chosen, theme: str) -> hv.Layout | hv.Overlay:
 DIAGNOSTICS = (
     Diagnostic(
         "eigenmode-shifts",
-        "What the weak modes would do on the sky",
-        "How all sources together move with one sigma of a weak mode, for up to nine that shift "
-        "them most. Such common shifts, rolls and stretches do not fall with more measurements, "
-        "only with better or more reference sources.",
+        _TITLE,
+        "How all sources move together per sigma along a weak direction, for the up to nine "
+        "directions that shift them most. More measurements do not reduce such common shifts, "
+        "rolls and stretches; only more or better reference sources do.",
         85,
         _draw,
         is_wide=True,

@@ -1,4 +1,4 @@
-"""The modes of the calibration: their spectrum, and what decides the weak ones."""
+"""Eigenmodes of the calibration: their spectrum, and what constrains the weak directions."""
 
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -33,19 +33,19 @@ from plateviz.tables.eigenmodes import (
 from plateviz.tables.sources import REFERENCE
 
 _PAGE_WIDTH = 860
-_NONE = "No modes in this result"
-_NO_WEAK = "No weak modes: the measurements decide more than half of each"
+_NONE = "No eigenmodes in this result"
+_NO_WEAK = "No weak directions: the measurements constrain more than half of each"
 _SPECTRUM_HOVER = [
-    ("mode", "@{mode} @{name}"),
+    ("eigenmode", "@{mode} @{name}"),
     ("measurements", "@{data_share}{0.0000}"),
     ("reference sources", "@{reference_share}{0.0000}"),
     ("priors of other sources", "@{source_share}{0.0000}"),
     ("priors of the calibration", "@{calibration_share}{0.0000}"),
-    ("information relative to all else fixed", "@{relative_text}"),
+    ("relative information", "@{relative_text}"),
 ]
 _PART_HOVER = [
-    ("mode", "@{mode} @{name}"),
-    ("decided by", "@{what}"),
+    ("weak direction", "@{mode} @{name}"),
+    ("constrained by", "@{what}"),
     ("share", "@{share}{0.0000}"),
 ]
 _DECIDER_COLOURS: Mapping[str, str] = MappingProxyType(
@@ -58,16 +58,16 @@ _DECIDER_COLOURS: Mapping[str, str] = MappingProxyType(
 )
 _WEAK_COLOUR = CLASS_COLOURS[REFERENCE]
 _WEAK_BELOW = 0.5
-# Parts of a bar from this length have room for words.
-_WORDED = 0.16
-_LEAST = 1e-3
-_LABELS: AxisLabels = {"xlabel": "mode, weakest first (number)", "ylabel": "share (0 to 1)"}
+# Parts of a bar that are at least this long have room for text.
+_LEAST_LABELLED_SHARE = 0.16
+_LEAST_VISIBLE_SHARE = 1e-3
+_LABELS: AxisLabels = {"xlabel": "eigenmode, weakest first (number)", "ylabel": "share (0 to 1)"}
 
 
 def plot_eigenmode_spectrum(
     table: pd.DataFrame, *, theme: str = "light", width: int = PANEL_WIDTH
 ) -> hv.Layout | hv.Overlay:
-    """Draw the share of every mode that the measurements decide, and its information.
+    """Draw the measurements' share of the information on every eigenmode, and its information.
 
     Parameters
     ----------
@@ -97,15 +97,15 @@ def plot_eigenmode_spectrum(
         [
             panel(
                 [line, *_points(rows, "data_share", theme)],
-                title="Share that the measurements decide",
-                subtitle=f"{weak} of {len(rows)} modes are weak: less than half",
+                title="Share that the measurements constrain",
+                subtitle=f"{weak} of {len(rows)} eigenmodes are weak: less than half",
                 ylim=(-0.04, 1.04),
                 ylabel="share of the measurements (0 to 1)",
             ),
             panel(
                 list(_points(rows, "relative_information", theme)),
-                title="Information relative to all else held fixed",
-                subtitle=f"{information.min():.1e} at the least",
+                title="Information relative to other parameters fixed",
+                subtitle=f"smallest: {information.min():.1e}",
                 ylim=(0.2 * float(information.min()), 5.0 * float(information.max())),
                 logy=True,
                 ylabel="relative information (ratio)",
@@ -118,7 +118,7 @@ def plot_eigenmode_spectrum(
 def plot_eigenmode_deciders(
     table: pd.DataFrame, *, theme: str = "light", width: int = _PAGE_WIDTH
 ) -> hv.Overlay:
-    """Draw a bar for each weak mode, with its name and the shares of what decides it.
+    """Draw a bar for each weak direction, with its name and the shares of what constrains it.
 
     Parameters
     ----------
@@ -126,14 +126,17 @@ def plot_eigenmode_deciders(
     theme : "light" or "dark"
     width : of the frame, screen pixels
     """
-    title = "What decides the weak modes"
-    labels: AxisLabels = {"xlabel": "share of what is known (0 to 1)", "ylabel": "mode (number)"}
+    title = "What decides the weak directions"
+    labels: AxisLabels = {
+        "xlabel": "share of the information (0 to 1)",
+        "ylabel": "weak direction (number)",
+    }
     if table.empty:
         return message(title, _NO_WEAK, theme=theme, width=width, **labels)
     modes = table.drop_duplicates("mode")
     last = int(modes["mode"].max())
     return framed(
-        [*_bars(table, theme), *_bar_words(table), *_names(modes, theme)],
+        [*_bars(table, theme), *_bar_labels(table), *_names(modes, theme)],
         title=title,
         theme=theme,
         width=width,
@@ -158,9 +161,9 @@ def _points(rows: pd.DataFrame, column: str, theme: str) -> Iterator[hv.Points]:
 def _bars(table: pd.DataFrame, theme: str) -> Iterator[hv.Rectangles]:
     rows = table.assign(bottom=table["mode"] + 0.36, top=table["mode"] + 0.02)
     for decider in DECIDERS:
-        # What nobody could see is not worth a word of the legend.
+        # Parts too short to be seen have no entry in the legend.
         parts = rows[rows["decider"] == decider]
-        if not (parts["share"] >= _LEAST).any():
+        if not (parts["share"] >= _LEAST_VISIBLE_SHARE).any():
             continue
         bars = hv.Rectangles(
             parts,
@@ -178,13 +181,13 @@ def _bars(table: pd.DataFrame, theme: str) -> Iterator[hv.Rectangles]:
         )
 
 
-def _bar_words(table: pd.DataFrame) -> Iterator[hv.Labels]:
-    rows = table[table["share"] >= _WORDED]
-    words = [
+def _bar_labels(table: pd.DataFrame) -> Iterator[hv.Labels]:
+    rows = table[table["share"] >= _LEAST_LABELLED_SHARE]
+    texts = [
         f"{what} {100.0 * s:.0f} %" for what, s in zip(rows["what"], rows["share"], strict=True)
     ]
     middle = 0.5 * (rows["left"] + rows["right"])
-    labels = hv.Labels((middle, rows["mode"] + 0.19, words))
+    labels = hv.Labels((middle, rows["mode"] + 0.19, texts))
     yield drawn(labels, text_color="#ffffff", text_font_size="10px")
 
 
@@ -212,18 +215,20 @@ DIAGNOSTICS = (
         "eigenmode-spectrum",
         "Eigenmodes of the calibration",
         "Every independent combination of calibration parameters, the weakest first: the share of "
-        "it that the measurements decide, and what is known of it relative to its parameters with "
-        "all else held fixed. Good: a dozen weak ones at most, clearly apart from the rest.",
+        "its information that comes from the measurements, and its information relative to that "
+        "with the other parameters fixed. Good: at most a dozen weak ones, clearly apart from "
+        "the rest.",
         82,
         _draw_spectrum,
         is_wide=True,
     ),
     Diagnostic(
         "weak-directions",
-        "What decides the weak modes",
-        "The combinations that the measurements leave open, and who decides them instead. Good: "
-        "the reference sources decide what moves the sky, and the calibration's priors only what "
-        "moves pointings against detectors. What a prior decides is assumed, not measured.",
+        "What decides the weak directions",
+        "The combinations that the measurements do not constrain, and what constrains them "
+        "instead. Good: the reference sources constrain what moves the sky, and the calibration's "
+        "priors constrain only what moves pointings against detectors. What a prior constrains is "
+        "assumed, not measured.",
         83,
         _draw_deciders,
         is_wide=True,

@@ -50,9 +50,9 @@ def plot_error_by_count(
     Parameters
     ----------
     table : `survey_schema.ERRORS_BY_COUNT`
-    measurement_mas : uncertainty of one measurement, for the paper's guide
+    measurement_mas : uncertainty of one measurement, for the paper's law
         sigma / sqrt(36 N), section "Discussion"
-    per_orbit : measurements of a source in one orbit, 36 in that guide
+    per_orbit : measurements of a source in one orbit, 36 in that law
     theme : "light" or "dark"
     width : of the frame, screen pixels
     """
@@ -60,20 +60,20 @@ def plot_error_by_count(
         return message(_TITLE, "No artificial sources", theme=theme, width=width, **_LABELS)
     rows = table.sort_values("n_orbits", kind="stable")
     colours = theme_of(theme)
-    guide = f"{measurement_mas:g} mas / √({per_orbit} N)"
+    law_label = f"{measurement_mas:g} mas / √({per_orbit} N)"
     xlim, ylim = _limits(rows)
     span = np.array(xlim)
     law = measurement_mas / np.sqrt(per_orbit * span)
     n = rows["n_orbits"]
     return framed(
         [
-            _curve(span, law, guide, colours.muted, "dotted"),
+            _curve(span, law, law_label, colours.muted, "dotted"),
             _curve(n, rows["floor_mas"], "floor: references", CLASS_COLOURS[REFERENCE], "dashed"),
             _curve(n, rows["expected_mas"], "√(noise² / N + floor²)", colours.line, "solid"),
             *_errors(rows),
         ],
         title=_TITLE,
-        subtitle=_words(rows),
+        subtitle=_subtitle(rows),
         theme=theme,
         width=width,
         height=round(0.8 * width),
@@ -120,7 +120,7 @@ def _errors(rows: pd.DataFrame) -> list[hv.Element]:
 def _limits(rows: pd.DataFrame) -> tuple[Limits, Limits]:
     n = rows["n_orbits"]
     seen = rows[["error_mas", "expected_mas", "floor_mas"]].to_numpy(dtype=float)
-    # A bar of few sources may reach down to zero, where a logarithm does not.
+    # The lower end of a bar is not used: with few sources it may be zero, which has no logarithm.
     low, high = float(np.nanmin(seen[seen > 0])), float(rows["error_high_mas"].max())
     return (
         (0.92 * float(n.min()), 1.09 * float(n.max())),
@@ -128,7 +128,7 @@ def _limits(rows: pd.DataFrame) -> tuple[Limits, Limits]:
     )
 
 
-def _words(rows: pd.DataFrame) -> str:
+def _subtitle(rows: pd.DataFrame) -> str:
     first, last = rows.iloc[0], rows.iloc[-1]
     noise, floor = angle_text(float(first["noise_mas"])), angle_text(float(last["floor_mas"]))
     orbits = f"{int(first['n_orbits'])} orbit{'s' if first['n_orbits'] > 1 else ''}"
@@ -149,9 +149,9 @@ SURVEY_FIGURES = (
     SurveyFigure(
         "error-by-count",
         "Error against number of orbits",
-        "The error of the mean position over N orbits. Good: along the drawn prediction. The "
-        "paper's square-root law has no floor; the errors of the reference sources are the same "
-        "in every orbit and do not average out.",
+        "The error of the mean position over N orbits. Good: points along the solid prediction. "
+        "The paper's square-root law has no floor; the errors of the reference sources are the "
+        "same in every orbit and do not average out.",
         40,
         _draw,
     ),

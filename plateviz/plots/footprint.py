@@ -49,7 +49,7 @@ def plot_footprint(
     return framed(
         [*_outlines(fields, theme), points, *_names(fields, theme)],
         title=_TITLE,
-        subtitle=_counts(sources, fields),
+        subtitle=_subtitle(sources, fields),
         theme=theme,
         width=width,
         xlim=(half_x, -half_x),
@@ -65,14 +65,14 @@ def _largest(*columns: pd.Series) -> float:
     return float(values.max()) or 1.0
 
 
-def _counts(sources: pd.DataFrame, fields: pd.DataFrame) -> str:
+def _subtitle(sources: pd.DataFrame, fields: pd.DataFrame) -> str:
     counts = sources["source_class"].value_counts()
     parts = [f"{count:,} {name}" for name, count in counts.items()]
     return f"{', '.join(parts)} sources; {fields['field_id'].nunique()} fields"
 
 
 def _outlines(fields: pd.DataFrame, theme: str) -> Iterator[hv.Path]:
-    """Yield the detectors of each field; the dashes tell overlapping fields apart."""
+    """Yield the detector outlines of each field, with dashes that differ between fields."""
     for number, (_, field) in enumerate(fields.groupby("field_id")):
         paths = [
             detector[["x_arcmin", "y_arcmin"]].to_numpy(dtype=float)
@@ -115,8 +115,9 @@ DIAGNOSTICS = (
     Diagnostic(
         "footprint",
         "Footprint",
-        "Where the sources lie on the sky, and the fields of this orbit. The reference "
-        "sources tie the solution to the sky; where a field has few, it leans on the others.",
+        "The sources on the sky, and the fields of this orbit. Good: reference sources in every "
+        "field. They tie the solution to the sky; a field with few of them depends on the other "
+        "fields.",
         10,
         _draw,
     ),

@@ -1,4 +1,4 @@
-"""The gallery: every picture that a module of `plateviz.plots` defines for a page."""
+"""The gallery: every figure that a module of `plateviz.plots` defines for a page."""
 
 import importlib
 import pkgutil
@@ -14,22 +14,22 @@ from plateviz.plots.survey_figure import SourceFigure, SurveyFigure
 @cache
 def diagnostics() -> tuple[Diagnostic, ...]:
     """Return the diagnostics in page order."""
-    return tuple(sorted(_defined("DIAGNOSTICS"), key=attrgetter("order")))
+    return tuple(sorted(_entries("DIAGNOSTICS"), key=attrgetter("order")))
 
 
 @cache
 def survey_figures() -> tuple[SurveyFigure, ...]:
     """Return the figures of a survey in page order."""
-    return tuple(sorted(_defined("SURVEY_FIGURES"), key=attrgetter("order")))
+    return tuple(sorted(_entries("SURVEY_FIGURES"), key=attrgetter("order")))
 
 
 @cache
 def source_figures() -> tuple[SourceFigure, ...]:
     """Return the figures of one source in page order."""
-    return tuple(sorted(_defined("SOURCE_FIGURES"), key=attrgetter("order")))
+    return tuple(sorted(_entries("SOURCE_FIGURES"), key=attrgetter("order")))
 
 
-def _defined(name: str) -> Iterator:
+def _entries(name: str) -> Iterator:
     for module in pkgutil.iter_modules(plateviz.plots.__path__):
         imported = importlib.import_module(f"plateviz.plots.{module.name}")
         yield from getattr(imported, name, ())

@@ -25,7 +25,7 @@ _DEPARTURE = "(χ² − dof) / √(2 dof)"
 def plot_motion_pulls(
     table: pd.DataFrame, *, theme: str = "light", width: int = PANEL_WIDTH
 ) -> hv.Layout | hv.Overlay:
-    """Draw the histogram of the pulls of each parameter of the motion with the unit normal.
+    """Draw the histogram of the pulls of each motion parameter with the unit normal.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def _panel(rows: pd.DataFrame, name: str, theme: str, width: int) -> hv.Overlay:
     return framed(
         [steps(rows, "sources", SERIES_COLOURS[0]), normal],
         title=_NAMES[name],
-        subtitle=_words(first, limit),
+        subtitle=_subtitle(first, limit),
         theme=theme,
         width=width,
         height=round(0.62 * width),
@@ -69,7 +69,7 @@ def _panel(rows: pd.DataFrame, name: str, theme: str, width: int) -> hv.Overlay:
     )
 
 
-def _words(first: pd.Series, limit: float) -> str:
+def _subtitle(first: pd.Series, limit: float) -> str:
     return (
         f"sd {first['sd']:.3f}, mean {first['mean']:.3f}\n"
         f"n = {first['n']:,}; {first['outside']:,} beyond ± {limit:g}"
@@ -88,10 +88,10 @@ SURVEY_FIGURES = (
     SurveyFigure(
         "motion-pulls",
         "Pulls of the fitted motions",
-        "Fitted minus true place, parallax and proper motion over their sigmas, for sources "
-        f"other than reference ones in at least {LEAST_ORBITS} orbits. Good: the unit normal. "
-        "Sources of one region share the reference sources' errors, so that a mean off zero is "
-        "no surprise; a width off one is.",
+        "Fitted minus true position, parallax and proper motion over their sigmas, for "
+        f"non-reference sources in at least {LEAST_ORBITS} orbits. Good: the unit normal. Sources "
+        "of one region share the reference sources' errors, so that the mean may differ from "
+        "zero; the width should be one.",
         60,
         _draw,
         is_wide=True,

@@ -1,4 +1,4 @@
-"""How many orbits measured a source (paper, figure "result:ts:orbit")."""
+"""Number of orbits that measured each source (paper, figure "result:ts:orbit")."""
 
 import holoviews as hv
 import pandas as pd
@@ -11,7 +11,7 @@ from plateviz.tables.orbit_counts import orbit_counts
 from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Orbits of each source"
-# Where a bin without a source is put, below the frame: a logarithm has no zero.
+# Drawn count of an empty bin, below the frame: zero has no logarithm.
 _NONE = 0.1
 _LOWEST = 0.7
 _ALL_TICKS_UP_TO = 200.0
@@ -38,7 +38,7 @@ def plot_orbit_counts(
             for name, rows in table.groupby("source_class", sort=False)
         ],
         title=_TITLE,
-        subtitle=_words(table),
+        subtitle=_subtitle(table),
         theme=theme,
         width=width,
         height=round(0.62 * width),
@@ -57,7 +57,7 @@ def _labels(step: int) -> AxisLabels:
 
 
 def _closed(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the bins between two empty ones, so that the outline comes down at both ends."""
+    """Return the bins with an empty one at each end, so that the outline is closed."""
     bins = rows[["left", "right", "count"]].astype(float)
     bins["count"] = bins["count"].clip(lower=_NONE)
     low, high = float(bins["left"].iloc[0]), float(bins["right"].iloc[-1])
@@ -67,7 +67,7 @@ def _closed(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.concat([ends[0], bins, ends[1]], ignore_index=True)
 
 
-def _words(table: pd.DataFrame) -> str:
+def _subtitle(table: pd.DataFrame) -> str:
     firsts = table.drop_duplicates("source_class")
     parts = [
         f"{row.source_class}: n = {row.n:,}, median {row.median:g}"
@@ -84,8 +84,8 @@ SURVEY_FIGURES = (
     SurveyFigure(
         "orbit-counts",
         "Orbits of each source",
-        "How many orbits measured a source, by class. Sources near the target are measured most "
-        "often; the classes should be alike where they share the sky.",
+        "Number of orbits that measured each source, by class. Sources near the target are "
+        "measured most often. Good: similar histograms for classes in the same part of the sky.",
         30,
         _draw,
     ),

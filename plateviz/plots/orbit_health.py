@@ -1,4 +1,4 @@
-"""The fits of all orbits against time: chi2 and the reference sources' normalised deviations."""
+"""Quality of fit against time: chi2 and the reference sources' deviations of each orbit."""
 
 import holoviews as hv
 import pandas as pd
@@ -27,7 +27,7 @@ _HOVER_CHI2 = [
     ("χ² / dof", "@{chi2_per_dof}{0.0000} ± @{expected_sd}{0.0000}"),
     ("departure", "@{z}{0.0} σ"),
 ]
-_HOVER_FAILED = [("orbit", "@{orbit_id}"), ("state", "@{state}"), ("why", "@{message}")]
+_HOVER_FAILED = [("orbit", "@{orbit_id}"), ("state", "@{state}"), ("reason", "@{message}")]
 _NAMES = {"ra": "α cos δ", "dec": "δ"}
 _MARKERS = {"ra": "circle", "dec": "triangle"}
 
@@ -37,7 +37,7 @@ def plot_orbit_health(
 ) -> hv.Layout | hv.Overlay:
     """Draw chi2 over its degrees of freedom and the normalised deviations of each orbit.
 
-    Failed orbits, and those that did not converge, are marked at the foot of the first panel.
+    Orbits that failed or did not converge are marked at the bottom of the first panel.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def _chi2(table: pd.DataFrame, xlim: Limits, theme: str, width: int) -> hv.Overl
 
 
 def _to_edges(fitted: pd.DataFrame, xlim: Limits) -> pd.DataFrame:
-    """Return the orbits with the first and the last repeated at the edges of the frame."""
+    """Return the orbits with the first and the last one repeated at the edges of the frame."""
     ends = [fitted.head(1).assign(year=xlim[0]), fitted.tail(1).assign(year=xlim[1])]
     return pd.concat([ends[0], fitted, ends[1]], ignore_index=True)
 
@@ -208,8 +208,8 @@ SURVEY_FIGURES = (
         "orbit-health",
         "Health of the orbits",
         "Chi2 over its degrees of freedom for each orbit, and the deviations of the reference "
-        "sources from their priors. Good: two orbits in three within the band; deviations at "
-        "their expected value, which is below 1 for a point estimate.",
+        "sources from their priors. Good: two thirds of the orbits within the band, and "
+        "deviations near their expected value, which is below 1 for a point estimate.",
         5,
         _draw,
         is_wide=True,

@@ -1,4 +1,4 @@
-"""Choosing the order of the distortion: evidence and reserved sources against the order."""
+"""Choice of the distortion order: evidence and reserved sources against the order."""
 
 from collections.abc import Iterable
 
@@ -24,7 +24,7 @@ _TITLE = "Orders of the distortion"
 _DIFFERENCE = "Evidence and prediction, against the best order"
 _HELD_OUT = "χ² of the reserved sources, by order"
 _XLABEL = "order of the distortion"
-_LABELS: AxisLabels = {"xlabel": _XLABEL, "ylabel": "log probability less the best (nat)"}
+_LABELS: AxisLabels = {"xlabel": _XLABEL, "ylabel": "log probability minus the best (nat)"}
 _HELD_OUT_LABELS: AxisLabels = {"xlabel": _XLABEL, "ylabel": "χ² / dof"}
 _SERIES = (
     ("evidence_below_best", "log evidence", "circle"),
@@ -34,7 +34,7 @@ _HOVER = [
     ("order", "@{order}"),
     ("coefficients", "@{n_terms}"),
     ("below the best", "@{below}{0,0.0}"),
-    ("by", "@{series}"),
+    ("criterion", "@{series}"),
 ]
 _HELD_OUT_HOVER = [
     ("order", "@{order}"),
@@ -43,7 +43,7 @@ _HELD_OUT_HOVER = [
     ("χ² / dof of all", "@{chi2_per_dof}{0.0000}"),
 ]
 _BAND_SIGMAS = 2.0
-# Ticks are chosen out of these, and at least this part of the axis apart.
+# Candidates of the ticks; chosen ones are at least `_APART` of the axis apart.
 _LOSSES = (0.0, *(float(10**k) for k in range(10)))
 _RATIOS = (
     *(0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0, 1.01, 1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 5.0),
@@ -55,7 +55,7 @@ _APART = 0.08
 def plot_orders(
     table: pd.DataFrame, *, theme: str = "light", width: int = PANEL_WIDTH
 ) -> hv.Layout | hv.Overlay:
-    """Draw what each order is worth by its evidence and by the sources it has not seen.
+    """Draw the evidence of each order, and its prediction of the reserved sources.
 
     Both axes are linear near their best value and logarithmic far from it.
 
@@ -66,12 +66,13 @@ def plot_orders(
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        words = "No orders compared: switch it on under Refit, then fit"
-        return message(_TITLE, words, theme=theme, width=width, **_LABELS)
-    return side_by_side([_worth(table, theme, width), _held_out(table, theme, width)], columns=2)
+        text = "No orders compared: switch it on under Refit, then fit"
+        return message(_TITLE, text, theme=theme, width=width, **_LABELS)
+    panels = [_differences(table, theme, width), _held_out(table, theme, width)]
+    return side_by_side(panels, columns=2)
 
 
-def _worth(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
+def _differences(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
     elements = [*_fitted(table, theme)]
     values = [np.zeros(1)]
     for (column, name, marker), colour in zip(_SERIES, SERIES_COLOURS, strict=False):
@@ -87,14 +88,14 @@ def _worth(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
     return framed(
         elements,
         title=_DIFFERENCE,
-        subtitle=_words(table),
+        subtitle=_subtitle(table),
         theme=theme,
         width=width,
         height=round(0.75 * width),
         xlim=_limits(table),
         ylim=(low, -0.1 * low),
         xticks=table["order"].tolist(),
-        yticks=[(place, words.replace("−0", "0")) for place, words in ticks],
+        yticks=[(place, label.replace("−0", "0")) for place, label in ticks],
         legend_columns=1,
         **_LABELS,
     )
@@ -103,8 +104,8 @@ def _worth(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
 def _held_out(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
     rows = table.dropna(subset=["held_out_chi2_per_dof"])
     if rows.empty:
-        words = "No reserved sources"
-        return message(_HELD_OUT, words, theme=theme, width=width, **_HELD_OUT_LABELS)
+        text = "No reserved sources"
+        return message(_HELD_OUT, text, theme=theme, width=width, **_HELD_OUT_LABELS)
     colours, spread = theme_of(theme), float(rows["held_out_sd"].max())
     scale = _BAND_SIGMAS * spread
     rows = rows.assign(height=np.arcsinh((rows["held_out_chi2_per_dof"] - 1.0) / scale))
@@ -128,8 +129,8 @@ def _held_out(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
             *_line(rows, "height", extra, "reserved sources", colours.mark, "triangle"),
         ],
         title=_HELD_OUT,
-        subtitle=f"{rows['n_reserved'].iloc[0]:,} sources, judged by the calibration of the "
-        f"others\nexpected: 1 ± {spread:.3f} for an order that is high enough",
+        subtitle=f"{rows['n_reserved'].iloc[0]:,} sources, with the calibration fitted to the "
+        f"others\nexpected: 1 ± {spread:.3f} for a sufficient order",
         theme=theme,
         width=width,
         height=round(0.75 * width),
@@ -142,18 +143,18 @@ def _held_out(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
     )
 
 
-def _words(table: pd.DataFrame) -> str:
-    """Return two lines, as the panel beside has: panels of unequal height are clipped."""
+def _subtitle(table: pd.DataFrame) -> str:
+    """Return two lines, as in the other panel, because panels of unequal height are clipped."""
     names = {"evidence": "evidence_below_best", "prediction": "log_density_below_best"}
     found = {name: preferred_order(table, column) for name, column in names.items()}
     best = [f"best {name}: order {order}" for name, order in found.items() if order is not None]
     if found["evidence"] is None:
         best.insert(0, "no evidence under a flat prior")
     fitted = table.loc[table["is_fitted"], "order"]
-    words = [f"fitted: order {order}, dotted" for order in fitted]
+    second = [f"fitted: order {order}, dotted" for order in fitted]
     if table["order"].max() < MAX_ORDER:
-        words.append(f"above {table['order'].max()} too few data")
-    return f"{'; '.join(best)}\n{'; '.join(words)}"
+        second.append(f"above {table['order'].max()} too few data")
+    return f"{'; '.join(best)}\n{'; '.join(second)}"
 
 
 def _line(
@@ -169,7 +170,7 @@ def _line(
 
 
 def _fitted(table: pd.DataFrame, theme: str) -> list[hv.Element]:
-    """Return a line at the order that was fitted."""
+    """Return a vertical line at the fitted order."""
     colour = theme_of(theme).line
     orders = table.loc[table["is_fitted"], "order"]
     return [drawn(hv.VLine(x), color=colour, line_width=1.2, line_dash="dotted") for x in orders]
@@ -180,11 +181,11 @@ def _limits(table: pd.DataFrame) -> tuple[float, float]:
 
 
 def _ticks(
-    places: Iterable[float], words: Iterable[str], low: float, high: float
+    places: Iterable[float], labels: Iterable[str], low: float, high: float
 ) -> list[tuple[float, str]]:
-    """Return the ticks within the axis that leave each other room, those near zero first."""
+    """Return ticks within the axis that do not overlap; those near zero take precedence."""
     chosen: list[tuple[float, str]] = []
-    for place, label in sorted(zip(places, words, strict=True), key=lambda tick: abs(tick[0])):
+    for place, label in sorted(zip(places, labels, strict=True), key=lambda tick: abs(tick[0])):
         apart = _APART * (high - low)
         if low <= place <= high and all(abs(place - other) >= apart for other, _ in chosen):
             chosen.append((float(place), label))
@@ -202,10 +203,10 @@ DIAGNOSTICS = (
     Diagnostic(
         "orders",
         "Choosing the order",
-        "What every order of the distortion is worth: its evidence, and how well the calibration "
-        "it gives predicts sources that were kept out of the fit. The dotted line is the order "
-        "fitted. Good: it is the best by evidence (5 less is odds of 1 to 150), and from it on "
-        "upwards the reserved sources' chi2 is inside the band.",
+        "The evidence of every order of the distortion, and how well its calibration predicts "
+        "reserved sources that were kept out of the fit. The dotted line is the fitted order. "
+        "Good: it has the highest evidence (5 less is odds of 1 to 150), and from it upwards "
+        "the chi2 of the reserved sources is inside the band.",
         82,
         _draw,
         is_wide=True,

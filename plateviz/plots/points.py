@@ -1,4 +1,4 @@
-"""Points by class of source, points in numbers that only a raster can show, histograms."""
+"""Elements shared by plots: points by class, rasters of many points, histograms, error bars."""
 
 from collections.abc import Callable, Sequence
 
@@ -16,7 +16,7 @@ from plateviz.plots.style import (
 )
 from plateviz.plots.theme import theme_of
 
-# Images for who zooms in, each about so many times as fine as the one before.
+# Number of images for zooming in, and the factor of resolution from one to the next.
 _LEVELS, _FINER = 3, 2
 Tooltips = Sequence[tuple[str, str]]
 
@@ -26,15 +26,15 @@ def class_points(
 ) -> hv.Points:
     """Return one element with a point per row, coloured and shaped by `source_class`.
 
-    One element rather than one per class keeps the index of a selected point equal to
-    the row of the table.
+    It is one element instead of one per class, so that the index of a selected point is the
+    row of the table.
 
     Parameters
     ----------
     table : with `id` (text), `source_class` and the columns of `x`, `y` and `extra`
     x, y : dimensions to draw
     hover : label and format of each line of the hover
-    extra : further columns that the hover needs
+    extra : other columns that the hover needs
     """
     points = hv.Points(table, [x, y], ["source_class", "id", *extra])
     kind = dim("source_class")
@@ -55,18 +55,19 @@ def class_points(
 def raster(
     points: hv.Points, *, half: float, width: int, theme: str, dynamic: bool
 ) -> list[hv.Element | hv.DynamicMap]:
-    """Return the number of points per cell about zero as images, of which one is seen at a time.
+    """Return the number of points per cell about zero as images, one of which is visible.
 
     Parameters
     ----------
-    points : to be counted
-    half : the square from -half to half is counted
+    points : the points to count
+    half : points are counted in the square from -half to half
     width : of the frame in screen pixels
     theme : "light" or "dark"
-    dynamic : True for a live plot, one image that is counted anew at each zoom; else there is one
-        for the whole square, and finer ones about its centre for who zooms in there
+    dynamic : True for a live plot, with one image that is counted again at each zoom; otherwise
+        one image of the whole square, and finer ones about its centre that replace it when
+        zooming in
     """
-    # Datashader and Numba take seconds and 150 MB to load; few plots have that many rows.
+    # Imported here, because Datashader and Numba take seconds and 150 MB to load.
     from holoviews.operation.datashader import rasterize
 
     def counted(half: float) -> hv.Element | hv.DynamicMap:
@@ -89,14 +90,14 @@ def raster(
     dense = float(np.nanmax(whole.dimension_values(2)))
     return [
         drawn(
-            # As if the cells were those of the whole, so that one scale of colours holds for all.
+            # Counts are scaled to cells of the whole image, so that one colour scale is valid.
             image.transform(
                 **{image.vdims[0].name: dim(image.vdims[0]) * float(_FINER ** (2 * i))}
             ),
             **_cells(theme),
             clim=(1.0, max(dense, 2.0)),
             colorbar=i == 0,
-            hooks=[_seen_between(halves[i + 1] if i + 1 < _LEVELS else 0.0, halves[i], i == 0)],
+            hooks=[_visible_between(halves[i + 1] if i + 1 < _LEVELS else 0.0, halves[i], i == 0)],
         )
         for i, image in enumerate(images)
     ]
@@ -112,8 +113,8 @@ def _cells(theme: str) -> dict[str, object]:
     }
 
 
-def _seen_between(least: float, most: float, is_whole: bool) -> Callable:
-    """Return a hook that shows an image while the frame reaches so far from zero, no other time."""
+def _visible_between(least: float, most: float, is_whole: bool) -> Callable:
+    """Return a hook that shows an image while the frame's reach is from `least` to `most`."""
     code = """
         const ends = [x.start, x.end, y.start, y.end].map(Math.abs);
         const reach = Math.max(...ends);
@@ -123,11 +124,10 @@ def _seen_between(least: float, most: float, is_whole: bool) -> Callable:
     def apply(plot: object, element: hv.Element) -> None:
         figure, image = plot.state, plot.handles["glyph_renderer"]  # type: ignore[attr-defined]
         image.visible = is_whole
-        told = {"x": figure.x_range, "y": figure.y_range, "image": image}
-        # The frame's own edge is a little farther out than the data.
-        callback = CustomJS(
-            args={**told, "least": 1.01 * least, "most": 1.01 * most, "whole": is_whole}, code=code
-        )
+        models = {"x": figure.x_range, "y": figure.y_range, "image": image}
+        # The edge of the frame lies slightly outside the data.
+        limits = {"least": 1.01 * least, "most": 1.01 * most, "whole": is_whole}
+        callback = CustomJS(args={**models, **limits}, code=code)
         for axis in (figure.x_range, figure.y_range):
             axis.js_on_change("start", callback)
             axis.js_on_change("end", callback)
@@ -136,7 +136,7 @@ def _seen_between(least: float, most: float, is_whole: bool) -> Callable:
 
 
 def steps(bins: pd.DataFrame, name: str, colour: str) -> hv.Curve:
-    """Return a histogram, `left`, `right` and `count` of each bin, as an outline."""
+    """Return a histogram (`left`, `right` and `count` of each bin) as an outline."""
     edges = np.append(bins["left"].to_numpy(), bins["right"].to_numpy()[-1])
     counts = np.append(bins["count"].to_numpy(), bins["count"].to_numpy()[-1])
     curve = hv.Curve((edges, counts), "edge", "count", label=name)
@@ -144,8 +144,8 @@ def steps(bins: pd.DataFrame, name: str, colour: str) -> hv.Curve:
 
 
 def unit_normal(area: float, limit: float, theme: str) -> hv.Curve:
-    """Return a unit normal of the same area as a histogram, from -limit to limit."""
-    # Drawn from the density at the centre of each bin, a normal would look like steps.
+    """Return a unit normal with the area of a histogram, from -limit to limit."""
+    # A finer grid than the bins, so that the curve is smooth.
     x = np.linspace(-limit, limit, 241)
     normal = area * np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi)
     curve = hv.Curve((x, normal), "x", "count", label="unit normal")
@@ -155,7 +155,7 @@ def unit_normal(area: float, limit: float, theme: str) -> hv.Curve:
 def error_bars(
     table: pd.DataFrame, x: str, y: str, sigma: str, colour: str, *, along: str = "y"
 ) -> hv.Segments:
-    """Return a bar of one `sigma` to both sides of each point, along "x" or "y"."""
+    """Return a bar of one `sigma` on both sides of each point, along "x" or "y"."""
     ends = {f"{axis}{end}": table[name] for axis, name in (("x", x), ("y", y)) for end in "01"}
     for end, sign in (("0", -1.0), ("1", 1.0)):
         ends[f"{along}{end}"] = table[y if along == "y" else x] + sign * table[sigma]

@@ -1,4 +1,4 @@
-"""How far the catalogue lies from the truth (paper, figure "exp:reference:hist")."""
+"""Separation between catalogue and truth (paper, figure "exp:reference:hist")."""
 
 import holoviews as hv
 import numpy as np
@@ -31,7 +31,7 @@ def plot_prior_separation(
     Parameters
     ----------
     table : `tables.prior_separation`
-    epoch : at which the separations were taken, Julian year
+    epoch : of the separations, Julian year
     theme : "light" or "dark"
     width : of each panel's frame, screen pixels
     """
@@ -61,7 +61,7 @@ def _panel(rows: pd.DataFrame, group: str, epoch: float, theme: str, width: int)
             drawn(expected, color=theme_of(theme).line, line_width=1.6),
         ],
         title=f"Catalogue minus truth, {group} sources",
-        subtitle=_words(first),
+        subtitle=_subtitle(first),
         theme=theme,
         width=width,
         height=round(0.7 * width),
@@ -79,7 +79,7 @@ def _labels(epoch: float, unit: str) -> AxisLabels:
     }
 
 
-def _words(first: pd.Series) -> str:
+def _subtitle(first: pd.Series) -> str:
     artificial = f", {first['n_artificial']:,} of them artificial" if first["n_artificial"] else ""
     return (
         f"n = {first['n']:,}{artificial}\n"
@@ -95,8 +95,8 @@ SURVEY_FIGURES = (
     SurveyFigure(
         "prior-separation",
         "Catalogue minus truth",
-        "How far the catalogue lies from the truth when the survey observes: what the priors "
-        "are wrong by. Good: the histograms follow what the catalogue states of its errors.",
+        "Separation between catalogue and truth at the epoch of the survey: the errors of the "
+        "priors. Good: histograms that follow the catalogue's stated uncertainties.",
         20,
         _draw,
         is_wide=True,

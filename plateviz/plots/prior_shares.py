@@ -1,4 +1,4 @@
-"""How much of each calibration parameter is prior."""
+"""Prior share of each calibration parameter."""
 
 import holoviews as hv
 import pandas as pd
@@ -26,7 +26,7 @@ _ROW_HEIGHT = 30
 def plot_prior_shares(
     table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
 ) -> hv.Overlay:
-    """Draw the prior share of every calibration parameter in a row for its group.
+    """Draw the prior share of every calibration parameter, a row per group.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def plot_prior_shares(
         ],
         title=_TITLE,
         subtitle=f"{len(table)} parameters, {int((table['prior_share'] > 0.5).sum())} of them "
-        "more prior than measured; at the right the largest share of each group",
+        "more prior than measured; right: largest share of each group",
         theme=theme,
         width=width,
         height=_ROW_HEIGHT * len(groups) + 8,
@@ -75,15 +75,15 @@ def plot_prior_shares(
 
 
 def _largest(table: pd.DataFrame, theme: str) -> list[hv.Element]:
-    """Return the largest share of each group in a column of its own, without the grid."""
+    """Return the largest share of each group as a separate column without grid lines."""
     rows, colours = table.groupby("row"), theme_of(theme)
     largest, is_flat = rows["prior_share"].max(), rows["prior_sigma"].min() == float("inf")
-    words = ["flat" if is_flat[row] else _text(share) for row, share in largest.items()]
+    texts = ["flat" if is_flat[row] else _text(share) for row, share in largest.items()]
     ground = hv.Rectangles([(1.02, -0.55, 1.18, len(largest) - 0.45)])
-    text = hv.Labels(([1.165] * len(largest), largest.index, words))
+    labels = hv.Labels(([1.165] * len(largest), largest.index, texts))
     return [
         drawn(ground, color=colours.background, line_color=None),
-        drawn(text, text_color=colours.text, text_font_size=TICK_SIZE, text_align="right"),
+        drawn(labels, text_color=colours.text, text_font_size=TICK_SIZE, text_align="right"),
     ]
 
 
@@ -99,9 +99,9 @@ DIAGNOSTICS = (
     Diagnostic(
         "prior-shares",
         "Prior share of the calibration",
-        "What of each parameter is prior: its marginal variance over that of the prior. Good: "
-        "near 0, measured; near 1, assumed. If a quarter of each of four detectors is prior, "
-        "what is assumed is their common part.",
+        "The marginal variance of each parameter over its prior variance. Good: near 0, which "
+        "is measured; near 1 is assumed. A share of a quarter in each of four detectors means "
+        "that their common part is assumed.",
         81,
         _draw,
     ),

@@ -1,4 +1,4 @@
-"""Goodness of fit: standardised residuals, chi2 of each exposure."""
+"""Goodness of fit: standardised residuals, and chi2 of each exposure."""
 
 import holoviews as hv
 import numpy as np
@@ -60,7 +60,7 @@ def plot_pulls(
             normal,
         ],
         title=_PULLS,
-        subtitle=_pull_words(table, limit),
+        subtitle=_pull_subtitle(table, limit),
         theme=theme,
         width=width,
         height=round(0.62 * width),
@@ -87,7 +87,7 @@ def plot_exposure_chi2(
     colours = theme_of(theme)
     band = _BAND_SIGMAS * table["expected_sd"]
     reach = max(float(band.max()), float((table["chi2_per_dof"] - 1.0).abs().max()))
-    # A step per exposure: the band belongs to each alone.
+    # A step per exposure, because the band differs between exposures.
     edges = np.repeat(table["index"].to_numpy(dtype=float), 2) + np.tile([-0.5, 0.5], len(table))
     low, high = np.repeat(1.0 - band.to_numpy(), 2), np.repeat(1.0 + band.to_numpy(), 2)
     area = hv.Area((edges, low, high), "index", ["low", "high"], label="expected ± 2σ")
@@ -118,7 +118,7 @@ def plot_exposure_chi2(
     )
 
 
-def _pull_words(table: pd.DataFrame, limit: float) -> str:
+def _pull_subtitle(table: pd.DataFrame, limit: float) -> str:
     parts = [
         f"{axis}: n = {rows['n'].iloc[0]:,}, sd {rows['sd'].iloc[0]:.3f}, "
         f"{rows['outside'].iloc[0]:,} beyond ± {limit:g}"
@@ -139,16 +139,17 @@ DIAGNOSTICS = (
     Diagnostic(
         "pulls",
         "Standardised residuals",
-        "All residuals over their expected scatter, freed of leverage. Good: the unit normal. "
-        "Wider says the measurement errors are stated too small, long tails say outliers.",
+        "All residuals over their expected scatter, corrected for leverage. Good: the unit "
+        "normal. A wider histogram means underestimated measurement errors, long tails mean "
+        "outliers.",
         40,
         _draw_pulls,
     ),
     Diagnostic(
         "exposure-chi2",
         "Chi2 of each exposure",
-        "Chi2 over its expected value, exposure by exposure. Good: inside the band; one exposure "
-        "far above it was disturbed.",
+        "Chi2 of each exposure over its expected value. Good: points inside the band. A single "
+        "exposure far above it was disturbed.",
         70,
         _draw_chi2,
     ),

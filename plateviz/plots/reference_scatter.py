@@ -1,4 +1,4 @@
-"""Reference sources: scatter between orbits against its prediction, deviation over its sigma."""
+"""Scatter of the reference sources between orbits, and their deviations over sigma."""
 
 import holoviews as hv
 import numpy as np
@@ -40,8 +40,8 @@ def plot_reference_scatter(
 ) -> hv.Layout | hv.Overlay:
     """Draw measured against predicted scatter for each coordinate, and the deviations' pulls.
 
-    Above 20,000 sources the number in each cell is drawn. The deviations have a panel where
-    there is a truth.
+    Above 20,000 sources the number in each cell is drawn. The panel of deviations requires a
+    truth.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def _deviations(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
         float(bins["n"].iloc[0] * (bins["right"] - bins["left"]).iloc[0]), limit, theme
     )
     counts = [*(float(part["count"].max()) for part in parts.values()), normal.range("count")[1]]
-    words = "\n".join(
+    subtitle = "\n".join(
         f"{_NAMES[axis]}: mean {part['mean'].iloc[0]:.2f}, sd {part['sd'].iloc[0]:.2f}, "
         f"{part['outside'].iloc[0]:,} beyond ± {limit:g}"
         for axis, part in parts.items()
@@ -145,7 +145,7 @@ def _deviations(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
             normal,
         ],
         title="Mean deviation from the truth",
-        subtitle=words,
+        subtitle=subtitle,
         theme=theme,
         width=width,
         height=width,
@@ -174,10 +174,10 @@ SURVEY_FIGURES = (
     SurveyFigure(
         "reference-scatter",
         "Scatter of the reference sources",
-        "How much a reference source scatters between orbits, against the noise that the fits "
-        "predict, and its mean deviation over what noise and catalogue allow. Good: points about "
-        "the line, a unit normal. The scatter is far below the reported sigma, because a prior's "
-        "error is the same in every orbit.",
+        "The scatter of each reference source between orbits against the noise that the fits "
+        "predict, and its mean deviation over its expected sigma from noise and catalogue. Good: "
+        "points about the line, and a unit normal. The scatter is far below the reported sigma, "
+        "because the error of a prior is the same in every orbit.",
         50,
         _draw,
         is_wide=True,

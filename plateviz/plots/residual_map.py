@@ -37,12 +37,12 @@ def plot_residual_map(
     theme: str = "light",
     width: int = FRAME_WIDTH,
 ) -> hv.Overlay:
-    """Draw residual vectors to a stated scale; mean vectors in bins above 2,000.
+    """Draw residual vectors to a stated scale; above 2,000, their means in bins.
 
     Parameters
     ----------
     table : `tables.residual_map`, of one detector in pix or of all in mm
-    detector : the detector that the table is of, or the instrument for all detectors
+    detector : the detector of the table, or the instrument for all detectors
     arrow_scale : drawn length over true length; None for a round number that makes the
         rms arrow about 4 % of the width
     theme : "light" or "dark"
@@ -58,7 +58,7 @@ def plot_residual_map(
     field = _field(detector)
     shown, binning = _thinned(table, detector, field)
     scale = arrow_scale or automatic_scale(shown, field)
-    length, words = _key(shown, unit)
+    length, length_text = _key(shown, unit)
     return framed(
         [
             _outlines(detector, theme),
@@ -70,11 +70,11 @@ def plot_residual_map(
                 hover=_hover(shown),
                 extra=[c for c in ("id", "exposure", "detector_id", "n") if c in shown] + _VALUES,
             ),
-            *key(length, words, scale=scale, field=field, theme=theme),
+            *key(length, length_text, scale=scale, field=field, theme=theme),
         ],
         title=_title(detector),
         subtitle=f"{_shown_exposures(table)}. {binning}\n"
-        f"Drawn {scale:,g} times enlarged: an arrow of {words}",
+        f"Arrows enlarged {scale:,g} times; key: {length_text}",
         theme=theme,
         width=width,
         xlim=field.x,
@@ -117,9 +117,9 @@ def _outlines(detector: Detector | Instrument, theme: str) -> hv.Path:
 def _thinned(
     table: pd.DataFrame, detector: Detector | Instrument, field: Field
 ) -> tuple[pd.DataFrame, str]:
-    """Return what is drawn, the vectors or their means in bins, and words on which."""
+    """Return the vectors or their means in bins, and a text that describes them."""
     if len(table) <= ARROW_LIMIT:
-        return table, f"{len(table):,} measurements, an arrow each"
+        return table, f"{len(table):,} measurements, one arrow each"
     bins = _BINS_ON_FOCAL_PLANE if isinstance(detector, Instrument) else _BINS_ON_DETECTOR
     x, y = field.x[1] / _MARGIN, field.y[1] / _MARGIN
     means = binned_vectors(
@@ -132,11 +132,11 @@ def _thinned(
 
 
 def _key(shown: pd.DataFrame, unit: str) -> tuple[float, str]:
-    """Return the length of the key arrow in axis units, and that length in words."""
+    """Return the length of the key arrow in axis units, and as text."""
     mas_per_unit = float(shown["mas_per_unit"].mean())
     length = round_125(2.0 * rms_length(shown)) if rms_length(shown) > 0 else 1.0
-    words = f"{length:g} pix" if unit == "pix" else f"{1000.0 * length:g} µm"
-    return length, f"{words} = {angle_text(length * mas_per_unit)}"
+    text = f"{length:g} pix" if unit == "pix" else f"{1000.0 * length:g} µm"
+    return length, f"{text} = {angle_text(length * mas_per_unit)}"
 
 
 def _hover(shown: pd.DataFrame) -> list[tuple[str, str]]:
@@ -166,9 +166,9 @@ DIAGNOSTICS = (
     Diagnostic(
         "residual-map",
         "Residual map",
-        "Measured minus predicted position on the detector, for the exposures and the detector "
-        "chosen. Good: directions without pattern. Neighbours that point the same way are "
-        "distortion that the order does not reach.",
+        "Measured minus predicted position on the detector, for the selected exposures and "
+        "detector. Good: directions without a pattern. Neighbouring arrows with a common "
+        "direction mean distortion that the order does not describe.",
         20,
         _draw,
         follows_selection=True,

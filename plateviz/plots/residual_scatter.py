@@ -47,7 +47,7 @@ def plot_residual_scatter(
         above 20,000 rows
     theme : "light" or "dark"
     width : of the frame, screen pixels
-    dynamic : whether a raster is counted anew at each zoom, which needs a live server
+    dynamic : whether a raster is counted again at each zoom, which needs a live server
     """
     if table.empty:
         return message(
@@ -61,13 +61,13 @@ def plot_residual_scatter(
     points = _points(table)
     if len(table) > ROW_LIMIT:
         data = raster(points, half=half, width=width, theme=theme, dynamic=dynamic)
-        line = CLASS_COLOURS[REFERENCE]  # visible on the darkest and the lightest cell
+        line = CLASS_COLOURS[REFERENCE]  # visible on dark and on light cells
     else:
         data, line = [points], theme_of(theme).line
     return framed(
         [*data, *_expected(expected, line)],
         title=_TITLE,
-        subtitle=_words(statistics),
+        subtitle=_subtitle(statistics),
         theme=theme,
         width=width,
         xlim=limits,
@@ -113,7 +113,7 @@ def _expected(sigma: tuple[float, float], colour: str) -> list[hv.Curve]:
     ]
 
 
-def _words(statistics: ScatterStatistics) -> str:
+def _subtitle(statistics: ScatterStatistics) -> str:
     count = statistics.n_exposures
     return (
         f"n = {statistics.n:,} in {count} exposure{'s' if count > 1 else ''}; "
@@ -131,8 +131,8 @@ DIAGNOSTICS = (
     Diagnostic(
         "residual-scatter",
         "Residual scatter",
-        "Residuals of the exposures and the detector chosen, x against y. Good: a round cloud "
-        "about zero, as wide as the measurement errors allow.",
+        "Residuals of the selected exposures and detector, x against y. Good: a round cloud "
+        "about zero, as wide as the measurement errors predict.",
         30,
         _draw,
         follows_selection=True,

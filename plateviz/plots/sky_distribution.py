@@ -25,7 +25,7 @@ _LABELS: AxisLabels = {"xlabel": "l (deg)", "ylabel": "b (deg)"}
 _X, _Y = hv.Dimension("l_deg"), hv.Dimension("b_deg")
 _HOVER = [("source", "@{id}"), ("l", "@{l_deg}{0.0000}°"), ("b", "@{b_deg}{0.0000}°")]
 _MARGIN = 0.04
-# Number of marks above which they would cover each other.
+# Number of points above which the density is drawn, because points would overlap.
 _POINT_LIMIT = 500
 
 
@@ -37,9 +37,9 @@ def plot_sky_distribution(
     theme: str = "light",
     width: int = PANEL_WIDTH,
 ) -> hv.Layout | hv.Overlay:
-    """Draw the sources in Galactic coordinates, l to the left, a panel per class.
+    """Draw the sources in Galactic coordinates, l increasing to the left, a panel per class.
 
-    A class of more than 500 sources is drawn as their number per square arcmin.
+    A class with more than 500 sources is drawn as its number per square arcmin.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ def plot_sky_distribution(
             framed(
                 [sources, *_outline(area, theme), *_cross(target, theme)],
                 title=f"{name.capitalize()} sources",
-                subtitle=_words(rows, is_dense, area, target),
+                subtitle=_subtitle(rows, is_dense, area, target),
                 theme=theme,
                 width=width,
                 xlim=xlim,
                 ylim=ylim,
-                # Limits from high to low are put in order where panels are linked.
+                # Linked panels sort their limits, so reversed limits would have no effect.
                 invert_xaxis=True,
                 **_LABELS,
             )
@@ -117,7 +117,7 @@ def _cross(target: tuple[float, float] | None, theme: str) -> list[hv.Points]:
 
 
 def _limits(table: pd.DataFrame, area: tuple[Limits, Limits] | None) -> tuple[Limits, Limits]:
-    """Return limits about all sources and the fields."""
+    """Return limits that contain all sources and the area of the fields."""
     (left, right), (low, high) = (
         (
             min([float(table[name].min()), *around]),
@@ -129,13 +129,13 @@ def _limits(table: pd.DataFrame, area: tuple[Limits, Limits] | None) -> tuple[Li
     return (left - margin, right + margin), (low - margin, high + margin)
 
 
-def _words(
+def _subtitle(
     rows: pd.DataFrame,
     is_dense: bool,
     area: tuple[Limits, Limits] | None,
     target: tuple[float, float] | None,
 ) -> str:
-    what = "colour: number per arcmin²" if is_dense else "a mark each"
+    what = "colour: number per arcmin²" if is_dense else "one mark each"
     guides = {"dashed: the fields' area": area, "cross: the target": target}
     shown = "; ".join(guide for guide, at in guides.items() if at)
     plural = "" if len(rows) == 1 else "s"
@@ -160,9 +160,9 @@ SURVEY_FIGURES = (
     SurveyFigure(
         "sky-distribution",
         "Sources in the sky",
-        "The sources of the catalogue in Galactic coordinates, by class. Where the reference "
-        "sources are few, an orbit's solution leans on few; the artificial ones lie about the "
-        "target.",
+        "The sources of the catalogue in Galactic coordinates, by class. Good: reference sources "
+        "over the whole area, because the solution of an orbit is tied to the sky by those in "
+        "its fields. Artificial sources lie about the target.",
         10,
         _draw,
         is_wide=True,

@@ -33,10 +33,10 @@ _HOVER = [
 ]
 _EXTRA = ["id", "orbit_id", "year", "n_obs", "sigma_ra_mas", "sigma_dec_mas"]
 _ZEROS = {
-    "catalogue": "the catalogue's place",
-    "true": "the true place",
-    "fit": "the fitted place",
-    "mean": "the mean of the estimates",
+    "catalogue": "catalogue position",
+    "true": "true position",
+    "fit": "fitted position",
+    "mean": "mean of the estimates",
 }
 _MARGIN = 1.12
 
@@ -44,11 +44,11 @@ _MARGIN = 1.12
 def plot_sky_track(
     table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
 ) -> hv.Overlay:
-    """Draw the places of one source, orbit by orbit, with truth, catalogue and fitted motion.
+    """Draw the position of one source in each orbit, with truth, catalogue and fitted motion.
 
     Parameters
     ----------
-    table : `tables.sky_track`; a catalogue that it leaves out is left out here
+    table : `tables.sky_track`; the catalogue is not drawn if the table leaves it out
     theme : "light" or "dark"
     width : of the frame, screen pixels
     """
@@ -67,7 +67,7 @@ def plot_sky_track(
             *(_truth(orbits) if _has(orbits, "true") else []),
         ],
         title=f"Source {first['id']}, {first['source_class']}",
-        subtitle=_words(first, track_statistics(table)),
+        subtitle=_subtitle(first, track_statistics(table)),
         theme=theme,
         width=width,
         xlim=xlim,
@@ -103,7 +103,7 @@ def _catalogue(rows: pd.DataFrame, theme: str) -> list[hv.Points]:
 
 
 def _truth(rows: pd.DataFrame) -> list[hv.Points]:
-    # Above the estimates, which would hide the one place of a source that does not move.
+    # Drawn above the estimates, which would hide the true position of a source without motion.
     points = hv.Points((rows["true_ra_mas"], rows["true_dec_mas"]), [_X, _Y], label="truth")
     return [drawn(points, color=SERIES_COLOURS[1], marker="diamond", size=7, line_color=None)]
 
@@ -128,7 +128,7 @@ def _estimates(rows: pd.DataFrame) -> list[hv.Element]:
 
 
 def _limits(table: pd.DataFrame) -> tuple[Limits, Limits]:
-    """Return a square about all that is drawn, East to the left."""
+    """Return the limits of a square that contains every element, East to the left."""
     ends = []
     for axis in ("ra", "dec"):
         sigma = table[f"sigma_{axis}_mas"].fillna(0.0)
@@ -141,14 +141,14 @@ def _limits(table: pd.DataFrame) -> tuple[Limits, Limits]:
     return (x + half, x - half), (y - half, y + half)
 
 
-def _words(first: pd.Series, statistics: TrackStatistics) -> str:
-    """Return three lines: orbits and separation, where zero is, what is left out."""
+def _subtitle(first: pd.Series, statistics: TrackStatistics) -> str:
+    """Return up to three lines: orbits and separation, the origin, and a catalogue left out."""
     ra, dec, both = (angle_text(rms) for rms in statistics[1:])
     separation = f"rms from the truth {ra} (α), {dec} (δ), {both} (2-D)"
     has_truth = np.isfinite(statistics.rms_2d)
     lines = [f"{orbits_text(statistics.n)}; {separation if has_truth else 'no truth'}"]
     at = "" if first["zero"] == "mean" else f" at J{first['mean_year']:.2f}"
-    lines.append(f"zero: {_ZEROS[first['zero']]}{at}")
+    lines.append(f"origin: {_ZEROS[first['zero']]}{at}")
     if first["zero"] != "catalogue":
         lines.append(f"catalogue left out: {angle_text(first['rms_catalogue_mas'])} off (rms, 2-D)")
     return "\n".join(lines)
@@ -162,9 +162,9 @@ SOURCE_FIGURES = (
     SourceFigure(
         "sky-track",
         "Motion on the sky",
-        "Where each orbit puts the source, with its marginal 1 sigma, and where catalogue and "
-        "truth have it. Good: the estimates follow the truth; a common offset of a reference "
-        "source is the error of its catalogue entry.",
+        "The estimated position of the source in each orbit with its marginal sigma, and the "
+        "catalogue and true positions. Good: the estimates follow the truth. A common offset of "
+        "a reference source is the error of its catalogue entry.",
         10,
         _draw,
     ),

@@ -33,7 +33,7 @@ ROW_LIMIT = 20_000
 ARROW_LIMIT = 2_000
 """Number of arrows above which the mean arrow of each bin is drawn."""
 HOVER_LIMIT = 3
-"""Number of points that one hover describes; more would fill the screen."""
+"""Maximum number of points that one hover describes."""
 FRAME_WIDTH = 460
 PANEL_WIDTH = 340
 
@@ -42,9 +42,8 @@ LABEL_SIZE = "12px"
 TICK_SIZE = "11px"
 FONT = "Helvetica, Arial, sans-serif"
 
-# From the Okabe-Ito palette, which stays distinct in all common colour-vision
-# deficiencies; lightness adjusted so that each has a contrast above 3 to 1 on both
-# backgrounds. The marker's shape says the same a second time.
+# From the Okabe-Ito palette, which is distinct in all common colour-vision deficiencies, with
+# lightness adjusted for a contrast above 3 to 1 on both backgrounds. Marker shapes differ, too.
 CLASS_COLOURS: Mapping[str, str] = MappingProxyType(
     {NON_REFERENCE: "#4291d2", ARTIFICIAL: "#12a37b", REFERENCE: "#e4602a"}
 )
@@ -77,16 +76,15 @@ def framed(
     elements : drawn in order
     title, subtitle : above the frame; the subtitle is wrapped to it
     theme : "light" or "dark"
-    width, height : of the frame in screen pixels; the height is that of equal aspect
-        where it is None
+    width, height : of the frame in screen pixels; a height of None gives equal aspect
     xlim, ylim : limits of the axes; the first may be the larger
-    legend_columns : columns of the legend, which stands below the frame so that it covers
-        no data; 0 for no legend
-    options : further plot options of the overlay (labels, ticks, log axes)
+    legend_columns : columns of the legend, which is below the frame so that it covers no
+        data; 0 for no legend
+    options : other plot options of the overlay (labels, ticks, log axes)
 
     Returns
     -------
-    One overlay; its aspect stays equal under box zoom where `height` is None
+    One overlay; if `height` is None, box zoom keeps the aspect equal
     """
     equal = height is None
     if height is None:
@@ -110,7 +108,7 @@ def framed(
 
 
 def _overlaid(elements: Sequence[hv.Element | hv.DynamicMap]) -> hv.Overlay | hv.DynamicMap:
-    # An overlay cannot hold a live element; the product of both is live itself.
+    # An overlay cannot contain a DynamicMap; the product with one is a DynamicMap.
     if any(isinstance(element, hv.DynamicMap) for element in elements):
         return functools.reduce(operator.mul, elements)
     return hv.Overlay(list(elements))
@@ -130,12 +128,12 @@ def message(
     xlabel: str = "",
     ylabel: str = "",
 ) -> hv.Overlay:
-    """Return an empty figure that says why it is empty."""
-    words = hv.Text(0.5, 0.5, text).opts(
+    """Return an empty figure with a text that gives the reason."""
+    label = hv.Text(0.5, 0.5, text).opts(
         text_color=theme_of(theme).muted, text_font_size=TITLE_SIZE, backend=BACKEND
     )
     return framed(
-        [hv.Points([]), words],
+        [hv.Points([]), label],
         title=title,
         theme=theme,
         width=width,
@@ -150,7 +148,12 @@ def message(
 
 
 def side_by_side(panels: Sequence[hv.Overlay], *, columns: int, linked: bool = False) -> hv.Layout:
-    """Return the figures in rows under one toolbar, shown on approach; axes linked on demand."""
+    """Return the figures in rows with one toolbar, shown on mouse-over.
+
+    Parameters
+    ----------
+    linked : whether panels share axes of the same dimension
+    """
     layout = hv.Layout(list(panels)).cols(columns)
     return drawn(layout, autohide_toolbar=True, shared_axes=linked)
 
@@ -171,7 +174,7 @@ def _styling(theme: Theme, subtitle: str, width: int, equal: bool) -> Callable:
         figure.background_fill_color = figure.border_fill_color = theme.background
         figure.outline_line_color = theme.muted
         figure.sizing_mode = None
-        # Figures that are drawn anew on a page that stays lose their points under WebGL.
+        # With WebGL, figures that replace others on an open page lose their points.
         figure.output_backend = "canvas"
         figure.toolbar.logo = None
         figure.toolbar.autohide = True
@@ -187,7 +190,7 @@ def _styling(theme: Theme, subtitle: str, width: int, equal: bool) -> Callable:
 
 
 def _of_type(models: Iterable[object], kind: type[_Model]) -> list[_Model]:
-    # Bokeh's own `select` walks every model of the document, which takes half of the drawing.
+    # Bokeh's `select` walks every model of the document, which takes half of the drawing time.
     return [model for model in models if isinstance(model, kind)]
 
 
@@ -203,7 +206,7 @@ def _font(part: str, colour: str, size: str, style: str = "normal") -> dict[str,
 def _style_titles(figure: Figure, theme: Theme, subtitle: str) -> None:
     for title in _of_type([figure.title, *figure.above], Title):
         title.update(**_font("text", theme.text, TITLE_SIZE, "bold"))
-    # The hook runs again at every update of a live plot: the subtitle is made once.
+    # The hook runs at every update of a live plot, but the subtitle is added only once.
     found = [t for t in figure.above if isinstance(t, Title) and t.name == "subtitle"]
     if subtitle and not found:
         found = [Title(name="subtitle")]

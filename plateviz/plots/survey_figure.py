@@ -1,7 +1,7 @@
-"""SurveyFigure and SourceFigure: one picture of a fitted survey, or of one of its sources.
+"""SurveyFigure and SourceFigure: one figure of a fitted survey, or of one of its sources.
 
-A module of this package that defines `SURVEY_FIGURES` or `SOURCE_FIGURES` is on the Survey or
-the Source page without being named anywhere else (`plateviz.plots.gallery` finds it).
+`plateviz.plots.gallery` finds every module of this package that defines `SURVEY_FIGURES` or
+`SOURCE_FIGURES`, and the Survey or the Source page shows its figures.
 """
 
 from collections.abc import Callable
@@ -14,15 +14,15 @@ from plateviz.tables.survey_tables import SourceTables, SurveyTables
 
 @dataclass(frozen=True)
 class SurveyFigure:
-    """One picture of a fitted survey.
+    """One figure of a fitted survey.
 
     Attributes
     ----------
     name : short and unique, used in addresses and file names
-    title : for people
-    caption : what it shows and what good looks like, in a sentence or two
-    order : place on the page
-    draw : picture of the tables, in a theme
+    title : displayed title
+    caption : what it shows and what a good solution looks like, in a few sentences
+    order : sort key on the page
+    draw : function of the tables and a theme's name that returns the figure
     is_wide : whether it takes the whole width of the page
     """
 
@@ -36,7 +36,7 @@ class SurveyFigure:
 
 @dataclass(frozen=True)
 class SourceFigure:
-    """One picture of a source of a fitted survey; attributes as `SurveyFigure` has them."""
+    """One figure of a source of a fitted survey; attributes as in `SurveyFigure`."""
 
     name: str
     title: str

@@ -1,4 +1,4 @@
-"""The colours that depend on whether a page is light or dark."""
+"""Colours of the light and the dark theme."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ class Theme:
 
     Attributes
     ----------
-    background, text, muted, grid : of the page, the words, the lesser words, the grid
+    background, text, muted, grid : of the page, the text, secondary text, the grid
     line : guide lines, outlines, expected curves
-    mark : the data where classes do not matter
-    ramp : colours of rising counts
+    mark : data without classes
+    ramp : colours of increasing counts
     """
 
     background: str
@@ -29,12 +29,12 @@ class Theme:
 
     @property
     def count_palette(self) -> list[str]:
-        """256 colours of rising counts."""
+        """256 colours of increasing counts."""
         return list(interp_palette(self.ramp, 256))
 
     @property
     def share_palette(self) -> list[str]:
-        """256 colours of shares from zero, which is the background, to one."""
+        """256 colours of shares from zero (the background colour) to one."""
         return list(interp_palette((self.background, *self.ramp[:4]), 256))
 
 
@@ -71,5 +71,5 @@ def theme_of(name: str) -> Theme:
         If there is no such theme.
     """
     if name not in THEMES:
-        raise ValueError(f"theme: expected one of {', '.join(THEMES)}, got {name!r}")
+        raise ValueError(f"theme: expected one of {', '.join(THEMES)}, found {name!r}")
     return THEMES[name]

@@ -1,4 +1,4 @@
-"""Ticks of logarithmic axes, each with its label."""
+"""Labelled ticks of logarithmic axes."""
 
 import math
 
@@ -12,13 +12,13 @@ def log_ticks(
 ) -> list[tuple[float, str]]:
     """Return round numbers within a decade of `limits`, with their labels.
 
-    Bokeh's own log ticks are linear here, and its labels round to the next power of ten.
+    Over short ranges Bokeh's log ticks are linear, and its labels round to powers of ten.
 
     Parameters
     ----------
     limits : of the axis
-    whole : whether to leave out what is no whole number
-    powers_only : whether to keep powers of ten only
+    whole : whether to return whole numbers only
+    powers_only : whether to return powers of ten only
     """
     fine = limits[1] < _FINE_BELOW * limits[0]
     steps = (1,) if powers_only else _FINE_STEPS if fine else _STEPS

@@ -47,7 +47,7 @@ def plot_time_series(
 ) -> hv.Layout | hv.Overlay:
     """Draw the offsets of one source against time, a panel per coordinate, linked in time.
 
-    Under them, where the motion was fitted, the residuals over the noise of each orbit.
+    If the motion was fitted, panels below show the residuals over the noise of each orbit.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def _offsets(rows: pd.DataFrame, axis: str, xlim: Limits, theme: str, width: int
     orbits, curve = rows[rows["kind"] == "orbit"], rows[rows["kind"] == "curve"]
     colours = theme_of(theme)
     zero = str(rows["zero"].iloc[0])
-    # A name of its own for each axis: what has one name is linked.
+    # A separate name for each axis, because axes of the same name are linked.
     y = f"offset_{axis}_mas"
     lines = {"catalogue": colours.muted, "true": SERIES_COLOURS[1], "fit": colours.line}
     drawn_lines = [name for name in lines if curve[f"{name}_mas"].notna().any()]
@@ -89,7 +89,7 @@ def _offsets(rows: pd.DataFrame, axis: str, xlim: Limits, theme: str, width: int
             _points(orbits, "offset_mas", y, "estimate ± 1σ", SERIES_COLOURS[0]),
         ],
         title=f"{_NAMES[axis]} of source {orbits['id'].iloc[0]}",
-        subtitle=f"{orbits_text(len(orbits))}; {_absent(orbits)}",
+        subtitle=f"{orbits_text(len(orbits))}; {_remarks(orbits)}",
         theme=theme,
         width=width,
         height=round(0.62 * width),
@@ -113,7 +113,7 @@ def _residuals(rows: pd.DataFrame, axis: str, xlim: Limits, theme: str, width: i
             _points(orbits, "pull", f"pull_{axis}", "", SERIES_COLOURS[0]),
         ],
         title=f"{_NAMES[axis]}: estimate minus fitted motion",
-        subtitle=f"over the part of its σ that scatters between orbits; rms {sd:.2f}; band ± 1σ",
+        subtitle=f"over the part of σ that scatters between orbits; rms {sd:.2f}; band ± 1σ",
         theme=theme,
         width=width,
         height=round(0.4 * width),
@@ -151,8 +151,8 @@ def _band(rows: pd.DataFrame, y: str, colour: str) -> list[hv.Area]:
     return [drawn(area, color=colour, alpha=0.22, line_alpha=0.0)]
 
 
-def _absent(orbits: pd.DataFrame) -> str:
-    """Return what is not drawn, and why; else what the band is."""
+def _remarks(orbits: pd.DataFrame) -> str:
+    """Return a text on the series that are not drawn; if there are none, on the band."""
     missing = []
     if orbits["catalogue_mas"].isna().all():
         missing.append("catalogue far beyond the frame")
@@ -177,7 +177,7 @@ def _offset_limits(rows: pd.DataFrame) -> Limits:
 
 
 def _spread(values: pd.Series, *, least: float) -> Limits:
-    """Return limits with a margin about all values, at least `least` apart."""
+    """Return limits that contain all values with a margin, at least `least` apart."""
     low, high = float(values.min()), float(values.max())
     margin = max(_MARGIN * (high - low), 0.5 * least)
     return low - margin, high + margin
@@ -191,9 +191,10 @@ SOURCE_FIGURES = (
     SourceFigure(
         "time-series",
         "Time series",
-        "The estimates of all orbits against time, from the truth where there is one, and what "
-        "the fitted motion leaves over the noise. Good: residuals within the band for two "
-        "orbits in three, without a trend; the fitted motion's band holds the truth.",
+        "The estimates of all orbits against time, relative to the truth if there is one, and "
+        "the residuals of the fitted motion over the noise. Good: residuals within the band for "
+        "two thirds of the orbits, without a trend; the truth within the band of the fitted "
+        "motion.",
         20,
         _draw,
         is_wide=True,

@@ -51,8 +51,8 @@ def plot_uncertainty(
 ) -> hv.Layout | hv.Overlay:
     """Draw conditional and marginal uncertainties against N, with the square-root law.
 
-    Above 20,000 points in a panel the median at each N is drawn, with the range from the
-    16th to the 84th percentile.
+    Above 20,000 points in a panel, the median at each N is drawn with the range from the 16th
+    to the 84th percentile.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def _panel(
     drawn_rows = uncertainty_by_count(rows) if reduced else rows
     marks = _medians(drawn_rows) if reduced else [_points(drawn_rows)]
     single = float(rows["sigma_single_mas"].iloc[0])
-    what = "median and 16–84 % range at each N" if reduced else "a point per source"
+    what = "median and 16–84 % range at each N" if reduced else "one point per source"
     return framed(
         [_law(single, limits[0], theme), *marks],
         title=f"Uncertainty of {_NAMES[coordinate]} against N",
@@ -164,9 +164,10 @@ DIAGNOSTICS = (
     Diagnostic(
         "uncertainty",
         "Uncertainty against number of measurements",
-        "The conditional uncertainty (calibration held fixed) follows the square root of N by "
-        "construction. The marginal one (calibration integrated out) is the honest one: how far "
-        "it lies above is what the calibration costs.",
+        "The conditional uncertainty (calibration fixed) falls with the square root of N by "
+        "construction. The marginal one (calibration integrated out) is the actual uncertainty. "
+        "Good: marginal values close above the conditional ones; the difference is the "
+        "uncertainty that the calibration adds.",
         60,
         _draw,
         is_wide=True,

@@ -1,4 +1,4 @@
-"""Numbers in words: an angle in the unit that fits, a number of orbits."""
+"""Text of numbers with their units: angles and numbers of orbits."""
 
 import math
 
@@ -8,7 +8,7 @@ _UAS_BELOW_MAS = 0.5
 
 
 def angle_unit(size_mas: float) -> tuple[str, float]:
-    """Return the unit, µas or mas, that suits `size_mas`, and what to multiply mas by."""
+    """Return the unit for angles of `size_mas`, µas or mas, and the factor from mas to it."""
     small = math.isfinite(size_mas) and size_mas < _UAS_BELOW_MAS
     return ("µas", UAS_PER_MAS) if small else ("mas", 1.0)
 
@@ -20,7 +20,7 @@ def angle_text(value_mas: float) -> str:
 
 
 def orbits_text(number: int) -> str:
-    """Return a number of orbits in words: "1 orbit", "83 orbits"."""
+    """Return a number of orbits as text: "1 orbit", "83 orbits"."""
     return f"{number:,} orbit{'' if number == 1 else 's'}"
 
 

@@ -1,4 +1,4 @@
-"""What made a report: the command, and the versions of what it called."""
+"""Provenance of a report: the command, and the versions of the packages."""
 
 import platform
 
@@ -9,12 +9,12 @@ _PACKAGES = ("plateviz", "jax", "numpy", "scipy", "holoviews", "bokeh")
 
 
 def facts_of(command: str, run: str | None = None) -> Facts:
-    """Return what made a report.
+    """Return the provenance of a report.
 
     Parameters
     ----------
-    command : as a person gave it
-    run : of the survey, None where there is none
+    command : the command line of the user
+    run : name of the survey's run, or None
     """
     made = {"Command": command} | ({} if run is None else {"Run": run})
     versions = {**versions_of(_PACKAGES), "Python": platform.python_version()}

@@ -1,4 +1,4 @@
-"""A figure of a report as a Bokeh document: small, the same bytes every time, in either theme."""
+"""A figure of a report as a compressed, reproducible Bokeh document, for both themes."""
 
 import gzip
 import json
@@ -11,25 +11,25 @@ from plateviz.plots.theme import theme_of
 
 _WITH_BACKGROUND = ("Figure", "Plot")
 _BACKGROUNDS = ("background_fill_color", "border_fill_color")
-# Dark colours of a page are put in the place of these.
+# Documents are in this theme; a dark page replaces its colours.
 THEME = "light"
 
 
 def packed_document(element: hv.core.Dimensioned) -> str:
-    """Return the Bokeh document of a picture: JSON, compressed, as text."""
+    """Return the Bokeh document of a figure as text: base64 of compressed JSON."""
     document = Document()
     document.add_root(hv.render(element, backend="bokeh"))
-    content = _settled(document.to_json(deferred=False))
+    content = _normalised(document.to_json(deferred=False))
     text = json.dumps(content, separators=(",", ":"))
     return b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode()
 
 
 def dark_colours() -> dict[str, object]:
-    """Return what a page makes a light figure dark with.
+    """Return the colours that a page replaces in a light figure for the dark theme.
 
     Returns
     -------
-    `colours`, light -> dark; `palettes`, pairs of a light and a dark one
+    `colours`, light -> dark; `palettes`, pairs of a light and a dark palette
     """
     light, dark = theme_of("light"), theme_of("dark")
     names = ("background", "text", "muted", "grid", "line", "mark")
@@ -42,11 +42,11 @@ def dark_colours() -> dict[str, object]:
     }
 
 
-def _settled(content: object) -> object:
-    """Return the document with what Bokeh leaves open.
+def _normalised(content: object) -> object:
+    """Return the document with reproducible model ids and explicit backgrounds.
 
-    Its models are counted from one, where Bokeh counts all that a process draws; and its plots
-    say their background, where Bokeh leaves out a white one.
+    Model ids are counted from one, because Bokeh counts over all documents of a process. Plots
+    have an explicit background, because Bokeh leaves out white.
     """
     numbers: dict[str, str] = {}
 

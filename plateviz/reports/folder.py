@@ -1,4 +1,4 @@
-"""A folder of reports: a page for each orbit of a run, and the survey as their index."""
+"""A folder of reports: a page for each orbit of a run, and an index page of the survey."""
 
 import json
 import os
@@ -17,7 +17,7 @@ from solver.io.atomic import sha256_of, write_atomically
 from solver.runtime.versions import versions_of
 
 _INDEX = "index.html"
-# Which run the pages are of; those of another are not mixed with them.
+# Identifies the run of the pages, so that pages of different runs are not mixed.
 _HEAD = "report.json"
 _PACKAGES = ("plateviz", "holoviews", "bokeh")
 
@@ -29,22 +29,22 @@ def write_folder(
     workers: int | None = None,
     progress: Callable[[int, int], None] = lambda *_: None,
 ) -> tuple[int, int]:
-    """Write the pages that are not there yet, and the index last.
+    """Write the missing pages, and the index last.
 
     Parameters
     ----------
-    facts : what is known beside the run
-    workers : processes; None for one on each core
-    progress : called with the number of pages done, and of all
+    facts : provenance of the report
+    workers : number of processes; None for one per core
+    progress : called with the number of finished pages, and of all pages
 
     Returns
     -------
-    How many pages of orbits were made, and how many were there.
+    The number of orbit pages written, and the number that existed.
 
     Raises
     ------
     InputError
-        If orbits of the run are missing, or the folder cannot be written or holds something else.
+        If orbits of the run are missing, or the folder cannot be written or has other content.
     """
     index = survey_report(run, facts)
     orbits = run.orbits()["orbit_id"].tolist()
@@ -53,7 +53,7 @@ def write_folder(
     done = len(orbits) - len(missing)
     progress(done, len(orbits))
     if missing:
-        # Spawned: a copy of a process with threads may stop at a lock that one of them held.
+        # Spawned, because a forked copy of a process with threads may deadlock.
         count = min(workers or os.cpu_count() or 1, len(missing))
         with ProcessPoolExecutor(count, get_context("spawn")) as pool:
             tasks = [
@@ -70,7 +70,7 @@ def write_folder(
 
 
 def _begin(run: SurveyRun, folder: Path) -> None:
-    """Make the folder, or see that it holds pages of the same run."""
+    """Create the folder, or check that its pages are of the same run."""
     head = {"run": sha256_of(run.directory / "run.toml"), "versions": versions_of(_PACKAGES)}
     path = folder / _HEAD
     if path.is_file():
@@ -84,7 +84,7 @@ def _begin(run: SurveyRun, folder: Path) -> None:
         raise InputError(f"{folder}: expected to write a folder, found: {error}") from error
     if not is_empty:
         raise InputError(
-            f"{folder}: expected an empty folder, or one of reports, found other files"
+            f"{folder}: expected an empty folder or a folder of reports, found other files"
         )
     with write_atomically(path) as temporary:
         temporary.write_text(json.dumps(head, indent=1), encoding="utf-8")
@@ -93,8 +93,8 @@ def _begin(run: SurveyRun, folder: Path) -> None:
 def _write(
     survey: Path, name: str, orbit: int, folder: Path, facts: Facts, links: list[Link]
 ) -> None:
-    """Write the page of one orbit: the task of one of the processes."""
-    # A hundred pages: one that lets a reader choose, `plateviz report --orbit` makes.
+    """Write the page of one orbit: the task of a process."""
+    # Without choices, to keep many pages small; `plateviz report --orbit` writes them.
     report = survey_orbit_report(open_run(survey, name), orbit, facts, has_choices=False)
     _write_page(_page(folder, orbit), replace(report, links=links))
 
@@ -108,12 +108,12 @@ def _page(folder: Path, orbit: int) -> Path:
     return folder / f"orbit-{orbit:04d}.html"
 
 
-def _link(words: str, orbit: int) -> Link:
-    return Link(words, _page(Path(), orbit).name)
+def _link(text: str, orbit: int) -> Link:
+    return Link(text, _page(Path(), orbit).name)
 
 
 def _around(orbits: list[int], orbit: int) -> list[Link]:
-    """Return the links of an orbit's page: to the index and to its neighbours."""
+    """Return the links of an orbit's page to the index and to the neighbouring orbits."""
     place = orbits.index(orbit)
     links = [Link("Survey", _INDEX)]
     links += [_link(f"← Orbit {number}", number) for number in orbits[:place][-1:]]
@@ -121,7 +121,7 @@ def _around(orbits: list[int], orbit: int) -> list[Link]:
 
 
 def _with_links(index: Report, orbits: list[int]) -> Report:
-    """Return the report of the survey with its table of orbits leading to their pages."""
+    """Return the survey's report with links from its table of orbits to their pages."""
     table = index.tables["Orbits"]
     first = table.columns[0]
     linked = table.assign(**{first: [_link(str(orbit), orbit) for orbit in orbits]})

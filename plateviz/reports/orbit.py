@@ -8,7 +8,7 @@ import pandas as pd
 
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
-from plateviz.reports.report import Facts, Picture, Report, plain
+from plateviz.reports.report import Facts, Report, ReportFigure, plain
 from plateviz.tables import calibration_tables, exposure_chi2, outlier_list, summary_strip
 from plateviz.tables.labels import dates
 from plateviz.tables.verdict import Verdict, orbit_verdict
@@ -16,7 +16,7 @@ from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.result import FitResult
 
-# So many exposures can be chosen by themselves: those whose chi2 is farthest off.
+# Number of exposures that a reader can select: those with the chi2 farthest from its expectation.
 _FARTHEST = 3
 
 
@@ -33,9 +33,10 @@ def orbit_report(
     ----------
     result : the solution
     instrument : that took the orbit
-    facts : what is known beside it; settings and inputs are added here
+    facts : provenance of the report; settings and inputs are added to it
     other : solution to compare with
-    has_choices : whether the figures that can be of one detector or exposure are drawn so, too
+    has_choices : whether figures that depend on a selection are also drawn for each detector and
+        for single exposures
     """
     date = dates(pd.Series([result.summary["epoch_mjd"]])).iloc[0]
     whole = Chosen(result, instrument, _exposures(result.exposures), other=other)
@@ -48,7 +49,7 @@ def orbit_report(
         subtitle=f"Plate Analysis of one orbit, mean epoch {date} (TCB)",
         verdict=orbit_verdict(result),
         items=summary_strip(result),
-        pictures=[_picture(d, whole, has_choices) for d in diagnostics() if d.has_data(whole)],
+        figures=[_figure(d, whole, has_choices) for d in diagnostics() if d.has_data(whole)],
         tables=tables,
         facts={
             **facts,
@@ -63,13 +64,13 @@ def failed_orbit_report(data: OrbitData, message: str, facts: Facts) -> Report:
 
     Parameters
     ----------
-    data : what was to be solved
-    message : why it was not
+    data : input data of the orbit
+    message : reason of the failure
     """
     rows = data.measurements
     counts = rows.groupby(["field_id", "plate_id", "detector_id"]).size().rename("n_obs")
     tables = {"Measurements by exposure and detector": counts.reset_index()}
-    found = [
+    contents = [
         f"The orbit has {len(rows):,} measurements of {rows['source_id'].nunique():,} sources on "
         f"{len(data.exposures):,} exposures."
     ]
@@ -77,28 +78,28 @@ def failed_orbit_report(data: OrbitData, message: str, facts: Facts) -> Report:
     return Report(
         title=f"Orbit {data.orbit_id}",
         subtitle="Plate Analysis of one orbit, failed",
-        verdict=Verdict("bad", headline, [message], found),
+        verdict=Verdict("bad", headline, [message], contents),
         items=[],
-        pictures=[],
+        figures=[],
         tables=tables,
         facts={**facts, "Inputs (SHA-256)": dict(data.provenance)},
     )
 
 
-def _picture(diagnostic: Diagnostic, whole: Chosen, has_choices: bool) -> Picture:
+def _figure(diagnostic: Diagnostic, whole: Chosen, has_choices: bool) -> ReportFigure:
     has_choices = has_choices and diagnostic.follows_selection
-    chosen = _selections(whole) if has_choices else {"All": whole}
-    return Picture(
+    selections = _selections(whole) if has_choices else {"All": whole}
+    return ReportFigure(
         diagnostic.name,
         diagnostic.title,
         diagnostic.caption,
-        {words: partial(diagnostic.draw, one) for words, one in chosen.items()},
+        {label: partial(diagnostic.draw, chosen) for label, chosen in selections.items()},
         diagnostic.is_wide,
     )
 
 
 def _selections(whole: Chosen) -> dict[str, Chosen]:
-    """Return what a reader may choose of the figures that follow a selection."""
+    """Return label -> selection of the figures that depend on exposures and detector."""
     chi2 = exposure_chi2(whole.result)
     farthest = chi2.sort_values("z", key=np.abs, ascending=False).head(_FARTHEST)
     detectors = [detector.detector_id for detector in whole.instrument.detectors]

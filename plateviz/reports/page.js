@@ -1,5 +1,5 @@
 "use strict";
-// Draws the figures of a report, in the theme of the reader, and hands out their values.
+// Draws the figures of a report in the reader's theme, and exports their values.
 (() => {
   const { colours, palettes } = JSON.parse(document.getElementById("colours").textContent);
   const figures = [...document.querySelectorAll("figure")];
@@ -13,7 +13,7 @@
     return JSON.parse(await new Response(stream).text());
   }
 
-  // The documents are in light colours.
+  // The documents are in the colours of the light theme.
   function darkened(part) {
     if (typeof part === "string") return colours[part] ?? part;
     if (Array.isArray(part)) {
@@ -67,7 +67,7 @@
     return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
   }
 
-  // Every data source of a figure, one below the other, each with its columns.
+  // All data sources of a figure as CSV blocks, each with its column names.
   function valuesOf(figure) {
     const { views } = shown.get(figure);
     const doc = views.roots[0].model.document;
@@ -117,7 +117,7 @@
     theme = theme === "dark" ? "light" : "dark";
     paint();
   });
-  // Closed tables would be missing on paper.
+  // Open all tables for printing.
   addEventListener("beforeprint", () => {
     document.querySelectorAll("details").forEach((part) => { part.open = true; });
   });

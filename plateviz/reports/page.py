@@ -1,4 +1,4 @@
-"""The page of a report: one HTML file that fetches nothing."""
+"""The page of a report: one self-contained HTML file."""
 
 import json
 import math
@@ -12,7 +12,7 @@ from bokeh.resources import Resources
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from plateviz.reports.figure import dark_colours, packed_document
-from plateviz.reports.report import Link, Picture, Report
+from plateviz.reports.report import Link, Report, ReportFigure
 from plateviz.reports.strip import STYLE, strip
 
 _DRAWN_IN = "light"
@@ -28,13 +28,13 @@ def page_of(
 
     Parameters
     ----------
-    progress : called with the number of figures drawn, and of all
-    made : the time stamp; now by default. Two pages of the same report differ in nothing else
+    progress : called with the number of figures drawn, and of all figures
+    made : the time stamp, now by default; pages of the same report differ in this only
     """
     figures = []
-    for done, picture in enumerate(report.pictures, start=1):
-        figures.append(_figure(picture))
-        progress(done, len(report.pictures))
+    for done, figure in enumerate(report.figures, start=1):
+        figures.append(_drawn(figure))
+        progress(done, len(report.figures))
     stamp = (made or datetime.now(UTC)).strftime("%Y-%m-%d %H:%M:%S UTC")
     return (
         _environment()
@@ -53,9 +53,9 @@ def page_of(
     )
 
 
-def _figure(picture: Picture) -> dict[str, object]:
-    documents = {words: packed_document(draw(_DRAWN_IN)) for words, draw in picture.choices.items()}
-    return {"picture": picture, "documents": documents}
+def _drawn(figure: ReportFigure) -> dict[str, object]:
+    documents = {label: packed_document(draw(_DRAWN_IN)) for label, draw in figure.choices.items()}
+    return {"figure": figure, "documents": documents}
 
 
 def _rows(table: pd.DataFrame) -> list[list[str | Link]]:
@@ -63,10 +63,10 @@ def _rows(table: pd.DataFrame) -> list[list[str | Link]]:
 
 
 def _cell(title: str, value: object) -> str | Link:
-    """Return a value as people read it; nothing where there is none."""
+    """Return a value as displayed text; empty for NaN."""
     if not isinstance(value, float):
         return value if isinstance(value, Link) else str(value)
-    # A coordinate needs ten decimals to tell microarcseconds apart, a size five digits.
+    # Coordinates need ten decimals to resolve a microarcsecond; other numbers five digits.
     return "" if math.isnan(value) else f"{value:.10f}" if "[deg]" in title else f"{value:.5g}"
 
 
@@ -87,7 +87,7 @@ def _environment() -> Environment:
 
 @cache
 def _bokeh() -> str:
-    """Return the library that draws, without the parts for widgets, tables and formulas."""
+    """Return BokehJS without its parts for widgets, tables and formulas."""
     script = Resources(mode="inline", components=["bokeh"], minified=True).js_raw[0]
-    # What a script in a page must not contain.
+    # An inline script must not contain its end tag.
     return script.replace("</script", "<\\/script")

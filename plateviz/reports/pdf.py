@@ -1,4 +1,4 @@
-"""Printing a report with the Chromium of this machine."""
+"""Printing of a report as PDF with an installed Chromium."""
 
 import os
 import shutil
@@ -10,18 +10,18 @@ from solver.errors import InputError
 from solver.io.atomic import write_atomically
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-# Time of the page's own clock in which all figures are drawn; it runs as fast as they are.
+# Limit of Chromium's virtual time, which advances as fast as the figures are drawn.
 _BUDGET_MS = 60_000
-_PATIENCE_S = 180.0
+_TIMEOUT_S = 180.0
 
 
 def find_chromium() -> Path:
-    """Return the Chromium of this machine.
+    """Return the path of the installed Chromium.
 
     Raises
     ------
     InputError
-        If there is none.
+        If none is found.
     """
     for name in _NAMES:
         found = shutil.which(name)
@@ -40,7 +40,7 @@ def print_pdf(page: Path, target: Path) -> None:
     """
     chromium = find_chromium()
     with write_atomically(target) as temporary, TemporaryDirectory(prefix="plateviz-") as profile:
-        # As root, which containers run as, Chromium starts without its sandbox only.
+        # As root, as in many containers, Chromium starts only without its sandbox.
         as_root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
         command = [
             str(chromium),
@@ -56,7 +56,7 @@ def print_pdf(page: Path, target: Path) -> None:
             page.resolve().as_uri(),
         ]
         try:
-            subprocess.run(command, check=True, capture_output=True, timeout=_PATIENCE_S)
+            subprocess.run(command, check=True, capture_output=True, timeout=_TIMEOUT_S)
         except (OSError, subprocess.SubprocessError) as error:
             raise InputError(f"{target}: expected {chromium} to print, found: {error}") from error
         if not temporary.stat().st_size:

@@ -1,4 +1,4 @@
-"""Report: what one file says, before it is HTML."""
+"""Report: the content of one report file, independent of HTML."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -12,31 +12,31 @@ from plateviz.tables import SummaryItem
 from plateviz.tables.verdict import Verdict
 
 Facts = dict[str, dict[str, str]]
-"""What is known beside the solution: title -> name -> value."""
+"""Provenance of a report: title -> name -> value."""
 
 SOLVED = "Versions that solved it"
-"""The title under which facts say that."""
+"""Title of the facts with the versions that made the solution."""
 
 Draw = Callable[[str], hv.core.Dimensioned]
-"""Gives a picture in a theme."""
+"""Function that draws a figure in a theme."""
 
 
 class Link(NamedTuple):
-    """Words that lead to another page; in a report or in a cell of its tables."""
+    """A link to another page, in a report or in a cell of its tables."""
 
-    words: str
+    text: str
     target: str
 
 
 @dataclass(frozen=True)
-class Picture:
+class ReportFigure:
     """One figure of a report.
 
     Attributes
     ----------
     name : short and unique in the report
-    title, caption : for people
-    choices : words -> what to draw; a reader chooses where there are several
+    title, caption : displayed text
+    choices : label -> function that draws; a reader selects one if there are several
     is_wide : whether it takes the whole width of the page
     """
 
@@ -49,15 +49,15 @@ class Picture:
 
 @dataclass(frozen=True)
 class Report:
-    """What one file says, in the order of the attributes.
+    """The content of one file, in the order of the attributes.
 
     Attributes
     ----------
-    title : of what it is
-    subtitle : what it was made from, in words
-    verdict : whether to trust it
-    items : the numbers to judge it by
-    pictures : every figure
+    title : name of the orbit, source or survey
+    subtitle : short description
+    verdict : whether to trust the solution
+    items : the numbers by which it is judged
+    figures : every figure
     tables : title -> values
     facts : settings, versions, hashes of the inputs, the command
     links : to other pages of the same folder
@@ -67,14 +67,14 @@ class Report:
     subtitle: str
     verdict: Verdict
     items: list[SummaryItem]
-    pictures: list[Picture]
+    figures: list[ReportFigure]
     tables: dict[str, pd.DataFrame] = field(default_factory=dict)
     facts: Facts = field(default_factory=dict)
     links: list[Link] = field(default_factory=list)
 
 
 def plain(values: Mapping[str, object]) -> dict[str, str]:
-    """Return settings or other plain values as facts: text as it is, all else as JSON."""
+    """Return settings or other plain values as facts: text unchanged, other values as JSON."""
     return {
         name: value if isinstance(value, str) else json.dumps(value)
         for name, value in values.items()

@@ -1,4 +1,4 @@
-"""The strip of numbers as HTML, in the dashboard and in reports, readable in both themes."""
+"""The summary strip as HTML, for the dashboard and reports in both themes."""
 
 from collections.abc import Iterable
 from html import escape
@@ -11,7 +11,7 @@ STYLE = (files("plateviz.reports") / "strip.css").read_text(encoding="utf-8")
 
 
 def strip(items: Iterable[SummaryItem]) -> str:
-    """Return numbers in a row of tiles, each with its name and how it is."""
+    """Return numbers as a row of tiles, each with its name and its state."""
     return f"<div class='strip'>{''.join(map(_cell, items))}</div>"
 
 

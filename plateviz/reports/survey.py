@@ -5,7 +5,7 @@ from functools import partial
 from plateviz.plots.gallery import source_figures, survey_figures
 from plateviz.plots.survey_figure import SourceFigure, SurveyFigure
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
-from plateviz.reports.report import SOLVED, Facts, Picture, Report, plain
+from plateviz.reports.report import SOLVED, Facts, Report, ReportFigure, plain
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.survey_tables import survey_tables
 from plateviz.solving.origin import SurveyFolder
@@ -30,7 +30,7 @@ def survey_report(run: SurveyRun, facts: Facts) -> Report:
 
     Parameters
     ----------
-    facts : what is known beside it
+    facts : provenance of the report
 
     Raises
     ------
@@ -43,14 +43,14 @@ def survey_report(run: SurveyRun, facts: Facts) -> Report:
     if missing:
         raise InputError(
             f"{run.directory}: expected a whole run, found {missing} of {len(orbits)} orbits "
-            "missing; `plateviz survey` goes on with them"
+            "missing; `plateviz survey` continues with them"
         )
     return Report(
         title=f"Survey {run.survey.resolve().name}",
         subtitle=f"Run {run.name} of {len(orbits):,} orbits",
         verdict=run_verdict(orbits, motions),
         items=run_strip(orbits, motions),
-        pictures=[_picture(figure, tables) for figure in survey_figures()],
+        figures=[_figure(figure, tables) for figure in survey_figures()],
         tables={"Orbits": in_words(orbit_list(orbits), ORBITS_OF_RUN)},
         facts={**facts, **_of_run(run)},
     )
@@ -63,7 +63,7 @@ def survey_orbit_report(
     other: FitResult | None = None,
     has_choices: bool = True,
 ) -> Report:
-    """Return the report of one orbit of a run, of one that failed, too.
+    """Return the report of one orbit of a run, fitted or failed.
 
     Parameters
     ----------
@@ -103,19 +103,21 @@ def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
         subtitle=f"{source_class(history).capitalize()} source in run {run.name}",
         verdict=source_verdict(history, motion),
         items=source_strip(history, motion),
-        pictures=[_picture(figure, found) for figure in source_figures()],
+        figures=[_figure(figure, found) for figure in source_figures()],
         tables=tables | {"Orbits": in_words(source_orbits(history), ORBITS_OF_SOURCE)},
         facts={**facts, **_of_run(run)},
     )
 
 
 def _of_run(run: SurveyRun) -> Facts:
-    """Return what the run was begun with."""
+    """Return versions, settings and inputs of the run."""
     header = run.header()
     titles = {SOLVED: "versions", "Settings": "settings", "Inputs (SHA-256)": "inputs"}
     return {title: plain(header[name]) for title, name in titles.items()}  # type: ignore[arg-type]
 
 
-def _picture(figure: SurveyFigure | SourceFigure, tables: SurveyTables | SourceTables) -> Picture:
+def _figure(
+    figure: SurveyFigure | SourceFigure, tables: SurveyTables | SourceTables
+) -> ReportFigure:
     draw = partial(figure.draw, tables)  # type: ignore[arg-type]
-    return Picture(figure.name, figure.title, figure.caption, {"All": draw}, figure.is_wide)
+    return ReportFigure(figure.name, figure.title, figure.caption, {"All": draw}, figure.is_wide)

@@ -1,4 +1,4 @@
-"""One orbit of a run, fitted in a process of its own: the task that Dask sends to its workers."""
+"""The task that Dask sends to its workers: fit one orbit of a run."""
 
 import time
 from pathlib import Path
@@ -14,7 +14,7 @@ from solver.runtime.threads import use_one_thread
 
 
 class Outcome(NamedTuple):
-    """What became of one orbit; `message` says why it failed, and is empty if it did not."""
+    """Outcome of one orbit; `message` is the reason if it failed, otherwise empty."""
 
     orbit: int
     seconds: float
@@ -22,9 +22,9 @@ class Outcome(NamedTuple):
 
 
 def fit_survey_orbit(survey: str, name: str, orbit: int) -> Outcome:
-    """Fit one orbit of a run that was begun, and write it where the run keeps it.
+    """Fit one orbit of a run whose directory exists, and write it into the run.
 
-    An orbit that has no solution is written down as such; every other error is raised.
+    An orbit without a solution is recorded as failed; every other error is raised.
     """
     start = time.perf_counter()
     run, message = Run(Path(survey), name), ""
@@ -40,7 +40,7 @@ def fit_survey_orbit(survey: str, name: str, orbit: int) -> Outcome:
 
 
 def _fit(run: Run, orbit: int) -> None:
-    # Only now: JAX counts the threads that it may use when it is imported.
+    # Imported here, because JAX sets its number of threads when it is imported.
     from solver.fit import OrbitFitter
 
     instrument = parse_instrument(str(read_header(run.survey)["instrument"]), run.survey / HEADER)

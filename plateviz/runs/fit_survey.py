@@ -1,8 +1,8 @@
-"""A survey fitted orbit by orbit by many workers, and what the orbits say together.
+"""Fit the orbits of a survey with Dask workers, and compute the tables over all orbits.
 
-Workers are processes of Dask, on this machine or wherever a scheduler has them; all must see
-the survey's directory. Each has one thread. An orbit is whole in its directory or not there, so
-that work stopped at any moment goes on where it was.
+Workers are processes on this machine or those of a Dask scheduler; all must have access to the
+survey's directory. Each has one thread. An orbit's directory is either complete or absent, so
+that an interrupted run can be continued at any time.
 """
 
 import logging
@@ -37,21 +37,21 @@ from solver.io.survey import survey_orbits
 from solver.model.apparent_motion import julian_year
 from solver.results.time_series import errors_by_count, motion_table
 
-# Rows of the history that are worked on at once: some 200 MB with all draws.
+# Rows of the history per batch: some 200 MB with all draws.
 _ROWS_AT_ONCE = 100_000
-# Dask watches its workers closely: a hundred times a second it looks where each of them is. With
-# as many workers as cores that was measured to take a twelfth of these.
-_QUIETLY = {
+# Dask's monitoring samples each worker a hundred times a second. With as many workers as cores
+# this took a twelfth of the processor time.
+_LESS_MONITORING = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
 }
-# How long a scheduler may take to answer.
-_PATIENCE = "20s"
+# Timeout of the connection to a scheduler.
+_TIMEOUT = "20s"
 
 
 class Progress(NamedTuple):
-    """How far a run is: orbits done of those asked for, and the last one."""
+    """Progress of a call: orbits done, orbits to fit, and the outcome of the last one."""
 
     done: int
     total: int
@@ -59,7 +59,7 @@ class Progress(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What a call did: orbits fitted now, fitted before, and failed, by orbit."""
+    """Result of a call: orbits fitted now, orbits fitted before, and reasons of failed ones."""
 
     run: Run
     fitted: list[int]
@@ -77,14 +77,14 @@ def fit_survey(
     scheduler: str | None = None,
     progress: Callable[[Progress], None] = lambda _: None,
 ) -> Report:
-    """Fit orbits of a survey that a run does not hold yet, and gather what they say together.
+    """Fit the orbits of a survey that a run does not contain yet, and write the tables over all.
 
     Parameters
     ----------
     name : of the run
     settings : of every fit
-    orbits : those to fit; all by default
-    workers : processes on this machine; one for each of its cores by default
+    orbits : orbits to fit; all by default
+    workers : number of processes on this machine; one per core by default
     scheduler : address of a Dask scheduler to use instead
     progress : called after every orbit
 
@@ -135,7 +135,7 @@ def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:
 def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
     if scheduler is not None:
         try:
-            client = Client(scheduler, timeout=_PATIENCE)
+            client = Client(scheduler, timeout=_TIMEOUT)
         except (OSError, ValueError) as error:
             raise InputError(
                 f"--scheduler: expected the address of a Dask scheduler, found {scheduler}: {error}"
@@ -144,17 +144,17 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
             yield client
         return
     with (
-        dask.config.set(_QUIETLY),
+        dask.config.set(_LESS_MONITORING),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            # Without a page of its own, and any port that is free for what it serves all the same.
+            # No dashboard; its server still needs a port, so any free one is taken.
             dashboard_address="127.0.0.1:0",
             scheduler_kwargs={"dashboard": False},
-            # The limit of memory is the machine's.
+            # No memory limit per worker.
             memory_limit=0,
-            # A worker that is slow to end is no news.
+            # No warnings about workers that are slow to end.
             silence_logs=logging.ERROR,
         ) as cluster,
         Client(cluster) as client,
@@ -163,7 +163,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
 
 
 def _outcomes(client: Client, run: Run, orbits: list[int]) -> Iterator[Outcome]:
-    """Fit orbits, and give what became of each as it is done."""
+    """Fit orbits, and yield the outcome of each when it is done."""
     where = str(run.survey.resolve())
     futures: dict[Future, int] = {
         client.submit(fit_survey_orbit, where, run.name, orbit, pure=False): orbit
@@ -174,14 +174,14 @@ def _outcomes(client: Client, run: Run, orbits: list[int]) -> Iterator[Outcome]:
         if error is None:
             yield future.result()
             continue
-        # A fault of ours or of the machine: the other orbits are not to suffer for it.
+        # An unexpected error must not stop the other orbits.
         message = f"{type(error).__name__}: {error}"
         run.keep_failure(futures[future], message)
         yield Outcome(futures[future], float("nan"), message)
 
 
 def _gather(run: Run) -> None:
-    """Write what the orbits say together, and that the run is complete where it is."""
+    """Write the tables over all orbits, and mark the run if it is complete."""
     complete = run.complete_orbits()
     if run.is_complete or not complete:
         return
@@ -208,7 +208,7 @@ def _write_tables(run: Run) -> None:
 
 
 def _whole_sources(history: parquet.ParquetFile) -> Iterator[pd.DataFrame]:
-    """Give the history piece by piece, each source whole."""
+    """Yield the history in batches that do not split a source."""
     rest: list[pa.RecordBatch] = []
     for batch in history.iter_batches(batch_size=_ROWS_AT_ONCE):
         table = pa.Table.from_batches([*rest, batch]).to_pandas()

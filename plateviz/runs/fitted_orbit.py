@@ -1,7 +1,7 @@
-"""Fitted orbits on disk: one directory each, Parquet inside, whole or not there at all.
+"""Fitted orbits on disk: one directory each, with Parquet files, either complete or absent.
 
-No user interface and no JAX. A directory is written beside its place and renamed, with
-the file `COMPLETE` written last; it is never edited afterwards.
+No user interface and no JAX. A directory is written under a temporary name, with the file
+`COMPLETE` last, and then renamed; it is never changed afterwards.
 """
 
 import json
@@ -24,19 +24,19 @@ from solver.io.parquet import write_parquet
 FORMAT = 1
 _COMPLETE = "COMPLETE"
 _HEAD = "result.json"
-# Apart from all else, so that two runs of the same work differ in nothing but this file.
+# In a separate file, so that repeated fits differ in this file only.
 _TIMINGS = "timings.json"
 
 
 def write_fitted_orbit(
     directory: Path, result: FitResult, beside: Mapping[str, pd.DataFrame] | None = None
 ) -> None:
-    """Write one fitted orbit; an existing directory is left as it is.
+    """Write one fitted orbit; an existing directory is not changed.
 
     Parameters
     ----------
-    directory : does not exist yet; its parent is made where needed
-    beside : further tables to keep with it, by name
+    directory : to write; its parent is created if needed
+    beside : additional tables to store with it, by name
     """
     directory.parent.mkdir(parents=True, exist_ok=True)
     staging = directory.with_name(f".{directory.name}-{secrets.token_hex(6)}")
@@ -56,7 +56,7 @@ def write_fitted_orbit(
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Remove what was left of runs in a folder whose writing was cut short."""
+    """Remove temporary directories that interrupted writes left in a folder."""
     for staging in folder.glob(".*-*"):
         if staging.is_dir():
             shutil.rmtree(staging, ignore_errors=True)
@@ -68,15 +68,17 @@ def read_fitted_orbit(directory: Path) -> FitResult:
     Raises
     ------
     InputError
-        If the directory is not a complete run, or was written by a newer version.
+        If the directory is not a complete fitted orbit, or was written by a newer version.
     """
     if not is_complete(directory):
-        raise InputError(f"{directory}: expected a complete run, found no {_COMPLETE} file in it")
+        raise InputError(
+            f"{directory}: expected a complete fitted orbit, found no {_COMPLETE} file in it"
+        )
     head = json.loads((directory / _HEAD).read_text(encoding="utf-8"))
     if head["format"] > FORMAT:
         raise InputError(
-            f"{directory}: expected a run of format {FORMAT} or older, found {head['format']}; "
-            "it was written by a newer plateviz"
+            f"{directory}: expected a fitted orbit of format {FORMAT} or older, found "
+            f"{head['format']}; it was written by a newer plateviz"
         )
     timings = json.loads((directory / _TIMINGS).read_text(encoding="utf-8"))
     tables = {table.name: _read_table(directory, table.name) for table in RESULT_TABLES}
@@ -91,7 +93,7 @@ def read_fitted_orbit(directory: Path) -> FitResult:
 
 
 def read_summary(directory: Path) -> dict[str, Any]:
-    """Return the summary of a complete run alone, with its `seconds`."""
+    """Return the summary of a complete fitted orbit, with its `seconds`."""
     head, timings = (
         json.loads((directory / name).read_text(encoding="utf-8")) for name in (_HEAD, _TIMINGS)
     )
@@ -99,7 +101,7 @@ def read_summary(directory: Path) -> dict[str, Any]:
 
 
 def is_complete(directory: Path) -> bool:
-    """Return whether a directory holds a whole run."""
+    """Return whether a directory is a complete fitted orbit."""
     return (directory / _COMPLETE).is_file()
 
 

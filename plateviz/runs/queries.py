@@ -1,7 +1,7 @@
-"""The store of a fitted survey: questions across its orbits, answered from files by DuckDB.
+"""Queries over the orbits of a fitted survey, answered from its files by DuckDB.
 
-Each orbit's directory holds its part of the history. When orbits were added the parts are
-gathered into one file in order of source, in which a source is found without reading the rest.
+Each orbit's directory contains its part of the history. After orbits are added, the parts are
+gathered into one file sorted by source, from which one source can be read without the rest.
 """
 
 from collections.abc import Mapping
@@ -25,12 +25,12 @@ HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE = (
     "motions.parquet",
     "errors_by_count.parquet",
 )
-# Rows of a group in the gathered file: a source is sought in one or two of them, but what is
-# known of each group is read first.
+# Row groups of the gathered file. Small groups are fast to read, because a source is in one or
+# two of them; many groups are slow, because the statistics of all groups are read first.
 _SMALLEST_GROUP = 8192
 _MOST_GROUPS = 1000
 
-# Of the class of a source as `plateviz.tables.sources` has it.
+# The classes are those of `plateviz.tables.sources`.
 _CLASSES = """
 WITH rows AS (
     SELECT *, count(*) OVER (PARTITION BY source_id) AS n_orbits,
@@ -49,10 +49,10 @@ FROM rows GROUP BY source_class ORDER BY source_class
 
 
 class SurveyRun:
-    """One run of a survey, asked across its orbits; reads files, keeps nothing large."""
+    """Queries over the orbits of one run; reads files and keeps nothing large in memory."""
 
     def __init__(self, run: Run) -> None:
-        """Take a run, complete or not."""
+        """Open a run, complete or not."""
         self._run = run
 
     @property
@@ -67,20 +67,20 @@ class SurveyRun:
 
     @property
     def directory(self) -> Path:
-        """Where the run is kept."""
+        """The run's directory."""
         return self._run.directory
 
     @property
     def is_complete(self) -> bool:
-        """Whether every orbit of the survey is there."""
+        """Whether every orbit of the survey is fitted and gathered."""
         return self._run.is_complete
 
     def header(self) -> Mapping[str, object]:
-        """Return what the run was begun with: `settings`, `versions`, hashes of the `inputs`."""
+        """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""
         return self._run.header()
 
     def failures(self) -> dict[int, str]:
-        """Return why orbits have no solution, by orbit."""
+        """Return the reasons why orbits have no solution, by orbit."""
         return self._run.failures()
 
     def has_fitted(self, orbit: int) -> bool:
@@ -101,7 +101,7 @@ class SurveyRun:
         return _typed(pd.DataFrame(rows, columns=RUN_ORBITS.names))
 
     def motions(self) -> pd.DataFrame:
-        """Return `survey_schema.MOTIONS`; no rows while nothing has been gathered."""
+        """Return `survey_schema.MOTIONS`; no rows until the orbits are gathered."""
         path = self.directory / MOTIONS_FILE
         return pd.read_parquet(path) if path.is_file() else pd.DataFrame(columns=MOTIONS.names)
 
@@ -110,11 +110,11 @@ class SurveyRun:
         path = self.directory / MOTIONS_FILE
         if not path.is_file():
             return None
-        # An id of a table is a NumPy integer, which DuckDB does not take.
+        # DuckDB does not accept NumPy integers, which ids from tables are.
         found = self._ask(
             "SELECT * FROM read_parquet(?) WHERE source_id = ?", str(path), int(source_id)
         )
-        # Row by row pandas would turn ids into floating-point numbers.
+        # Without the conversion pandas would make the ids of a row floating-point numbers.
         return None if found.empty else found.astype(object).iloc[0]
 
     def errors_by_count(self) -> pd.DataFrame | None:
@@ -150,11 +150,11 @@ class SurveyRun:
         )
 
     def classes(self, often: int) -> pd.DataFrame:
-        """Return what the orbits say of each class of sources, by `source_class`.
+        """Return statistics over all orbits for each class of sources, by `source_class`.
 
         Parameters
         ----------
-        often : orbits that a source is to exceed for `sigma_often`
+        often : `sigma_often` is of sources measured in more orbits than this
 
         Returns
         -------
@@ -175,7 +175,7 @@ class SurveyRun:
         )
 
     def result(self, orbit: int) -> FitResult:
-        """Return one fitted orbit; InputError if it is not there."""
+        """Return one fitted orbit; InputError if it does not exist."""
         return read_fitted_orbit(self._run.orbit_directory(orbit))
 
     @cached_property
@@ -220,21 +220,21 @@ def open_run(survey: Path, name: str) -> SurveyRun:
             return run
     names = ", ".join(run.name for run in survey_runs(survey)) or "none"
     raise InputError(
-        f"{survey}: expected a run {name!r}, found {names}; `plateviz survey` makes one"
+        f"{survey}: expected a run {name!r}, found {names}; `plateviz survey` creates one"
     )
 
 
 def rows_of_a_group(n_rows: int) -> int:
-    """Return how many rows a group of a gathered history of so many rows has."""
+    """Return the number of rows per row group in a gathered history of `n_rows` rows."""
     return max(_SMALLEST_GROUP, n_rows // _MOST_GROUPS)
 
 
 def gather_history(run: Run) -> Path:
-    """Write the history of all orbits that are there in order of source and epoch; the file."""
+    """Write the history of all fitted orbits sorted by source and epoch; return its path."""
     target = run.directory / HISTORY_FILE
     parts = [str(run.orbit_directory(orbit) / HISTORY_FILE) for orbit in run.complete_orbits()]
     with write_atomically(target) as temporary, duckdb.connect() as connection:
-        # One thread writes the same bytes every time.
+        # With one thread the written bytes are reproducible.
         connection.execute("SET threads = 1")
         found = connection.execute("SELECT count(*) FROM read_parquet(?)", [parts]).fetchone()
         group = rows_of_a_group(0 if found is None else int(found[0]))

@@ -3,13 +3,13 @@
     runs/NAME/run.toml                    settings, versions, hashes of the inputs; written first
     runs/NAME/orbit=0000/                 one fitted orbit (`plateviz.runs.fitted_orbit`)
     runs/NAME/failed/orbit=0000.json      why an orbit has no solution
-    runs/NAME/history.parquet             all orbits in order of source (`plateviz.runs.queries`)
-    runs/NAME/motions.parquet, ...        what follows from it
-    runs/NAME/gathered.json               the orbits that these tables hold; written after them
-    runs/NAME/COMPLETE                    written last, when every orbit of the survey is there
+    runs/NAME/history.parquet             all orbits sorted by source (`plateviz.runs.queries`)
+    runs/NAME/motions.parquet, ...        tables computed from it
+    runs/NAME/gathered.json               the orbits in these tables; written after them
+    runs/NAME/COMPLETE                    written last, when every orbit of the survey is fitted
 
-No user interface and no JAX. What is there is never edited: a run that was interrupted goes on
-with the orbits that are missing, and only with the choices with which it was begun.
+No user interface and no JAX. Existing files of orbits are never changed: an interrupted run is
+continued with the missing orbits, and only with the settings with which it was created.
 """
 
 import json
@@ -62,26 +62,26 @@ class Run:
 
     @property
     def directory(self) -> Path:
-        """Where the run is kept."""
+        """The run's directory."""
         return self.survey / "runs" / self.name
 
     @property
     def is_complete(self) -> bool:
-        """Whether every orbit of the survey is there, and what follows from them."""
+        """Whether every orbit of the survey is fitted, and the tables over all are written."""
         return (self.directory / _COMPLETE).is_file()
 
     def orbit_directory(self, orbit: int) -> Path:
-        """Return where a fitted orbit is kept."""
+        """Return the directory of a fitted orbit."""
         return self.directory / f"orbit={orbit:04d}"
 
     def complete_orbits(self) -> list[int]:
-        """Return the orbits that are there, in order."""
+        """Return the fitted orbits, sorted."""
         found = (_ORBIT.fullmatch(path.name) for path in self.directory.glob("orbit=*"))
         numbers = sorted(int(match[1]) for match in found if match)
         return [number for number in numbers if is_complete(self.orbit_directory(number))]
 
     def failures(self) -> dict[int, str]:
-        """Return why orbits have no solution, by orbit."""
+        """Return the reasons why orbits have no solution, by orbit."""
         reasons = {}
         for path in sorted((self.directory / _FAILED).glob("orbit=*.json")):
             content = json.loads(path.read_text(encoding="utf-8"))
@@ -93,16 +93,16 @@ class Run:
         return FitSettings.from_dict(section(self.header(), "settings"))
 
     def header(self) -> Mapping[str, object]:
-        """Return what the run was begun with: `settings`, `versions`, hashes of the `inputs`."""
+        """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""
         return read_header(self.directory, _HEADER)
 
     def keep(self, orbit: int, result: FitResult, history: pd.DataFrame) -> None:
-        """Write a fitted orbit, with what it adds to the history of its sources."""
+        """Write a fitted orbit with its part of the history, and remove a recorded failure."""
         write_fitted_orbit(self.orbit_directory(orbit), result, {"history": history})
         self._failure_path(orbit).unlink(missing_ok=True)
 
     def keep_failure(self, orbit: int, message: str) -> None:
-        """Write why an orbit has no solution."""
+        """Write the reason why an orbit has no solution."""
         path = self._failure_path(orbit)
         path.parent.mkdir(exist_ok=True)
         with write_atomically(path) as temporary:
@@ -110,17 +110,17 @@ class Run:
             temporary.write_text(content, encoding="utf-8")
 
     def gathered_orbits(self) -> list[int]:
-        """Return the orbits whose history has been gathered, with all that follows from it."""
+        """Return the orbits that the tables over all orbits contain."""
         path = self.directory / _GATHERED
         return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
 
     def mark_gathered(self, orbits: list[int]) -> None:
-        """Say which orbits have been gathered; written after all that follows from them."""
+        """Record the gathered orbits; call after the tables over all orbits are written."""
         with write_atomically(self.directory / _GATHERED) as temporary:
             temporary.write_text(json.dumps(orbits), encoding="utf-8")
 
     def mark_complete(self) -> None:
-        """Say that nothing is missing; the run is not changed from then on."""
+        """Mark the run as complete; it is not changed afterwards."""
         with write_atomically(self.directory / _COMPLETE):
             pass
 
@@ -136,13 +136,13 @@ def runs_of(survey: Path) -> list[Run]:
 
 
 def begin_run(survey: Path, name: str, settings: FitSettings) -> Run:
-    """Make a run, or take up the one that is there.
+    """Create a run, or return an existing one with the same settings.
 
     Raises
     ------
     InputError
-        If the directory is no survey, the name cannot be that of a folder, or a run of that
-        name was begun with other settings, versions or inputs.
+        If the directory is not a survey, the name is not a valid folder name, or a run of that
+        name exists with other settings, versions or inputs.
     """
     survey_orbits(survey)
     if not _NAME.fullmatch(name):
@@ -159,7 +159,7 @@ def begin_run(survey: Path, name: str, settings: FitSettings) -> Run:
     try:
         run.directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{run.directory}: expected to make a folder, found: {error}") from error
+        raise InputError(f"{run.directory}: expected to create a folder, found: {error}") from error
     write_header(run.directory, content, _HEADER)
     return run
 
@@ -182,6 +182,6 @@ def _check_same(path: Path, found: Mapping[str, object], wanted: Mapping[str, ob
     ]
     if different:
         raise InputError(
-            f"{path}: expected the choices with which this run was begun, found other "
-            f"{', '.join(different)}; another --run NAME keeps both"
+            f"{path}: expected the settings with which this run was created, found other "
+            f"{', '.join(different)}; use another --run NAME to keep both"
         )

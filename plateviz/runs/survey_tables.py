@@ -1,4 +1,4 @@
-"""What the pictures of a fitted survey are drawn from, read from its files."""
+"""Input tables of the figures of a fitted survey, read from its files."""
 
 from plateviz.runs.queries import SurveyRun
 from plateviz.tables.survey_tables import SurveyTables

@@ -1,8 +1,8 @@
-"""Results as tidy tables, one function per figure; all numbers on the screen come from here.
+"""Results as tidy tables, one function per figure: the source of every displayed number.
 
 Imports `solver` only. The truth is a frame with `source_id`, `ra` and `dec` (deg, direction at
-the mean epoch of the orbit, without aberration), or None; a table that needs the truth is empty
-without it.
+the mean epoch of the orbit, without aberration), or None. A table that needs the truth is empty
+if it is None.
 """
 
 from plateviz.tables.calibration import calibration_tables, distortion
@@ -25,6 +25,7 @@ from plateviz.tables.prior_separation import prior_separation, prior_separation_
 from plateviz.tables.prior_shares import prior_shares
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
 from plateviz.tables.reference_scatter import reference_scatter, scatter_cells
+from plateviz.tables.reproduction import reproduction
 from plateviz.tables.residuals import (
     ScatterStatistics,
     binned_vectors,
@@ -97,6 +98,7 @@ __all__ = [
     "pull_bins",
     "pull_histogram",
     "reference_scatter",
+    "reproduction",
     "residual_map",
     "residual_scatter",
     "run_strip",

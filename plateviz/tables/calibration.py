@@ -1,4 +1,4 @@
-"""Tables of the calibration: the distortion as a field of vectors, the fitted values."""
+"""Tables of the calibration: the distortion as a vector field, and the fitted values."""
 
 import numpy as np
 import pandas as pd
@@ -21,7 +21,7 @@ def distortion(result: FitResult, instrument: Instrument, *, grid: int = 17) -> 
     """Return the fitted distortion on a square grid that covers the detectors.
 
     Eq. (model:Lx) and Eq. (model:Ly), with the value at the optical centre subtracted:
-    the displacement there is zero for every order, as Eq. (model:A0) has it for order 5.
+    the displacement there is zero for every order, as in Eq. (model:A0) for order 5.
 
     Parameters
     ----------
@@ -58,11 +58,11 @@ def distortion(result: FitResult, instrument: Instrument, *, grid: int = 17) -> 
 
 
 def displacement_um(coefficients: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the Legendre sum less its value at the origin.
+    """Return the Legendre sum minus its value at the origin.
 
     Parameters
     ----------
-    coefficients : um, ordered by total degree, then by falling power of x, from degree 2
+    coefficients : um, from degree 2, ordered by total degree, then by falling power of x
     x, y : scaled focal-plane coordinates, shape (n,)
 
     Returns
@@ -84,9 +84,8 @@ def calibration_tables(result: FitResult) -> dict[str, pd.DataFrame]:
     Returns
     -------
     "Exposures", "Detectors" and "Distortion" -> a row per exposure, detector or
-    coefficient pair, named by the column `element`; for each group its value, marginal
-    sigma and the share of the answer that is prior. The unit stands in brackets in the
-    column's name.
+    coefficient pair, named in the column `element`; for each group its value, marginal
+    sigma and prior share. Column names give the unit in brackets.
     """
     return {title: _display_table(result, axis) for title, axis in _TITLES}
 
@@ -116,7 +115,7 @@ def _coefficient_matrix(coefficients: np.ndarray) -> np.ndarray:
     if (order + 1) * (order + 2) // 2 - 3 != len(coefficients):
         raise ValueError(
             f"coefficients: expected those of a complete order (3, 7, 12, 18, ...), "
-            f"got {len(coefficients)}"
+            f"found {len(coefficients)}"
         )
     matrix = np.zeros((order + 1, order + 1))
     degrees = [(d - power, power) for d in range(2, order + 1) for power in range(d + 1)]

@@ -10,19 +10,19 @@ from solver.data.result import FitResult
 
 
 def comparison(result_a: FitResult, result_b: FitResult) -> pd.DataFrame:
-    """Return position B minus position A of every source in both, and the sigmas' ratio.
+    """Return position B minus position A of every source in both fits, and the ratio of sigmas.
 
     Parameters
     ----------
-    result_a : the fit on screen
+    result_a : the fit taken as reference
     result_b : the fit compared with it
 
     Returns
     -------
     `source_id`, `id`, `source_class`, `n_obs` (of A), `x_arcmin` (ra cos(dec)),
     `y_arcmin`, `difference_ra_mas` (ra cos(dec)), `difference_dec_mas`, `pull_ra`,
-    `pull_dec` (difference over the marginal sigma of A; not unit normal, since both fits
-    share their data), `sigma_ratio_ra`, `sigma_ratio_dec` (marginal, B over A)
+    `pull_dec` (difference over the marginal sigma of A; not unit normal, because both fits
+    use the same data), `sigma_ratio_ra`, `sigma_ratio_dec` (marginal, B over A)
     """
     columns = ["source_id", "ra", "dec", "sigma_ra_marginal", "sigma_dec_marginal"]
     table = ordered_by_class(result_a.sources).merge(

@@ -1,4 +1,4 @@
-"""Tables of the course of a fit."""
+"""Tables of the convergence of a fit: steps and losses."""
 
 import pandas as pd
 
@@ -9,7 +9,7 @@ _FINAL_STEPS = 50
 
 
 def convergence(result: FitResult) -> pd.DataFrame:
-    """Return the trace of the fit with the tolerance that it had to reach.
+    """Return the trace of the fit with the convergence tolerance.
 
     Returns
     -------
@@ -20,7 +20,7 @@ def convergence(result: FitResult) -> pd.DataFrame:
 
 
 def loss_excess(result: FitResult) -> pd.DataFrame:
-    """Return the losses of an svi run; no rows of an engine without a loss.
+    """Return the losses of an svi run; no rows for an engine without a loss.
 
     Returns
     -------

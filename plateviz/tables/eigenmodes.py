@@ -1,4 +1,4 @@
-"""Tables of the modes: the combinations of calibration parameters, and what decides them."""
+"""Tables of the calibration's eigenmodes, and of what constrains its weak directions."""
 
 import numpy as np
 import pandas as pd
@@ -17,17 +17,17 @@ DATA, REFERENCES, SOURCES, CALIBRATION = (
 DECIDERS = (DATA, REFERENCES, SOURCES, CALIBRATION)
 _COLUMNS = {DATA: "data_share", REFERENCES: "reference_share", SOURCES: "source_share"}
 _MAS_PER_ARCMIN = 60_000.0
-_LEAST = 0.1
+_LEAST_SHIFT_SHARE = 0.1
 _SPECTRUM = ["mode", "name", *_COLUMNS.values(), "calibration_share", "relative_information"]
 
 
 def eigenmode_spectrum(result: FitResult) -> pd.DataFrame:
-    """Return all modes, the weakest first; no rows of a result without them.
+    """Return all eigenmodes, the weakest first; no rows if the result has none.
 
     Returns
     -------
-    The columns of `solver.data.schema`'s table of modes and `is_weak`, whether it is one of
-    those that are told in full
+    The columns of `solver.data.schema`'s table `modes` and `is_weak`: whether the eigenmode is
+    one of the weak directions that are described in full
     """
     if result.modes is None:
         return pd.DataFrame(columns=[*_SPECTRUM, "is_weak"])
@@ -35,12 +35,12 @@ def eigenmode_spectrum(result: FitResult) -> pd.DataFrame:
 
 
 def eigenmode_deciders(result: FitResult) -> pd.DataFrame:
-    """Return what decides each weak mode, in the order of `DECIDERS`, as parts of a bar.
+    """Return what constrains each weak direction, in the order of `DECIDERS`, as parts of a bar.
 
     Returns
     -------
-    `mode`, `name`, `decider` (of `DECIDERS`), `what` (words; the calibration's priors by
-    group), `share`, and `left` and `right`, the shares added up; parts of no share have
+    `mode`, `name`, `decider` (of `DECIDERS`), `what` (its text; the calibration's priors by
+    group), `share`, and the cumulative shares `left` and `right`; parts of zero share have
     no row
     """
     columns = ["mode", "name", "decider", "what", "share", "left", "right"]
@@ -63,13 +63,13 @@ def eigenmode_deciders(result: FitResult) -> pd.DataFrame:
 
 
 def eigenmode_groups(result: FitResult) -> pd.DataFrame:
-    """Return how much of each weak mode is in each parameter group.
+    """Return the share of each parameter group in each weak direction.
 
     Returns
     -------
     `mode`, `name`, `group` (label), `share` (of the squares of moves over conditional
-    sigmas), `move` (rms of the group's elements with one sigma of the mode), `unit`; and
-    `shift_mas`, the rms shift of the sources, the same in all rows of a mode
+    sigmas), `move` (rms of the group's elements per sigma along the direction), `unit`; and
+    `shift_mas`, the rms shift of the sources, the same in all rows of a direction
     """
     columns = ["mode", "name", "group", "share", "move", "unit", "shift_mas"]
     if result.modes is None or result.mode_parameters is None:
@@ -90,25 +90,27 @@ def eigenmode_groups(result: FitResult) -> pd.DataFrame:
 
 
 def eigenmode_shifts(result: FitResult, *, most: int | None = None) -> pd.DataFrame:
-    """Return what weak modes would do on the sky, a row per mode and source.
+    """Return the shifts of the sources along weak directions, a row per direction and source.
 
     Parameters
     ----------
     result : the fit
-    most : at most so many modes, those that shift the sources most and not ten times
-        less than the first of them; None for all
+    most : maximum number of directions, those with the largest rms shift; directions with
+        less than a tenth of the largest are left out; None for all
 
     Returns
     -------
     `mode`, `name`, `id`, tail `x`, `y` in arcmin from the centre of the field (ra
-    cos(dec), East positive), shift `u`, `v` in arcmin with one sigma of the mode,
+    cos(dec), East positive), shift `u`, `v` in arcmin per sigma along the direction,
     `shift_ra_mas`, `shift_dec_mas`
     """
     columns = ["mode", "name", "id", "x", "y", "u", "v", "shift_ra_mas", "shift_dec_mas"]
     if result.modes is None or result.mode_shifts is None:
         return pd.DataFrame(columns=columns)
     rms = _shift_rms(result)
-    largest = (rms if most is None else rms[rms >= _LEAST * rms.max()].nlargest(most)).index
+    largest = (
+        rms if most is None else rms[rms >= _LEAST_SHIFT_SHARE * rms.max()].nlargest(most)
+    ).index
     rows = result.mode_shifts[result.mode_shifts["mode"].isin(largest)]
     rows = rows.merge(result.sources[["source_id", "ra", "dec"]], on="source_id", how="left")
     centre = mean_direction(result.sources["ra"].to_numpy(), result.sources["dec"].to_numpy())
@@ -126,7 +128,7 @@ def eigenmode_shifts(result: FitResult, *, most: int | None = None) -> pd.DataFr
 
 
 def _shift_rms(result: FitResult) -> pd.Series:
-    """Return the rms length of the shifts of all sources by mode, mas."""
+    """Return the rms length of the shifts of all sources by eigenmode, mas."""
     if result.mode_shifts is None:
         return pd.Series(dtype=float)
     squares = result.mode_shifts["shift_ra"] ** 2 + result.mode_shifts["shift_dec"] ** 2

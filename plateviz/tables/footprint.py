@@ -16,7 +16,7 @@ def footprint_sources(result: FitResult) -> pd.DataFrame:
     Returns
     -------
     `source_id`, `id` (text), `source_class`, `n_obs`, `ra`, `dec` (deg), `x_arcmin`
-    (ra cos(dec), East positive) and `y_arcmin`; reference stars last, so that they are
+    (ra cos(dec), East positive) and `y_arcmin`; reference sources last, so that they are
     drawn on top
     """
     table = ordered_by_class(result.sources)
@@ -28,10 +28,10 @@ def footprint_sources(result: FitResult) -> pd.DataFrame:
 def footprint_fields(result: FitResult, instrument: Instrument) -> pd.DataFrame:
     """Return the outline of each detector on the first exposure of each field.
 
-    The nominal corners are taken through the fitted pointing, position angle and focal
-    length; distortion (below a pixel) is left out. The pointing is that of the observed,
-    aberrated sky: each outline is moved by the mean difference between the places where
-    the sources of its exposure were seen and where they are, up to 0.35 arcmin.
+    The nominal corners are projected with the fitted pointing, position angle and focal
+    length; distortion (below a pixel) is neglected. The pointing refers to the observed,
+    aberrated sky: each outline is moved by the mean difference between the observed and the
+    estimated positions of the sources of its exposure, up to 0.35 arcmin.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def footprint_fields(result: FitResult, instrument: Instrument) -> pd.DataFrame:
     first = exposures.sort_values(["field_id", "plate_id"]).drop_duplicates("field_id")
     corners = np.concatenate([d.corners_um()[[0, 1, 2, 3, 0]] for d in instrument.detectors])
     frames = [
-        _outline(corners, optics.loc[index], instrument, _seen(result, exposures.loc[index]))
+        _outline(corners, optics.loc[index], instrument, _observed(result, exposures.loc[index]))
         for index in first.index
     ]
     if not frames:
@@ -72,8 +72,8 @@ _FIELD_COLUMNS = [
 ]
 
 
-def _seen(result: FitResult, exposure: pd.Series) -> pd.DataFrame:
-    """Return where the sources of an exposure lie on its ideal focal plane and on the sky."""
+def _observed(result: FitResult, exposure: pd.Series) -> pd.DataFrame:
+    """Return the positions of an exposure's sources on its ideal focal plane and on the sky."""
     rows = result.residuals
     here = (rows["field_id"] == exposure["field_id"]) & (rows["plate_id"] == exposure["plate_id"])
     places = result.sources[["source_id", "ra", "dec"]]
@@ -81,12 +81,12 @@ def _seen(result: FitResult, exposure: pd.Series) -> pd.DataFrame:
 
 
 def _outline(
-    corners: np.ndarray, pointing: pd.Series, instrument: Instrument, seen: pd.DataFrame
+    corners: np.ndarray, pointing: pd.Series, instrument: Instrument, observed: pd.DataFrame
 ) -> pd.DataFrame:
     ra, dec = sky_of_focal_plane(corners, pointing)
-    if len(seen):
-        apparent = sky_of_focal_plane(seen[["ideal_x", "ideal_y"]].to_numpy(), pointing)
-        east, north = offsets_deg(*apparent, seen["ra"].to_numpy(), seen["dec"].to_numpy())
+    if len(observed):
+        apparent = sky_of_focal_plane(observed[["ideal_x", "ideal_y"]].to_numpy(), pointing)
+        east, north = offsets_deg(*apparent, observed["ra"].to_numpy(), observed["dec"].to_numpy())
         dec = dec - north.mean()
         ra = (ra - east.mean() / np.cos(np.radians(dec))) % 360.0
     ids = [d.detector_id for d in instrument.detectors]

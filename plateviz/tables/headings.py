@@ -1,16 +1,16 @@
-"""How the columns of tables are called, and their numbers written, on pages and in reports."""
+"""Titles and number formats of the columns of tables on pages and in reports."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import pandas as pd
 
-_ALPHA, _DELTA = "Reference stars, α", "Reference stars, δ"
-_CATALOGUE, _TRUTH, _SIGMA = "less catalogue, mas", "less truth, mas", "marginal σ, mas"
+_ALPHA, _DELTA = "Reference sources, α", "Reference sources, δ"
+_CATALOGUE, _TRUTH, _SIGMA = "minus catalogue, mas", "minus truth, mas", "marginal σ, mas"
 
 
 class Heading(NamedTuple):
-    """How a column is shown: its title, the format of its numbers, and what stands above it."""
+    """How a column is shown: its title, its number format, and the title of its group."""
 
     title: str
     format: str = ""
@@ -64,11 +64,12 @@ SOURCES_OF_RUN: Mapping[str, Heading] = {
 
 
 def in_words(table: pd.DataFrame, headings: Mapping[str, Heading]) -> pd.DataFrame:
-    """Return a table as it is read: its columns by their titles, its numbers as text.
+    """Return a table for display: titles as column names, numbers formatted as text.
 
     Parameters
     ----------
-    headings : column -> how it is shown; others are left out, and so are those without any value
+    headings : column -> how it is shown; other columns, and columns without any value, are
+        left out
     """
     shown = {
         f"{heading.group}: {heading.title}" if heading.group else heading.title: table[name].map(
@@ -79,7 +80,7 @@ def in_words(table: pd.DataFrame, headings: Mapping[str, Heading]) -> pd.DataFra
     return pd.DataFrame({title: values for title, values in shown.items() if (values != "").any()})
 
 
-def _text(value: Any, form: str) -> str:  # noqa: ANN401 what tables hold
+def _text(value: Any, form: str) -> str:  # noqa: ANN401 a cell of any type
     if pd.isna(value):
         return ""
     if not form:

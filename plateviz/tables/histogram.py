@@ -1,17 +1,17 @@
-"""A histogram about zero, to be drawn beside a unit normal."""
+"""Histogram of pulls about zero, for comparison with a unit normal."""
 
 import numpy as np
 import pandas as pd
 
 
 def pull_bins(values: pd.Series, *, bins: int = 41, limit: float = 5.0) -> pd.DataFrame:
-    """Return the histogram of values that should be unit normal.
+    """Return the histogram of values that are expected to be unit normal.
 
     Parameters
     ----------
-    values : NaN is left out
+    values : NaN is ignored
     bins : number of bins from -limit to limit; odd, so that one is centred on zero
-    limit : largest value shown; what lies beyond is counted, not binned
+    limit : largest absolute value binned; values beyond it are only counted
 
     Returns
     -------

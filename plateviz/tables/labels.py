@@ -1,4 +1,4 @@
-"""Words for exposures, ids and dates, the same in every plot and table."""
+"""Text for exposures, ids and dates, the same in every plot and table."""
 
 import pandas as pd
 
@@ -13,11 +13,11 @@ def exposure_labels(table: pd.DataFrame) -> pd.Series:
 
 
 def id_strings(ids: pd.Series) -> pd.Series:
-    """Return the ids as text: a browser keeps numbers exact up to 2**53 only."""
+    """Return the ids as text, because a browser represents integers exactly up to 2**53 only."""
     return ids.astype("int64").astype(str)
 
 
 def dates(epochs: pd.Series) -> pd.Series:
-    """Return MJDs as "2028-03-01 12:40", which sorts as they do; empty where there is none."""
-    words = pd.to_datetime(epochs - _MJD_UNIX_EPOCH, unit="D", errors="coerce").dt.strftime(_MINUTE)
-    return words.fillna("").astype(object)
+    """Return MJDs as text that sorts in time ("2028-03-01 12:40"); empty where there is none."""
+    text = pd.to_datetime(epochs - _MJD_UNIX_EPOCH, unit="D", errors="coerce").dt.strftime(_MINUTE)
+    return text.fillna("").astype(object)

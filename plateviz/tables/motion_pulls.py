@@ -1,4 +1,4 @@
-"""Table of the pulls of the fitted motions: fitted minus true, over sigma."""
+"""Table of the pulls of the fitted motions: fitted minus true over sigma."""
 
 import numpy as np
 import pandas as pd
@@ -16,13 +16,13 @@ def motion_pulls(motions: pd.DataFrame, *, least_orbits: int = LEAST_ORBITS) -> 
     Parameters
     ----------
     motions : `survey_schema.MOTIONS`; artificial sources count as non-reference here
-    least_orbits : orbits that a source must have been measured in
+    least_orbits : minimum number of orbits that measured a source
 
     Returns
     -------
     A row per parameter and bin: `parameter` (of `survey_schema.MOTION_PARAMETERS` where there
-    is a truth, and "chi2": that of the fit less its degrees of freedom, over their scatter
-    sqrt(2 dof)), `least_orbits` and the columns of `tables.pull_bins`; no rows without pulls
+    is a truth, and "chi2": (chi2 - dof) / sqrt(2 dof) of the motion fit), `least_orbits` and
+    the columns of `tables.pull_bins`; no rows without pulls
     """
     chosen = motions[~motions["is_reference"] & (motions["n_orbits"] >= least_orbits)]
     with_dof = chosen[chosen["dof"] > 0]

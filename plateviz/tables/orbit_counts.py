@@ -1,4 +1,4 @@
-"""Table of how many orbits measured a source."""
+"""Table of the number of orbits that measured each source."""
 
 import numpy as np
 import pandas as pd

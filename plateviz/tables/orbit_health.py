@@ -1,4 +1,4 @@
-"""Table of the fits of all orbits of a run against time."""
+"""Table of the quality of fit of each orbit of a run against time."""
 
 import numpy as np
 import pandas as pd
@@ -7,7 +7,7 @@ from solver.model.apparent_motion import julian_year
 
 
 def orbit_health(orbits: pd.DataFrame) -> pd.DataFrame:
-    """Return how well each orbit was fitted.
+    """Return the quality of fit of each orbit.
 
     Parameters
     ----------
@@ -16,8 +16,8 @@ def orbit_health(orbits: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     A row per orbit in order of id: `orbit_id`, `state` ("complete", "not converged", "failed"
-    or "missing"), `message`, `year` (Julian; between its neighbours for an orbit without an
-    epoch), `chi2_per_dof`, `expected_sd` = sqrt(2 / dof), `z`, the departure from 1 over that,
+    or "missing"), `message`, `year` (Julian; interpolated for an orbit without an epoch),
+    `chi2_per_dof`, `expected_sd` = sqrt(2 / dof), `z` = (chi2_per_dof - 1) / expected_sd,
     and the normalised deviations of the reference sources `deviation_ra`, `deviation_dec` with
     their expectations `expected_ra`, `expected_dec`
     """
@@ -29,7 +29,7 @@ def orbit_health(orbits: pd.DataFrame) -> pd.DataFrame:
             "orbit_id": rows["orbit_id"],
             "state": rows["status"].where(~is_complete | (rows["converged"] == 1), "not converged"),
             "message": rows["message"],
-            "year": _filled(rows),
+            "year": _interpolated_years(rows),
             "chi2_per_dof": rows["chi2_per_dof"],
             "expected_sd": scatter,
             "z": (rows["chi2_per_dof"] - 1.0) / scatter,
@@ -41,8 +41,8 @@ def orbit_health(orbits: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
-def _filled(rows: pd.DataFrame) -> np.ndarray:
-    """Return the Julian years; orbits follow each other in time, and a failed one has none."""
+def _interpolated_years(rows: pd.DataFrame) -> np.ndarray:
+    """Return the Julian years, interpolated in orbit number where a failed orbit has none."""
     year, order = julian_year(rows["epoch"]), rows["orbit_id"].to_numpy(dtype=float)
     known = np.isfinite(year)
     return np.interp(order, order[known], year[known]) if known.any() else year

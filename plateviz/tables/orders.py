@@ -1,4 +1,4 @@
-"""Table of the distortion orders that were compared, and what it says in a sentence."""
+"""Table of the compared distortion orders, and its summary in one sentence."""
 
 import numpy as np
 import pandas as pd
@@ -15,14 +15,14 @@ _COLUMNS = (
 
 
 def order_comparison(result: FitResult) -> pd.DataFrame:
-    """Return what evidence and reserved sources say of every order, against the best.
+    """Return the evidence and the reserved-source prediction of every order, against the best.
 
     Returns
     -------
     A row per order: `n_terms` of the distortion, `is_fitted`, `chi2_per_dof` of all
-    measurements, and of the reserved ones with its expected scatter about 1,
-    `held_out_sd` = sqrt(2 / dof); `*_below_best` are in natural logarithms and zero for the
-    best order. NaN where a figure does not exist; empty where no orders were compared.
+    measurements, and `held_out_chi2_per_dof` of the reserved ones with its expected scatter
+    about 1, `held_out_sd` = sqrt(2 / dof); `*_below_best` are in natural logarithms and zero
+    for the best order. NaN where a number does not exist; empty if no orders were compared.
     """
     found = result.orders
     if found is None:
@@ -40,7 +40,7 @@ def order_comparison(result: FitResult) -> pd.DataFrame:
 
 
 def order_verdict(table: pd.DataFrame) -> str:
-    """Say which orders evidence and reserved sources prefer, and which one was fitted.
+    """Return a sentence that names the orders preferred by each criterion, and the fitted order.
 
     Parameters
     ----------
@@ -50,24 +50,24 @@ def order_verdict(table: pd.DataFrame) -> str:
     by_density = preferred_order(table, "log_density_below_best")
     predicts = "predicts the reserved sources best"
     if by_evidence is None and by_density is None:
-        words = "Nothing tells the orders apart"
+        preference = "No criterion distinguishes the orders"
     elif by_evidence == by_density:
-        words = f"Order {by_evidence} has the highest evidence and {predicts}"
+        preference = f"Order {by_evidence} has the highest evidence and {predicts}"
     elif by_density is None:
-        words = f"Order {by_evidence} has the highest evidence"
+        preference = f"Order {by_evidence} has the highest evidence"
     elif by_evidence is None:
-        words = f"Order {by_density} {predicts} (under a flat prior no evidence can compare)"
+        preference = f"Order {by_density} {predicts} (the evidence is undefined under a flat prior)"
     else:
         behind = table.set_index("order")["log_density_below_best"][by_evidence]
-        words = (
+        preference = (
             f"Order {by_evidence} has the highest evidence; order {by_density} {predicts}, "
-            f"{behind:,.1f} in log density above it"
+            f"with a log density higher by {behind:,.1f}"
         )
-    return f"{words}; {_fitted_words(table, by_evidence, by_density)}.{_left_out(table)}"
+    return f"{preference}; {_fitted_order(table, by_evidence, by_density)}.{_left_out(table)}"
 
 
 def preferred_order(table: pd.DataFrame, column: str) -> int | None:
-    """Return the best order by a criterion, the lowest of those that are equally good.
+    """Return the best order by a criterion, the lowest of equally good ones.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def preferred_order(table: pd.DataFrame, column: str) -> int | None:
 
     Returns
     -------
-    None where the criterion cannot tell
+    None if no order has a value
     """
     best = table.loc[table[column] == 0.0, "order"]
     return None if best.empty else int(best.iloc[0])
@@ -86,13 +86,13 @@ def _below_best(values: pd.Series) -> pd.Series:
     return values.max() - values
 
 
-def _fitted_words(table: pd.DataFrame, *preferred: int | None) -> str:
+def _fitted_order(table: pd.DataFrame, *preferred: int | None) -> str:
     fitted = table.loc[table["is_fitted"], "order"]
     order = "another" if fitted.empty else int(fitted.iloc[0])
     named = {p for p in preferred if p is not None}
     if order in named:
-        return "that is the order fitted" if len(named) == 1 else f"the order fitted is {order}"
-    return f"the order fitted is {order}" + (", neither" if len(named) == 2 else "")
+        return "this is the fitted order" if len(named) == 1 else f"the fitted order is {order}"
+    return f"the fitted order is {order}" + (", which is neither" if len(named) == 2 else "")
 
 
 def _left_out(table: pd.DataFrame) -> str:
@@ -100,8 +100,10 @@ def _left_out(table: pd.DataFrame) -> str:
     if highest == MAX_ORDER:
         return ""
     if highest == MAX_ORDER - 1:
-        return f" Order {MAX_ORDER} is left out: it has more parameters than the data can hold."
+        return (
+            f" Order {MAX_ORDER} is left out: it has more parameters than the data can constrain."
+        )
     return (
         f" Orders {highest + 1} to {MAX_ORDER} are left out: they have more parameters than the "
-        "data can hold."
+        "data can constrain."
     )

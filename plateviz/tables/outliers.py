@@ -1,4 +1,4 @@
-"""Table of the measurements that a robust fit has left out."""
+"""Table of the measurements that a robust fit has removed as outliers."""
 
 import pandas as pd
 
@@ -7,7 +7,7 @@ from solver.data.result import FitResult
 
 
 def outlier_list(result: FitResult) -> pd.DataFrame | None:
-    """Return the outliers for people, the farthest first.
+    """Return the outliers for display, the farthest first.
 
     Parameters
     ----------
@@ -15,9 +15,9 @@ def outlier_list(result: FitResult) -> pd.DataFrame | None:
 
     Returns
     -------
-    `exposure`, `detector`, `source`, the residuals in pixels, and in sigmas how far the
-    measurement lies from its prediction and how far it would move its source; None
-    where no outliers were looked for
+    `exposure`, `detector`, `source`, the residuals in pixels, and in sigmas the distance of
+    the measurement from its prediction and the shift of its source that it would cause; None
+    if the fit did not search for outliers
     """
     found = result.outliers
     if found is None:

@@ -1,4 +1,4 @@
-"""Tables of how far the catalogue lies from the truth at an epoch of observation."""
+"""Tables of the separation between catalogue and truth at an epoch of observation."""
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ _COLUMNS = ["id", "group", "is_artificial", "separation_mas", "sigma_mas"]
 def prior_separation(
     catalogue: pd.DataFrame, truth: pd.DataFrame | None, *, epoch: float = EPOCH
 ) -> pd.DataFrame:
-    """Return the separation of catalogue and truth at an epoch, and how large it may be.
+    """Return the separation of catalogue and truth at an epoch, and its stated uncertainty.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def prior_separation(
     -------
     A row per source in both: `id`, `group` ("reference" or "non-reference"), `is_artificial`,
     `separation_mas` on the sky (2-D), and `sigma_mas`, the rms over both coordinates of the
-    uncertainty that the catalogue states for that epoch; no rows without a truth
+    catalogue's uncertainty at that epoch; no rows without a truth
     """
     if truth is None:
         return pd.DataFrame(columns=_COLUMNS)
@@ -61,19 +61,19 @@ def prior_separation(
 def prior_separation_histogram(
     table: pd.DataFrame, *, bins: int = 50, share: float = 0.998
 ) -> pd.DataFrame:
-    """Return the histogram of `prior_separation` for each group that it holds.
+    """Return the histogram of `prior_separation` for each group in it.
 
     Parameters
     ----------
     table : not empty
-    bins : number of bins from zero on
-    share : of the separations that the bins hold; what lies beyond is counted, not binned
+    bins : number of bins, starting at zero
+    share : quantile of the separations where the bins end; values beyond are only counted
 
     Returns
     -------
     A row per group and bin: `group`, `left`, `right`, mas, `count`, and `expected`, the
-    number by the catalogue's own uncertainties, taken alike in both coordinates; repeated
-    along the group `n`, `n_artificial`, `outside` and `median_mas`
+    number predicted by the catalogue's uncertainties, taken equal in both coordinates;
+    repeated along the group `n`, `n_artificial`, `outside` and `median_mas`
     """
     frames = []
     for group in (name for name in GROUPS if (table["group"] == name).any()):
@@ -115,5 +115,5 @@ def _variance(
 
 
 def _beyond(edges: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Return how many sources are expected beyond each separation (Rayleigh's law)."""
+    """Return the number of sources expected beyond each separation (Rayleigh distribution)."""
     return np.array([np.exp(-0.5 * (edge / sigma) ** 2).sum() for edge in edges])

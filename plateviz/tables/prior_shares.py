@@ -1,4 +1,4 @@
-"""Table of how much of each calibration parameter is prior."""
+"""Table of the prior share of each calibration parameter."""
 
 import numpy as np
 import pandas as pd
@@ -10,10 +10,10 @@ _HALF_BAND = 0.36
 
 
 def prior_shares(result: FitResult) -> pd.DataFrame:
-    """Return the share of every calibration parameter that is prior, by group.
+    """Return the prior share of every calibration parameter, by group.
 
-    It is the marginal variance over the prior's: 0 where the parameter is measured, 1
-    where it is merely assumed.
+    The prior share is the marginal variance over the prior variance: 0 if the parameter is
+    determined by the measurements, 1 if by its prior alone.
 
     Parameters
     ----------

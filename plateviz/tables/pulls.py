@@ -14,7 +14,7 @@ def pull_histogram(result: FitResult, *, bins: int = 48, limit: float = 6.0) -> 
     ----------
     result : the fit
     bins : number of bins from -limit to limit
-    limit : largest standardised residual shown; what lies beyond is counted, not binned
+    limit : largest absolute value binned; values beyond it are only counted
 
     Returns
     -------
@@ -30,9 +30,9 @@ def exposure_chi2(result: FitResult) -> pd.DataFrame:
 
     Returns
     -------
-    `index` (order in time of the schema), `exposure` (words), `field_id`, `plate_id`,
-    `n_obs`, `chi2_per_dof`, `expected_sd` = sqrt(2 / dof), and `z`, the departure from 1
-    over that scatter
+    `index` (order of the result's `exposures`), `exposure` (text), `field_id`, `plate_id`,
+    `n_obs`, `chi2_per_dof`, `expected_sd` = sqrt(2 / dof), and
+    `z` = (chi2_per_dof - 1) / expected_sd
     """
     table = result.exposures.reset_index(drop=True)
     ratio = table["chi2"] / table["dof"]
@@ -54,8 +54,8 @@ def exposure_chi2(result: FitResult) -> pd.DataFrame:
 def _histogram(result: FitResult, axis: str, edges: np.ndarray) -> pd.DataFrame:
     values = result.residuals[f"standardised_{axis}"].dropna().to_numpy()
     counts, _ = np.histogram(values, edges)
-    # The density at the centre would overstate wide bins at the peak; the mean over the
-    # bin by Simpson's rule is exact to 1e-5 for the widths in use.
+    # The density at the centre overestimates the count in wide bins at the peak; the mean
+    # over the bin by Simpson's rule is exact to 1e-5 for the widths in use.
     centre = 0.5 * (edges[1:] + edges[:-1])
     density = (_normal(edges[1:]) + 4.0 * _normal(centre) + _normal(edges[:-1])) / 6.0
     return pd.DataFrame(

@@ -1,4 +1,4 @@
-"""Tables of how the reference sources scatter between orbits, and how far off they are."""
+"""Tables of the scatter of the reference sources between orbits, and of their mean deviations."""
 
 import numpy as np
 import pandas as pd
@@ -18,7 +18,7 @@ def reference_scatter(motions: pd.DataFrame, *, least_orbits: int = LEAST_ORBITS
     Parameters
     ----------
     motions : `survey_schema.MOTIONS`
-    least_orbits : orbits below which a measured scatter says little
+    least_orbits : minimum number of orbits; with fewer the measured scatter is too uncertain
 
     Returns
     -------
@@ -50,14 +50,14 @@ def reference_scatter(motions: pd.DataFrame, *, least_orbits: int = LEAST_ORBITS
 
 
 def scatter_cells(table: pd.DataFrame, *, bins: int = 60) -> pd.DataFrame:
-    """Return a `reference_scatter` of one coordinate counted in logarithmic cells.
+    """Return the number of sources in logarithmic cells of a `reference_scatter` coordinate.
 
-    For more sources than can be drawn one by one.
+    Used when there are too many sources to draw one by one.
 
     Returns
     -------
-    `left`, `right` (predicted, mas), `low`, `high` (measured, mas) and `n` of each cell that
-    holds a source
+    `left`, `right` (predicted, mas), `low`, `high` (measured, mas) and `n` of each non-empty
+    cell
     """
     names = ["expected_mas", "scatter_mas"]
     values = table[names].to_numpy(dtype=float)

@@ -1,7 +1,6 @@
-"""The paper's numbers beside ours: what each means, and the ratio of the two.
+"""Table of the paper's numbers beside ours, with the ratio of the two.
 
-Where a statement of the paper can be read in more than one way, `reading` says which one is
-compared.
+Where a statement of the paper is ambiguous, `reading` gives the interpretation compared.
 """
 
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ import pandas as pd
 
 # "Observed for more than 80 orbits", section "Time-series astrometric analysis".
 OFTEN = 80
-# Few artificial sources reach the largest number of orbits.
+# Minimum number of sources; few artificial sources reach the largest number of orbits.
 _ENOUGH_SOURCES = 50
 _A100_MINUTES = (50.0, 140.0)
 _SECONDS_PER_MINUTE = 60.0
@@ -21,7 +20,7 @@ COLUMNS = ["quantity", "reading", "unit", "paper_low", "paper_high", "ours", "ra
 
 @dataclass(frozen=True)
 class SurveyFigures:
-    """What a fitted survey says.
+    """Tables of a fitted survey from which `reproduction` is computed.
 
     Attributes
     ----------
@@ -44,9 +43,9 @@ def reproduction(figures: SurveyFigures) -> pd.DataFrame:
 
     Returns
     -------
-    `quantity`, `reading`, `unit`, `paper_low`, `paper_high` (the same where the paper gives one
-    number), `ours`, and `ratio` of ours to the paper's number, or to the nearer end of its
-    range, one inside it; NaN where the survey does not hold the figure
+    `quantity`, `reading`, `unit`, `paper_low`, `paper_high` (equal where the paper gives one
+    number), `ours`, and `ratio` of ours to the paper's number; for a range, to its nearer
+    end, or 1 inside it. NaN where the survey does not provide the number
     """
     rows = [
         *_of_orbits(figures),
@@ -149,7 +148,7 @@ def _of_motions(motions: pd.DataFrame) -> list[_Row]:
     return [
         _separation("reference", (100.0, 500.0), "two-dimensional", reference["rms_truth_2d"]),
         ("scatter, reference", f"one coordinate about the motion, {which}", "uas", 30, 30, scatter),
-        # The paper's sentence is of separations, its explanation of one coordinate: 4 mas / 6.
+        # The paper states separations, but explains them in one coordinate: 4 mas / 6.
         _separation("non-reference", (600.0, 800.0), "two-dimensional", other["rms_truth_2d"]),
         _separation("non-reference", (600.0, 800.0), "one coordinate", _one_coordinate(other)),
         _separation("artificial", (750.0, 750.0), "two-dimensional", artificial["rms_truth_2d"]),
@@ -177,7 +176,7 @@ def _one_coordinate(motions: pd.DataFrame) -> pd.Series:
 
 
 def _of_errors(errors: pd.DataFrame) -> list[_Row]:
-    """Return the last error that enough sources tell, against the paper's and its law."""
+    """Return the error at the largest orbit count with enough sources, and the paper's values."""
     enough = errors[errors["n_sources"] >= _ENOUGH_SOURCES]
     if enough.empty:
         return []
@@ -189,7 +188,7 @@ def _of_errors(errors: pd.DataFrame) -> list[_Row]:
     return [
         (
             "error of artificial sources",
-            f"one coordinate, mean of {count} orbits; noise and floor predict {expected:.0f}",
+            f"one coordinate, mean of {count} orbits; {expected:.0f} predicted by noise and floor",
             "uas",
             70.0,
             70.0,

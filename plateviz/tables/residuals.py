@@ -1,4 +1,4 @@
-"""Tables of residuals on the detectors: vectors, scatter, and their means in bins."""
+"""Tables of residuals on the detectors: vectors, scatter, and means in bins."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -23,24 +23,24 @@ def residual_map(
     exposures: Iterable[ExposureKey] | None = None,
     detector_id: int | None = None,
 ) -> pd.DataFrame:
-    """Return the residual vectors of chosen exposures, on one detector or on all.
+    """Return the residual vectors of selected exposures, on one detector or on all.
 
     Parameters
     ----------
     result : the fit
     instrument : of the fit; gives the order of the detectors
-    exposures : (field_id, plate_id) of each exposure wanted; None for all
+    exposures : (field_id, plate_id) of each selected exposure; None for all
     detector_id : the detector, or None for all detectors on the focal plane
 
     Returns
     -------
     `source_id`, `id`, `exposure`, `detector_id`, the tail `x`, `y` and the vector `u`, `v`
-    (pix on one detector, mm on the focal plane: the residual turned by the detector's
+    (pix on one detector, mm on the focal plane: the residual rotated by the detector's
     fitted rotation), `mas_per_unit` (mas on the sky per unit of u and v), and the residual
     on the detector in `residual_x_mpix`, `residual_y_mpix`, `residual_x_mas`,
     `residual_y_mas`
     """
-    rows = _chosen(result.residuals, exposures, detector_id)
+    rows = _selected(result.residuals, exposures, detector_id)
     fitted = result.values_on("det").loc[instrument.index_of(rows["detector_id"].to_numpy())]
     focal_um = _focal_length_um(result, rows)
     d_x_um = (rows["residual_x"] * fitted["pitch_x"].to_numpy()).to_numpy()
@@ -81,21 +81,21 @@ def residual_scatter(
     exposures: Iterable[ExposureKey] | None = None,
     detector_id: int | None = None,
 ) -> pd.DataFrame:
-    """Return residual x against y of chosen exposures, with the scatter expected of them.
+    """Return residual x against y of selected exposures, with the expected scatter.
 
     Parameters
     ----------
     result : the fit
-    exposures : (field_id, plate_id) of each exposure wanted; None for all
+    exposures : (field_id, plate_id) of each selected exposure; None for all
     detector_id : the detector, or None for all
 
     Returns
     -------
     `source_id`, `id`, `exposure`, `detector_id`, `residual_x_mpix`, `residual_y_mpix`,
-    and `expected_x_mpix`, `expected_y_mpix`: the measurement uncertainty less what the
+    and `expected_x_mpix`, `expected_y_mpix`: the measurement uncertainty reduced by what the
     fit absorbs (half the leverage in each axis)
     """
-    rows = _chosen(result.residuals, exposures, detector_id)
+    rows = _selected(result.residuals, exposures, detector_id)
     kept = np.sqrt(np.clip(1.0 - 0.5 * rows["leverage"], 0.0, None))
     return pd.DataFrame(
         {
@@ -112,7 +112,7 @@ def residual_scatter(
 
 
 class ScatterStatistics(NamedTuple):
-    """What sums up a table of `residual_scatter`; rms about zero, in mpix."""
+    """Summary of a table of `residual_scatter`; rms about zero, in mpix."""
 
     n: int
     n_exposures: int
@@ -123,7 +123,7 @@ class ScatterStatistics(NamedTuple):
 
 
 def scatter_statistics(table: pd.DataFrame) -> ScatterStatistics:
-    """Return the numbers that sum up a table of `residual_scatter`, not empty."""
+    """Return the summary of a table of `residual_scatter` that is not empty."""
     names = ("residual_x_mpix", "residual_y_mpix", "expected_x_mpix", "expected_y_mpix")
     rms = (float(np.sqrt(np.mean(table[name].to_numpy(dtype=float) ** 2))) for name in names)
     return ScatterStatistics(len(table), table["exposure"].nunique(), *rms)
@@ -139,19 +139,19 @@ def binned_vectors(
 ) -> pd.DataFrame:
     """Return the mean vector in each bin of a regular grid; empty bins have no row.
 
-    A bin cut by a detector's edge holds few vectors, and their mean is long by chance
-    alone: `least_share` leaves such bins out.
+    A bin cut by a detector's edge contains few vectors, and their mean is long by chance:
+    `least_share` leaves such bins out.
 
     Parameters
     ----------
     table : tails `x`, `y`, vectors `u`, `v`; other numeric columns are averaged too
-    x_range, y_range : the limits of the grid; what lies outside counts in the edge bins
+    x_range, y_range : limits of the grid; points outside are counted in the edge bins
     bins : number of bins along each axis
     least_share : bins with less than this share of the mean number per bin have no row
 
     Returns
     -------
-    The numeric columns of `table` averaged, the place included, and the number of
+    The numeric columns of `table` averaged, including `x` and `y`, and the number of
     vectors `n`
     """
     column = _bin_index(table["x"], x_range, bins)
@@ -170,7 +170,7 @@ def _bin_index(values: pd.Series, limits: tuple[float, float], bins: int) -> np.
     return np.clip(np.floor(scaled), 0, bins - 1).astype(np.int64)
 
 
-def _chosen(
+def _selected(
     residuals: pd.DataFrame, exposures: Iterable[ExposureKey] | None, detector_id: int | None
 ) -> pd.DataFrame:
     keep = np.ones(len(residuals), dtype=bool)

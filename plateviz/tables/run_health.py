@@ -1,4 +1,4 @@
-"""Tables of a run: how each orbit's fit came out, and all of them in a few numbers."""
+"""Tables of a run: the quality of each orbit's fit, and summary numbers of all orbits."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -17,7 +17,7 @@ _OF_STATUS: Mapping[str, State] = MappingProxyType(
 
 
 def orbit_list(orbits: pd.DataFrame) -> pd.DataFrame:
-    """Return the orbits of a run for people, a row each.
+    """Return the orbits of a run for display, a row each.
 
     Parameters
     ----------
@@ -25,13 +25,13 @@ def orbit_list(orbits: pd.DataFrame) -> pd.DataFrame:
 
     Returns
     -------
-    `orbit_id`, `date` (of the mean epoch, as text), and the figures that say how the fit is
+    `orbit_id`, `date` (of the mean epoch, as text), and the numbers that describe the fit
     """
     return orbits.assign(date=dates(orbits["epoch"]))[list(ORBITS_OF_RUN)]
 
 
 def orbit_states(orbits: pd.DataFrame) -> pd.DataFrame:
-    """Return how each figure of `orbit_list` is, row by row, as the summary strip judges it.
+    """Return the state of each number of `orbit_list`, by the rules of the summary strip.
 
     Returns
     -------
@@ -60,12 +60,12 @@ def _positive(numbers: pd.Series) -> pd.Series:
 
 
 def run_strip(orbits: pd.DataFrame, motions: pd.DataFrame) -> list[SummaryItem]:
-    """Return the numbers to judge a run by.
+    """Return the numbers by which a run is judged.
 
     Parameters
     ----------
     orbits : `survey_schema.RUN_ORBITS`
-    motions : `survey_schema.MOTIONS`, no rows while nothing has been gathered
+    motions : `survey_schema.MOTIONS`, no rows until the orbits are gathered
     """
     return [
         *_counts(orbits),
@@ -78,24 +78,24 @@ def run_strip(orbits: pd.DataFrame, motions: pd.DataFrame) -> list[SummaryItem]:
 
 def _counts(orbits: pd.DataFrame) -> list[SummaryItem]:
     n = {status: int((orbits["status"] == status).sum()) for status in (COMPLETE, FAILED, MISSING)}
-    whole = n[COMPLETE] == len(orbits)
+    all_complete = n[COMPLETE] == len(orbits)
     return [
         SummaryItem(
             "Orbits complete",
             f"{n[COMPLETE]:,} (of {len(orbits):,})",
-            "fitted, and kept in the run",
-            "good" if whole else "warn",
+            "fitted and stored in the run",
+            "good" if all_complete else "warn",
         ),
         SummaryItem(
             "Orbits failed",
             f"{n[FAILED]:,}",
-            "without a solution; the table says why",
+            "without a solution; the table gives the reason",
             "bad" if n[FAILED] else "good",
         ),
         SummaryItem(
             "Orbits missing",
             f"{n[MISSING]:,}",
-            "not fitted yet; `plateviz survey` goes on with them",
+            "not fitted yet; `plateviz survey` continues with them",
             "warn" if n[MISSING] else "good",
         ),
     ]
@@ -104,7 +104,7 @@ def _counts(orbits: pd.DataFrame) -> list[SummaryItem]:
 def _converged(orbits: pd.DataFrame) -> SummaryItem:
     fitted = orbits[orbits["status"] == COMPLETE]
     n = int((fitted["converged"] == 1).sum())
-    hint = "orbits whose last step fell below the tolerance, of those fitted"
+    hint = "fitted orbits whose last step fell below the tolerance"
     return SummaryItem(
         "Converged", f"{n:,} (of {len(fitted):,})", hint, "good" if n == len(fitted) else "bad"
     )
@@ -116,24 +116,24 @@ def _chi2(orbits: pd.DataFrame) -> SummaryItem:
     hint = "median over the orbits, lowest and highest; expected 1"
     if values.empty:
         return SummaryItem(label, "–", hint, "neutral")
-    words = f"{values.median():.3f} ({values.min():.3f} to {values.max():.3f})"
-    return SummaryItem(label, words, hint, "neutral")
+    value = f"{values.median():.3f} ({values.min():.3f} to {values.max():.3f})"
+    return SummaryItem(label, value, hint, "neutral")
 
 
 def _totals(orbits: pd.DataFrame) -> SummaryItem:
     seconds = orbits["seconds"].sum()
-    hint = f"in all orbits fitted; the fits took {seconds:,.0f} s, one after the other"
+    hint = f"in all fitted orbits; the fits took {seconds:,.0f} s in total"
     return SummaryItem("Measurements", f"{orbits['n_measurements'].sum():,.0f}", hint, "neutral")
 
 
 def _motions(motions: pd.DataFrame) -> SummaryItem:
     if motions.empty:
-        hint = "Motions are fitted when all orbits are there; until then there are none."
+        hint = "Motions are fitted after the last orbit."
         return SummaryItem("Motions fitted", "none yet", hint, "neutral")
     fitted = int(motions["fit_pmra"].notna().sum())
     references = int(motions["is_reference"].sum())
     hint = (
-        "sources with a position, parallax and proper motion from all their orbits, of those "
-        f"measured in any; {references:,} of them are reference sources"
+        "measured sources with a position, parallax and proper motion fitted to all their orbits; "
+        f"{references:,} of the measured sources are reference sources"
     )
     return SummaryItem("Motions fitted", f"{fitted:,} (of {len(motions):,})", hint, "neutral")

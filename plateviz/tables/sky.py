@@ -1,8 +1,10 @@
-"""Directions on the sky: safe differences, and the focal plane mapped back to the sky."""
+"""Offsets between sky positions, and sky positions of points on the focal plane."""
 
 import numpy as np
 import pandas as pd
 
+from solver.model.astrometry import sky_position
+from solver.model.directions import tangent_frame, unproject
 from solver.units import MAS_PER_DEG
 
 ARCMIN_PER_DEG = 60.0
@@ -19,11 +21,11 @@ def offsets_deg(
 
     Returns
     -------
-    deg, with the cosine of `dec`; differences are taken before anything is scaled
+    deg, with the cosine of `dec`; the differences are taken before they are scaled
     """
     difference = np.asarray(ra) - ra_0
-    # Whole turns are removed by subtraction, which keeps a difference near zero exact;
-    # the usual (x + 180) % 360 - 180 would round it to the precision of 180 deg.
+    # Subtracting whole turns keeps a difference near zero exact; the usual
+    # (x + 180) % 360 - 180 would round it to the precision of 180 deg.
     difference = difference - 360.0 * np.round(difference / 360.0)
     return difference * np.cos(np.radians(dec)), np.asarray(dec) - dec_0
 
@@ -45,17 +47,15 @@ def offsets_arcmin(
 
 
 def mean_direction(ra: np.ndarray, dec: np.ndarray) -> tuple[float, float]:
-    """Return the direction of the mean of unit vectors, deg; (0, 0) for no direction."""
+    """Return the direction of the mean unit vector, deg; (0, 0) for empty arrays."""
     if len(ra) == 0:
         return 0.0, 0.0
-    mean = _unit_vectors(np.radians(ra), np.radians(dec)).mean(axis=0)
-    return _direction(mean)
+    mean = tangent_frame(ra, dec)[:, 0].mean(axis=0, keepdims=True)
+    return tuple(angle.item() for angle in sky_position(mean))
 
 
 def sky_of_focal_plane(ideal_um: np.ndarray, pointing: pd.Series) -> tuple[np.ndarray, np.ndarray]:
-    """Return the directions seen at places of the ideal focal plane of one exposure.
-
-    The inverse of Eq. (method:ideal) and of the gnomonic Eq. (method:projection).
+    """Return the sky positions of points on the ideal focal plane of one exposure.
 
     Parameters
     ----------
@@ -66,21 +66,6 @@ def sky_of_focal_plane(ideal_um: np.ndarray, pointing: pd.Series) -> tuple[np.nd
     -------
     ra, dec : deg, shape (n,)
     """
-    angle = np.radians(pointing["position_angle"])
-    c, s = np.cos(angle), np.sin(angle)
-    # Rows times this matrix apply the transpose of the rotation of Eq. (method:ideal).
-    minus_xi, eta = (ideal_um / pointing["focal_length"] @ np.array([(c, s), (-s, c)])).T
-    ra, dec = np.radians(pointing["pointing_ra"]), np.radians(pointing["pointing_dec"])
-    axis = _unit_vectors(ra, dec)
-    east = np.array([-np.sin(ra), np.cos(ra), 0.0])
-    north = np.cross(axis, east)
-    return _direction(axis - np.outer(minus_xi, east) + np.outer(eta, north))
-
-
-def _unit_vectors(ra: np.ndarray, dec: np.ndarray) -> np.ndarray:
-    return np.stack([np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)], axis=-1)
-
-
-def _direction(vectors: np.ndarray) -> tuple:
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    return np.degrees(np.arctan2(y, x)) % 360.0, np.degrees(np.arctan2(z, np.hypot(x, y)))
+    place = [np.array([pointing[f"pointing_{axis}"]]) for axis in ("ra", "dec")]
+    angle, focal_length = np.radians(pointing["position_angle"]), pointing["focal_length"]
+    return sky_position(unproject(ideal_um, tangent_frame(*place)[0], angle, focal_length))

@@ -1,4 +1,4 @@
-"""Tables of where the sources of a catalogue lie in Galactic coordinates."""
+"""Tables of the distribution of a catalogue's sources in Galactic coordinates."""
 
 import numpy as np
 import pandas as pd
@@ -18,12 +18,12 @@ def sky_distribution(catalogue: pd.DataFrame, truth: pd.DataFrame | None = None)
     Parameters
     ----------
     catalogue : `schema.CATALOGUE`
-    truth : `schema.TRUTH`, which has the places where it is given; the classes are those of
+    truth : `schema.TRUTH`; if given, the positions are taken from it and the classes from
         the catalogue
 
     Returns
     -------
-    `id`, `source_class`, `l_deg`, which does not jump within the catalogue, and `b_deg`
+    `id`, `source_class`, `l_deg`, unwrapped about the mean longitude, and `b_deg`
     """
     flags = catalogue[["source_id", "is_reference", "is_artificial"]]
     places = catalogue if truth is None else truth
@@ -42,9 +42,10 @@ def sky_distribution(catalogue: pd.DataFrame, truth: pd.DataFrame | None = None)
 
 
 def sky_density(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the sources of a `sky_distribution` counted in cells of the sky.
+    """Return the number of sources of a `sky_distribution` in cells of the sky.
 
-    The cells divide what the sources cover, and are as small as a mean of four sources allows.
+    The cells divide the area covered by the sources, with a mean of at least four sources per
+    cell.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def sky_density(table: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     A row per cell of the whole grid: `l_deg`, `b_deg` (centre), `n`, and `density`, sources
-    per square arcmin; NaN where there is none
+    per square arcmin; NaN for an empty cell
     """
     spans = [(float(table[name].min()), float(table[name].max())) for name in ("l_deg", "b_deg")]
     widths = [(high - low) or 1.0 for low, high in spans]
@@ -78,7 +79,7 @@ def sky_density(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _unwrapped(l_deg: np.ndarray) -> np.ndarray:
-    """Return longitudes within half a turn of their mean direction."""
+    """Return the longitudes within half a turn of their mean direction."""
     angle = np.radians(l_deg)
     centre = np.degrees(np.arctan2(np.sin(angle).mean(), np.cos(angle).mean()))
     return l_deg - 360.0 * np.round((l_deg - centre) / 360.0)

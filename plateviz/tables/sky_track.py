@@ -1,4 +1,4 @@
-"""Table of one source's motion on the sky, counted from a point that stands still."""
+"""Table of one source's motion on the sky, as offsets from a fixed point."""
 
 from typing import NamedTuple
 
@@ -8,16 +8,16 @@ import pandas as pd
 from plateviz.tables.source_track import SERIES, source_curves, source_track
 
 _AXES = ("ra", "dec")
-# What the places are counted from where the catalogue is far: the first that there is.
+# The origin if the catalogue is far away: the first series that exists.
 _ZEROS = ("true", "fit")
-# Shorter than this many sigmas a track says nothing of how far off a catalogue may be drawn.
+# Minimum distance in sigmas up to which the catalogue is drawn, for tracks shorter than that.
 _LEAST_EXTENT_SIGMAS = 10.0
 
 
 class TrackStatistics(NamedTuple):
-    """Number of orbits and rms separation from the truth, mas; NaN without a truth.
+    """Number of orbits, and rms separation from the truth in each coordinate and in 2-D.
 
-    In each coordinate and on the sky (2-D).
+    The separations are in mas, NaN without a truth.
     """
 
     n: int
@@ -27,11 +27,11 @@ class TrackStatistics(NamedTuple):
 
 
 def sky_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
-    """Return the places of one source at its orbits and between them, in the tangent plane.
+    """Return the positions of one source at its orbits and between them, in the tangent plane.
 
-    They are counted from the catalogue's place at the mean epoch. Where the catalogue lies
-    further off than the source itself moves, it is left out (NaN) and they are counted from
-    the true place at that time, else the fitted one, else the mean of the estimates.
+    The origin is the catalogue's position at the mean epoch. If the catalogue lies further
+    away than the source itself moves, it is left out (NaN), and the origin is the true position
+    at that time, else the fitted one, else the mean of the estimates.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ def sky_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
     Returns
     -------
     Rows of the `kind` "orbit" with all columns of `tables.source_track`, and of the kind
-    "curve" with those of `tables.source_curves`; repeated along the table `zero` (what is
-    counted from: "catalogue", "true", "fit" or "mean"), `mean_year` and `rms_catalogue_mas`,
-    the rms separation from the catalogue (2-D). No rows without an orbit
+    "curve" with those of `tables.source_curves`; repeated along the table `zero` (the origin:
+    "catalogue", "true", "fit" or "mean"), `mean_year` and `rms_catalogue_mas`, the rms
+    separation from the catalogue (2-D). No rows without an orbit
     """
     track = source_track(history, motion)
     if track.empty:
@@ -70,14 +70,14 @@ def sky_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
 
 
 def track_statistics(table: pd.DataFrame) -> TrackStatistics:
-    """Return what sums up a `sky_track` that is not empty."""
+    """Return the summary of a `sky_track` that is not empty."""
     rows = table[table["kind"] == "orbit"]
     squares = [float(((rows[f"{a}_mas"] - rows[f"true_{a}_mas"]) ** 2).mean()) for a in _AXES]
     return TrackStatistics(len(rows), squares[0] ** 0.5, squares[1] ** 0.5, sum(squares) ** 0.5)
 
 
 def _is_near(track: pd.DataFrame, distance: list[pd.Series]) -> bool:
-    """Return whether the catalogue lies no further off than the source itself moves."""
+    """Return whether the catalogue is no further away than the source itself moves."""
     extents = [float(np.ptp(track[f"{axis}_mas"])) for axis in _AXES]
     sigmas = [float(track[f"sigma_{axis}_mas"].median()) for axis in _AXES]
     furthest = max(float(difference.abs().max()) for difference in distance)
@@ -90,7 +90,7 @@ def _zero(track: pd.DataFrame) -> str:
 
 
 def _origin(track: pd.DataFrame, curves: pd.DataFrame, zero: str, axis: str) -> float:
-    """Return where the zero lies, mas from the catalogue's place at the mean epoch."""
+    """Return the origin in one coordinate, mas from the catalogue's position at the mean epoch."""
     if zero == "catalogue":
         return 0.0
     if zero == "mean":

@@ -1,4 +1,4 @@
-"""Tables of one source of a run: its numbers, its motion, its orbits; and the list of sources."""
+"""Tables of one source of a run (numbers, motion, orbits), and the list of sources."""
 
 import math
 
@@ -27,12 +27,12 @@ def source_class(history: pd.DataFrame) -> str:
 
 
 def source_strip(history: pd.DataFrame, motion: pd.Series | None) -> list[SummaryItem]:
-    """Return the numbers of one source.
+    """Return the summary numbers of one source.
 
     Parameters
     ----------
     history : `survey_schema.HISTORY` of the source, at least one row
-    motion : its row of `survey_schema.MOTIONS`, or None while nothing has been gathered
+    motion : its row of `survey_schema.MOTIONS`, or None until the orbits are gathered
     """
     measurements = f"{history['n_obs'].sum():,}"
     if motion is None:
@@ -63,24 +63,24 @@ def _separation(motion: pd.Series, other: str) -> SummaryItem:
 def _scatter(motion: pd.Series, axis: str, symbol: str) -> SummaryItem:
     found, expected = motion[f"scatter_{axis}"], motion[f"expected_scatter_{axis}"]
     hint = (
-        "Standard deviation in mas of the orbits' positions about the fitted motion, and as "
-        "their noise predicts it."
+        "Standard deviation in mas of the orbits' positions about the fitted motion, and the "
+        "value that their noise predicts."
     )
-    words = "–" if math.isnan(found) else f"{found:.3f} (expected {expected:.3f})"
-    return _plain(f"Scatter in {symbol}, mas", words, hint)
+    value = "–" if math.isnan(found) else f"{found:.3f} (expected {expected:.3f})"
+    return _plain(f"Scatter in {symbol}, mas", value, hint)
 
 
 def _chi2(motion: pd.Series) -> SummaryItem:
     dof, label = int(motion["dof"]), "χ² of the motion"
     if dof <= 0 or math.isnan(motion["chi2"]):
-        hint = "Too few orbits: the motion passes through all its positions, or is not fitted."
+        hint = "Too few orbits: the motion fits all positions exactly, or is not fitted."
         return _plain(label, "–", hint)
-    hint = f"Weighted by the noise alone. Expected {dof} ± {math.sqrt(2.0 * dof):.1f}."
+    hint = f"Weighted by the noise only. Expected {dof} ± {math.sqrt(2.0 * dof):.1f}."
     return _plain(label, f"{motion['chi2']:.1f} (dof {dof})", hint)
 
 
 def motion_table(motion: pd.Series) -> pd.DataFrame:
-    """Return the fitted motion of a source against its catalogue and its truth.
+    """Return the fitted motion of a source relative to its catalogue entry and its truth.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def motion_table(motion: pd.Series) -> pd.DataFrame:
     Returns
     -------
     A row per parameter: `parameter`, `unit`, `fit`, `sigma_noise`, `sigma_catalogue`, `sigma`,
-    `true` (both less the catalogue's) and `pull`; NaN where there is none
+    `true` and `pull`; `fit` and `true` are relative to the catalogue. NaN where there is none
     """
     rows = []
     for name in MOTION_PARAMETERS:
@@ -100,7 +100,7 @@ def motion_table(motion: pd.Series) -> pd.DataFrame:
 
 
 def source_orbits(history: pd.DataFrame) -> pd.DataFrame:
-    """Return the orbits of one source for people, a row each.
+    """Return the orbits of one source for display, a row each.
 
     Parameters
     ----------

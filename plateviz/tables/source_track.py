@@ -23,10 +23,10 @@ _TRACK_COLUMNS = [
 
 
 class _Frame(NamedTuple):
-    """Where the offsets of a source are counted from, and how its catalogue entry moves.
+    """Origin of the offsets of a source, and the motion of its catalogue entry.
 
-    `catalogue` has the five parameters about (ra, dec) at `mean_year`; `origin` is its place
-    at that time, mas; `is_determined` says whether the orbits decide the parameters.
+    `catalogue` has the five parameters about (ra, dec) at `mean_year`; `origin` is its position
+    at that time, mas; `is_determined` is whether the orbits determine the parameters.
     """
 
     ra: float
@@ -38,7 +38,7 @@ class _Frame(NamedTuple):
 
 
 def source_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
-    """Return the places of one source at the epochs of its orbits.
+    """Return the positions of one source at the epochs of its orbits.
 
     Parameters
     ----------
@@ -50,8 +50,8 @@ def source_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFram
     A row per orbit in order of epoch: `id`, `source_class`, `orbit_id`, `n_obs`, `year`
     (Julian), and in ra cos(dec) and dec, mas: the estimate `ra_mas`, `dec_mas`, its marginal
     `sigma_ra_mas`, `sigma_dec_mas` and `noise_ra_mas`, `noise_dec_mas` (the part that scatters
-    between orbits), `catalogue_*_mas`, `true_*_mas` and `fit_*_mas` (NaN where there is none),
-    all from the catalogue's place at the mean epoch `mean_year`
+    between orbits), `catalogue_*_mas`, `true_*_mas` and `fit_*_mas` (NaN where there is none);
+    the origin is the catalogue's position at the mean epoch `mean_year`
     """
     rows = history.sort_values(["epoch", "orbit_id"], kind="stable").reset_index(drop=True)
     if rows.empty:
@@ -80,13 +80,13 @@ def source_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFram
 
 
 def source_curves(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
-    """Return the motion of one source between its orbits, as `source_track` counts it.
+    """Return the motion of one source between its orbits, with the origin of `source_track`.
 
     Returns
     -------
     `year` and, mas, `catalogue_*_mas`, `true_*_mas`, `fit_*_mas` and the uncertainty of the
-    fit `fit_sigma_ra_mas`, `fit_sigma_dec_mas`; no rows where the orbits are too few, or too
-    close in time, to say how the source moves
+    fit `fit_sigma_ra_mas`, `fit_sigma_dec_mas`; no rows if the orbits are too few, or too
+    close in time, to determine the motion
     """
     rows = history.sort_values(["epoch", "orbit_id"], kind="stable").reset_index(drop=True)
     names = [f"{series}_{axis}_mas" for series in (*SERIES, "fit_sigma") for axis in _AXES]
@@ -112,7 +112,7 @@ def source_curves(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFra
 
 
 def _frame(rows: pd.DataFrame) -> _Frame:
-    """Find the catalogue's motion from its places at the orbits."""
+    """Return the origin and the catalogue's motion, fitted to its positions at the orbits."""
     dec = float(rows["dec"].iloc[0] - rows["offset_dec"].iloc[0] / MAS_PER_DEG)
     east = float(rows["offset_ra"].iloc[0] / np.cos(np.radians(rows["dec"].iloc[0])))
     ra = float(rows["ra"].iloc[0] - east / MAS_PER_DEG)
@@ -126,20 +126,20 @@ def _frame(rows: pd.DataFrame) -> _Frame:
 
 
 def _catalogue_places(rows: pd.DataFrame, ra: float, dec: float) -> np.ndarray:
-    """Return where the catalogue has the source at each orbit, mas from (ra, dec)."""
+    """Return the catalogue's position of the source at each orbit, mas from (ra, dec)."""
     d_ra, d_dec = offsets_mas(rows["ra"].to_numpy(), rows["dec"].to_numpy(), ra, dec)
     return np.stack([d_ra, d_dec], axis=-1) - rows[["offset_ra", "offset_dec"]].to_numpy()
 
 
 def _solve(design: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the five parameters of the motion through places, shape (n, 2); NaN without."""
+    """Return the five parameters fitted to positions, shape (n, 2); NaN if a position is NaN."""
     if not np.isfinite(places).all():
         return np.full(N_PARAMETERS, np.nan)
     return np.linalg.lstsq(design.reshape(-1, N_PARAMETERS), places.reshape(-1), rcond=None)[0]
 
 
 def _fitted(frame: _Frame, mjd: np.ndarray, motion: pd.Series | None) -> np.ndarray:
-    """Return fitted minus catalogue place, mas, shape (n, 2); NaN where there is no fit."""
+    """Return fitted minus catalogue position, mas, shape (n, 2); NaN where there is no fit."""
     if motion is None:
         return np.full((len(mjd), 2), np.nan)
     fit = motion[[f"fit_{name}" for name in MOTION_PARAMETERS]].to_numpy(dtype=float)
@@ -147,10 +147,11 @@ def _fitted(frame: _Frame, mjd: np.ndarray, motion: pd.Series | None) -> np.ndar
 
 
 def _fit_sigma(rows: pd.DataFrame, at_orbits: np.ndarray, design: np.ndarray) -> np.ndarray:
-    """Return the uncertainty of the fitted place where `design` looks, mas, shape (n, 2).
+    """Return the uncertainty of the fitted position at the rows of `design`, mas, shape (n, 2).
 
-    The part of the noise follows from the weights of the orbits. That of the catalogue's
-    errors, alike in all orbits, goes with time as those of a place and of a proper motion do.
+    The noise part follows from the weights of the orbits. The variance from the catalogue's
+    errors, which are shared by all orbits, is quadratic in time, as that of a position with a
+    proper motion.
     """
     sigma = rows[["sigma_ra_noise", "sigma_dec_noise"]].to_numpy(dtype=float)
     covariance = sigma[:, :, None] * sigma[:, None, :]
@@ -160,7 +161,7 @@ def _fit_sigma(rows: pd.DataFrame, at_orbits: np.ndarray, design: np.ndarray) ->
     of_motion = np.linalg.pinv(np.einsum("nai,naj->ij", at_orbits, weighted), hermitian=True)
     noise = np.einsum("nai,ij,naj->na", design, of_motion, design)
     shared = rows[["sigma_ra_catalogue", "sigma_dec_catalogue"]].to_numpy(dtype=float) ** 2
-    # The fourth column of the design is the time in RA, for both coordinates alike.
+    # Column 3 of the design is the time in RA; it is the same for both coordinates.
     powers, wanted = (np.vander(d[:, 0, 3], 3) for d in (at_orbits, design))
     catalogue = wanted @ np.linalg.lstsq(powers, shared, rcond=None)[0]
     return np.sqrt(noise + np.clip(catalogue, 0.0, None))

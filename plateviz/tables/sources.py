@@ -1,4 +1,4 @@
-"""Tables with a row per source: deviation from the truth, uncertainty."""
+"""Tables with a row per source: deviation from the truth, and uncertainty."""
 
 import numpy as np
 import pandas as pd
@@ -45,7 +45,7 @@ def ordered_by_class(sources: pd.DataFrame) -> pd.DataFrame:
 
 
 def deviation(result: FitResult, truth: pd.DataFrame | None) -> pd.DataFrame:
-    """Return estimated minus true position of each source that has a truth.
+    """Return estimated minus true position of each source with a known truth.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def deviation(result: FitResult, truth: pd.DataFrame | None) -> pd.DataFrame:
 
 
 def deviation_statistics(table: pd.DataFrame) -> pd.DataFrame:
-    """Return what sums up a table of `deviation`, a row per class that it holds.
+    """Return the summary of a table of `deviation`, a row per class in it.
 
     Returns
     -------
@@ -151,7 +151,7 @@ def uncertainty(result: FitResult, instrument: Instrument) -> pd.DataFrame:
 def uncertainty_by_count(table: pd.DataFrame) -> pd.DataFrame:
     """Return the median and the 16th and 84th percentile of `uncertainty` per n_obs.
 
-    For orbits with more sources than can be drawn one by one.
+    Used when there are too many sources to draw one by one.
 
     Returns
     -------
@@ -165,8 +165,8 @@ def uncertainty_by_count(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _sigma_single_mas(result: FitResult, instrument: Instrument) -> float:
-    # Detectors are mounted at any angle and the roll changes, so x and y are pooled: one
-    # measurement has the same uncertainty in both coordinates, to this law's purpose.
+    # x and y are pooled, because the mounting angles and the roll differ: the square-root law
+    # takes one uncertainty per measurement for both coordinates.
     residuals = result.residuals
     detectors = {d.detector_id: d for d in instrument.detectors}
     pitch_x = residuals["detector_id"].map({i: d.pitch_x_um for i, d in detectors.items()})

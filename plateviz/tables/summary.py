@@ -1,4 +1,4 @@
-"""The strip of numbers that says whether a fit can be trusted."""
+"""The summary strip: the numbers by which a fit is judged."""
 
 import math
 from collections.abc import Mapping
@@ -7,12 +7,12 @@ from typing import Literal, NamedTuple
 from solver.data.result import FitResult
 
 State = Literal["good", "warn", "bad", "neutral"]
-_SIGMAS = 3.0
-_MATERIAL = 0.2
+_GOOD_SIGMAS = 3.0
+_BAD_SHARE = 0.2
 
 
 class SummaryItem(NamedTuple):
-    """One number: its name, its value in words, what it means, and how it is."""
+    """One number: its name, its value as text, its meaning, and its state."""
 
     label: str
     value: str
@@ -21,11 +21,11 @@ class SummaryItem(NamedTuple):
 
 
 def summary_strip(result: FitResult) -> list[SummaryItem]:
-    """Return the numbers to judge a fit by, the verdicts first.
+    """Return the numbers by which a fit is judged, the judged ones first.
 
     A number is "good" within three times its expected scatter of its expected value,
-    "warn" beyond, and "bad" if it also lies more than 20 % off: with many measurements
-    the smallest flaw is significant, but only a large one spoils the uncertainties.
+    "warn" beyond that, and "bad" if it also differs by more than 20 %: with many measurements
+    the smallest flaw is significant, but only a large one invalidates the uncertainties.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def summary_strip(result: FitResult) -> list[SummaryItem]:
 
     Returns
     -------
-    Items with label, value, hint and state; those on the truth only where there is one
+    Items with label, value, hint and state; those on the truth only if there is one
     """
     return [
         _converged(result),
@@ -52,20 +52,20 @@ def _number(result: FitResult, key: str) -> float:
 
 
 def verdict(value: float, expected: float, scatter: float) -> State:
-    """Return how a number is, as `summary_strip` says; "neutral" where it cannot be judged."""
+    """Return the state of a number by the rule of `summary_strip`; "neutral" if not finite."""
     if not (math.isfinite(value) and math.isfinite(expected) and scatter >= 0):
         return "neutral"
     departure = abs(value - expected)
-    if departure <= _SIGMAS * scatter:
+    if departure <= _GOOD_SIGMAS * scatter:
         return "good"
-    return "bad" if departure > _MATERIAL * abs(expected) else "warn"
+    return "bad" if departure > _BAD_SHARE * abs(expected) else "warn"
 
 
-def _rule(expected: float, scatter: float, because: str) -> str:
+def _rule(expected: float, scatter: float, origin: str) -> str:
     return (
-        f"Expected {expected:.3f} ± {scatter:.3f} ({because}). "
-        f"Good within {_SIGMAS:.0f} times that scatter; bad if beyond and more than "
-        f"{100 * _MATERIAL:.0f} % off."
+        f"Expected {expected:.3f} ± {scatter:.3f} ({origin}). "
+        f"Good within {_GOOD_SIGMAS:.0f} times that scatter; bad if beyond it and more than "
+        f"{100 * _BAD_SHARE:.0f} % off."
     )
 
 
@@ -84,11 +84,11 @@ def _chi2(result: FitResult) -> SummaryItem:
     value = _number(result, "chi2_per_dof")
     scatter = math.sqrt(2.0 / dof) if dof > 0 else float("nan")
     parameters = _number(result, "effective_parameters")
-    because = f"√(2/dof); dof = {dof:,.0f} after {parameters:,.0f} effective parameters"
+    origin = f"√(2/dof); dof = {dof:,.0f} after {parameters:,.0f} effective parameters"
     return SummaryItem(
         "χ² per degree of freedom",
         f"{value:.3f}",
-        _rule(1.0, scatter, because),
+        _rule(1.0, scatter, origin),
         verdict(value, 1.0, scatter),
     )
 
@@ -98,12 +98,12 @@ def _normalised_deviation(result: FitResult, coordinate: str, symbol: str) -> Su
     expected = _number(result, f"expected_normalised_deviation_{coordinate}")
     count = int(_number(result, "n_reference"))
     scatter = expected / math.sqrt(2.0 * count) if count else float("nan")
-    because = f"expected value over √(2 n), {count} reference stars"
+    origin = f"expected value over √(2 n), {count} reference sources"
     return SummaryItem(
-        f"Reference stars, {symbol}",
+        f"Reference sources, {symbol}",
         f"{value:.3f} (expected {expected:.3f})",
         "Rms of estimate minus catalogue over the catalogue's sigma. "
-        + _rule(expected, scatter, because),
+        + _rule(expected, scatter, origin),
         verdict(value, expected, scatter),
     )
 
@@ -116,11 +116,11 @@ def _from_truth(result: FitResult) -> list[SummaryItem]:
             f"{figures['pull_sd_ra']:.2f}, {figures['pull_sd_dec']:.2f} "
             f"({_rms(figures):.2f} mas rms)",
             f"Standard deviation of deviation over marginal sigma in α, δ of {figures['n']} "
-            "sources with 10 or more measurements and a simulated truth; expected 1. Sources "
-            "share the calibration's error, so no scatter is expected of one orbit alone. "
+            "sources with 10 or more measurements and a simulated truth; expected 1. It is not "
+            "judged, because the sources of one orbit share the calibration's error. "
             f"Mean deviation {figures['mean_ra']:.3f}, {figures['mean_dec']:.3f} mas, of which "
             f"{figures['induced_ra']:.3f}, {figures['induced_dec']:.3f} mas come from the "
-            "reference stars' errors.",
+            "reference sources' errors.",
             "neutral",
         )
         for name, figures in truth.items()
@@ -134,17 +134,17 @@ def _rms(figures: Mapping[str, float]) -> float:
 def _counts(result: FitResult) -> list[SummaryItem]:
     names = {
         "n_measurements": ("Measurements", "positions of a source on an exposure"),
-        "n_sources": ("Sources", "solved for"),
-        "n_reference": ("Reference stars", "sources with a precise catalogue position"),
-        "n_exposures": ("Exposures", "images of the orbit, all detectors at once"),
+        "n_sources": ("Sources", "sources solved for"),
+        "n_reference": ("Reference sources", "sources with a precise catalogue position"),
+        "n_exposures": ("Exposures", "exposures of the orbit, each with all detectors"),
     }
     items = [
         SummaryItem(label, f"{_number(result, key):,.0f}", hint, "neutral")
         for key, (label, hint) in names.items()
     ]
     if _number(result, "n_reference") == 0:
-        hint = "Without reference stars nothing ties the solution to the sky."
-        items[2] = SummaryItem("Reference stars", "0", hint, "bad")
+        hint = "Without reference sources nothing ties the solution to the sky."
+        items[2] = SummaryItem("Reference sources", "0", hint, "bad")
     return items
 
 

@@ -1,4 +1,4 @@
-"""SurveyTables and SourceTables: the frames from which the figures of a run are drawn."""
+"""SurveyTables and SourceTables: input tables of the figures of a run."""
 
 from dataclasses import dataclass
 
@@ -7,15 +7,15 @@ import pandas as pd
 
 @dataclass(frozen=True)
 class SurveyTables:
-    """What a picture of a survey is drawn from.
+    """Input tables of the figures of a survey.
 
     Attributes
     ----------
     orbits : `survey_schema.RUN_ORBITS`
     motions : `survey_schema.MOTIONS`
     catalogue : `schema.CATALOGUE`
-    truth : `schema.TRUTH`, or None where there is none
-    errors_by_count : as `plots.plot_error_by_count` takes it, or None without artificial sources
+    truth : `schema.TRUTH`, or None
+    errors_by_count : `survey_schema.ERRORS_BY_COUNT`, or None without artificial sources
     area : Galactic longitudes and latitudes between which the fields lie, deg, or None
     target : Galactic longitude and latitude, deg, or None
     """
@@ -31,7 +31,7 @@ class SurveyTables:
 
 @dataclass(frozen=True)
 class SourceTables:
-    """What a picture of one source is drawn from.
+    """Input tables of the figures of one source.
 
     Attributes
     ----------

@@ -11,19 +11,19 @@ _COLUMNS = [
     *("offset_mas", "sigma_mas", "catalogue_mas", "true_mas", "fit_mas", "fit_sigma_mas"),
     *("residual_mas", "noise_mas", "pull"),
 ]
-# What the offsets are counted from: the first of these that there is.
+# The origin of the offsets: the first of these that exists.
 _ZEROS = ("true", "fit", "catalogue")
-# A catalogue further off than this many times what is drawn would flatten all else.
+# The catalogue is left out if it is further away than this multiple of the largest offset.
 _CATALOGUE_REACH = 3.0
-# Estimates further off than this many sigmas from the catalogue are counted from their mean.
+# If the mean offset from the catalogue exceeds this many sigmas, it is the origin instead.
 _CATALOGUE_SIGMAS = 20.0
 
 
 def time_series(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
     """Return the offsets of one source in each coordinate at its orbits and between them.
 
-    Offsets are counted from the truth, else from the fitted motion, else from the catalogue;
-    where the estimates lie far from that, from the catalogue's motion through their mean.
+    The origin is the truth, else the fitted motion, else the catalogue; if the estimates lie
+    far from the catalogue, it is the catalogue's motion shifted to their mean.
 
     Parameters
     ----------
@@ -34,12 +34,11 @@ def time_series(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame
     -------
     A row per coordinate ("ra", "dec") and time, of the `kind` "orbit" or "curve", with `year`
     (Julian) and, mas, `catalogue_mas`, `true_mas`, `fit_mas` (NaN where there is none, or
-    where the catalogue is far beyond the rest); `zero` names what is counted from ("true",
-    "fit", "catalogue", "mean"). Rows of
-    orbits have `id`, `source_class`, `orbit_id`, `n_obs`, the estimate `offset_mas` and its
-    marginal `sigma_mas`, `residual_mas` (estimate minus fitted motion), `noise_mas` (sigma of
-    what scatters between orbits) and `pull`, the residual over that; rows of the curve
-    `fit_sigma_mas`. No rows without an orbit
+    where the catalogue is far away); `zero` is the origin ("true", "fit", "catalogue",
+    "mean"). Rows of orbits have `id`, `source_class`, `orbit_id`, `n_obs`, the estimate
+    `offset_mas` and its marginal `sigma_mas`, `residual_mas` (estimate minus fitted motion),
+    `noise_mas` (sigma of the part that scatters between orbits) and `pull` (residual_mas over
+    noise_mas); rows of the curve have `fit_sigma_mas`. No rows without an orbit
     """
     track = source_track(history, motion)
     if track.empty:

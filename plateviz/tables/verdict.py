@@ -1,4 +1,4 @@
-"""The verdict in words on a solution, a run or a source: whether to trust it, and why."""
+"""The verdict on a solution, a run or a source as text: whether to trust it, and why."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -14,9 +14,9 @@ from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
 from solver.data.result import FitResult
 
-# Among good exposures, or good sources, one so far off would be found in one orbit of a hundred.
+# Probability that a good orbit has any exposure, or any source, reported as far off.
 _BY_CHANCE = 0.01
-# Of a single chi2: three and four sigmas of a normal, one side.
+# Tail probabilities of a single chi2: three and four sigmas of a normal, one-sided.
 _UNLIKELY, _FAR_OFF = 1.35e-3, 3.2e-5
 _MOST_NAMED, _MOST_ORBITS = 3, 20
 _HEADLINES: dict[State, str] = {
@@ -27,14 +27,14 @@ _HEADLINES: dict[State, str] = {
 
 
 class Verdict(NamedTuple):
-    """What to think of a solution.
+    """The judgement of a solution, a run or a source.
 
     Attributes
     ----------
     state : "good", "warn" or "bad"
-    headline : in one sentence
-    reasons : sentences that say why
-    notable : sentences on what stands out; none where nothing does
+    headline : the judgement in one sentence
+    reasons : sentences that give the reasons
+    notable : sentences on what stands out; may be empty
     """
 
     state: State
@@ -47,12 +47,12 @@ def orbit_verdict(result: FitResult) -> Verdict:
     """Return the verdict on one fitted orbit, by the same rules as `summary_strip`."""
     items = summary_strip(result)
     state = worst(item.state for item in items)
-    reasons = [_converged(result), *map(_judged, _verdicts(items)), _common_error(result)]
+    reasons = [_converged(result), *map(_sentence, _judged(items)), _common_error(result)]
     return Verdict(state, _HEADLINES[state], reasons, _notable(result))
 
 
-def _verdicts(items: list[SummaryItem]) -> list[SummaryItem]:
-    """Return the numbers that are judged, but for the convergence, of which the words say more."""
+def _judged(items: list[SummaryItem]) -> list[SummaryItem]:
+    """Return the judged numbers without the first, convergence, which `_converged` describes."""
     return [item for item in items[1:] if item.state != "neutral"]
 
 
@@ -62,7 +62,7 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame) -> Verdict:
     Parameters
     ----------
     orbits : `survey_schema.RUN_ORBITS`
-    motions : `survey_schema.MOTIONS`, no rows while nothing has been gathered
+    motions : `survey_schema.MOTIONS`, no rows until the orbits are gathered
     """
     items = run_strip(orbits, motions)
     of_orbits = orbit_states(orbits).drop(columns="status")
@@ -79,7 +79,7 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame) -> Verdict:
         f"Orbit {row.orbit_id} has no solution: {row.message}" for row in failed.itertuples()
     ]
     if len(bad):
-        notable.append(f"Numbers far from what is expected: {_named(bad['orbit_id'])}.")
+        notable.append(f"Numbers far from their expected values: {_named(bad['orbit_id'])}.")
     return Verdict(state, headline, reasons, notable)
 
 
@@ -98,47 +98,47 @@ def _fitted(orbits: pd.DataFrame) -> list[str]:
     return [
         f"{len(fitted):,} of {len(orbits):,} orbits have a solution; {converged:,} of these "
         "converged.",
-        f"χ² per degree of freedom is {chi2.median():.3f} in the median, {chi2.min():.3f} to "
-        f"{chi2.max():.3f} over the orbits; expected 1.",
+        f"χ² per degree of freedom has a median of {chi2.median():.3f} and ranges from "
+        f"{chi2.min():.3f} to {chi2.max():.3f} over the orbits; expected 1.",
     ]
 
 
 def _motions(motions: pd.DataFrame) -> list[str]:
     if motions.empty:
-        return ["Motions are fitted when all orbits have a solution; there are none."]
+        return ["No motions are fitted yet; this is done after the last orbit."]
     fitted = int(motions["fit_pmra"].notna().sum())
     return [
-        f"{fitted:,} of {len(motions):,} sources were measured often enough for a fit of position, "
+        f"{fitted:,} of {len(motions):,} sources were measured in enough orbits to fit position, "
         "parallax and proper motion."
     ]
 
 
 def source_verdict(history: pd.DataFrame, motion: pd.Series | None) -> Verdict:
-    """Return what to think of the motion of one source.
+    """Return the verdict on the motion of one source.
 
     Parameters
     ----------
     history : `survey_schema.HISTORY` of the source, at least one row
-    motion : its row of `survey_schema.MOTIONS`, or None while nothing has been gathered
+    motion : its row of `survey_schema.MOTIONS`, or None until the orbits are gathered
     """
     items = source_strip(history, motion)
     reasons = [f"{item.label}: {item.value}. {item.hint}" for item in items[2:]]
     if motion is None or not motion["dof"] > 0:
-        return Verdict("warn", "There are too few orbits to judge the motion by.", reasons, [])
+        return Verdict("warn", "There are too few orbits to judge the motion.", reasons, [])
     above = float(chdtrc(motion["dof"], motion["chi2"]))
     state: State = "bad" if above < _FAR_OFF else "good"
     if state == "good" and min(above, 1.0 - above) < _UNLIKELY:
         state = "warn"
     headline = {
-        "good": "The positions scatter about the fitted motion as their noise says.",
-        "warn": "The positions scatter about the fitted motion by another amount than their noise.",
+        "good": "The positions scatter about the fitted motion as their noise predicts.",
+        "warn": "The scatter of the positions about the fitted motion differs from their noise.",
         "bad": "The positions scatter about the fitted motion by more than their noise explains.",
     }[state]
     return Verdict(state, headline, reasons, [])
 
 
 def worst(states: Iterable[State]) -> State:
-    """Return the worst of some states; "good" where none of them is bad or a warning."""
+    """Return the worst of some states; "good" if none of them is "bad" or "warn"."""
     found = set(states)
     return "bad" if "bad" in found else "warn" if "warn" in found else "good"
 
@@ -153,11 +153,11 @@ def _converged(result: FitResult) -> str:
     )
 
 
-def _judged(item: SummaryItem) -> str:
+def _sentence(item: SummaryItem) -> str:
     meaning = {
-        "good": "as it should be",
-        "warn": "farther from what is expected than chance explains, though by little",
-        "bad": "far from what is expected",
+        "good": "as expected",
+        "warn": "significantly different from the expected value, but by little",
+        "bad": "far from the expected value",
         "neutral": "not judged",
     }[item.state]
     return f"{item.label}: {item.value}, {meaning}. {item.hint}"
@@ -169,8 +169,8 @@ def _common_error(result: FitResult) -> str:
         for axis, name in (("ra", "α cos δ"), ("dec", "δ"))
     )
     return (
-        f"All sources but the references share an error of {errors} (one sigma), which comes "
-        "from the reference catalogue and does not fall with the number of measurements."
+        f"All sources except reference sources share an error of {errors} (one sigma), which "
+        "comes from the reference catalogue and does not decrease with more measurements."
     )
 
 
@@ -195,7 +195,7 @@ def _far_exposures(result: FitResult) -> list[str]:
         f"{row.exposure} (χ²/dof {row.chi2_per_dof:.3f} ± {row.expected_sd:.3f})"
         for row in far.head(_MOST_NAMED).itertuples()
     )
-    return [f"Exposures that fit worse or better than chance explains: {len(far):,}. {named}."]
+    return [f"Exposures with a χ² too high or too low to be chance: {len(far):,}. {named}."]
 
 
 def _far_sources(result: FitResult) -> list[str]:
@@ -210,16 +210,16 @@ def _far_sources(result: FitResult) -> list[str]:
         f"{name} (χ² {row.chi2:.0f}, expected {row.dof:.0f})"
         for name, row in zip(worst_ids, far.head(_MOST_NAMED).itertuples(), strict=True)
     )
-    return [f"Sources that scatter by more than their errors say: {len(far):,}. {named}."]
+    return [f"Sources that scatter by more than their errors: {len(far):,}. {named}."]
 
 
 def _outliers(result: FitResult) -> list[str]:
     if result.outliers is None or result.outliers.empty:
         return []
-    return [f"Measurements left out as outliers: {len(result.outliers):,}."]
+    return [f"Measurements removed as outliers: {len(result.outliers):,}."]
 
 
 def _unknown_truth(result: FitResult) -> list[str]:
     if result.true_places is not None:
         return []
-    return ["There is no truth to compare with, so figures and numbers that need one are absent."]
+    return ["There is no truth to compare with; the figures and numbers that need one are absent."]

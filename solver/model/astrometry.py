@@ -12,7 +12,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from solver.model.correlation import ASTROMETRY, correlation_matrices
-from solver.model.projection import tangent_frame
+from solver.model.directions import tangent_frame
 from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000, RAD_PER_DEG, RAD_PER_MAS
 
 

@@ -1,4 +1,4 @@
-"""Sky to the ideal focal plane: directions, pointing axes, gnomonic projection.
+"""Sky to the ideal focal plane: displaced directions, pointing axes, gnomonic projection.
 
 Paper, section "Observation model", Eqs. (method:projection) and (method:ideal), written
 with unit vectors: trigonometry belongs to sources and exposures, and what is left for
@@ -10,25 +10,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 
-def tangent_frame(
-    ra_deg: Float[np.ndarray, " n"], dec_deg: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, "n 3 3"]:
-    """Return the local frames (direction, east, north) at sky positions.
-
-    Parameters
-    ----------
-    ra_deg, dec_deg : deg
-
-    Returns
-    -------
-    unit vectors along the second axis, in the order direction, east, north
-    """
-    a, d = np.radians(ra_deg), np.radians(dec_deg)
-    ca, sa, cd, sd, zero = np.cos(a), np.sin(a), np.cos(d), np.sin(d), np.zeros_like(a)
-    rows = [(cd * ca, cd * sa, sd), (-sa, ca, zero), (-sd * ca, -sd * sa, cd)]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
 def displace(
     frame: Float[Array | np.ndarray, "n 3 3"],
     east: Float[Array | np.ndarray, " n"],
@@ -38,7 +19,7 @@ def displace(
 
     Parameters
     ----------
-    frame : as from `tangent_frame`
+    frame : as from `directions.tangent_frame`
     east, north : rad
     """
     moved = frame[:, 0] + east[:, None] * frame[:, 1] + north[:, None] * frame[:, 2]

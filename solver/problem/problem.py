@@ -17,10 +17,11 @@ from solver.data.parameters import CALIBRATION_GROUPS, PARAMETERS, SOURCES
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import InputError
 from solver.model.astrometry import propagate, sky_position
+from solver.model.directions import tangent_frame
 from solver.model.distortion import terms
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry
-from solver.model.projection import displace, tangent_frame
+from solver.model.projection import displace
 from solver.problem.measurements import KEY, Measurements, sort_measurements
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.prior_centres import calibration_centres, catalogue_shift

@@ -17,8 +17,8 @@ from solver.linear.leverage import Covariances
 from solver.linear.source_elimination import ReducedSystem
 from solver.model.astrometry import catalogue_covariance, jacobian_at, years_since_epoch
 from solver.model.correlation import square_roots
+from solver.model.directions import tangent_frame
 from solver.model.ephemeris import observer_at
-from solver.model.projection import tangent_frame
 from solver.problem.problem import Problem
 from solver.results.diagnostics import error_budget, induced_shift
 from solver.results.tables import uncertainties

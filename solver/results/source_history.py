@@ -7,7 +7,7 @@ from solver.data.result import FitResult
 from solver.data.survey_schema import HISTORY
 from solver.linear.leverage import Covariances
 from solver.linear.source_elimination import ReducedSystem
-from solver.model.projection import tangent_frame
+from solver.model.directions import tangent_frame
 from solver.problem.problem import Problem
 from solver.results.shared_errors import error_budget_table, shared_error_table
 from solver.results.tables import separation

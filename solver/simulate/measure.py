@@ -17,10 +17,10 @@ from solver.data.parameters import CALIBRATION_GROUPS, PARAMETERS
 from solver.data.schema import MEASUREMENT
 from solver.data.settings import FitSettings
 from solver.model.astrometry import frames_at, sky_position
+from solver.model.directions import tangent_frame
 from solver.model.distortion import terms
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry, Index, predict
-from solver.model.projection import tangent_frame
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.prior_centres import calibration_centres
 from solver.simulate.placement import place_detectors

@@ -1,4 +1,4 @@
-"""A plausible fitted orbit, made with NumPy alone: no fit is run."""
+"""A synthetic fitted orbit, made with NumPy: no fit is run."""
 
 import shutil
 import sys
@@ -42,7 +42,7 @@ def make_fit_result() -> Callable[[int], tuple[FitResult, pd.DataFrame]]:
 
 @pytest.fixture(scope="session")
 def fit_result() -> FitResult:
-    """About 300 sources, 12 exposures, 4 detectors; complete against `solver.data.schema`."""
+    """About 300 sources, 12 exposures, 4 detectors; every table of `solver.data.schema`."""
     return synthetic_fit(1)[0]
 
 
@@ -56,7 +56,7 @@ def made_survey(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def run(monkeypatch, capsys):
-    """Return the function that runs the command line: exit code, what it printed, and errors."""
+    """Return the function that runs the command line: exit code, standard output and error."""
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["plateviz", *map(str, arguments)])
@@ -70,19 +70,19 @@ def run(monkeypatch, capsys):
 
 @pytest.fixture
 def survey_folder(made_survey, tmp_path) -> Path:
-    """A survey of its own, without any run."""
+    """A private copy of the survey, without any run."""
     return Path(shutil.copytree(made_survey, tmp_path / "survey"))
 
 
 @pytest.fixture(scope="module")
 def fitted_survey(made_survey, tmp_path_factory) -> Path:
-    """A survey for the runs of one module."""
+    """A copy of the survey, shared by the tests of one module."""
     return Path(shutil.copytree(made_survey, tmp_path_factory.mktemp("runs") / "survey"))
 
 
 @pytest.fixture(scope="session")
 def compared(fit_result) -> FitResult:
-    """The fit beside all orders: the fifth best by evidence, the sixth by its predictions."""
+    """The fit with all orders compared: order 5 is best by evidence, order 6 by prediction."""
     order = np.arange(10)
     misfit = 10.0 ** (5 - order.clip(max=5)) - 1.0
     terms = np.array([0, 0, 6, 14, 24, 36, 50, 66, 84, 104])
@@ -111,7 +111,7 @@ def truth() -> pd.DataFrame:
 
 
 def synthetic_fit(seed: int = 1, n_sources: int = N_SOURCES) -> tuple[FitResult, pd.DataFrame]:
-    """Return a result with the right statistics, and the truth it scatters about."""
+    """Return a result with realistic statistics, and the truth about which it scatters."""
     random = np.random.default_rng(seed)
     exposures, pointings = _exposures(random)
     truth = _truth(n_sources)
@@ -131,7 +131,7 @@ def synthetic_fit(seed: int = 1, n_sources: int = N_SOURCES) -> tuple[FitResult,
         settings=FitSettings(order=ORDER),
         true_places=truth[["source_id", "ra", "dec"]].assign(induced_ra=0.02, induced_dec=-0.01),
     )
-    result = replace(result, **_modes(random, result))
+    result = replace(result, **_eigenmodes(random, result))
     return result, truth[["source_id", "ra", "dec"]]
 
 
@@ -159,7 +159,7 @@ def _exposures(random: np.random.Generator) -> tuple[pd.DataFrame, pd.DataFrame]
 
 
 def _truth(n_sources: int) -> pd.DataFrame:
-    # A sky of its own seed: two fits of the same orbit share it.
+    # A separate seed, so that two fits of the same orbit share the truth.
     random = np.random.default_rng(100)
     kind = np.arange(n_sources)
     return pd.DataFrame(
@@ -365,14 +365,14 @@ def _summary(
     }
 
 
-MODE_NAMES = ["common detector x with common pointing RA", "common position angle", "common Dec"]
+WEAK_NAMES = ["common detector x with common pointing RA", "common position angle", "common Dec"]
 
 
-def _modes(random: np.random.Generator, result: FitResult) -> dict[str, pd.DataFrame]:
-    """Two modes that only a prior and the reference sources decide, and a third that both do."""
+def _eigenmodes(random: np.random.Generator, result: FitResult) -> dict[str, pd.DataFrame]:
+    """Three weak directions: constrained by a prior, by the reference sources, and by both."""
     calibration, ids = result.calibration, result.sources["source_id"].to_numpy()
-    count, weak = len(calibration), len(MODE_NAMES)
-    names = pd.Series([*MODE_NAMES, *[""] * (count - weak)], dtype="str")
+    count, weak = len(calibration), len(WEAK_NAMES)
+    names = pd.Series([*WEAK_NAMES, *[""] * (count - weak)], dtype="str")
     data = np.r_[0.0, 0.0, 0.25, np.linspace(0.6, 1.0, count - weak)]
     of_calibration = np.r_[1.0, 0.0, 0.5, np.zeros(count - weak)]
     modes = pd.DataFrame(
@@ -416,5 +416,5 @@ def _modes(random: np.random.Generator, result: FitResult) -> dict[str, pd.DataF
 
 @pytest.fixture(scope="session")
 def survey() -> SurveySample:
-    """A fitted survey of 90 orbits and 72 sources; complete against `solver.data.survey_schema`."""
+    """A fitted survey of 90 orbits and 72 sources, with the columns of `survey_schema`."""
     return synthetic_survey()

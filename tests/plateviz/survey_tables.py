@@ -1,4 +1,4 @@
-"""A small fitted survey with the right statistics, made with NumPy alone: no orbit is fitted."""
+"""A small synthetic fitted survey with realistic statistics, made with NumPy: nothing is fitted."""
 
 from typing import NamedTuple
 
@@ -49,7 +49,7 @@ class SurveySample(NamedTuple):
 def synthetic_survey(
     *, n_orbits: int = 90, n_reference: int = 24, n_artificial: int = 12, n_other: int = 36
 ) -> SurveySample:
-    """Return a survey in which the named numbers of sources were measured, two orbits failed."""
+    """Return a survey of which two orbits failed and one is missing."""
     random = np.random.default_rng(7)
     counts = (n_reference, n_artificial, n_other)
     truth = _truth(random, *counts)
@@ -174,7 +174,7 @@ def _history(
     noise, shared = NOISE_MAS[is_reference], SHARED_MAS[is_reference]
     mjd = seen["epoch"].to_numpy()
     true_offset = np.stack(offsets_mas(*true.T, *listed.T), axis=-1)
-    # A reference source's estimate stays near its prior, another's near the truth.
+    # Estimates of reference sources stay near the prior, those of other sources near the truth.
     error = shared * random.standard_normal(2) + noise * random.standard_normal((len(mjd), 2))
     offset = error + (0.1 if is_reference else 1.0) * true_offset
     dec = listed[:, 1] + offset[:, 1] / MAS_PER_DEG

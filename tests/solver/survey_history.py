@@ -6,8 +6,8 @@ import pandas as pd
 from solver.data.survey_schema import HISTORY, N_DRAWS, SHARED_ERRORS
 from solver.model.apparent_motion import julian_year
 from solver.model.astrometry import jacobian_at
+from solver.model.directions import tangent_frame
 from solver.model.ephemeris import observer_at
-from solver.model.projection import tangent_frame
 
 EPOCH = 2029.0
 FIRST_ID = 4_057_482_027_171_038_209

@@ -9,7 +9,7 @@ from plateviz.plots.gallery import source_figures, survey_figures
 from plateviz.reports.orbit import orbit_report
 from plateviz.reports.page import page_of
 from plateviz.reports.pdf import print_pdf
-from plateviz.reports.report import Picture, Report
+from plateviz.reports.report import Report, ReportFigure
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from plateviz.tables.verdict import Verdict
 from solver.data.instrument import MINI_MOCK
@@ -38,13 +38,13 @@ def survey_page(survey, tmp_path_factory):
     """A report with every figure of a survey and of a source."""
     tables = SurveyTables(survey.orbits, survey.motions, survey.catalogue, survey.truth)
     source = SourceTables(*survey.source("other"))
-    pictures = [
-        Picture(f.name, f.title, f.caption, {"All": lambda theme, f=f, t=t: f.draw(t, theme)})
+    drawn = [
+        ReportFigure(f.name, f.title, f.caption, {"All": lambda theme, f=f, t=t: f.draw(t, theme)})
         for figures, t in ((survey_figures(), tables), (source_figures(), source))
         for f in figures
     ]
     path = tmp_path_factory.mktemp("reports") / "survey.html"
-    path.write_text(page_of(Report("S", "", Verdict("good", "", [], []), [], pictures)), "utf-8")
+    path.write_text(page_of(Report("S", "", Verdict("good", "", [], []), [], drawn)), "utf-8")
     return path
 
 

@@ -50,7 +50,7 @@ def test_two_results_are_compared(run, fit_result, tmp_path):
     ("options", "message"),
     [
         (["--orbit", "9"], "expected an orbit 9, found none of that number"),
-        (["--orbit", "2"], "expected a complete run, found no COMPLETE file"),
+        (["--orbit", "2"], "expected a complete fitted orbit, found no COMPLETE file"),
         (["--orbit", "0", "--survey"], "expected one of --orbit, --source and --survey"),
         (["--run", "other"], "expected a run 'other', found default"),
         (["--survey"], "found 1 of 3 orbits missing"),

@@ -1,4 +1,4 @@
-"""A small TAP service on this machine: its queue, its table, and real SQL behind its ADQL."""
+"""A small local TAP service with a job queue, which answers ADQL with SQLite."""
 
 import gzip
 import io
@@ -20,7 +20,7 @@ SINGLE = ("ra_error", "dec_error", "parallax_error", "pmra_error", "pmdec_error"
 
 
 def archive_table(stars):
-    """Return stars as the archive has them: its units, precisions and further columns."""
+    """Return stars with the additional columns of the archive."""
     l_deg, b_deg = icrs_to_galactic(stars["ra"].to_numpy(), stars["dec"].to_numpy())
     return stars.assign(
         l=l_deg % 360.0,
@@ -31,11 +31,11 @@ def archive_table(stars):
 
 
 class Service:
-    """What a service answers, and the queries that it was asked.
+    """The answers of a service, and the queries that it received.
 
     Attributes
     ----------
-    phases : what the queue says of the job, one after another, the last for ever
+    phases : states of the job in successive polls; the last one is repeated
     edit : changes the table of the answer
     finish : changes the bytes of the answer
     """
@@ -51,17 +51,17 @@ class Service:
         self.database.create_function("CIRCLE", 4, lambda _, *c: " ".join(map(repr, c)))
         self.database.create_function("CONTAINS", 2, contains)
         archive_table(stars).to_sql("gaia_source", self.database, index=False)
-        # pandas writes into the first database, ADQL names the second.
+        # pandas writes into the main database, but ADQL names the attached one.
         self.database.execute("CREATE TABLE gaiadr3.gaia_source AS SELECT * FROM main.gaia_source")
 
     def select(self, query):
-        """Return names and rows of a query."""
+        """Return the column names and rows of a query."""
         top = re.search(r" TOP (\d+)", query)
         found = self.database.execute(query.replace(top[0], "") + f" LIMIT {top[1]}")
         return [item[0] for item in found.description], found.fetchall()
 
     def answer(self):
-        """Return the answer to the last query as a VOTable, compressed as the archive does."""
+        """Return the answer to the last query as a compressed VOTable, as the archive does."""
         names, rows = self.select(self.queries[-1])
         table = Table()
         for name, values in zip(names, zip(*rows, strict=True), strict=True):
@@ -96,7 +96,7 @@ def column(name, values):
 
 @contextmanager
 def serving(service):
-    """Give the address of a service that answers as long as the block runs."""
+    """Yield the address of a service that runs inside the block."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), handler(service))
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
     thread.start()
@@ -138,6 +138,6 @@ def handler(service):
             return found.encode()
 
         def log_message(self, *_):
-            """Say nothing."""
+            """Suppress log messages."""
 
     return Handler

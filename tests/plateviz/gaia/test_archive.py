@@ -29,7 +29,7 @@ FORMATS = (".fits", ".ecsv", ".vot", ".parquet")
 def stars():
     truth = truth_catalogue(SURVEY).drop(columns=["is_reference", "is_artificial"])
     table = truth.assign(**dict.fromkeys(CORRELATIONS, 0.125))[GAIA.names]
-    # A hundred whose parallax is too uncertain.
+    # The first hundred fail the parallax cut.
     table.loc[:99, "parallax_error"] = table.loc[:99, "parallax"] / 4.5
     return table
 
@@ -53,7 +53,7 @@ def read(path):
     return gaia_stars(located.table, located.where)
 
 
-def test_fetched_stars_are_simulated_from(run, url, stars, tmp_path):
+def test_survey_is_simulated_from_fetched_stars(run, url, stars, tmp_path):
     table, folder = tmp_path / "gaia.fits", tmp_path / "survey"
     assert run("gaia", table, "--url", url)[0] == 0
     code, _, err = run("simulate", folder, "--orbits", "1", "--catalog", table)
@@ -66,16 +66,14 @@ def test_fetched_stars_are_simulated_from(run, url, stars, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_every_format_holds_the_stars_and_how_they_were_asked_for(
-    run, url, service, stars, tmp_path, suffix
-):
+def test_every_format_has_the_stars_and_the_query(run, url, service, stars, tmp_path, suffix):
     path = tmp_path / f"gaia{suffix}"
     code, out, _ = run("gaia", path, "--url", url, "--json")
-    told = json.loads(out)
+    printed = json.loads(out)
     assert code == 0
-    assert told["stars"] == len(stars) - 100
-    assert (told["output"], told["service"], told["from_cache"]) == (str(path), url, False)
-    assert service.queries == [told["query"]]
+    assert printed["stars"] == len(stars) - 100
+    assert (printed["output"], printed["service"], printed["from_cache"]) == (str(path), url, False)
+    assert service.queries == [printed["query"]]
     assert [p.name for p in tmp_path.iterdir() if p.is_file()] == [path.name]
     found = read(path)
     np.testing.assert_array_equal(found["source_id"], stars["source_id"][100:])
@@ -83,7 +81,7 @@ def test_every_format_holds_the_stars_and_how_they_were_asked_for(
     np.testing.assert_allclose(found["ra_error"], stars["ra_error"][100:], rtol=1e-6)
     meta = metadata(path)
     assert {key: meta[key.upper()] for key in ("query", "service", "date")} == {
-        key: told[key] for key in ("query", "service", "date")
+        key: printed[key] for key in ("query", "service", "date")
     }
 
 
@@ -105,7 +103,7 @@ def test_stars_without_a_magnitude_are_kept(run, url, stars, tmp_path):
     assert str(table["pmra"].unit) == "mas / yr"
 
 
-def test_a_second_time_needs_no_network(run, service, tmp_path):
+def test_repeated_query_needs_no_network(run, service, tmp_path):
     with serving(service) as url:
         run("gaia", tmp_path / "first.parquet", "--url", url)
     code, out, _ = run("gaia", tmp_path / "second.parquet", "--url", url)
@@ -119,7 +117,7 @@ def test_a_second_time_needs_no_network(run, service, tmp_path):
     assert metadata(kept)["QUERY"] == star_query().query
 
 
-def test_refresh_asks_again(run, url, service, tmp_path):
+def test_refresh_queries_again(run, url, service, tmp_path):
     run("gaia", tmp_path / "gaia.ecsv", "--url", url)
     code, out, _ = run("gaia", tmp_path / "gaia.ecsv", "--url", url, "--refresh")
     assert code == 0
@@ -127,19 +125,19 @@ def test_refresh_asks_again(run, url, service, tmp_path):
     assert len(service.queries) == 2
 
 
-def test_the_queue_of_the_service_is_waited_for(run, url, service, tmp_path):
+def test_queued_job_is_polled_until_it_ends(run, url, service, tmp_path):
     service.phases = ["QUEUED", "EXECUTING", "COMPLETED"]
     assert run("gaia", tmp_path / "gaia.ecsv", "--url", url)[0] == 0
     assert service.polls > 2
 
 
-def test_another_selection_is_not_taken_from_the_cache(run, url, service, tmp_path):
+def test_different_selection_is_not_taken_from_the_cache(run, url, service, tmp_path):
     run("gaia", tmp_path / "gaia.ecsv", "--url", url)
     run("gaia", tmp_path / "gaia.ecsv", "--url", url, "--parallax-over-error", "10")
     assert len(service.queries) == 2
 
 
-def test_a_damaged_cache_is_fetched_anew(run, url, service, tmp_path):
+def test_damaged_cache_is_fetched_again(run, url, service, tmp_path):
     run("gaia", tmp_path / "gaia.ecsv", "--url", url)
     kept = cached_file(star_query(), url)
     kept.write_bytes(kept.read_bytes()[:1000])
@@ -148,8 +146,8 @@ def test_a_damaged_cache_is_fetched_anew(run, url, service, tmp_path):
     assert len(find_catalogue(kept).table) > 0
 
 
-def test_the_archive_of_gaia_is_asked_by_default(run, url, service, monkeypatch, tmp_path):
-    # The module of the archive asks for its notices over the network as it is imported.
+def test_archive_of_gaia_is_queried_by_default(run, url, service, monkeypatch, tmp_path):
+    # On import, the archive's module requests notices over the network.
     monkeypatch.setitem(sys.modules, "astroquery.gaia", SimpleNamespace(Gaia=TapPlus(url=url)))
     code, out, _ = run("gaia", tmp_path / "gaia.ecsv", "--json")
     assert code == 0
@@ -208,7 +206,7 @@ def without(*names):
     ],
     ids=["error", "aborted", "overflow", "torn", "page", "column", "empty"],
 )
-def test_unusable_answers_are_one_message(run, url, service, tmp_path, change, message):
+def test_unusable_answers_give_one_message(run, url, service, tmp_path, change, message):
     for name, value in change.items():
         setattr(service, name, value)
     assert_refused(run, tmp_path, ["--url", url], message)
@@ -225,16 +223,16 @@ def test_unusable_answers_are_one_message(run, url, service, tmp_path, change, m
     ],
     ids=["no-service", "no-address", "order", "turns", "pole"],
 )
-def test_a_mistake_is_one_message(run, service, tmp_path, options, message):
+def test_invalid_options_give_one_message(run, service, tmp_path, options, message):
     assert_refused(run, tmp_path, options, message)
 
 
-def test_a_page_that_is_not_there_is_one_message(run, url, tmp_path):
+def test_missing_page_gives_one_message(run, url, tmp_path):
     wrong = url.replace("/tap", "/elsewhere")
     assert_refused(run, tmp_path, ["--url", wrong], "found HTTPError: Error 404: no such page")
 
 
-def test_a_failed_refresh_leaves_everything_as_it_was(run, service, tmp_path):
+def test_failed_refresh_changes_no_file(run, service, tmp_path):
     with serving(service) as url:
         run("gaia", tmp_path / "gaia.fits", "--url", url)
     kept, output = cached_file(star_query(), url), tmp_path / "gaia.fits"
@@ -245,7 +243,7 @@ def test_a_failed_refresh_leaves_everything_as_it_was(run, service, tmp_path):
     assert (kept.read_bytes(), output.read_bytes()) == before
 
 
-def test_absent_astroquery_is_said(run, service, monkeypatch, tmp_path):
+def test_missing_astroquery_is_reported(run, service, monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "astroquery.gaia", None)
     assert_refused(run, tmp_path, [], "expected the package astroquery, which the extra 'gaia'")
 
@@ -255,24 +253,22 @@ def test_absent_astroquery_is_said(run, service, monkeypatch, tmp_path):
     [("gaia.txt", "expected a suffix out of .fits"), ("no/gaia.fits", "to write into a folder")],
     ids=["format", "folder"],
 )
-def test_an_output_that_cannot_be_written_is_said_before_anything_is_asked(
-    run, url, service, tmp_path, name, message
-):
+def test_unwritable_output_is_reported_before_the_query(run, url, service, tmp_path, name, message):
     code, _, err = run("gaia", tmp_path / name, "--url", url)
     assert code == 2
     assert message in err
     assert service.queries == []
 
 
-def test_a_cache_that_cannot_be_made_is_said_before_anything_is_asked(run, url, service, tmp_path):
+def test_unwritable_cache_is_reported_before_the_query(run, url, service, tmp_path):
     (tmp_path / "cache").write_text("not a folder")
     code, _, err = run("gaia", tmp_path / "gaia.fits", "--url", url)
     assert code == 2
-    assert "expected to make the folder" in err
+    assert "expected to create the folder" in err
     assert service.queries == []
 
 
-def test_a_field_cut_off_by_the_limit_is_refused(run, url, tmp_path, monkeypatch):
+def test_answer_at_the_row_limit_is_refused(run, url, tmp_path, monkeypatch):
     monkeypatch.setattr("plateviz.gaia.archive.MOST_STARS", 300)
     assert_refused(run, tmp_path, ["--url", url], "expected from 1 to 299 stars, found 300")
 
@@ -285,10 +281,10 @@ def assert_refused(run, tmp_path, options, message):
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_half_a_selection_may_be_given():
+def test_limits_not_given_have_defaults():
     assert star_query(b_deg=(0.0, 1.0)) == replace(star_query(), b_deg=(0.0, 1.0))
 
 
-def test_numbers_that_are_not_are_refused():
+def test_nan_limits_are_refused():
     with pytest.raises(InputError, match="--l: expected limits"):
         StarQuery((float("nan"), 1.0), (0.0, 1.0), 5.0)

@@ -1,4 +1,4 @@
-"""Every plot with a table to draw, and its figures."""
+"""Every plot with an example table, and its Bokeh figures."""
 
 import functools
 
@@ -16,6 +16,7 @@ def orbit_drawings(fit_result, compared, make_fit_result, truth, instrument):
     residuals = tables.residual_map(fit_result, instrument, detector_id=0)
     fields = tables.footprint_fields(fit_result, instrument)
     detector = instrument.detectors[0]
+    differences = tables.comparison(fit_result, make_fit_result(2)[0])
     return {
         "footprint": (
             lambda t, **o: plots.plot_footprint(t, fields.head(20 * len(t)), **o),
@@ -30,10 +31,9 @@ def orbit_drawings(fit_result, compared, make_fit_result, truth, instrument):
         "pulls": (plots.plot_pulls, tables.pull_histogram(fit_result)),
         "exposure_chi2": (plots.plot_exposure_chi2, tables.exposure_chi2(fit_result)),
         "orders": (plots.plot_orders, tables.order_comparison(compared)),
-        "comparison": (
-            plots.plot_comparison,
-            tables.comparison(fit_result, make_fit_result(2)[0]),
-        ),
+        "comparison": (plots.plot_comparison, differences),
+        "comparison_histogram": (plots.plot_comparison_histogram, differences),
+        "comparison_map": (plots.plot_comparison_map, differences),
         "eigenmode_spectrum": (
             plots.plot_eigenmode_spectrum,
             tables.eigenmode_spectrum(fit_result),
@@ -95,7 +95,7 @@ def survey_drawings(survey, errors_by_count):
 
 @pytest.fixture(scope="module")
 def drawings(orbit_drawings, survey_drawings):
-    """Return the same of all plots."""
+    """Return name -> (draw, table) of all plots."""
     return {**orbit_drawings, **survey_drawings}
 
 

@@ -35,7 +35,7 @@ def test_round_125_takes_the_nearest_step(value, expected):
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
-def test_round_125_of_no_size_is_one(value):
+def test_round_125_without_a_positive_value_is_one(value):
     assert round_125(value) == 1.0
 
 
@@ -73,10 +73,10 @@ def test_automatic_scale_of_vectors_without_length_is_one(vectors):
 
 
 @pytest.mark.parametrize("x", [(-10.0, 10.0), (10.0, -10.0)], ids=["upwards", "East to the left"])
-def test_key_arrow_has_its_true_length_and_stands_below_the_data(x):
+def test_key_arrow_has_its_true_length_and_is_below_the_data(x):
     field = Field(x, FIELD.y)
-    strokes, words = key(2e-3, "2 milli", scale=1000.0, field=field, theme="dark")
+    strokes, label = key(2e-3, "2 milli", scale=1000.0, field=field, theme="dark")
     segment = strokes.dframe()
     assert _lengths(segment).iloc[0] == pytest.approx(2.0)
     assert field.ylim[0] < segment["y"].iloc[0] < field.y[0]
-    assert words.data[2] == "2 milli"
+    assert label.data[2] == "2 milli"

@@ -1,4 +1,4 @@
-"""The pictures of the modes: what is marked, worded and drawn to scale."""
+"""Figures of the eigenmodes and weak directions: marks, labels and scales."""
 
 from dataclasses import replace
 
@@ -26,30 +26,30 @@ def of_kind(drawing, kind):
     return [element for element in drawing if isinstance(element, kind)]
 
 
-def words_of(drawing):
+def labels_of(drawing):
     return [str(w) for e in of_kind(drawing, hv.Labels) for w in e.dimension_values(2)]
 
 
-def test_weak_modes_are_marked_in_the_spectrum(fit_result):
+def test_weak_directions_are_marked_in_the_spectrum(fit_result):
     panel = next(iter(plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result))))
     rest, weak = of_kind(panel, hv.Points)
     assert weak.dimension_values("mode").tolist() == [1, 2, 3]
     assert len(rest) + len(weak) == len(fit_result.modes)
 
 
-def test_both_panels_of_the_spectrum_have_all_modes(fit_result):
+def test_both_panels_of_the_spectrum_have_all_eigenmodes(fit_result):
     for panel in plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result)):
         assert sum(map(len, of_kind(panel, hv.Points))) == len(fit_result.modes)
 
 
-def test_every_weak_mode_is_named_beside_its_bar(fit_result):
-    words = words_of(plots.plot_eigenmode_deciders(tables.eigenmode_deciders(fit_result)))
-    assert set(fit_result.modes["name"].head(3)) <= set(words)
-    assert "prior of detector x 25 %" not in words
-    assert "prior of detector x 100 %" in words
+def test_every_weak_direction_is_named_beside_its_bar(fit_result):
+    labels = labels_of(plots.plot_eigenmode_deciders(tables.eigenmode_deciders(fit_result)))
+    assert set(fit_result.modes["name"].head(3)) <= set(labels)
+    assert "prior of detector x 25 %" not in labels
+    assert "prior of detector x 100 %" in labels
 
 
-def test_what_decides_nothing_is_not_in_the_legend(fit_result):
+def test_legend_has_no_entry_without_a_share(fit_result):
     drawing = plots.plot_eigenmode_deciders(tables.eigenmode_deciders(fit_result))
     labels = {bars.label for bars in of_kind(drawing, hv.Rectangles)}
     assert labels == {"measurements", "reference sources", "priors of the calibration"}
@@ -65,15 +65,15 @@ def test_bars_are_as_long_as_the_shares(fit_result):
     assert length == pytest.approx(table["share"].sum())
 
 
-def test_cells_have_words_only_where_the_share_counts(fit_result):
+def test_only_cells_with_a_large_share_have_labels(fit_result):
     table = tables.eigenmode_groups(fit_result)
-    words = words_of(plots.plot_eigenmode_groups(table))
-    told = int((table["share"] >= 0.005).sum())
-    assert len(words) == 2 * told + table["mode"].nunique()
+    labels = labels_of(plots.plot_eigenmode_groups(table))
+    labelled = int((table["share"] >= 0.005).sum())
+    assert len(labels) == 2 * labelled + table["mode"].nunique()
 
 
 @pytest.mark.parametrize(
-    ("move", "unit", "words"),
+    ("move", "unit", "text"),
     [
         (120.4, "arcsec", "120 arcsec"),
         (1.9, "arcsec", "1.9 arcsec"),
@@ -83,11 +83,11 @@ def test_cells_have_words_only_where_the_share_counts(fit_result):
         (0.0, "µm", "0 µm"),
     ],
 )
-def test_moves_are_told_in_the_unit_that_suits_them(move, unit, words):
-    assert _amount(move, unit) == words
+def test_moves_are_given_in_a_suitable_unit(move, unit, text):
+    assert _amount(move, unit) == text
 
 
-def test_shifts_of_all_modes_are_drawn_to_one_scale(fit_result):
+def test_shifts_of_all_directions_have_one_scale(fit_result):
     table = tables.eigenmode_shifts(fit_result)
     stretches = []
     for panel, mode in zip(plots.plot_eigenmode_shifts(table), (1, 2, 3), strict=True):
@@ -98,7 +98,7 @@ def test_shifts_of_all_modes_are_drawn_to_one_scale(fit_result):
     assert np.allclose(stretches, stretches[0])
 
 
-def test_key_of_the_shifts_is_as_long_as_it_says(fit_result):
+def test_key_of_the_shifts_has_the_stated_length(fit_result):
     panel = next(iter(plots.plot_eigenmode_shifts(tables.eigenmode_shifts(fit_result))))
     key = next(e for e in panel if e.label == "key").dframe().iloc[0]
     shafts = shafts_of(panel)
@@ -116,11 +116,11 @@ def test_few_sources_have_an_arrow_each(fit_result):
     assert tails.dimension_values("id").tolist() == table["id"].head(50).tolist()
 
 
-def test_every_parameter_has_a_point_of_its_prior_share(fit_result):
+def test_every_parameter_has_a_point_at_its_prior_share(fit_result):
     drawing = plots.plot_prior_shares(tables.prior_shares(fit_result))
     (points,) = of_kind(drawing, hv.Points)
     assert len(points) == len(fit_result.calibration)
-    assert words_of(drawing).count("flat") == 1
+    assert labels_of(drawing).count("flat") == 1
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -131,7 +131,7 @@ def test_diagnostics_are_in_the_gallery(fit_result, instrument, name, theme):
 
 
 @pytest.mark.parametrize("name", NAMES[:-1])
-def test_a_result_without_modes_is_drawn_as_a_message(fit_result, instrument, name):
+def test_result_without_eigenmodes_is_drawn_as_a_message(fit_result, instrument, name):
     old = replace(fit_result, modes=None, mode_parameters=None, mode_shifts=None)
     (diagnostic,) = [d for d in diagnostics() if d.name == name]
     drawing = diagnostic.draw(Chosen(old, instrument), "light")

@@ -1,51 +1,45 @@
-"""What holds for every plot: titles, units, themes, exact ids, hovers that find their column."""
+"""Properties of every plot: titles, units, themes, exact ids, columns of the hovers."""
 
 import re
+from pathlib import Path
 
 import pytest
 from bokeh.models import ColumnDataSource, HoverTool
 
+from plateviz import plots
 from plateviz.plots.theme import THEMES
-from tests.plateviz.plots.drawn import figures_of, sources_of, subtitle_of, titles_of, words_of
+from tests.plateviz.plots.drawn import figures_of, sources_of, subtitle_of, texts_of, titles_of
 
 _LABELLED_UNIT = re.compile(
     r"\(.+\)|per bin|χ² / dof|expected scatter|iteration|in order|N$|σ of A$|"
     r"order of the distortion$|over its expected σ|/ σ$|orbits N|dof\)$"
 )
-NAMES_OF_ORBIT = [
-    "footprint",
-    "residual_map",
-    "residual_scatter",
-    "deviation",
-    "uncertainty",
-    "convergence",
-    "distortion",
-    "pulls",
-    "exposure_chi2",
-    "orders",
-    "comparison",
-    "eigenmode_spectrum",
-    "eigenmode_deciders",
-    "eigenmode_groups",
-    "eigenmode_shifts",
-    "prior_shares",
-]
-NAMES_OF_SURVEY = [
-    "sky_distribution",
-    "prior_separation",
-    "orbit_counts",
-    "error_by_count",
-    "reference_scatter",
-    "motion_pulls",
-    "orbit_health",
-    "sky_track",
-    "time_series",
-]
-with_every_plot = pytest.mark.parametrize("name", [*NAMES_OF_ORBIT, *NAMES_OF_SURVEY])
 
 
-def test_no_plot_is_left_out(drawings):
-    assert list(drawings) == [*NAMES_OF_ORBIT, *NAMES_OF_SURVEY]
+def plot_names(*, survey_only=False):
+    """Return the <noun> of every `plot_<noun>` that a module of `plateviz.plots` defines.
+
+    `survey_only`: only of modules that define figures of a survey or of one source.
+    """
+    names = []
+    for path in sorted(Path(plots.__file__).parent.glob("*.py")):
+        text = path.read_text("utf-8")
+        if not survey_only or re.search(r"^(SURVEY|SOURCE)_FIGURES\b", text, re.MULTILINE):
+            names += re.findall(r"^def plot_(\w+)", text, re.MULTILINE)
+    return names
+
+
+with_every_plot = pytest.mark.parametrize("name", plot_names())
+with_every_survey_plot = pytest.mark.parametrize("name", plot_names(survey_only=True))
+
+
+def test_every_plot_is_exported():
+    assert set(plots.__all__) == {f"plot_{name}" for name in plot_names()}
+    assert all(callable(getattr(plots, name)) for name in plots.__all__)
+
+
+def test_every_plot_has_a_table_to_draw(drawings):
+    assert set(drawings) == set(plot_names())
 
 
 @with_every_plot
@@ -55,7 +49,7 @@ def test_axes_are_labelled_with_units(figures, name):
             assert _LABELLED_UNIT.search(axis.axis_label), axis.axis_label
 
 
-@pytest.mark.parametrize("name", NAMES_OF_SURVEY)
+@with_every_survey_plot
 def test_every_figure_of_a_survey_has_a_title_and_a_subtitle(figures, name):
     for figure in figures(name):
         assert figure.title.text
@@ -63,18 +57,18 @@ def test_every_figure_of_a_survey_has_a_title_and_a_subtitle(figures, name):
 
 
 @with_every_plot
-def test_empty_table_gives_a_titled_figure_that_says_why(drawings, name):
+def test_empty_table_gives_a_titled_figure_with_a_reason(drawings, name):
     draw, table = drawings[name]
     for figure in figures_of(draw(table.head(0))):
-        (words,) = words_of(figure)
+        (text,) = texts_of(figure)
         assert figure.title.text
         assert figure.xaxis.axis_label
-        assert words.startswith("No ")
+        assert text.startswith("No ")
 
 
 @with_every_plot
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_every_word_has_the_colours_of_the_theme(figures, name, theme):
+def test_text_has_the_colours_of_the_theme(figures, name, theme):
     colours = THEMES[theme]
     for figure in figures(name, theme):
         assert figure.background_fill_color == figure.border_fill_color == colours.background
@@ -97,7 +91,7 @@ def test_fonts_are_11_to_13_pixels(figures, name):
 
 @with_every_plot
 def test_no_figure_is_drawn_by_webgl(figures, name):
-    """Which loses the points of a figure that replaces another on a page that stays."""
+    """WebGL loses the points of a figure that replaces another on an open page."""
     assert {figure.output_backend for figure in figures(name)} == {"canvas"}
 
 
@@ -127,8 +121,8 @@ def test_ids_reach_the_browser_as_exact_text(figures, name, fit_result, survey):
             assert "source_id" not in source.data
 
 
-@pytest.mark.parametrize("name", NAMES_OF_SURVEY)
-def test_a_table_is_drawn_alike_twice(drawings, name):
+@with_every_survey_plot
+def test_drawing_a_table_twice_gives_equal_figures(drawings, name):
     draw, table = drawings[name]
     first, second = (
         [str(s.data) for f in figures_of(draw(table)) for s in sources_of(f)] for _ in range(2)

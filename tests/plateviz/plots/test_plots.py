@@ -1,4 +1,4 @@
-"""Plots of an orbit: what each draws."""
+"""Contents of the plots of an orbit."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def test_class_colours_stand_out_on_both_backgrounds(colour, theme):
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("part", ["text", "muted"])
-def test_words_are_readable_on_both_backgrounds(part, theme):
+def test_text_is_readable_on_both_backgrounds(part, theme):
     assert _contrast(getattr(THEMES[theme], part), THEMES[theme].background) >= 4.5
 
 
@@ -94,7 +94,7 @@ def test_convergence_shows_the_tolerance(drawings):
     assert line.data == table["tolerance"].iloc[0]
 
 
-def test_convergence_shows_the_loss_of_an_engine_that_has_one(fit_result):
+def test_convergence_shows_the_loss_of_svi(fit_result):
     loss = 1e6 * np.exp(-np.arange(300) / 20.0) - 500.0
     steps = pd.DataFrame({"step": np.arange(1, 301), "loss": loss})
     svi = replace(fit_result, losses=steps)

@@ -49,7 +49,7 @@ def test_hover_shows_the_true_residual_and_the_exact_id(on_detector, instrument)
 
 def test_subtitle_states_the_scale_in_pixels_and_mas(on_detector, instrument):
     overlay = plot_residual_map(on_detector, instrument.detectors[2], arrow_scale=5000.0)
-    assert "5,000 times enlarged: an arrow of 0.02 pix = 8.5 mas" in _subtitle(overlay)
+    assert "Arrows enlarged 5,000 times; key: 0.02 pix = 8.5 mas" in _subtitle(overlay)
 
 
 def test_key_arrow_is_drawn_to_the_scale_of_the_arrows(on_detector, instrument):

@@ -100,21 +100,21 @@ def test_deviation_ellipse_is_the_mean_marginal_covariance(deviations):
     assert np.abs(points[:, 1]).max() == pytest.approx(1.0, rel=1e-2)
 
 
-def test_deviation_says_how_many_lie_beyond_the_frame(deviations):
+def test_deviation_states_the_number_beyond_the_frame(deviations):
     table = deviations[deviations["source_class"] == tables.NON_REFERENCE].copy()
     table.iloc[0, table.columns.get_loc("deviation_ra_mas")] = 1e4
     figure = hv.render(next(iter(plot_deviation(table))), backend="bokeh")
     assert "1 beyond the frame" in _subtitle(figure)
 
 
-def test_deviation_without_truth_says_so(fit_result):
+def test_deviation_without_truth_has_a_message(fit_result):
     overlay = plot_deviation(tables.deviation(fit_result, None))
     text = next(e for e in overlay if isinstance(e, hv.Text))
     assert text.data[2] == "No truth for this orbit"
 
 
 @pytest.mark.parametrize(("coordinate", "panels"), [("ra", 1), ("dec", 1), ("both", 2)])
-def test_uncertainty_draws_the_wanted_coordinates_in_log_log(uncertainties, coordinate, panels):
+def test_uncertainty_draws_the_given_coordinates_in_log_log(uncertainties, coordinate, panels):
     plot = hv.render(plot_uncertainty(uncertainties, coordinate=coordinate), backend="bokeh")
     figures = list(plot.select({"type": Plot}))
     assert len(figures) == panels

@@ -1,4 +1,4 @@
-"""Figures of a survey and of its sources: what each draws."""
+"""Contents of the plots of a survey and of its sources."""
 
 import holoviews as hv
 import numpy as np
@@ -37,7 +37,7 @@ def test_crowded_class_is_drawn_as_a_density(drawings):
     assert hv.Image not in artificial
 
 
-def test_prior_separation_uses_the_unit_that_fits(figures):
+def test_prior_separation_uses_a_suitable_unit(figures):
     other, reference = figures("prior_separation")
     assert "(µas)" in reference.xaxis.axis_label
     assert "(mas)" in other.xaxis.axis_label
@@ -117,7 +117,7 @@ def test_orbits_are_linked_in_time(figures):
     assert first.y_range is not second.y_range
 
 
-def test_time_series_is_linked_in_time_alone(figures):
+def test_time_series_is_linked_in_time_only(figures):
     panels = figures("time_series")
     assert len(panels) == 4
     assert len({id(panel.x_range) for panel in panels}) == 1
@@ -169,7 +169,7 @@ def test_gallery_draws_every_figure_of_a_survey(survey, errors_by_count, theme):
         assert figures_of(figure.draw(bare, theme))
 
 
-def test_gallery_tells_the_pages_apart():
+def test_gallery_separates_the_pages_and_sorts_their_figures():
     orders = [[f.order for f in page()] for page in (diagnostics, survey_figures, source_figures)]
     assert [len(page) > 1 for page in orders] == [True, True, True]
     assert all(page == sorted(page) for page in orders)

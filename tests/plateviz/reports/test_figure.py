@@ -1,4 +1,4 @@
-"""Figures of reports: light ones turn dark by their colours alone, and bytes repeat."""
+"""Figures of reports: dark figures by replaced colours, and reproducible bytes."""
 
 import gzip
 import json
@@ -42,7 +42,7 @@ def unpacked(element):
 
 
 def darkened(part, table):
-    """Do in Python what the page does in the browser."""
+    """Replace the colours as the page does in the browser."""
     if isinstance(part, str):
         return table.colours.get(part, part)
     if isinstance(part, list):
@@ -54,23 +54,23 @@ def darkened(part, table):
 
 
 @pytest.mark.parametrize("name", [*DIAGNOSTICS, *OF_SURVEY, *OF_SOURCE])
-def test_light_figure_in_dark_colours_is_the_dark_figure(draw, name):
+def test_light_figure_with_replaced_colours_is_the_dark_figure(draw, name):
     table = SimpleNamespace(**dark_colours())
     expected = unpacked(draw(name, "dark"))
     assert darkened(unpacked(draw(name, "light")), table) == darkened(expected, table)
 
 
-def test_figure_that_is_drawn_again_has_the_same_bytes(draw):
+def test_figure_drawn_twice_has_the_same_bytes(draw):
     assert packed_document(draw("deviation", "light")) == packed_document(
         draw("deviation", "light")
     )
 
 
-def test_models_are_counted_from_one():
+def test_model_ids_are_counted_from_one():
     found = set(re.findall(r'"id": "(\w+)"', json.dumps(unpacked(hv.Points([(0.0, 1.0)])))))
     assert found == {f"m{number + 1}" for number in range(len(found))}
 
 
-def test_background_is_said_though_it_is_white():
+def test_white_background_is_explicit():
     figure = unpacked(hv.Points([(0.0, 1.0)]))["roots"][0]
     assert figure["attributes"]["border_fill_color"] == "#ffffff"

@@ -1,4 +1,4 @@
-"""Pages of reports: what they say, that they repeat, and that they fetch nothing."""
+"""Pages of reports: their content, reproducible bytes, and no external resources."""
 
 import re
 from dataclasses import replace
@@ -30,17 +30,17 @@ def page(report):
 
 
 def shell_of(page):
-    """Return the page without what scripts and documents hold."""
+    """Return the page without scripts and documents."""
     return re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
 
 
-def test_page_repeats_byte_for_byte_but_for_its_time(report, page):
+def test_page_is_reproducible_except_for_its_time(report, page):
     later = page_of(report, made=MADE.replace(year=2031))
     assert later != page
     assert later.replace("2031-01-02", "2030-01-02") == page
 
 
-def test_page_names_nothing_to_fetch(page):
+def test_page_has_no_external_resources(page):
     assert _ADDRESS.findall(shell_of(page)) == []
 
 
@@ -49,24 +49,24 @@ def test_page_has_every_figure_with_data_and_its_caption(report, page, fit_resul
     for diagnostic in diagnostics():
         there = f'id="figure-{diagnostic.name}"' in shell
         assert there == (diagnostic.name not in ("comparison", "orders"))
-    assert all(picture.title in shell for picture in report.pictures)
+    assert all(figure.title in shell for figure in report.figures)
 
 
 def test_choices_can_be_left_out(fit_result, instrument, report):
     plain = orbit_report(fit_result, instrument, FACTS, has_choices=False)
-    assert [p.name for p in plain.pictures] == [p.name for p in report.pictures]
-    assert all(len(picture.choices) == 1 for picture in plain.pictures)
-    assert any(len(picture.choices) > 1 for picture in report.pictures)
+    assert [f.name for f in plain.figures] == [f.name for f in report.figures]
+    assert all(len(figure.choices) == 1 for figure in plain.figures)
+    assert any(len(figure.choices) > 1 for figure in report.figures)
 
 
-def test_page_tells_command_settings_and_hashes(fit_result, instrument):
+def test_page_has_command_settings_and_hashes(fit_result, instrument):
     hashed = replace(fit_result, provenance={"obs.fits": "0123abcd"})
     shell = shell_of(page_of(orbit_report(hashed, instrument, FACTS)))
-    for words in ("plateviz report &lt;b&gt;here&lt;/b&gt;", "0123abcd", "gauss-newton"):
-        assert words in shell
+    for text in ("plateviz report &lt;b&gt;here&lt;/b&gt;", "0123abcd", "gauss-newton"):
+        assert text in shell
 
 
-def test_words_of_people_stay_words():
+def test_text_is_escaped():
     verdict = Verdict("warn", "<script>alert(1)</script>", [], [])
     report = Report("a & b", "", verdict, [], [], {"T": pd.DataFrame({"<i>": ["</table>"]})})
     shell = page_of(report)
@@ -75,35 +75,35 @@ def test_words_of_people_stay_words():
     assert "&lt;/table&gt;" in shell
 
 
-def test_coordinates_are_told_to_ten_decimals_and_nothing_for_nan():
+def test_coordinates_have_ten_decimals_and_nan_is_empty():
     table = pd.DataFrame({"RA [deg]": [266.12345678912], "σ": [float("nan")]})
     shell = page_of(Report("t", "", Verdict("good", "", [], []), [], [], {"T": table}))
     assert "<td>266.1234567891</td><td></td>" in shell
 
 
-def test_without_a_truth_its_figure_is_absent_and_the_report_says_so(fit_result, instrument):
+def test_report_without_a_truth_has_no_deviation_and_a_remark(fit_result, instrument):
     summary = {k: v for k, v in fit_result.summary.items() if k != "truth"}
     blind = replace(fit_result, true_places=None, summary=summary)
     report = orbit_report(blind, instrument, {})
-    assert "deviation" not in [picture.name for picture in report.pictures]
+    assert "deviation" not in [figure.name for figure in report.figures]
     assert any("no truth" in sentence for sentence in report.verdict.notable)
 
 
 def test_two_solutions_are_compared(fit_result, instrument):
     report = orbit_report(fit_result, instrument, {}, other=fit_result)
-    assert "comparison" in [picture.name for picture in report.pictures]
+    assert "comparison" in [figure.name for figure in report.figures]
 
 
 def test_selections_are_all_then_each_detector_then_the_farthest_exposures(report):
-    choices = next(p.choices for p in report.pictures if p.name == "residual-map")
-    words = list(choices)
-    assert words[0] == "All exposures and detectors"
-    assert words[1:5] == [f"All exposures, detector {number}" for number in (0, 1, 2, 3)]
-    assert all("χ²/dof" in chosen for chosen in words[5:])
-    assert len(words) == 8
+    choices = next(f.choices for f in report.figures if f.name == "residual-map")
+    labels = list(choices)
+    assert labels[0] == "All exposures and detectors"
+    assert labels[1:5] == [f"All exposures, detector {number}" for number in (0, 1, 2, 3)]
+    assert all("χ²/dof" in label for label in labels[5:])
+    assert len(labels) == 8
 
 
-def test_failed_orbit_says_why_and_what_there_is(made_survey):
+def test_report_of_a_failed_orbit_has_the_reason(made_survey):
     from plateviz.solving.origin import SurveyFolder
 
     data: OrbitData = SurveyFolder(str(made_survey)).read(1)

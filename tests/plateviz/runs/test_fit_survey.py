@@ -1,4 +1,4 @@
-"""A small survey fitted for real: by one worker and by two, interrupted, and with a fault."""
+"""Fits of a small survey: with one and two workers, interrupted, and with a damaged orbit."""
 
 import os
 import shutil
@@ -28,7 +28,7 @@ SETTINGS = FitSettings()
 
 
 def contents(run):
-    """Return the bytes of every file of a run, but of those that hold times."""
+    """Return the bytes of every file of a run, except files of timings."""
     paths = sorted(path for path in run.directory.rglob("*") if path.is_file())
     return {
         str(path.relative_to(run.directory)): path.read_bytes()
@@ -60,14 +60,14 @@ def test_results_do_not_depend_on_the_number_of_workers(report, fitted_survey):
     assert [name for name in one if one[name] != two[name]] == []
 
 
-def test_complete_run_is_not_touched(report, fitted_survey):
+def test_complete_run_is_not_changed(report, fitted_survey):
     before = {p: p.stat().st_mtime_ns for p in report.run.directory.rglob("*")}
     again = fit_survey(fitted_survey, "one", SETTINGS)
     assert (again.fitted, again.kept) == ([], [0, 1, 2])
     assert {p: p.stat().st_mtime_ns for p in report.run.directory.rglob("*")} == before
 
 
-def test_orbits_in_parts_make_the_same_run(report, fitted_survey):
+def test_fitting_in_parts_gives_the_same_run(report, fitted_survey):
     seen = []
     first = fit_survey(fitted_survey, "parts", SETTINGS, [2], 1, progress=seen.append)
     assert not first.run.is_complete
@@ -78,7 +78,7 @@ def test_orbits_in_parts_make_the_same_run(report, fitted_survey):
     assert contents(rest.run) == contents(report.run)
 
 
-def test_orbit_that_fails_stops_no_other(fitted_survey):
+def test_failed_orbit_does_not_stop_the_others(fitted_survey):
     path = measurement_path(fitted_survey, 1)
     whole = path.read_bytes()
     path.write_bytes(whole[:1000])
@@ -100,7 +100,7 @@ def test_orbit_that_fails_stops_no_other(fitted_survey):
     assert mended.run.is_complete
 
 
-def test_killed_run_goes_on_with_what_is_missing(report, fitted_survey):
+def test_killed_run_continues_with_the_missing_orbits(report, fitted_survey):
     command = [sys.executable, "-m", "plateviz.cli.main", "survey", str(fitted_survey)]
     process = subprocess.Popen([*command, "--run", "killed"], start_new_session=True)
     killed = Run(fitted_survey, "killed")
@@ -116,7 +116,7 @@ def test_killed_run_goes_on_with_what_is_missing(report, fitted_survey):
     assert contents(killed) == contents(report.run)
 
 
-def test_run_killed_before_its_orbits_were_gathered_is_made_whole(report, fitted_survey):
+def test_run_killed_before_gathering_is_completed(report, fitted_survey):
     late = fit_survey(fitted_survey, "late", SETTINGS, [0], 1).run
     for orbit in (1, 2):
         shutil.copytree(report.run.orbit_directory(orbit), late.orbit_directory(orbit))
@@ -125,14 +125,14 @@ def test_run_killed_before_its_orbits_were_gathered_is_made_whole(report, fitted
     assert contents(late) == contents(report.run)
 
 
-def test_orbits_table_is_that_of_the_schema(run):
+def test_orbits_table_follows_the_schema(run):
     table = run.orbits()
     assert list(table.columns) == RUN_ORBITS.names
     assert (table["status"] == "complete").all()
     assert (np.abs(table["chi2_per_dof"] - 1.0) < 6.0 * np.sqrt(2.0 / table["dof"])).all()
 
 
-def test_history_of_a_source_is_what_its_orbits_say(run):
+def test_history_of_a_source_agrees_with_its_orbits(run):
     counts = run.counts()
     often = int(counts.loc[counts["n_orbits"].idxmax(), "source_id"])
     history = run.history(often)
@@ -145,14 +145,14 @@ def test_history_of_a_source_is_what_its_orbits_say(run):
     assert run.history(1).empty
 
 
-def test_a_source_is_found_by_the_id_that_a_table_has(run):
+def test_source_is_found_by_a_numpy_id(run):
     found = run.motions()["source_id"].iloc[0]
     assert isinstance(found, np.integer)
     assert set(run.history(found)["source_id"]) == {found}
     assert run.motion(found)["source_id"] == found
 
 
-def test_motions_hold_every_source(run):
+def test_motions_include_every_source(run):
     motions, counts = run.motions(), run.counts()
     assert list(motions.columns) == MOTIONS.names
     pd.testing.assert_frame_equal(motions[counts.columns.tolist()], counts)
@@ -167,7 +167,7 @@ def test_errors_by_count_are_of_the_artificial_sources(run):
     assert errors["n_orbits"].iloc[0] == 1
 
 
-def test_classes_scatter_as_their_sources_do(run):
+def test_statistics_of_classes_agree_with_their_sources(run):
     classes, motions = run.classes(often=2), run.motions()
     others = motions[~motions["is_reference"] & ~motions["is_artificial"]]
     squares = others["n_orbits"] * others["rms_truth_2d"] ** 2
@@ -176,7 +176,7 @@ def test_classes_scatter_as_their_sources_do(run):
     assert classes.loc["non-reference", "sigma_single"] == pytest.approx(4.0, rel=1e-3)
 
 
-def test_paper_is_reproduced_from_a_run_that_is_there(run, fitted_survey):
+def test_paper_is_reproduced_from_an_existing_run(run, fitted_survey):
     before = contents(Run(fitted_survey, run.name))
     table = reproduced(fitted_survey, run.name, None).set_index("quantity")
     assert table.loc["uncertainty times sqrt(N)", "ratio"] == pytest.approx(1.0, abs=1e-3)
@@ -199,14 +199,14 @@ def test_runs_are_found_by_name(run, fitted_survey):
         open_run(fitted_survey, "none")
 
 
-def test_table_that_cannot_be_read_is_told(fitted_survey):
+def test_unreadable_table_is_reported(fitted_survey):
     torn = begin_run(fitted_survey, "torn", SETTINGS)
     (torn.directory / "history.parquet").write_bytes(b"PAR1")
     with pytest.raises(InputError, match="torn: expected the tables of a run, found"):
         SurveyRun(torn).history(1)
 
 
-def test_run_that_has_nothing_yet_is_empty(fitted_survey):
+def test_new_run_is_empty(fitted_survey):
     empty = SurveyRun(begin_run(fitted_survey, "empty", SETTINGS))
     assert empty.history(1).empty
     assert empty.counts().empty
@@ -216,12 +216,12 @@ def test_run_that_has_nothing_yet_is_empty(fitted_survey):
     assert (empty.orbits()["status"] == "missing").all()
 
 
-def test_orbit_that_is_not_there_is_refused(fitted_survey):
+def test_unknown_orbit_is_refused(fitted_survey):
     with pytest.raises(InputError, match="expected orbits of the survey, 0 to 2, found 7"):
         fit_survey(fitted_survey, "one", SETTINGS, [1, 7])
 
 
-def test_workers_of_a_scheduler_make_the_same_run(report, fitted_survey):
+def test_workers_of_a_scheduler_give_the_same_run(report, fitted_survey):
     with LocalCluster(
         n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", memory_limit=0
     ) as cluster:
@@ -231,7 +231,7 @@ def test_workers_of_a_scheduler_make_the_same_run(report, fitted_survey):
 
 
 def test_scheduler_that_does_not_answer_is_refused(fitted_survey, monkeypatch):
-    monkeypatch.setattr("plateviz.runs.fit_survey._PATIENCE", "1s")
+    monkeypatch.setattr("plateviz.runs.fit_survey._TIMEOUT", "1s")
     with pytest.raises(InputError, match="--scheduler: expected the address"):
         fit_survey(fitted_survey, "nowhere", SETTINGS, scheduler="tcp://127.0.0.1:9")
 
@@ -239,11 +239,11 @@ def test_scheduler_that_does_not_answer_is_refused(fitted_survey, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "orbits"), [(None, None), ("3", [3]), ("0-2,7", [0, 1, 2, 7])], ids=str
 )
-def test_orbits_are_told_by_ranges(text, orbits):
+def test_orbits_are_parsed_from_ranges(text, orbits):
     assert parse_orbits(text) == orbits
 
 
 @pytest.mark.parametrize("text", ["", "a", "3-1", "1-2-3", "1,,2"])
-def test_text_that_tells_no_orbits_is_refused(text):
+def test_text_that_is_not_a_range_is_refused(text):
     with pytest.raises(InputError, match="--orbits: expected numbers and ranges"):
         parse_orbits(text)

@@ -1,4 +1,4 @@
-"""Runs on disk: whole or not there, and read back as they were."""
+"""Fitted orbits on disk: complete or absent, and unchanged when read back."""
 
 import json
 
@@ -10,7 +10,7 @@ from solver.data.schema import RESULT_TABLES
 from solver.errors import InputError
 
 
-def test_a_run_is_read_back_as_it_was(fit_result, tmp_path):
+def test_fitted_orbit_is_unchanged_when_read_back(fit_result, tmp_path):
     write_fitted_orbit(tmp_path / "run", fit_result)
     back = read_fitted_orbit(tmp_path / "run")
     for table in RESULT_TABLES:
@@ -26,12 +26,12 @@ def test_a_run_is_read_back_as_it_was(fit_result, tmp_path):
     assert back.sources["source_id"].dtype == "int64"
 
 
-def test_a_run_keeps_the_orders_compared(compared, tmp_path):
+def test_compared_orders_are_stored(compared, tmp_path):
     write_fitted_orbit(tmp_path / "run", compared)
     pd.testing.assert_frame_equal(read_fitted_orbit(tmp_path / "run").orders, compared.orders)
 
 
-def test_a_run_that_is_there_is_never_changed(fit_result, make_fit_result, tmp_path):
+def test_existing_fitted_orbit_is_not_changed(fit_result, make_fit_result, tmp_path):
     write_fitted_orbit(tmp_path / "run", fit_result)
     before = {p.name: p.read_bytes() for p in (tmp_path / "run").iterdir()}
     write_fitted_orbit(tmp_path / "run", make_fit_result(2)[0])
@@ -39,7 +39,7 @@ def test_a_run_that_is_there_is_never_changed(fit_result, make_fit_result, tmp_p
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
-def test_an_interrupted_write_leaves_nothing(fit_result, tmp_path, monkeypatch):
+def test_interrupted_write_leaves_no_file(fit_result, tmp_path, monkeypatch):
     def stop(*_, **__):
         raise OSError("no space left")
 
@@ -49,15 +49,15 @@ def test_an_interrupted_write_leaves_nothing(fit_result, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_run_without_its_last_file_is_refused(fit_result, tmp_path):
+def test_fitted_orbit_without_its_last_file_is_refused(fit_result, tmp_path):
     write_fitted_orbit(tmp_path / "run", fit_result)
     (tmp_path / "run" / "COMPLETE").unlink()
     assert not is_complete(tmp_path / "run")
-    with pytest.raises(InputError, match=r"run: expected a complete run, found no COMPLETE"):
+    with pytest.raises(InputError, match=r"run: expected a complete fitted orbit, found no COMP"):
         read_fitted_orbit(tmp_path / "run")
 
 
-def test_a_run_of_a_newer_version_is_refused(fit_result, tmp_path):
+def test_fitted_orbit_of_a_newer_version_is_refused(fit_result, tmp_path):
     write_fitted_orbit(tmp_path / "run", fit_result)
     head = json.loads((tmp_path / "run" / "result.json").read_text())
     (tmp_path / "run" / "result.json").write_text(json.dumps({**head, "format": FORMAT + 1}))

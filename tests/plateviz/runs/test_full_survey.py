@@ -1,4 +1,4 @@
-"""The paper's survey at its full size: some ten minutes and 5 GB; `pytest -m full` runs it."""
+"""The paper's survey at full size; takes ten minutes and 5 GB, run with `pytest -m full`."""
 
 import pytest
 
@@ -22,26 +22,26 @@ def run(tmp_path_factory):
 
 
 @pytest.mark.parametrize("parameter", MOTION_PARAMETERS)
-def test_motions_err_as_their_sigmas_say(run, parameter):
+def test_errors_of_motions_agree_with_their_sigmas(run, parameter):
     motions = run.motions()
     others = motions[~motions["is_reference"] & (motions["n_orbits"] >= 40)]
     assert others[f"pull_{parameter}"].std() == pytest.approx(1.0, abs=0.05)
 
 
 @pytest.mark.parametrize("n_orbits", [10, 30, 80])
-def test_errors_fall_to_the_floor_that_is_foretold(run, n_orbits):
+def test_errors_fall_to_the_predicted_floor(run, n_orbits):
     row = run.errors_by_count().set_index("n_orbits").loc[n_orbits]
     assert row["error_mas"] == pytest.approx(row["expected_mas"], rel=0.1)
 
 
-def test_every_orbit_fits(run):
+def test_every_orbit_converges_with_the_expected_chi2(run):
     orbits = run.orbits()
     assert (orbits["converged"] == 1.0).all()
     pulls = (orbits["chi2_per_dof"] - 1.0) / (2.0 / orbits["dof"]) ** 0.5
     assert pulls.abs().max() < 4.5
 
 
-def test_reference_sources_scatter_as_foretold(run):
+def test_reference_sources_scatter_as_predicted(run):
     motions = run.motions()
     often = motions[motions["is_reference"] & (motions["n_orbits"] >= 40)]
     ratio = (often["scatter_ra"] / often["expected_scatter_ra"]) ** 2

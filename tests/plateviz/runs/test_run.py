@@ -1,4 +1,4 @@
-"""Runs of a survey: begun once, gone on with, never edited."""
+"""Runs of a survey: created once, continued, never changed."""
 
 import pytest
 
@@ -11,7 +11,7 @@ ODD = FitSettings(
 )
 
 
-def test_run_keeps_its_settings(survey_folder):
+def test_run_stores_its_settings(survey_folder):
     run = begin_run(survey_folder, "odd", ODD)
     assert run.settings() == ODD
     assert begin_run(survey_folder, "odd", ODD) == run
@@ -20,13 +20,13 @@ def test_run_keeps_its_settings(survey_folder):
     assert run in runs_of(survey_folder)
 
 
-def test_run_of_other_settings_is_refused(survey_folder):
+def test_run_with_other_settings_is_refused(survey_folder):
     begin_run(survey_folder, "one", FitSettings())
     with pytest.raises(InputError, match=r"run\.toml: expected .* found other settings \(order\)"):
         begin_run(survey_folder, "one", FitSettings(order=4))
 
 
-def test_run_of_other_inputs_is_refused(survey_folder):
+def test_run_with_other_inputs_is_refused(survey_folder):
     begin_run(survey_folder, "inputs", FitSettings())
     with (survey_folder / "survey.toml").open("a", encoding="utf-8") as header:
         header.write("# changed\n")
@@ -35,25 +35,25 @@ def test_run_of_other_inputs_is_refused(survey_folder):
 
 
 @pytest.mark.parametrize("name", ["", "../up", ".hidden", "a b", "a/b"])
-def test_name_that_is_no_folder_is_refused(survey_folder, name):
+def test_invalid_folder_name_is_refused(survey_folder, name):
     with pytest.raises(InputError, match="--run: expected a name"):
         begin_run(survey_folder, name, FitSettings())
 
 
-def test_folder_that_is_no_run_is_left_alone(survey_folder):
+def test_folder_that_is_not_a_run_is_refused(survey_folder):
     (survey_folder / "runs" / "mine").mkdir(parents=True)
     (survey_folder / "runs" / "mine" / "notes.txt").write_text("keep", encoding="utf-8")
     with pytest.raises(InputError, match="expected a run, found a folder without"):
         begin_run(survey_folder, "mine", FitSettings())
 
 
-def test_folder_that_is_no_survey_has_no_runs(tmp_path):
+def test_folder_that_is_not_a_survey_has_no_runs(tmp_path):
     assert runs_of(tmp_path) == []
     with pytest.raises(InputError, match=r"expected a survey with a file survey\.toml"):
         begin_run(tmp_path, "one", FitSettings())
 
 
-def test_failure_is_told_until_the_orbit_is_there(survey_folder, fit_result):
+def test_failure_is_recorded_until_the_orbit_is_fitted(survey_folder, fit_result):
     run = begin_run(survey_folder, "failing", FitSettings())
     run.keep_failure(1, "orbit 1: no light")
     assert run.failures() == {1: "orbit 1: no light"}
@@ -62,7 +62,7 @@ def test_failure_is_told_until_the_orbit_is_there(survey_folder, fit_result):
     assert run.complete_orbits() == [1]
 
 
-def test_half_an_orbit_is_none(survey_folder):
+def test_incomplete_orbit_is_not_listed(survey_folder):
     run = begin_run(survey_folder, "half", FitSettings())
     run.orbit_directory(0).mkdir()
     (run.orbit_directory(0) / "history.parquet").touch()

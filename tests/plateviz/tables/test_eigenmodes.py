@@ -1,4 +1,4 @@
-"""Tables of the modes and of the prior shares."""
+"""Tables of the eigenmodes and of the prior shares."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from plateviz import tables
 from plateviz.tables.eigenmodes import DECIDERS
 
 
-def test_spectrum_has_every_mode_and_marks_the_named(fit_result):
+def test_spectrum_has_every_eigenmode_and_marks_the_weak_ones(fit_result):
     table = tables.eigenmode_spectrum(fit_result)
     assert len(table) == len(fit_result.modes)
     assert table.loc[table["is_weak"], "mode"].tolist() == [1, 2, 3]
@@ -23,7 +23,7 @@ def test_parts_of_a_bar_fill_it_in_the_order_of_the_deciders(fit_result):
         assert rows["decider"].map(DECIDERS.index).is_monotonic_increasing
 
 
-def test_priors_of_the_calibration_are_told_by_group(fit_result):
+def test_priors_of_the_calibration_are_listed_by_group(fit_result):
     table = tables.eigenmode_deciders(fit_result)
     first = table[table["mode"] == 1]
     assert first["what"].tolist() == ["prior of detector x"]
@@ -46,7 +46,7 @@ def test_moves_of_the_groups_are_rms_in_their_unit(fit_result):
     assert found["shift_mas"] == pytest.approx(np.hypot(0.04, 0.01))
 
 
-def test_shifts_have_their_sources_places_and_arcminutes(fit_result):
+def test_shifts_have_source_positions_and_lengths_in_arcmin(fit_result):
     table = tables.eigenmode_shifts(fit_result)
     assert len(table) == len(fit_result.mode_shifts)
     assert np.allclose(table["u"] * 60_000.0, table["shift_ra_mas"])
@@ -54,9 +54,9 @@ def test_shifts_have_their_sources_places_and_arcminutes(fit_result):
     assert np.abs(table["x"]).max() < 30.0
 
 
-def test_only_the_modes_that_shift_most_are_mapped(fit_result):
+def test_only_the_eigenmodes_with_the_largest_shifts_are_mapped(fit_result):
     assert tables.eigenmode_shifts(fit_result, most=1)["mode"].unique().tolist() == [3]
-    # The first shifts the sources by a four-hundredth of what the third does.
+    # The rms shift of the first is 1/400 of that of the third.
     assert tables.eigenmode_shifts(fit_result, most=3)["mode"].unique().tolist() == [2, 3]
 
 
@@ -70,13 +70,13 @@ def test_only_the_modes_that_shift_most_are_mapped(fit_result):
     ],
     ids=lambda table: table.__name__,
 )
-def test_a_result_without_modes_has_no_rows_and_all_columns(fit_result, table):
+def test_result_without_eigenmodes_has_no_rows_and_all_columns(fit_result, table):
     old = replace(fit_result, modes=None, mode_parameters=None, mode_shifts=None)
     assert table(old).empty
     assert list(table(old).columns) == list(table(fit_result).columns)
 
 
-def test_prior_shares_are_those_of_the_calibration_in_rows_of_their_groups(fit_result):
+def test_prior_shares_equal_those_of_the_calibration_with_a_row_per_group(fit_result):
     table = tables.prior_shares(fit_result)
     assert table["prior_share"].tolist() == fit_result.calibration["prior_share"].tolist()
     assert table.groupby("row")["group"].nunique().eq(1).all()

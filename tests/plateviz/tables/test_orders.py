@@ -1,4 +1,4 @@
-"""The comparison of the orders, as people see it."""
+"""The comparison of the orders: table, sentence, figure, command line and refit panel."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -23,7 +23,7 @@ def table(compared):
 
 
 def only(result, highest):
-    """Return the result with the orders up to one that the data can hold."""
+    """Return the comparison of the orders up to `highest`."""
     kept = result.orders[result.orders["order"] <= highest]
     return tables.order_comparison(replace(result, orders=kept))
 
@@ -58,11 +58,11 @@ def test_scatter_of_the_reserved_sources_is_that_of_chi2(table):
     assert table["held_out_chi2_per_dof"].iloc[5] == 1.0
 
 
-def test_the_order_fitted_is_marked(table):
+def test_fitted_order_is_marked(table):
     assert table.loc[table["is_fitted"], "order"].tolist() == [5]
 
 
-def test_of_equal_orders_the_lowest_is_best(table):
+def test_lowest_of_equally_good_orders_is_preferred(table):
     equal = table.assign(evidence_below_best=[1.0, 1.0, *[0.0] * 8])
     assert preferred_order(equal, "evidence_below_best") == 2
 
@@ -77,32 +77,32 @@ EVIDENCE, DENSITY = "evidence_below_best", "log_density_below_best"
             {},
             5,
             "Order 5 has the highest evidence; order 6 predicts the reserved sources best, "
-            "0.5 in log density above it; the order fitted is 5.",
+            "with a log density higher by 0.5; the fitted order is 5.",
         ),
-        ({}, 3, "the order fitted is 3, neither."),
+        ({}, 3, "the fitted order is 3, which is neither."),
         (
             {DENSITY: EVIDENCE},
             5,
             "Order 5 has the highest evidence and predicts the reserved "
-            "sources best; that is the order fitted.",
+            "sources best; this is the fitted order.",
         ),
-        ({DENSITY: EVIDENCE}, 4, "sources best; the order fitted is 4."),
+        ({DENSITY: EVIDENCE}, 4, "sources best; the fitted order is 4."),
         (
             {EVIDENCE: None},
             6,
-            "Order 6 predicts the reserved sources best (under a flat prior no "
-            "evidence can compare); that is the order fitted.",
+            "Order 6 predicts the reserved sources best (the evidence is undefined "
+            "under a flat prior); this is the fitted order.",
         ),
-        ({DENSITY: None}, 5, "Order 5 has the highest evidence; that is the order fitted."),
+        ({DENSITY: None}, 5, "Order 5 has the highest evidence; this is the fitted order."),
         (
             {EVIDENCE: None, DENSITY: None},
             5,
-            "Nothing tells the orders apart; the order fitted is 5.",
+            "No criterion distinguishes the orders; the fitted order is 5.",
         ),
     ],
     ids=["differ", "neither", "agree", "another", "flat", "none-reserved", "nothing"],
 )
-def test_the_verdict_is_one_sentence(table, changes, fitted, expected):
+def test_order_verdict_is_one_sentence(table, changes, fitted, expected):
     changed = table.assign(
         is_fitted=table["order"] == fitted,
         **{name: table[other] if other else np.nan for name, other in changes.items()},
@@ -114,13 +114,13 @@ def test_the_verdict_is_one_sentence(table, changes, fitted, expected):
     ("highest", "expected"),
     [(9, ""), (8, " Order 9 is left out: it has"), (6, " Orders 7 to 9 are left out: they have")],
 )
-def test_orders_that_the_data_cannot_hold_are_said(compared, highest, expected):
-    _, _, said = tables.order_verdict(only(compared, highest)).partition("fitted is 5.")
-    assert said.startswith(expected)
-    assert bool(said) == bool(expected)
+def test_orders_that_the_data_cannot_constrain_are_named(compared, highest, expected):
+    _, _, rest = tables.order_verdict(only(compared, highest)).partition("order is 5.")
+    assert rest.startswith(expected)
+    assert bool(rest) == bool(expected)
 
 
-def test_figure_says_which_orders_are_best_and_which_was_fitted(table):
+def test_figure_names_the_best_orders_and_the_fitted_one(table):
     worth, held_out = figures(table)
     assert "best evidence: order 5; best prediction: order 6" in subtitle(worth)
     assert "fitted: order 5, dotted" in subtitle(worth)
@@ -129,12 +129,12 @@ def test_figure_says_which_orders_are_best_and_which_was_fitted(table):
     assert "1 ± 0.017" in subtitle(held_out)
 
 
-def test_figure_says_from_where_on_the_data_are_too_few(compared):
+def test_figure_names_the_highest_order_that_the_data_constrain(compared):
     worth, _ = figures(only(compared, 6))
     assert "above 6 too few data" in subtitle(worth)
 
 
-def test_both_the_cliff_and_the_small_differences_can_be_read(table):
+def test_ticks_resolve_both_large_and_small_differences(table):
     worth, held_out = figures(table)
     assert {"0", "−10", "−1,000", "−1,000,000"} <= set(labels(worth))
     assert {"1", "1.05", "5", "100"} <= set(labels(held_out))
@@ -154,7 +154,7 @@ def test_band_is_two_sigma_wide(table):
     )
 
 
-def test_order_fitted_is_a_line_in_both_panels(table):
+def test_fitted_order_is_a_line_in_both_panels(table):
     for panel in plots.plot_orders(table):
         assert [e.data for e in panel if isinstance(e, hv.VLine)] == [5]
 
@@ -165,7 +165,7 @@ def test_no_evidence_leaves_one_curve(table):
     assert names == ["log density of the reserved sources"]
 
 
-def test_without_reserved_sources_the_panel_says_so(table):
+def test_panel_without_reserved_sources_has_a_message(table):
     columns = {c: np.nan for c in ("held_out_chi2_per_dof", "log_density_below_best")}
     _, held_out = figures(table.assign(**columns))
     assert any("No reserved" in str(r.data_source.data.get("text", "")) for r in held_out.renderers)

@@ -1,4 +1,4 @@
-"""The paper's numbers beside ours: which one is compared, and the ratio."""
+"""The paper's numbers beside ours: which number is compared, and the ratio."""
 
 import numpy as np
 import pandas as pd
@@ -63,7 +63,7 @@ def test_ratio_is_to_the_number_or_to_the_nearer_end_of_the_range(figures, quant
     assert row["ratio"] == pytest.approx(ratio)
 
 
-def test_separations_are_read_both_ways(figures):
+def test_separations_are_compared_in_2d_and_in_one_coordinate(figures):
     rows = reproduction(figures).set_index("quantity")
     for name, both in (("non-reference", 700.0), ("artificial", 750.0)):
         found = rows.loc[f"rms separation, {name}"]
@@ -75,13 +75,13 @@ def test_residuals_are_compared_in_pixels_and_on_the_sky(figures):
     assert rows["ours"].tolist() == pytest.approx([0.01, 4.0])
 
 
-def test_error_is_that_of_the_most_orbits_which_enough_sources_have(figures):
+def test_error_is_that_of_the_largest_orbit_count_with_enough_sources(figures):
     rows = reproduction(figures).set_index("quantity").loc["error of artificial sources"]
     assert rows["reading"].str.contains("80 orbits").all()
     assert rows["ours"].tolist() == pytest.approx([70.0, 70.0])
 
 
-def test_survey_without_a_class_leaves_its_numbers_open(figures):
+def test_survey_without_a_class_has_no_numbers_for_it(figures):
     few = SurveyFigures(
         figures.orbits,
         figures.motions.iloc[1:],

@@ -34,13 +34,13 @@ def test_orbits_have_dates_that_sort_and_keep_their_order(survey):
     assert dates.is_monotonic_increasing
 
 
-def test_the_date_is_that_of_the_epoch(survey):
+def test_date_is_that_of_the_epoch(survey):
     # MJD 51544.5 is the noon of 1 January 2000.
     orbits = survey.orbits.iloc[:2].assign(epoch=[51544.5, np.nan])
     assert orbit_list(orbits)["date"].tolist() == ["2000-01-01 12:00", ""]
 
 
-def test_each_figure_is_judged_by_its_expected_scatter(survey):
+def test_each_number_is_judged_by_its_expected_scatter(survey):
     row = survey.orbits[survey.orbits["status"] == "complete"].iloc[[0, 0, 0]]
     scatter = math.sqrt(2.0 / row["dof"].iloc[0])
     orbits = row.assign(
@@ -54,13 +54,13 @@ def test_each_figure_is_judged_by_its_expected_scatter(survey):
     assert judged["status"].tolist() == ["good", "good", "bad"]
 
 
-def test_what_is_missing_is_not_judged(survey):
+def test_missing_numbers_are_not_judged(survey):
     failed = survey.orbits[survey.orbits["status"] != "complete"]
     judged = orbit_states(failed)
     assert set(judged["chi2_per_dof"]) | set(judged["normalised_deviation_ra"]) == {"neutral"}
 
 
-def test_the_run_is_summed_up(survey):
+def test_run_strip_summarises_the_orbits_and_motions(survey):
     items = run_strip(survey.orbits, survey.motions)
     failed = int((survey.orbits["status"] == "failed").sum())
     assert values(items)["Orbits failed"] == f"{failed}"
@@ -70,7 +70,7 @@ def test_the_run_is_summed_up(survey):
     assert values(items)["Motions fitted"] == f"{fitted} (of {len(survey.motions)})"
 
 
-def test_a_run_of_nothing_is_summed_up_too(survey):
+def test_run_strip_of_a_run_without_orbits_has_no_numbers(survey):
     orbits = survey.orbits.assign(status="missing", chi2_per_dof=np.nan, n_measurements=np.nan)
     found = values(run_strip(orbits, survey.motions.iloc[:0]))
     assert found["Motions fitted"] == "none yet"
@@ -78,7 +78,7 @@ def test_a_run_of_nothing_is_summed_up_too(survey):
     assert found["Orbits missing"] == str(len(orbits))
 
 
-def test_the_motion_stands_against_catalogue_and_truth(survey):
+def test_motion_table_has_fit_truth_and_uncertainties(survey):
     _, motion = survey.source("reference")
     table = motion_table(motion).set_index("parameter")
     assert table.loc["parallax", "fit"] == motion["fit_parallax"]
@@ -89,7 +89,7 @@ def test_the_motion_stands_against_catalogue_and_truth(survey):
     )
 
 
-def test_the_numbers_of_a_source_say_what_is_known(survey):
+def test_source_strip_shows_only_known_numbers(survey):
     history, motion = survey.source("artificial")
     found = values(source_strip(history, motion))
     assert found["Orbits"] == f"{len(history)} (in {motion['span']:.2f} yr)"
@@ -97,7 +97,7 @@ def test_the_numbers_of_a_source_say_what_is_known(survey):
     assert set(values(source_strip(history, None))) == {"Orbits", "Measurements"}
 
 
-def test_a_source_of_few_orbits_has_no_motion_to_judge(survey):
+def test_source_with_few_orbits_has_no_chi2_of_the_motion(survey):
     history, motion = survey.source("reference")
     few = motion.copy()
     few[["chi2", "dof", "scatter_ra", "rms_truth_2d"]] = [np.nan, 0, np.nan, np.nan]
@@ -110,11 +110,11 @@ def test_a_source_of_few_orbits_has_no_motion_to_judge(survey):
     ("kind", "name"),
     [("reference", "reference"), ("artificial", "artificial"), ("other", "non-reference")],
 )
-def test_the_class_of_a_source_is_named(survey, kind, name):
+def test_source_class_has_its_name(survey, kind, name):
     assert source_class(survey.source(kind)[0]) == name
 
 
-def test_the_deviation_is_from_the_truth(survey):
+def test_deviation_is_from_the_truth(survey):
     history, _ = survey.source("reference")
     table = source_orbits(history)
     expected = history["offset_ra"] - history["true_offset_ra"]
@@ -123,13 +123,13 @@ def test_the_deviation_is_from_the_truth(survey):
     assert without["deviation_ra"].isna().all()
 
 
-def test_a_source_without_freedom_has_no_chi2(survey):
+def test_source_without_degrees_of_freedom_has_no_chi2(survey):
     history, _ = survey.source("reference")
     table = source_orbits(history.assign(dof=0.0))
     assert table["chi2_per_dof"].isna().all()
 
 
-def test_the_sources_with_most_orbits_come_first():
+def test_sources_with_most_orbits_come_first():
     counts = pd.DataFrame(
         {
             "source_id": [2**53 + 1, 7, 8],

@@ -1,4 +1,4 @@
-"""The strip of numbers: verdicts against the expected scatter, hints that say the rule."""
+"""The summary strip: states by the expected scatter, and hints that state the rule."""
 
 import dataclasses
 
@@ -27,7 +27,7 @@ def test_chi2_is_judged_by_its_expected_scatter(fit_result, value, state):
     assert _item(result, "χ² per degree of freedom").state == state
 
 
-def test_hint_says_the_expected_scatter(fit_result):
+def test_hint_states_the_expected_scatter(fit_result):
     hint = _item(_with(fit_result, dof=20_000.0), "χ² per degree of freedom").hint
     assert "1.000 ± 0.010" in hint
     assert "√(2/dof)" in hint
@@ -45,12 +45,12 @@ def test_normalised_deviation_is_judged_beside_its_expected_value(fit_result, va
         normalised_deviation_ra=value,
         expected_normalised_deviation_ra=0.33,
     )
-    item = _item(result, "Reference stars, α")
+    item = _item(result, "Reference sources, α")
     assert item.state == state
     assert "expected 0.330" in item.value
 
 
-def test_no_reference_star_is_bad_and_does_not_divide_by_zero(fit_result):
+def test_no_reference_source_is_bad_and_does_not_divide_by_zero(fit_result):
     nothing = float("nan")
     result = _with(
         fit_result,
@@ -58,16 +58,16 @@ def test_no_reference_star_is_bad_and_does_not_divide_by_zero(fit_result):
         normalised_deviation_ra=nothing,
         expected_normalised_deviation_ra=nothing,
     )
-    assert _item(result, "Reference stars").state == "bad"
-    assert _item(result, "Reference stars, α").state == "neutral"
+    assert _item(result, "Reference sources").state == "bad"
+    assert _item(result, "Reference sources, α").state == "neutral"
 
 
-def test_a_fit_that_did_not_converge_is_bad_and_says_why(fit_result):
+def test_fit_that_did_not_converge_is_bad_and_gives_the_reason(fit_result):
     item = _item(_with(fit_result, converged=False, reason="no damping helped"), "Converged")
     assert (item.value, item.state, item.hint) == ("no", "bad", "no damping helped")
 
 
-def test_truth_appears_only_where_there_is_one(fit_result):
+def test_pulls_against_the_truth_appear_only_with_a_truth(fit_result):
     assert not any("truth" in item.label for item in summary_strip(fit_result))
     figures = {"n": 12, **{f"{kind}_{axis}": 0.5 for kind in KINDS for axis in ("ra", "dec")}}
     with_truth = _with(fit_result, truth={"artificial": figures})
@@ -76,7 +76,7 @@ def test_truth_appears_only_where_there_is_one(fit_result):
     assert "12 sources" in item.hint
 
 
-def test_counts_and_time_are_written_out(fit_result):
+def test_counts_and_time_are_formatted(fit_result):
     assert _item(fit_result, "Measurements").value == f"{len(fit_result.residuals):,}"
     assert _item(fit_result, "Time").value == "2.2 s"
     assert "fit 1.60 s" in _item(fit_result, "Time").hint

@@ -1,4 +1,4 @@
-"""Tables of a fitted survey: against positions by vectors, against closed forms, by hand."""
+"""Tables of a fitted survey, against positions by vectors and closed forms."""
 
 import numpy as np
 import pandas as pd
@@ -28,7 +28,7 @@ def test_sample_has_the_columns_of_the_schema(survey, name, table):
     assert list(getattr(survey, name)) == table.names
 
 
-def test_julian_years_turn_into_mjds_and_back():
+def test_julian_years_and_mjds_convert_both_ways():
     assert julian_year(51544.5) == 2000.0
     assert mjd_of(julian_year(62000.25)) == pytest.approx(62000.25, abs=1e-6)
 
@@ -44,7 +44,7 @@ def test_parallax_factors_are_those_of_the_solver(survey):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("series", ["catalogue", "true"])
-def test_curves_pass_through_the_places_at_the_orbits(survey, kind, series):
+def test_curves_pass_through_the_positions_at_the_orbits(survey, kind, series):
     source = survey.source(kind)
     track, curve = tables.source_track(*source), tables.source_curves(*source)
     for axis in ("ra", "dec"):
@@ -53,7 +53,7 @@ def test_curves_pass_through_the_places_at_the_orbits(survey, kind, series):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_track_is_counted_from_the_catalogue_at_the_mean_epoch(survey, kind):
+def test_origin_of_the_track_is_the_catalogue_at_the_mean_epoch(survey, kind):
     history, motion = survey.source(kind)
     track = tables.source_track(history, motion)
     row = survey.catalogue[survey.catalogue["source_id"] == history["source_id"].iloc[0]]
@@ -76,14 +76,14 @@ def test_fitted_motion_follows_the_row_of_motions(survey):
 @pytest.mark.parametrize("kind", KINDS)
 def test_band_of_the_fit_is_its_sigma_at_its_epoch(survey, kind):
     history, motion = survey.source(kind)
-    # A source seen throughout: its place and its motion are nearly independent at the epoch.
+    # For a source measured throughout, position and motion are nearly uncorrelated at the epoch.
     curve = tables.source_curves(history, motion)
     band = np.interp(EPOCH, curve["year"], curve["fit_sigma_ra_mas"])
     assert band == pytest.approx(motion["sigma_ra"], rel=0.03)
 
 
-def test_band_of_the_fit_holds_correlations(survey):
-    """Far from the fit's epoch the errors of place and motion cancel between the orbits."""
+def test_band_of_the_fit_includes_correlations(survey):
+    """Far from the fit's epoch the errors of position and motion cancel between the orbits."""
     history, motion = survey.source("other")
     late = history[history["epoch"] > history["epoch"].median()]
     curve = tables.source_curves(late, motion)
@@ -96,14 +96,14 @@ def test_one_orbit_has_a_track_but_no_curve(survey):
     assert tables.source_curves(*source).empty
 
 
-def test_sky_track_of_a_reference_source_is_counted_from_the_catalogue(survey):
+def test_origin_of_a_reference_sources_sky_track_is_the_catalogue(survey):
     table = tables.sky_track(*survey.source("reference"))
     assert set(table["zero"]) == {"catalogue"}
     assert table["catalogue_ra_mas"].notna().all()
 
 
 @pytest.mark.parametrize("kind", ["artificial", "other"])
-def test_sky_track_leaves_a_far_catalogue_out(survey, kind):
+def test_sky_track_leaves_out_a_far_catalogue(survey, kind):
     table = tables.sky_track(*survey.source(kind))
     assert set(table["zero"]) == {"true"}
     assert table["catalogue_ra_mas"].isna().all()
@@ -116,7 +116,7 @@ def test_artificial_source_has_its_truth_at_zero(survey):
 
 
 @pytest.mark.parametrize(("has_motion", "zero"), [(True, "fit"), (False, "mean")])
-def test_sky_track_without_truth_finds_another_zero(survey, has_motion, zero):
+def test_sky_track_without_truth_has_another_origin(survey, has_motion, zero):
     history, motion = survey.source("other")
     blind = history.assign(true_offset_ra=np.nan, true_offset_dec=np.nan)
     table = tables.sky_track(blind, motion if has_motion else None)
@@ -125,7 +125,7 @@ def test_sky_track_without_truth_finds_another_zero(survey, has_motion, zero):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_track_statistics_are_those_of_the_motions(survey, kind):
+def test_track_statistics_agree_with_the_motions(survey, kind):
     history, motion = survey.source(kind)
     statistics = tables.track_statistics(tables.sky_track(history, motion))
     assert statistics.n == motion["n_orbits"]
@@ -133,7 +133,7 @@ def test_track_statistics_are_those_of_the_motions(survey, kind):
     assert statistics.rms_2d == pytest.approx(motion["rms_truth_2d"], rel=1e-6)
 
 
-def test_time_series_counts_from_the_truth(survey):
+def test_origin_of_the_time_series_is_the_truth(survey):
     history, motion = survey.source("reference")
     table = tables.time_series(history, motion)
     orbits = table[(table["coordinate"] == "dec") & (table["kind"] == "orbit")]
@@ -143,7 +143,7 @@ def test_time_series_counts_from_the_truth(survey):
     assert table["catalogue_mas"].notna().all()
 
 
-def test_time_series_leaves_a_far_catalogue_out(survey):
+def test_time_series_leaves_out_a_far_catalogue(survey):
     assert tables.time_series(*survey.source("other"))["catalogue_mas"].isna().all()
 
 
@@ -155,7 +155,7 @@ def test_time_series_residuals_are_over_the_noise(survey):
 
 
 @pytest.mark.parametrize(("has_motion", "zero"), [(True, "fit"), (False, "mean")])
-def test_time_series_without_truth_finds_another_zero(survey, has_motion, zero):
+def test_time_series_without_truth_has_another_origin(survey, has_motion, zero):
     history, motion = survey.source("other")
     blind = history.assign(true_offset_ra=np.nan, true_offset_dec=np.nan)
     table = tables.time_series(blind, motion if has_motion else None)
@@ -191,7 +191,7 @@ def test_sky_density_counts_every_source(survey):
     assert cells["density"].notna().equals(cells["n"] > 0)
 
 
-def test_sky_density_of_an_even_field_is_its_number_over_its_area():
+def test_sky_density_of_a_uniform_field_is_number_over_area():
     l_deg, b_deg = (g.ravel() for g in np.meshgrid(np.linspace(0, 2, 200), np.linspace(0, 1, 100)))
     table = pd.DataFrame({"l_deg": l_deg, "b_deg": b_deg})
     assert tables.sky_density(table)["density"].mean() == pytest.approx(20_000 / 7200.0, rel=0.01)
@@ -240,7 +240,7 @@ def test_prior_separation_without_truth_has_no_rows(survey):
     assert tables.prior_separation(survey.catalogue, None).empty
 
 
-def test_orbit_counts_hold_every_source(survey):
+def test_orbit_counts_include_every_source(survey):
     bins = tables.orbit_counts(survey.motions)
     sums = bins.groupby("source_class")["count"].sum()
     assert sums.to_dict() == {"artificial": 12, "non-reference": 36, "reference": 24}
@@ -256,7 +256,7 @@ def test_orbit_counts_have_at_most_fifty_bins(survey, most, step):
     assert bins["count"].sum() == len(motions)
 
 
-def test_reference_scatter_keeps_reference_sources_of_enough_orbits(survey):
+def test_reference_scatter_keeps_reference_sources_with_enough_orbits(survey):
     table = tables.reference_scatter(survey.motions, least_orbits=80)
     chosen = survey.motions[survey.motions["is_reference"] & (survey.motions["n_orbits"] >= 80)]
     assert set(table["id"]) == set(chosen["source_id"].astype(str))
@@ -271,14 +271,14 @@ def test_scatter_cells_count_every_source(survey):
     assert tables.scatter_cells(table)["n"].sum() == len(table)
 
 
-def test_pull_bins_count_what_is_shown_and_what_is_beyond():
+def test_pull_bins_count_values_inside_and_beyond_the_limit():
     bins = tables.pull_bins(pd.Series([0.0, 1.0, -7.0, np.nan]))
     assert bins["count"].sum() == 2
     assert bins["outside"].iloc[0] == 1
     assert bins["n"].iloc[0] == 3
 
 
-def test_motion_pulls_are_those_of_non_reference_sources_of_enough_orbits(survey):
+def test_motion_pulls_are_of_non_reference_sources_with_enough_orbits(survey):
     bins = tables.motion_pulls(survey.motions)
     chosen = survey.motions[~survey.motions["is_reference"] & (survey.motions["n_orbits"] >= 40)]
     assert list(bins["parameter"].unique()) == [*survey_schema.MOTION_PARAMETERS, "chi2"]
@@ -294,20 +294,20 @@ def test_motion_pulls_without_truth_keep_chi2(survey):
     assert list(tables.motion_pulls(blind)["parameter"].unique()) == ["chi2"]
 
 
-def test_orbit_health_puts_a_failed_orbit_between_its_neighbours(survey):
+def test_orbit_health_places_a_failed_orbit_between_its_neighbours(survey):
     table = tables.orbit_health(survey.orbits).set_index("orbit_id")
     assert table["state"].value_counts().to_dict() == {"complete": 87, "failed": 2, "missing": 1}
     assert table["year"].loc[10] < table["year"].loc[11] < table["year"].loc[12]
     assert table["year"].loc[12] < table["year"].loc[13]
 
 
-def test_orbit_health_tells_what_did_not_converge(survey):
+def test_orbit_health_marks_orbits_that_did_not_converge(survey):
     orbits = survey.orbits.copy()
     orbits.loc[3, "converged"] = 0.0
     assert tables.orbit_health(orbits)["state"].iloc[3] == "not converged"
 
 
-def test_orbit_health_knows_the_expected_scatter(survey):
+def test_orbit_health_has_the_expected_scatter(survey):
     table = tables.orbit_health(survey.orbits)
     assert table["expected_sd"].iloc[0] == pytest.approx(
         np.sqrt(2.0 / survey.orbits["dof"].iloc[0])

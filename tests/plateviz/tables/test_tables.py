@@ -1,4 +1,4 @@
-"""Tables: the numbers behind every plot, against independent calculations."""
+"""Tables of one orbit, against independent calculations."""
 
 import numpy as np
 import pandas as pd
@@ -30,7 +30,7 @@ def test_fixture_is_complete_against_the_schema(fit_result):
     [(1e-4, 359.9999, 2e-4), (359.9999, 1e-4, -2e-4), (266.1, 266.0, 0.1)],
     ids=["across 0 upwards", "across 0 downwards", "plain"],
 )
-def test_offset_in_ra_wraps_and_carries_cos_dec(ra, ra_0, expected_deg):
+def test_offset_in_ra_wraps_and_includes_cos_dec(ra, ra_0, expected_deg):
     d_ra, d_dec = offsets_mas(np.array([ra]), np.array([60.0]), ra_0, 60.0)
     assert d_ra[0] == pytest.approx(0.5 * expected_deg * 3.6e6, rel=1e-6)
     assert d_dec[0] == 0.0
@@ -77,7 +77,7 @@ def test_footprint_polygons_agree_with_astropy_gnomonic(fit_result, instrument):
             places = np.column_stack(wcs.all_world2pix(rows["ra"], rows["dec"], 0))
             corners = detector.corners_um()[[0, 1, 2, 3, 0]]
             sides = np.diff(places, axis=0)
-            # Aberration moves an outline as a whole, by 21 arcsec or 480 um at most.
+            # Aberration moves the whole outline, by at most 21 arcsec or 480 um.
             assert np.allclose(sides, np.diff(corners, axis=0), atol=0.5)
             assert np.abs(places - corners).max() < 480.0
 
@@ -96,7 +96,7 @@ def test_measured_sources_lie_within_the_outlines_of_their_detectors(fit_result,
         along, towards = np.diff(ring, axis=0), places[:, None, :] - ring[:-1]
         turn = along[:, 0] * towards[:, :, 1] - along[:, 1] * towards[:, :, 0]
         inside = (turn > 0.0).all(axis=1) | (turn < 0.0).all(axis=1)
-        # What lies within a few pixels of an edge may be put across it by the distortion.
+        # Distortion may move sources within a few pixels of an edge across it.
         assert inside.mean() > 0.95
 
 
@@ -139,13 +139,13 @@ def test_residual_vectors_on_the_focal_plane_point_along_it(fit_result, instrume
         assert np.allclose(tip, place, atol=1e-6)
 
 
-@pytest.mark.parametrize("exposures", [[(9, 9)], []], ids=["unknown", "none chosen"])
+@pytest.mark.parametrize("exposures", [[(9, 9)], []], ids=["unknown", "none selected"])
 def test_residual_tables_of_no_exposure_are_empty(fit_result, instrument, exposures):
     assert tables.residual_map(fit_result, instrument, exposures=exposures).empty
     assert tables.residual_scatter(fit_result, exposures=exposures).empty
 
 
-def test_expected_scatter_leaves_out_what_the_fit_absorbs(fit_result):
+def test_expected_scatter_excludes_what_the_fit_absorbs(fit_result):
     table = tables.residual_scatter(fit_result)
     expected = 10.0 * np.sqrt(1.0 - 0.5 * fit_result.residuals["leverage"])
     assert np.allclose(table["expected_x_mpix"], expected)
@@ -186,7 +186,7 @@ def test_uncertainty_has_a_row_per_source_kind_and_coordinate(fit_result, instru
     assert table["sigma_single_mas"].iloc[0] == pytest.approx(4.244, abs=1e-3)
 
 
-def test_uncertainty_by_count_holds_the_median(fit_result, instrument):
+def test_uncertainty_by_count_has_the_median(fit_result, instrument):
     table = tables.uncertainty(fit_result, instrument)
     row = tables.uncertainty_by_count(table).iloc[0]
     same = table[
@@ -199,7 +199,7 @@ def test_uncertainty_by_count_holds_the_median(fit_result, instrument):
     assert row["n"] == len(same)
 
 
-def test_convergence_carries_the_tolerance(fit_result):
+def test_convergence_has_the_tolerance(fit_result):
     table = tables.convergence(fit_result)
     assert (table["tolerance"] == fit_result.settings.tolerance).all()
 
@@ -241,7 +241,7 @@ def test_pull_histogram_counts_every_residual(fit_result):
         assert rows["expected"].sum() == pytest.approx(0.9545 * rows["n"].iloc[0], rel=1e-4)
 
 
-def test_exposure_chi2_is_measured_in_its_expected_scatter(fit_result):
+def test_exposure_chi2_is_scaled_by_its_expected_scatter(fit_result):
     row = tables.exposure_chi2(fit_result).iloc[3]
     exposure = fit_result.exposures.iloc[3]
     assert row["expected_sd"] == pytest.approx(np.sqrt(2.0 / exposure["dof"]))
@@ -264,7 +264,7 @@ def test_comparison_of_a_fit_with_itself_is_zero(fit_result):
     assert (table[["sigma_ratio_ra", "sigma_ratio_dec"]] == 1.0).all(axis=None)
 
 
-def test_difference_histogram_holds_every_source(fit_result, make_fit_result):
+def test_difference_histogram_includes_every_source(fit_result, make_fit_result):
     table = tables.comparison(fit_result, make_fit_result(2)[0])
     histogram = tables.difference_histogram(table)
     assert (histogram.groupby("coordinate")["count"].sum() == len(table)).all()

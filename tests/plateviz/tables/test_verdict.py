@@ -1,4 +1,4 @@
-"""Verdicts in words, against solutions with a known flaw."""
+"""Verdicts on solutions with a known flaw."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ def test_worst_state_decides(states, expected):
     assert worst(states) == expected
 
 
-def test_solution_as_it_should_be_can_be_trusted(fit_result):
+def test_good_solution_can_be_trusted(fit_result):
     sound = with_summary(fit_result, chi2_per_dof=1.0)
     verdict = orbit_verdict(sound)
     assert verdict.state in ("good", "warn")
@@ -41,10 +41,10 @@ def test_solution_that_has_not_converged_is_not_trusted(fit_result):
     assert verdict.reasons[0] == "The fit has not converged: it ran out."
 
 
-def test_chi2_far_off_is_told(fit_result):
+def test_chi2_far_off_is_reported(fit_result):
     verdict = orbit_verdict(with_summary(fit_result, chi2_per_dof=2.0))
     assert verdict.state == "bad"
-    assert any("2.000, far from what is expected" in sentence for sentence in verdict.reasons)
+    assert any("2.000, far from the expected value" in sentence for sentence in verdict.reasons)
 
 
 def test_exposure_and_source_that_stand_out_are_named(fit_result):
@@ -60,29 +60,29 @@ def test_exposure_and_source_that_stand_out_are_named(fit_result):
 def test_run_names_its_failed_orbits(survey):
     verdict = run_verdict(survey.orbits, survey.motions)
     assert verdict.state == "bad"
-    told = [sentence for sentence in verdict.notable if "has no solution" in sentence]
-    assert [sentence.split()[1] for sentence in told] == ["11", "12"]
+    failed = [sentence for sentence in verdict.notable if "has no solution" in sentence]
+    assert [sentence.split()[1] for sentence in failed] == ["11", "12"]
 
 
 @pytest.mark.parametrize(
-    ("n_bad", "words"),
-    [(1, "expected: orbit 0."), (2, "expected: orbits 0, 1."), (30, "30 orbits, among them 0, 1,")],
+    ("n_bad", "text"),
+    [(1, "values: orbit 0."), (2, "values: orbits 0, 1."), (30, "30 orbits, among them 0, 1,")],
 )
-def test_orbits_far_off_are_named(survey, n_bad, words):
+def test_orbits_far_off_are_named(survey, n_bad, text):
     orbits = pd.concat([survey.orbits[survey.orbits["status"] == "complete"].head(1)] * 40)
     orbits = orbits.assign(orbit_id=range(40)).reset_index(drop=True)
     orbits.loc[orbits["orbit_id"] < n_bad, "chi2_per_dof"] = 9.0
     verdict = run_verdict(orbits, survey.motions)
-    assert any(words in sentence for sentence in verdict.notable)
+    assert any(text in sentence for sentence in verdict.notable)
 
 
-def test_run_without_an_orbit_fitted_says_so(survey):
+def test_run_without_fitted_orbits_is_reported(survey):
     none = survey.orbits.assign(status="missing")
     assert "No orbit has a solution." in run_verdict(none, survey.motions.iloc[:0]).reasons
 
 
-def test_chance_alone_makes_no_source_stand_out(fit_result):
-    """chi2 of few measurements is skewed: so far above its mean one in a thousand lies."""
+def test_sources_within_chance_are_not_reported(fit_result):
+    """The chi2 of few measurements is skewed, so that chance alone gives large values."""
     dof = np.full(len(fit_result.sources), 8.0)
     quantiles = (np.arange(len(dof)) + 0.5) / len(dof)
     by_chance = fit_result.sources.assign(dof=dof, chi2=chdtri(dof, 1.0 - quantiles))
@@ -91,7 +91,7 @@ def test_chance_alone_makes_no_source_stand_out(fit_result):
 
 
 @pytest.mark.parametrize(("chi2", "state"), [(100.0, "good"), (170.0, "bad"), (50.0, "warn")])
-def test_source_is_judged_by_the_scatter_about_its_motion(survey, chi2, state):
+def test_source_is_judged_by_its_scatter_about_the_motion(survey, chi2, state):
     history, motion = survey.source("other")
     motion = motion.copy()
     motion["chi2"], motion["dof"] = chi2, 100

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver.model.astrometry import frames_at, propagate, sky_position
-from solver.model.projection import tangent_frame
+from solver.model.directions import tangent_frame
 from tests.solver.small_orbit import ASTROMETRY, MAS, MJD, earth, epoch_places, make_orbit
 
 HUNDREDTH_UAS = 1e-5 * MAS

@@ -4,7 +4,8 @@ from astropy.wcs import WCS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.model.projection import displace, focal_axes, project, tangent_frame
+from solver.model.directions import tangent_frame, unproject
+from solver.model.projection import displace, focal_axes, project
 from tests.solver.small_orbit import ideal_plane, standard_coordinates
 
 FOCAL_LENGTH = 4.86e6
@@ -49,6 +50,18 @@ def test_ideal_plane_is_that_of_the_papers_trigonometry(ra, dec, east, north, an
     coordinates = standard_coordinates(*np.radians([*source, ra, dec]))
     expected = ideal_plane(*coordinates, np.radians(angle), FOCAL_LENGTH)
     np.testing.assert_allclose(project_one(source, (ra, dec), angle), expected, atol=1e-7)
+
+
+@settings(deadline=None, max_examples=40)
+@given(longitudes, latitudes, separations, separations, st.floats(-180.0, 180.0))
+def test_unproject_undoes_the_projection(ra, dec, x_deg, y_deg, angle):
+    frame = tangent_frame(np.array([ra]), np.array([dec]))[0]
+    ideal = FOCAL_LENGTH * np.radians([[x_deg, y_deg]])
+    (direction,) = unproject(ideal, frame, np.radians(angle), FOCAL_LENGTH)
+    axes = focal_axes(jnp.asarray(frame[:1]), jnp.array([np.radians(angle)]))
+    components = (axes @ direction).T
+    found = project(tuple(components), jnp.array([FOCAL_LENGTH]))
+    np.testing.assert_allclose(np.concatenate(found), ideal[0], atol=1e-8)
 
 
 @settings(deadline=None, max_examples=20)

@@ -1,0 +1,53 @@
+"""Directions as unit vectors: local frames on the sky, and the inverse of the gnomonic projection.
+
+NumPy only, so that code which must not load JAX can use it.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+
+def tangent_frame(
+    ra_deg: Float[np.ndarray, " n"], dec_deg: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 3 3"]:
+    """Return the local frames (direction, east, north) at sky positions.
+
+    Parameters
+    ----------
+    ra_deg, dec_deg : deg
+
+    Returns
+    -------
+    unit vectors along the second axis, in the order direction, east, north
+    """
+    a, d = np.radians(ra_deg), np.radians(dec_deg)
+    ca, sa, cd, sd, zero = np.cos(a), np.sin(a), np.cos(d), np.sin(d), np.zeros_like(a)
+    rows = [(cd * ca, cd * sa, sd), (-sa, ca, zero), (-sd * ca, -sd * sa, cd)]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def unproject(
+    ideal_um: Float[np.ndarray, "n 2"],
+    frame: Float[np.ndarray, "3 3"],
+    position_angle: float,
+    focal_length: float,
+) -> Float[np.ndarray, "n 3"]:
+    """Return the directions of positions on the ideal focal plane of one exposure.
+
+    The inverse of `projection.project`, Eqs. (method:projection) and (method:ideal):
+    the pointing plus x and y along the focal plane's axes, in focal lengths.
+
+    Parameters
+    ----------
+    ideal_um : x and y, um, origin on the optical axis
+    frame : of the pointing, as from `tangent_frame`
+    position_angle : rad
+    focal_length : um
+
+    Returns
+    -------
+    vectors of length one or more
+    """
+    c, s = np.cos(position_angle), np.sin(position_angle)
+    axes = np.array([(-c, s), (s, c)]) @ frame[1:]
+    return frame[0] + ideal_um / focal_length @ axes

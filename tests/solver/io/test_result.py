@@ -152,7 +152,7 @@ def test_summary_keeps_types(written):
 
 
 def test_summary_must_be_plain(tmp_path, result):
-    with pytest.raises(TypeError, match="plain numbers and words"):
+    with pytest.raises(TypeError, match="plain numbers and text"):
         write_result(replace(result, summary={"a": object()}), tmp_path / "result.fits")
     assert list(tmp_path.iterdir()) == []
 

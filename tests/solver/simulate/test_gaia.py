@@ -159,7 +159,7 @@ def test_unusable_values_are_refused(change, message, stars):
 
 def test_gaps_are_said_where_another_row_is_wrong(archive):
     archive["dec"][N_GAPS + 2] = -100.0
-    with pytest.raises(InputError, match="gaia.fits, its 2993 rows without gaps.*is row 3"):
+    with pytest.raises(InputError, match="gaia.fits, its 2993 complete rows.*is row 3"):
         gaia_stars(archive, "gaia.fits")
 
 

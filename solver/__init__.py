@@ -1,16 +1,16 @@
 """Plate Analysis: the solver of plateviz, with no plotting and no user interface.
 
-From the pixel positions of stars on the exposures ("plates") of one satellite orbit and
-a reference catalogue it finds, in one Bayesian fit, every star's position, each
-exposure's pointing and focal length, the optical distortion and the detectors' places.
+The input is the pixel positions of stars on the exposures ("plates") of one satellite
+orbit, and a reference catalogue. One Bayesian fit estimates every star's position, each
+exposure's pointing and focal length, the optical distortion and the detectors' positions.
 
-This is the one place that turns on float64 in JAX: at a right ascension of 266 deg one
-float32 step is about 110 mas, four orders of magnitude above what is measured here.
-It does so without importing JAX, because readers of results (the web process among
-them) use this package too and must start without it: public names load on first use.
+Importing this package enables float64 in JAX: at a right ascension of 266 deg one float32
+step is about 110 mas, four orders of magnitude above the accuracy required. JAX itself is
+not imported, because programs that only read results (such as the web process) must start
+without it; public names load on first use.
 
-`numpyro.plate` means a vectorised axis and collides with the paper's "plate"; here a
-plate is always called an exposure, and `plate_id` is only a column name.
+The paper's "plate" is called an exposure here, since `numpyro.plate` is a vectorised axis;
+`plate_id` is only a column name.
 """
 
 import importlib
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from solver.simulate.settings import SurveySettings as SurveySettings
     from solver.simulate.survey import simulate_survey as simulate_survey
 
-# OpenBLAS reads this when it is loaded: its idle threads are to sleep after some microseconds,
-# not to spin for as long as a product takes, beside JAX and a second OpenBLAS in SciPy.
+# OpenBLAS reads this when it is loaded. Its idle threads then sleep after some microseconds
+# instead of spinning, which would compete with JAX and with SciPy's own copy of OpenBLAS.
 os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "14")
 os.environ["JAX_ENABLE_X64"] = "1"
 if "jax" in sys.modules:
@@ -74,7 +74,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 any public name
-    """Load a public name on first use, so that importing `solver` costs nothing."""
+    """Load a public name on first use, so that `import solver` stays fast."""
     if name not in _PUBLIC:
         raise AttributeError(f"module 'solver' has no attribute {name!r}")
     return getattr(importlib.import_module(_PUBLIC[name]), name)

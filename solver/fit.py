@@ -1,4 +1,4 @@
-"""fit_orbit: one orbit in, one result out; the engines' common front."""
+"""Fit one orbit with any engine: `fit_orbit`, and `OrbitFitter` for repeated fits."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -50,28 +50,28 @@ def fit_orbit(
 
     Parameters
     ----------
-    data : checked tables, as from `solver.read_orbit`
-    instrument : nominal focal plane; its detectors' ids are those of the measurements
-    settings : the defaults are the paper's
-    progress : called after every iteration; what it raises stops the fit
-    resumption : where the svi engine is to go on, and who keeps its state
+    data : checked tables, as returned by `solver.read_orbit`
+    instrument : nominal focal plane, with the detector ids of the measurements
+    settings : defaults to those of the paper
+    progress : called after every iteration; an exception from it stops the fit
+    resumption : state from which the svi engine continues, and the callback that saves it
 
     Returns
     -------
-    The result, whether converged or not: `summary["converged"]` and `summary["reason"]`.
+    The result, converged or not: see `summary["converged"]` and `summary["reason"]`.
 
     Raises
     ------
     InputError
-        If the data cannot hold what the settings ask for.
+        If the settings exclude data that do not exist, or need more data than there are.
     FitError
-        If no solution with uncertainties exists; the message says why.
+        If no solution with uncertainties exists; the message gives the reason.
     """
     return OrbitFitter(data, instrument).fit(settings or FitSettings(), progress, resumption)
 
 
-class _Fitted(NamedTuple):
-    """What the last fit leaves for the next question."""
+class _LastFit(NamedTuple):
+    """State of the last fit, from which what-if solutions start."""
 
     settings: FitSettings
     problem: Problem
@@ -82,17 +82,23 @@ class _Fitted(NamedTuple):
 
 
 class OrbitFitter:
-    """One orbit, fitted again and again: it keeps what a change of settings can start from."""
+    """Fit one orbit repeatedly, reusing the last fit when settings change."""
 
     def __init__(self, data: OrbitData, instrument: Instrument = MINI_MOCK) -> None:
-        """Take checked tables, as from `solver.read_orbit`; InputError if JAX has no device."""
+        """Take checked tables, as from `solver.read_orbit`.
+
+        Raises
+        ------
+        InputError
+            If JAX has no device.
+        """
         require_device()
-        self._selection = ProblemCache(data, instrument)
+        self._cache = ProblemCache(data, instrument)
         self._orbit_id = data.orbit_id
         self._instrument = instrument
-        self._kept: _Fitted | None = None
+        self._last_fit: _LastFit | None = None
         self._starts: list[WarmStart] = []
-        self._tried: list[FitSettings] = []
+        self._attempted: list[FitSettings] = []
         self._stopped: tuple[FitSettings, object] | None = None
 
     def fit(
@@ -101,109 +107,117 @@ class OrbitFitter:
         progress: Callable[[Iteration], None] = lambda _: None,
         resumption: Resumption | None = None,
     ) -> FitResult:
-        """Solve the orbit from the start; arguments and errors as those of `fit_orbit`.
+        """Fit the orbit; parameters and exceptions as those of `fit_orbit`.
 
-        A run of the svi engine that was stopped is gone on with where it was.
+        A fit of the svi engine that was stopped continues where it stopped.
         """
         start = time.perf_counter()
-        data, problem = self._selection.choose(settings)
+        data, problem = self._cache.choose(settings)
         outliers = None
         if settings.robust:
             outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
-            data, problem = self._selection.choose(settings, outliers)
+            data, problem = self._cache.choose(settings, outliers)
         prepared = time.perf_counter()
-        found = run_engine(problem, settings, progress, resumption or self._resumption(settings))
+        estimate = run_engine(problem, settings, progress, resumption or self._resumption(settings))
         result, solution = _result(
-            data, self._instrument, settings, problem, found, (start, prepared)
+            data, self._instrument, settings, problem, estimate, (start, prepared)
         )
         self._stopped = None
         fitted = time.perf_counter()
         orders = self._compare_orders(problem, settings, progress)
-        if found.mode.status.is_solution:
-            self._kept = _Fitted(
-                settings, problem, found.mode, solution.covariance, outliers, orders
+        if estimate.mode.status.is_solution:
+            self._last_fit = _LastFit(
+                settings, problem, estimate.mode, solution.covariance, outliers, orders
             )
-            self._starts, self._tried = [WarmStart(settings, problem, found.mode)], [settings]
+            self._starts = [WarmStart(settings, problem, estimate.mode)]
+            self._attempted = [settings]
         result = _with_outliers(result, outliers)
         return _with_orders(result, orders, time.perf_counter() - fitted)
 
     def what_if(self, settings: FitSettings) -> FitResult | None:
-        """Return the solution under other settings by one step from the last fit.
+        """Return the solution under other settings without a refit.
 
-        The outliers are those of that fit, and so is the comparison of the orders where it
-        is the order alone that changes.
+        The outliers are those of the last fit. So is the comparison of distortion orders, if
+        only the order differs.
 
         Returns
         -------
-        None if there is no fit to start from, or only a refit can tell; see
-        `solver.engines.what_if.solve_what_if`.
+        The result; None if there is no fit to start from, or if a refit is needed (see
+        `solver.engines.what_if.solve_what_if`).
         """
-        kept = self._kept
-        if kept is None or not kept.settings.what_if_holds(settings):
+        last = self._last_fit
+        if last is None or not last.settings.what_if_holds(settings):
             return None
         start = time.perf_counter()
-        data, problem = self._selection.choose(settings, kept.outliers)
+        data, problem = self._cache.choose(settings, last.outliers)
         prepared = time.perf_counter()
-        near = nearest(self._starts, settings)
-        mode = near and solve_what_if(near.mode, near.problem, problem, settings)
+        base = nearest(self._starts, settings)
+        mode = base and solve_what_if(base.mode, base.problem, problem, settings)
         if mode is None:
             return None
-        found = Estimate(mode)
-        result, _ = _result(data, self._instrument, settings, problem, found, (start, prepared))
-        same_but_order = settings == kept.settings.with_(order=settings.order)
-        orders = kept.orders if same_but_order else None
-        return replace(_with_outliers(result, kept.outliers), orders=orders)
+        estimate = Estimate(mode)
+        result, _ = _result(data, self._instrument, settings, problem, estimate, (start, prepared))
+        same_but_order = settings == last.settings.with_(order=settings.order)
+        orders = last.orders if same_but_order else None
+        return replace(_with_outliers(result, last.outliers), orders=orders)
 
     def history(self, result: FitResult) -> pd.DataFrame:
-        """Return what the last fit, whose result is given, adds to the history of its sources.
+        """Return the rows that the last fit adds to the history of its sources.
 
+        Parameters
+        ----------
+        result : the result of the last fit
+
+        Returns
+        -------
         See `solver.results.source_history.history_table`.
 
         Raises
         ------
         FitError
-            If the last fit is no solution.
+            If the last fit has no solution.
         """
-        kept = self._kept
-        if kept is None or kept.settings != result.settings or kept.mode.reduced is None:
+        last = self._last_fit
+        if last is None or last.settings != result.settings or last.mode.reduced is None:
             raise FitError(f"orbit {self._orbit_id}: {result.summary['reason']}")
-        return history_table(kept.problem, kept.mode.reduced, kept.covariance, result)
+        return history_table(last.problem, last.mode.reduced, last.covariance, result)
 
     def get_ready(self, order: int) -> Iterator[None]:
-        """Prepare, while nobody waits, for what may be asked of the last fit next.
+        """Precompute warm starts for the what-if solutions that are likely to come next.
 
-        See `solver.engines.warm_starts.likely`; with that, it takes no longer than other priors do.
+        These are lower orders (`solver.engines.warm_starts.likely`); with a warm start they
+        take no longer than a change of priors.
 
         Parameters
         ----------
-        order : of the solution on the screen
+        order : distortion order of the solution shown now
 
         Yields
         ------
-        Between steps of about a second, so that a question need not wait for the rest.
+        None, about once a second, so that the caller can handle a request in between.
         """
-        kept = self._kept
-        if kept is None:
+        last = self._last_fit
+        if last is None:
             return
         wanted = likely(self._starts[0], order)
-        # Where there is not memory for all, what was likely of another order is not kept.
-        self._tried = [kept.settings, *(tried for tried in self._tried if tried in wanted)]
-        self._starts = [start for start in self._starts if start.settings in self._tried]
+        # Memory is limited: drop the warm starts that are no longer likely to be used.
+        self._attempted = [last.settings, *(item for item in self._attempted if item in wanted)]
+        self._starts = [start for start in self._starts if start.settings in self._attempted]
         for settings in wanted:
-            if settings not in self._tried:
-                self._tried.append(settings)
-                self._starts += self._started(kept, settings)
+            if settings not in self._attempted:
+                self._attempted.append(settings)
+                self._starts += self._warm_start(last, settings)
                 yield
 
-    def _started(self, kept: _Fitted, settings: FitSettings) -> list[WarmStart]:
-        """Return a change of the last fit, linearised at its own solution, where there is one."""
+    def _warm_start(self, last: _LastFit, settings: FitSettings) -> list[WarmStart]:
+        """Return a warm start for `settings`, in a list; an empty list if there is no solution."""
         try:
-            _, problem = self._selection.choose(settings, kept.outliers)
+            _, problem = self._cache.choose(settings, last.outliers)
         except InputError:
-            # A prior is shifted of a term that the lower order has not, or too little is left.
+            # A prior is shifted for a term that the lower order lacks, or too few data remain.
             return []
-        mode = solve_what_if(kept.mode, kept.problem, problem, settings)
-        # So far may the stars have to move that only a fit can tell.
+        mode = solve_what_if(last.mode, last.problem, problem, settings)
+        # The sources may move beyond the range of the linear model; then a fit is needed.
         mode = mode or find_mode(problem, settings)
         is_solved = mode.status.is_solution
         return [WarmStart(settings, problem, linearised(problem, mode))] if is_solved else []
@@ -221,11 +235,11 @@ class OrbitFitter:
         return compare_orders(highest_problem, settings, progress)
 
     def _resumption(self, settings: FitSettings) -> Resumption:
-        def keep(state: object) -> None:
+        def save(state: object) -> None:
             self._stopped = settings, state
 
-        asked_again = self._stopped is not None and self._stopped[0] == settings
-        return Resumption(self._stopped[1] if asked_again and self._stopped else None, keep)
+        is_same_fit = self._stopped is not None and self._stopped[0] == settings
+        return Resumption(self._stopped[1] if is_same_fit and self._stopped else None, save)
 
 
 def _with_outliers(result: FitResult, outliers: pd.DataFrame | None) -> FitResult:
@@ -238,8 +252,8 @@ def _with_outliers(result: FitResult, outliers: pd.DataFrame | None) -> FitResul
 def _with_orders(result: FitResult, orders: pd.DataFrame | None, seconds: float) -> FitResult:
     if orders is None:
         return result
-    taken = {**dict(result.summary["seconds"]), "orders": seconds}
-    return replace(result, summary={**result.summary, "seconds": taken}, orders=orders)
+    timings = {**dict(result.summary["seconds"]), "orders": seconds}
+    return replace(result, summary={**result.summary, "seconds": timings}, orders=orders)
 
 
 def _result(
@@ -247,15 +261,15 @@ def _result(
     instrument: Instrument,
     settings: FitSettings,
     problem: Problem,
-    found: Estimate,
+    estimate: Estimate,
     times: tuple[float, float],
 ) -> tuple[FitResult, SolvedProblem]:
-    mode = found.mode
+    mode = estimate.mode
     if mode.reduced is None:
         raise FitError(f"orbit {data.orbit_id}: {mode.status.value}")
     start, prepared = times
     solved = time.perf_counter()
-    solution = solved_problem(problem, found, mode.reduced)
+    solution = solved_problem(problem, estimate, mode.reduced)
     sources, places = source_table(solution), true_places(solution, data.truth)
     calibration = calibration_table(solution, instrument)
     tables = {
@@ -265,7 +279,7 @@ def _result(
         "exposures": exposure_table(solution),
         "trace": trace_table(mode),
         "true_places": places,
-        "losses": loss_table(found.losses),
+        "losses": loss_table(estimate.losses),
         **eigenmode_tables(solution, calibration, instrument),
     }
     seconds = {
@@ -273,7 +287,7 @@ def _result(
         "fit": solved - prepared,
         "diagnose": time.perf_counter() - solved,
     }
-    summary = {**summarise(solution, settings, seconds), **found.figures}
+    summary = {**summarise(solution, settings, seconds), **estimate.figures}
     if places is not None:
         summary["truth"] = truth_summary(sources, places)
     result = FitResult(

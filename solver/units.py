@@ -1,16 +1,16 @@
-"""The units of the project, and the constants that convert between them.
+"""Units used in the project, and conversion constants.
 
 | where                        | unit                                                  |
 |------------------------------|-------------------------------------------------------|
-| files and tables             | as `schema.py` says: deg, mas, um, pix, MJD (TCB)     |
+| files and tables             | as in `schema.py`: deg, mas, um, pix, MJD (TCB)       |
 | parameters inside the solver | offsets from an origin, in the unit of their group    |
 | directions                   | unit vectors, BCRS axes                               |
 | velocities                   | in units of the speed of light, BCRS axes             |
 | positions of the observer    | au, BCRS axes                                         |
 
-An angle is never kept as a bare number of degrees where microarcseconds matter:
-1 uas is 2.8e-10 deg, and a float64 near 266 deg resolves 5.7e-14 deg, so that a degree
-value is exact enough to store, but not to subtract, scale and exponentiate.
+Computations that need microarcseconds do not use angles in degrees: 1 uas is 2.8e-10 deg
+and a float64 near 266 deg resolves 5.7e-14 deg, which is precise enough to store a value,
+but not to subtract, scale and exponentiate it.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What goes into a fit and what comes out, with no maths: tables, parameters, settings, results.
+"""Inputs and outputs of a fit: tables, parameters, settings and results. No computation.
 
 Imports `solver.errors` and `solver.units` only, and never JAX.
 """

@@ -1,4 +1,4 @@
-"""What a column and a table are: name, type, unit, meaning, and how to recognise them."""
+"""Definitions of a column (name, type, unit, meaning, aliases) and of a table."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -8,19 +8,19 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Column:
-    """One column.
+    """Definition of one column.
 
     Attributes
     ----------
     name : the canonical name, used everywhere inside the project
     dtype : "int64", "float64", "float32", "bool" or "str"
     unit : astropy unit string of the canonical table; "" where there is none
-    meaning : one line for people
+    meaning : description in one line
     aliases : other names accepted when reading, in order of preference
-    required : whether a table without it is refused
-    default : value of an absent optional column
-    positive : whether values at or below zero are refused
-    may_be_nan : whether NaN is a legitimate value
+    required : whether a table without the column is rejected
+    default : value of an optional column that is absent
+    positive : whether values at or below zero are rejected
+    may_be_nan : whether NaN is valid
     """
 
     name: str
@@ -36,7 +36,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """One table: its name (also the HDU's), its columns, and the columns that are its key."""
+    """Definition of one table: name (also of its HDU), columns and key columns."""
 
     name: str
     columns: tuple[Column, ...]
@@ -63,5 +63,5 @@ class Table:
 
 
 def numpy_dtype(column: Column) -> np.dtype:
-    """Return the NumPy type that holds `column`."""
+    """Return the NumPy type of `column`."""
     return np.dtype(object if column.dtype == "str" else column.dtype)

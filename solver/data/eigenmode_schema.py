@@ -1,6 +1,7 @@
-"""The tables of the modes: which combinations of calibration parameters the data decide.
+"""Tables of the eigenmodes: which combinations of calibration parameters the data constrain.
 
-A mode is here an eigenvector (`solver.results.eigenmodes`), not the maximum of the posterior.
+In these tables a `mode` is an eigenmode (`solver.results.eigenmodes`), not the maximum of the
+posterior.
 """
 
 from solver.data.columns import Column, Table

@@ -1,4 +1,4 @@
-"""Exclusions: sources, exposures and detectors whose measurements a fit is not to use."""
+"""Exclusions: sources, exposures and detectors whose measurements a fit does not use."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -14,13 +14,13 @@ _EXCLUSION = re.compile(r"(source|detector)=(-?\d+)|(exposure)=(-?\d+)/(-?\d+)")
 
 @dataclass(frozen=True)
 class Exclusions:
-    """What is left out.
+    """Excluded sources, exposures and detectors.
 
     Attributes
     ----------
-    sources : source_id
-    exposures : (field_id, plate_id)
-    detectors : detector_id
+    sources : `source_id` of each excluded source
+    exposures : (`field_id`, `plate_id`) of each excluded exposure
+    detectors : `detector_id` of each excluded detector
     """
 
     sources: frozenset[int] = frozenset()
@@ -28,22 +28,22 @@ class Exclusions:
     detectors: frozenset[int] = frozenset()
 
     def __bool__(self) -> bool:
-        """Whether anything is left out."""
+        """Whether anything is excluded."""
         return bool(self.sources or self.exposures or self.detectors)
 
     def without(self, data: OrbitData) -> OrbitData:
-        """Return the orbit without what is left out; row labels stay those of `data`.
+        """Return the orbit without the excluded measurements; row labels stay those of `data`.
 
         Raises
         ------
         InputError
-            If something named was not measured, or nothing would be left.
+            If an excluded item has no measurements, or no measurement would remain.
         """
         if not self:
             return data
         rows = data.measurements
         exposure = list(zip(rows["field_id"], rows["plate_id"], strict=True))
-        gone = np.zeros(len(rows), dtype=bool)
+        is_excluded = np.zeros(len(rows), dtype=bool)
         for kind, excluded, measured in (
             ("source", self.sources, rows["source_id"].tolist()),
             ("exposure", self.exposures, exposure),
@@ -55,16 +55,16 @@ class Exclusions:
                     f"excluded {kind} {_text(min(missing))}: expected one with measurements in "
                     f"orbit {data.orbit_id}, found none"
                 )
-            gone |= np.fromiter((value in excluded for value in measured), bool, len(rows))
-        if gone.all():
+            is_excluded |= np.fromiter((value in excluded for value in measured), bool, len(rows))
+        if is_excluded.all():
             raise InputError(
-                f"exclusions: expected some measurements of orbit {data.orbit_id} to be left, "
+                f"exclusions: expected some measurements of orbit {data.orbit_id} to remain, "
                 f"found that all {len(rows)} are excluded"
             )
-        return of_rows(data, ~gone)
+        return of_rows(data, ~is_excluded)
 
     def names(self) -> list[str]:
-        """Return what is left out in words, in order."""
+        """Return the excluded items as text, sorted."""
         return [
             *(f"source {number}" for number in sorted(self.sources)),
             *(f"exposure {_text(pair)}" for pair in sorted(self.exposures)),
@@ -72,7 +72,7 @@ class Exclusions:
         ]
 
     def to_dict(self) -> dict[str, list]:
-        """Return plain values; `from_dict` reads them back."""
+        """Return the exclusions as plain values; `from_dict` reads them back."""
         return {
             "sources": sorted(self.sources),
             "exposures": [list(pair) for pair in sorted(self.exposures)],
@@ -81,7 +81,7 @@ class Exclusions:
 
     @staticmethod
     def from_dict(values: Mapping[str, Iterable]) -> "Exclusions":
-        """Return what `to_dict` wrote."""
+        """Return the exclusions that `to_dict` wrote."""
         return Exclusions(
             frozenset(values["sources"]),
             frozenset((field, plate) for field, plate in values["exposures"]),
@@ -90,12 +90,14 @@ class Exclusions:
 
 
 def thinned_orbit(data: OrbitData, whole: OrbitData, every: int) -> OrbitData:
-    """Return the orbit with one in so many of its reference sources and of its others.
+    """Return the orbit with every n-th reference source and every n-th other source.
 
     Parameters
     ----------
-    data : the orbit, or what exclusions left of it
-    whole : the orbit, from which the sources are chosen: the same whatever is excluded
+    data : the orbit after exclusions
+    whole : the orbit before exclusions; the sources are chosen from it, so that the choice
+        does not depend on the exclusions
+    every : n
     """
     if every == 1:
         return data
@@ -106,22 +108,22 @@ def thinned_orbit(data: OrbitData, whole: OrbitData, every: int) -> OrbitData:
 
 
 def of_rows(data: OrbitData, chosen: np.ndarray) -> OrbitData:
-    """Return the orbit with some measurements, and the exposures that these are of.
+    """Return the orbit with the chosen measurements and their exposures.
 
     Parameters
     ----------
-    chosen : of every measurement, whether to take it
+    chosen : boolean, one per measurement
     """
     rows = data.measurements[chosen]
-    left = set(zip(rows["field_id"], rows["plate_id"], strict=True))
+    measured = set(zip(rows["field_id"], rows["plate_id"], strict=True))
     plates = zip(data.exposures["field_id"], data.exposures["plate_id"], strict=True)
-    used = np.fromiter((plate in left for plate in plates), bool, len(data.exposures))
+    used = np.fromiter((plate in measured for plate in plates), bool, len(data.exposures))
     exposures = data.exposures[used].reset_index(drop=True)
     return replace(data, measurements=rows, exposures=exposures)
 
 
 def parse_exclusions(texts: Iterable[str]) -> Exclusions:
-    """Return the exclusions that a person wrote.
+    """Parse exclusions.
 
     Parameters
     ----------
@@ -130,7 +132,7 @@ def parse_exclusions(texts: Iterable[str]) -> Exclusions:
     Raises
     ------
     InputError
-        If one reads otherwise.
+        If a text has another form.
     """
     sources, exposures, detectors = set(), set(), set()
     for text in texts:

@@ -1,4 +1,4 @@
-"""Instrument: the nominal focal plane, built in for the mini-mock or read from TOML.
+"""Instrument: the nominal focal plane, either that of the mini-mock or read from TOML.
 
 Paper, section "Survey Design": focal length, four detectors of 1920 x 1920 pixels of
 10 um in a 2 x 2 grid with gaps of 3 mm. A detector's rotation is that of the model,
@@ -19,7 +19,7 @@ from solver.errors import InputError
 
 @dataclass(frozen=True)
 class Detector:
-    """Nominal place of one detector.
+    """Nominal position, rotation and pixels of one detector.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Instrument:
 
     Attributes
     ----------
-    name : for people
+    name : name to show
     focal_length_um : nominal focal length, um
     distortion_scale_um : 1/s of Eq. (model:Lx), the focal-plane radius mapped to 1, um
     detectors : in the order of the detector axis
@@ -65,22 +65,22 @@ class Instrument:
     detectors: tuple[Detector, ...]
 
     def index_of(self, detector_ids: np.ndarray) -> np.ndarray:
-        """Return the position of each id along the detector axis; -1 where unknown."""
+        """Return the index of each id along the detector axis; -1 if unknown."""
         known = {d.detector_id: i for i, d in enumerate(self.detectors)}
         ids, inverse = np.unique(detector_ids, return_inverse=True)
         return np.array([known.get(int(i), -1) for i in ids], dtype=np.int64)[inverse]
 
 
 def _mini_mock() -> Instrument:
-    # Places and rotations as in the published simulator: centres 11.1 mm from the axis.
-    places = ((-1, -1, 0.0), (1, -1, -90.0), (1, 1, 180.0), (-1, 1, 90.0))
+    # As in the published simulator; the centres are at x, y = +-11.1 mm from the optical axis.
+    positions = ((-1, -1, 0.0), (1, -1, -90.0), (1, 1, 180.0), (-1, 1, 90.0))
     return Instrument(
         name="JASMINE mini-mock",
         focal_length_um=4.86e6,
         distortion_scale_um=21_000.0,
         detectors=tuple(
             Detector(i, 11_100.0 * x, 11_100.0 * y, rotation, 10.0, 10.0, 1920, 1920)
-            for i, (x, y, rotation) in enumerate(places)
+            for i, (x, y, rotation) in enumerate(positions)
         ),
     )
 
@@ -108,7 +108,7 @@ def read_instrument(path: Path) -> Instrument:
     Raises
     ------
     InputError
-        If the file cannot be read, a key is missing or unknown, or a value is not usable.
+        If the file cannot be read, a key is missing or unknown, or a value is invalid.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -118,7 +118,12 @@ def read_instrument(path: Path) -> Instrument:
 
 
 def parse_instrument(text: str, path: Path) -> Instrument:
-    """Return the instrument that a TOML text describes; `path` is named in messages.
+    """Return the instrument described by a TOML text.
+
+    Parameters
+    ----------
+    text : content of the file, as for `read_instrument`
+    path : file name for error messages
 
     Raises
     ------
@@ -145,9 +150,9 @@ def parse_instrument(text: str, path: Path) -> Instrument:
 
 
 def write_instrument(instrument: Instrument) -> str:
-    """Return the TOML text that `read_instrument` reads back as `instrument`."""
+    """Return `instrument` as TOML text that `read_instrument` can read."""
     lines = [
-        # A JSON string is a TOML string.
+        # A JSON string is also a TOML string.
         f"name = {json.dumps(instrument.name)}",
         f"focal_length_um = {instrument.focal_length_um!r}",
         f"distortion_scale_um = {instrument.distortion_scale_um!r}",

@@ -8,16 +8,16 @@ import pandas as pd
 
 @dataclass(frozen=True)
 class OrbitData:
-    """Everything that a fit of one orbit reads; columns and units as in `solver.data.schema`.
+    """Input tables of one orbit; columns and units as in `solver.data.schema`.
 
     Attributes
     ----------
     measurements : `schema.MEASUREMENT`, any row order
-    exposures : `schema.ENVIRONMENT`, one row per exposure with measurements: one without
-        has no roll, whose prior is flat, and a fit would say that the system is singular
+    exposures : `schema.ENVIRONMENT`, one row per exposure with measurements. An exposure
+        without measurements would make the fit singular: its position angle has a flat prior
     catalogue : `schema.CATALOGUE`, at least every measured source
-    truth : `schema.TRUTH`, or None where there is no truth
-    provenance : file name -> SHA-256 of what was read
+    truth : `schema.TRUTH`, or None if there is no truth
+    provenance : file name -> SHA-256 of each file read
     """
 
     measurements: pd.DataFrame

@@ -1,4 +1,4 @@
-"""The table of the distortion orders that were compared; `solver.data.schema` lists it."""
+"""Table that compares distortion orders; exported by `solver.data.schema`."""
 
 from solver.data.columns import Column, Table
 

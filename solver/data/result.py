@@ -1,4 +1,4 @@
-"""FitResult: the tables and the summary of one fitted orbit. No JAX, no files."""
+"""FitResult: tables and summary of one fitted orbit. Neither JAX nor files are used here."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from solver.data.settings import FitSettings
 
 
 class FitStatus(Enum):
-    """How a fit ended; the value is the message for people."""
+    """How a fit ended; the value is the message to show."""
 
     CONVERGED = "every step of the last iteration is below the tolerance times its uncertainty"
     WHAT_IF = "one step of the linearised model, which a refit would confirm"
@@ -28,7 +28,7 @@ class FitStatus(Enum):
 
     @property
     def is_solution(self) -> bool:
-        """Whether the engine ended where it was to."""
+        """Whether the engine reached a solution."""
         return self in _SOLUTIONS
 
 
@@ -48,18 +48,19 @@ class FitResult:
     ----------
     sources : `schema.SOURCES`, in ascending source_id
     residuals : `schema.RESIDUALS`, in the row order of the measurements read
-    calibration : `schema.CALIBRATION`, every group of the parameter table but the sources
+    calibration : `schema.CALIBRATION`, every parameter group except the sources
     exposures : `schema.EXPOSURES`, in order of (field_id, plate_id)
     trace : `schema.TRACE`
-    summary : plain numbers and words; keys as written by `solver.fit`
-    settings : the choices that made it
+    summary : plain numbers and text; keys as written by `solver.fit`
+    settings : settings of the fit
     provenance : file name -> SHA-256 of the inputs
-    true_places : `schema.TRUE_PLACES`, or None where there is no truth
-    outliers : `schema.OUTLIERS`, or None where none were looked for
-    orders : `schema.ORDERS`, or None where they were not compared
-    losses : `schema.LOSSES`, or None of an engine without a loss
-    modes, mode_parameters, mode_shifts : `schema.MODES` with what the weak ones of them move,
-        or None in a result from before there were any
+    true_places : `schema.TRUE_PLACES`, or None if there is no truth
+    outliers : `schema.OUTLIERS`, or None if the fit was not robust
+    orders : `schema.ORDERS`, or None if orders were not compared
+    losses : `schema.LOSSES`, or None if the engine has no loss
+    modes, mode_parameters, mode_shifts : the eigenmodes, and the parameters and sources that
+        the weak ones move, as in `solver.data.eigenmode_schema`; None in a result of an older
+        version without them
     """
 
     sources: pd.DataFrame
@@ -80,7 +81,7 @@ class FitResult:
 
     @property
     def orbit_id(self) -> int:
-        """The orbit that was fitted."""
+        """The `orbit_id` of the fitted orbit."""
         return int(self.exposures["orbit_id"].iloc[0])
 
     def values_on(self, axis: str, column: str = "value") -> pd.DataFrame:
@@ -93,7 +94,7 @@ class FitResult:
 
         Returns
         -------
-        Row per element of the axis in order, a column per group on it.
+        One row per element of the axis, in order, and one column per group on the axis.
         """
         names = [group.name for group in groups_on(axis)]  # type: ignore[arg-type]
         rows = self.calibration[self.calibration["group"].isin(names)]

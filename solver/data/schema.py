@@ -1,8 +1,8 @@
-"""Every table of the project, written once: column name, type, unit, meaning, aliases.
+"""Definition of every input and result table: column name, type, unit, meaning, aliases.
 
-The input tables carry the names that the published files use (paper, tables
+The input tables use the column names of the published files (paper, tables
 "Columns of the Ground Truth Catalog" and "Inputs, Model Parameters, and Priors"); the
-result tables carry ours. `solver.io` maps them to and from files.
+result tables use names of this project. `solver.io` maps them to and from files.
 """
 
 from solver.data.columns import Column, Table
@@ -133,7 +133,7 @@ CATALOGUE = Table(
     aliases=("reference", "ref", "catalog"),
 )
 
-# The errors of a true catalogue are not used, and its flags repeat the reference's.
+# The errors of a true catalogue are not used, and its flags repeat those of the catalogue.
 _TRUTH_OPTIONAL = {
     "ra_error",
     "dec_error",

@@ -1,4 +1,4 @@
-"""The tables of a survey that was fitted orbit by orbit: what each orbit adds, and all together."""
+"""Tables of a survey fitted orbit by orbit: rows from each orbit, and combined results."""
 
 from solver.data.columns import Column, Table
 
@@ -13,7 +13,7 @@ _AXES = ("ra", "dec")
 
 
 def _covariance(kind: str, meaning: str) -> tuple[Column, ...]:
-    """Return the columns of a 2 x 2 covariance."""
+    """Return the columns of a 2 x 2 position covariance."""
     return (
         Column(f"sigma_ra_{kind}", "float64", "mas", f"{meaning}, sigma of ra cos(dec)"),
         Column(f"sigma_dec_{kind}", "float64", "mas", f"{meaning}, sigma of dec"),
@@ -21,8 +21,8 @@ def _covariance(kind: str, meaning: str) -> tuple[Column, ...]:
     )
 
 
-_NOISE = _covariance("noise", "part of the marginal covariance that scatters between orbits")
-_SHARED = _covariance("catalogue", "part that the catalogue's errors cause, alike in all orbits")
+_NOISE = _covariance("noise", "part of the marginal covariance that is independent between orbits")
+_SHARED = _covariance("catalogue", "part from the catalogue's errors, common to all orbits")
 
 ERROR_BUDGET = Table("error_budget", (_SOURCE, *_NOISE, *_SHARED), key=("source_id",))
 
@@ -64,7 +64,7 @@ HISTORY = Table(
                 f"true_offset_{axis}",
                 "float64",
                 "mas",
-                f"truth minus catalogue in {axis}; NaN where there is no truth",
+                f"truth minus catalogue in {axis}; NaN without truth",
                 may_be_nan=True,
             )
             for axis in _AXES
@@ -104,17 +104,19 @@ MOTIONS = Table(
         Column("span", "float64", "yr", "time from the first to the last orbit"),
         Column("epoch", "float64", "yr", "epoch of the fit, Julian year in TCB"),
         *_of_motion("fit", "fitted minus catalogue"),
-        *_of_motion("sigma_noise", "sigma of the fit by the measurements' noise"),
-        *_of_motion("sigma_catalogue", "sigma by the catalogue's errors, alike in all orbits"),
-        *_of_motion("sigma", "sigma of the fit, both together"),
+        *_of_motion("sigma_noise", "sigma of the fit from measurement noise"),
+        *_of_motion(
+            "sigma_catalogue", "sigma of the fit from the catalogue's errors, common to all orbits"
+        ),
+        *_of_motion("sigma", "total sigma of the fit"),
         *_of_motion("true", "truth minus catalogue"),
         *_of_motion("pull", "fitted minus true, over sigma"),
-        Column("chi2", "float64", "", "of the fit, weighted by the noise", may_be_nan=True),
+        Column("chi2", "float64", "", "chi2 of the fit, weighted by the noise", may_be_nan=True),
         Column("dof", "int64", "", "degrees of freedom of chi2"),
         *_per_axis("scatter", "standard deviation of the orbits' positions about the motion"),
-        *_per_axis("expected_scatter", "the same as predicted from the noise of each orbit"),
+        *_per_axis("expected_scatter", "scatter predicted from the noise of each orbit"),
         *_per_axis("mean_deviation", "mean of estimate minus truth over the orbits"),
-        *_per_axis("expected_deviation", "sigma of that mean: noise and catalogue"),
+        *_per_axis("expected_deviation", "sigma of that mean, from noise and catalogue"),
         *_per_axis("rms_truth", "rms separation from the truth in one coordinate"),
         Column("rms_truth_2d", "float64", "mas", "rms separation from the truth", may_be_nan=True),
         *_per_axis("rms_catalogue", "rms separation from the catalogue in one coordinate"),
@@ -123,23 +125,27 @@ MOTIONS = Table(
     key=("source_id",),
 )
 
-# How the errors of mean positions fall with the number of orbits averaged.
+# Error of mean positions against the number of orbits averaged.
 ERRORS_BY_COUNT = Table(
     "errors_by_count",
     (
         Column("n_orbits", "int64", "", "number of orbits averaged, N"),
-        Column("n_sources", "int64", "", "number of sources with so many orbits"),
-        Column("error_mas", "float64", "mas", "rms error in one coordinate, both pooled"),
-        Column("error_low_mas", "float64", "mas", "one sigma below"),
-        Column("error_high_mas", "float64", "mas", "one sigma above"),
-        Column("expected_mas", "float64", "mas", "noise and floor together"),
-        Column("noise_mas", "float64", "mas", "of the noise, which falls with sqrt(N)"),
-        Column("floor_mas", "float64", "mas", "of the catalogue's errors, which does not"),
+        Column("n_sources", "int64", "", "number of sources with at least N orbits"),
+        Column("error_mas", "float64", "mas", "rms error in one coordinate, RA and Dec pooled"),
+        Column("error_low_mas", "float64", "mas", "error_mas less its sigma"),
+        Column("error_high_mas", "float64", "mas", "error_mas plus its sigma"),
+        Column("expected_mas", "float64", "mas", "expected error, from noise and floor"),
+        Column(
+            "noise_mas", "float64", "mas", "expected error from noise, which falls as 1/sqrt(N)"
+        ),
+        Column(
+            "floor_mas", "float64", "mas", "expected error from the catalogue, common to all orbits"
+        ),
     ),
     key=("n_orbits",),
 )
 
-# A row per orbit of a run; figures are missing where the orbit failed or is still to be fitted.
+# One row per orbit of a run; numbers are missing if the orbit failed or is not fitted yet.
 RUN_ORBITS = Table(
     "orbits",
     (
@@ -159,12 +165,20 @@ RUN_ORBITS = Table(
                 ("dof", "", "effective degrees of freedom"),
                 ("residual_rms_x", "pix", "rms residual in x"),
                 ("residual_rms_y", "pix", "rms residual in y"),
-                ("normalised_deviation_ra", "", "of the reference sources, in alpha*"),
-                ("normalised_deviation_dec", "", "of the reference sources, in delta"),
-                ("expected_normalised_deviation_ra", "", "its expectation, in alpha*"),
-                ("expected_normalised_deviation_dec", "", "its expectation, in delta"),
-                ("mean_error_ra", "mas", "sigma of the mean error of all other sources, alpha*"),
-                ("mean_error_dec", "mas", "sigma of the mean error of all other sources, delta"),
+                (
+                    "normalised_deviation_ra",
+                    "",
+                    "normalised deviation of the reference sources, alpha*",
+                ),
+                (
+                    "normalised_deviation_dec",
+                    "",
+                    "normalised deviation of the reference sources, delta",
+                ),
+                ("expected_normalised_deviation_ra", "", "expected normalised deviation, alpha*"),
+                ("expected_normalised_deviation_dec", "", "expected normalised deviation, delta"),
+                ("mean_error_ra", "mas", "sigma of the mean error of the other sources, alpha*"),
+                ("mean_error_dec", "mas", "sigma of the mean error of the other sources, delta"),
                 ("seconds", "s", "time from reading to writing"),
             )
         ),

@@ -1,4 +1,4 @@
-"""Atomic file writing: a reader sees the old file or the new one, never a part of it."""
+"""Atomic file writing: a reader sees the old file or the new one, never a partial file."""
 
 import hashlib
 import os
@@ -12,22 +12,22 @@ from solver.errors import InputError
 
 @contextmanager
 def write_atomically(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside `path` that takes its place once it is whole.
+    """Write to a temporary file that replaces `path` when it is complete.
 
     Parameters
     ----------
-    path : the file to write; one that exists is replaced
+    path : the file to write; an existing file is replaced
 
     Yields
     ------
-    An empty file in the same folder and with the same suffix. When the block ends it is
-    flushed to disk and renamed to `path`; when the block raises it is removed and `path`
-    is left as it was.
+    Path of an empty file in the same folder and with the same suffix. When the block ends,
+    the file is flushed to disk and renamed to `path`. If the block raises, the file is
+    removed and `path` is unchanged.
 
     Raises
     ------
     InputError
-        Before the block runs if `path` cannot be written; after it if the disk refuses.
+        Before the block if `path` cannot be written; after it if writing to disk fails.
     """
     target = require_writable(path)
     temporary = target.with_name(f".{target.stem}-{secrets.token_hex(6)}{target.suffix}")
@@ -44,13 +44,13 @@ def write_atomically(path: Path) -> Iterator[Path]:
 
 
 def require_writable(path: Path) -> Path:
-    """Return the place where `path` is to be written, links followed.
+    """Return `path` with links resolved, after checking that it can be written.
 
     Raises
     ------
     InputError
-        If the folder is missing or read-only, or `path` is something other than a file
-        that may be replaced.
+        If the folder is missing or read-only, or `path` exists and is not a file that can
+        be replaced.
     """
     target = Path(path).resolve()
     folder = target.parent
@@ -58,7 +58,7 @@ def require_writable(path: Path) -> Path:
         raise InputError(f"{path}: expected to write into a folder, found no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"{path}: expected a folder that can be written, found {folder} read-only")
-    # A device such as /dev/null exists but must never be renamed over.
+    # A device such as /dev/null exists, but must not be replaced.
     if target.exists() and not target.is_file():
         raise InputError(f"{path}: expected a file to write, found something that is not a file")
     if target.exists() and not os.access(target, os.W_OK):

@@ -1,4 +1,4 @@
-"""Column checks: the values of one raw column in the type and unit that the schema asks."""
+"""Column checks: convert one raw column to the type and unit of the schema, and check it."""
 
 import warnings
 from typing import NamedTuple
@@ -11,19 +11,19 @@ from astropy.utils.masked import Masked
 
 from solver.data.columns import Column
 
-# Where float32 resolves worse than what is measured: 110 mas at 266 deg, minutes in MJD.
+# Units in which float32 is too coarse: 110 mas at 266 deg, minutes in MJD.
 _UNITS_IN_FLOAT64 = ("deg", "d")
 _TIME_FORMAT = {"d": "mjd", "yr": "jyear"}
 _LOGICALS = {"t": True, "true": True, "f": False, "false": False}
 
 
 class Converted(NamedTuple):
-    """The values of one column, and what is wrong with them.
+    """Converted values of one column, and their problems.
 
     Attributes
     ----------
-    values : in the canonical type and unit; None where they could not be converted
-    problems : one message each; empty if the values can be used
+    values : values in the canonical type and unit; None if they cannot be converted
+    problems : one message per problem; empty if the values can be used
     """
 
     values: np.ndarray | None
@@ -31,19 +31,19 @@ class Converted(NamedTuple):
 
 
 def convert(raw: RawColumn | Quantity | Time, column: Column, where: str) -> Converted:
-    """Convert one raw column to the type and unit of `column`, and judge every value.
+    """Convert one raw column to the type and unit of `column`, and check every value.
 
     Parameters
     ----------
     raw : a column of an astropy table, masked or not
-    column : what it should be
+    column : definition of the expected column
     where : the file, table and column, for messages
 
     Returns
     -------
-    Values of the canonical type in the canonical unit. Integers never pass through a
-    float; a time becomes an MJD or a Julian year in TCB; an absent unit is taken to be
-    the canonical one.
+    Values of the canonical type in the canonical unit. Integers are never converted to
+    floats on the way; times become MJDs or Julian years in TCB; a column without a unit is
+    assumed to have the canonical one.
     """
     if isinstance(raw, Time):
         return _from_time(raw, column, where)
@@ -58,7 +58,7 @@ def convert(raw: RawColumn | Quantity | Time, column: Column, where: str) -> Con
 
 
 def missing_rows(raw: RawColumn | Quantity | Time) -> np.ndarray:
-    """Return which rows of a raw column hold no value: those masked, NaN or infinite."""
+    """Return which rows of a raw column have no value: masked, NaN or infinite."""
     if isinstance(raw, Time):
         return np.asarray(raw.mask)
     values, missing = _split(raw)
@@ -89,7 +89,7 @@ def _from_time(raw: Time, column: Column, where: str) -> Converted:
     if missing.any():
         return _refused(where, "a time in every row", _rows(missing, "without one"))
     with warnings.catch_warnings():
-        # ERFA calls UTC years beyond its leap-second table dubious.
+        # ERFA warns of UTC years beyond its leap-second table.
         warnings.simplefilter("ignore")
         values = np.asarray(raw.tcb.to_value(_TIME_FORMAT[column.unit]), dtype=np.float64)
     return Converted(values, _value_problems(values, column, where))
@@ -102,7 +102,7 @@ def _floats(values: np.ndarray, unit: Unit | None, column: Column, where: str) -
         return _refused(where, "float64, for its precision", str(values.dtype))
     canonical = Unit(column.unit)
     if isinstance(unit, UnrecognizedUnit):
-        # An old VOTable's units are read by rules that do not know "mas.yr**-1".
+        # The unit format of old VOTables does not include "mas.yr**-1".
         unit = Unit(str(unit), parse_strict="silent")
     converted = values.astype(np.float64)
     if unit is not None and unit not in (Unit(""), canonical):
@@ -119,11 +119,11 @@ def _value_problems(values: np.ndarray, column: Column, where: str) -> list[str]
     finite = np.isfinite(values)
     if not finite.all() and not column.may_be_nan:
         found.append(f"{where}: expected finite numbers, found {_rows(~finite, 'NaN or infinite')}")
-    low, high, words = _limits(column)
+    low, high, expected = _limits(column)
     bad = finite & ((values <= low) if column.positive else (values < low) | (values > high))
     if bad.any():
         value = float(values[np.argmax(bad)])
-        found.append(f"{where}: expected {words}, found {value!r}: {_rows(bad, 'such')}")
+        found.append(f"{where}: expected {expected}, found {value!r}: {_rows(bad, 'invalid')}")
     return found
 
 
@@ -160,29 +160,29 @@ def _logicals(values: np.ndarray, where: str) -> Converted:
     if values.dtype.kind in "iu":
         bad = (values != 0) & (values != 1)
         if bad.any():
-            return _refused(where, expected, f"{values[bad][0]}: {_rows(bad, 'such')}")
+            return _refused(where, expected, f"{values[bad][0]}: {_rows(bad, 'invalid')}")
         return Converted(values == 1, [])
     if values.dtype.kind in "SUO":
-        words = [word.strip().lower() for word in _words(values)]
-        bad = np.array([word not in _LOGICALS for word in words], dtype=bool)
+        texts = [text.strip().lower() for text in _as_text(values)]
+        bad = np.array([text not in _LOGICALS for text in texts], dtype=bool)
         if bad.any():
-            found = f"{words[int(np.argmax(bad))]!r}: {_rows(bad, 'such')}"
+            found = f"{texts[int(np.argmax(bad))]!r}: {_rows(bad, 'invalid')}"
             return _refused(where, expected, found)
-        return Converted(np.array([_LOGICALS[word] for word in words], dtype=bool), [])
+        return Converted(np.array([_LOGICALS[text] for text in texts], dtype=bool), [])
     return _refused(where, expected, _kind(values))
 
 
 def _texts(values: np.ndarray, where: str) -> Converted:
     if values.dtype.kind not in "SUO":
         return _refused(where, "text", _kind(values))
-    return Converted(np.array(_words(values), dtype=object), [])
+    return Converted(np.array(_as_text(values), dtype=object), [])
 
 
-def _words(values: np.ndarray) -> list[str]:
+def _as_text(values: np.ndarray) -> list[str]:
     return [v.decode("ascii", "replace") if isinstance(v, bytes) else str(v) for v in values]
 
 
 def _kind(values: np.ndarray) -> str:
     if values.dtype.kind in "SUO" and values.size:
-        return f"text such as {_words(values[:1])[0]!r}"
+        return f"text such as {_as_text(values[:1])[0]!r}"
     return str(values.dtype)

@@ -1,9 +1,9 @@
-"""Consistency of the tables of an observation with each other and with the catalogue."""
+"""Consistency checks between the tables of an observation, the catalogue and the truth."""
 
 import numpy as np
 import pandas as pd
 
-_MOST_NAMED = 5
+_MAX_LISTED = 5
 _EXPOSURE = ["orbit_id", "field_id", "plate_id"]
 
 
@@ -11,27 +11,27 @@ def exposure_problems(
     measurements: pd.DataFrame, exposures: pd.DataFrame, where: str, where_exposures: str
 ) -> list[str]:
     """Return a message if a measured exposure has no row in the environment table."""
-    lacking = sorted(exposures_of(measurements) - exposures_of(exposures))
-    if not lacking:
+    missing = sorted(exposures_of(measurements) - exposures_of(exposures))
+    if not missing:
         return []
     return [
         f"{where}: expected a row in {where_exposures} for every measured exposure "
-        f"(orbit_id, field_id, plate_id), found none for {_some(lacking)}"
+        f"(orbit_id, field_id, plate_id), found none for {_listed(missing)}"
     ]
 
 
 def catalogue_problems(
     measurements: pd.DataFrame, catalogue: pd.DataFrame, where: str, where_catalogue: str
 ) -> list[str]:
-    """Return messages for measured sources not in the catalogue, or no reference among them."""
+    """Return messages if measured sources are missing from the catalogue or none is a reference."""
     measured = np.unique(measurements["source_id"])
     known = catalogue["source_id"].to_numpy()
-    lacking = measured[~np.isin(measured, known)]
+    missing = measured[~np.isin(measured, known)]
     found = []
-    if lacking.size:
+    if missing.size:
         found.append(
             f"{where}, column source_id: expected every measured source in {where_catalogue}, "
-            f"found {lacking.size} of {measured.size} that are not: {_some(lacking.tolist())}"
+            f"found {missing.size} of {measured.size} that are not: {_listed(missing.tolist())}"
         )
     references = known[catalogue["is_reference"].to_numpy(dtype=bool)]
     if not np.isin(measured, references).any():
@@ -45,7 +45,7 @@ def catalogue_problems(
 def truth_problems(
     measurements: pd.DataFrame, truth: pd.DataFrame, where: str, where_truth: str
 ) -> list[str]:
-    """Return a message if the truth knows none of the measured sources; some is enough."""
+    """Return a message if no measured source is in the truth; some missing ones are allowed."""
     measured = np.unique(measurements["source_id"])
     if np.isin(measured, truth["source_id"]).any():
         return []
@@ -60,6 +60,6 @@ def exposures_of(table: pd.DataFrame) -> set[tuple[int, int, int]]:
     return set(table[_EXPOSURE].drop_duplicates().itertuples(index=False, name=None))
 
 
-def _some(items: list) -> str:
-    told = ", ".join(str(item) for item in items[:_MOST_NAMED])
-    return told + (f" and {len(items) - _MOST_NAMED} more" if len(items) > _MOST_NAMED else "")
+def _listed(items: list) -> str:
+    text = ", ".join(str(item) for item in items[:_MAX_LISTED])
+    return text + (f" and {len(items) - _MAX_LISTED} more" if len(items) > _MAX_LISTED else "")

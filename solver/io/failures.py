@@ -1,4 +1,4 @@
-"""Failures of the reading libraries on damaged files, told as one `InputError`."""
+"""Conversion of library exceptions on damaged files to `InputError`."""
 
 import struct
 import warnings
@@ -14,8 +14,8 @@ from pyarrow import ArrowException
 
 from solver.errors import InputError
 
-# Measured by feeding the readers damaged files: they fail with whatever their own code
-# trips over first, a KeyError for TFIELDS = 999 or a TypeError for NAXIS2 = 'abc'.
+# Found by reading damaged files. The libraries raise whatever fails first in their own code,
+# such as KeyError for TFIELDS = 999 or TypeError for NAXIS2 = 'abc'.
 _RAISED_ON_DAMAGE = (
     ArithmeticError,
     ArrowException,
@@ -37,25 +37,25 @@ _RAISED_ON_DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,
 )
-_LONGEST_REASON = 300
+_MAX_REASON_LENGTH = 300
 
 
 @contextmanager
 def reading(where: str, expected: str) -> Iterator[None]:
-    """Turn every failure of a reading library inside the block into an `InputError`.
+    """Convert exceptions of a reading library inside the block to `InputError`.
 
-    The libraries' warnings are silenced as well: what they warn of (a failed checksum, a
-    short file, an unknown unit) is checked by the callers, who refuse it.
+    Warnings of the libraries are silenced. The callers check what these would report, such as
+    a wrong checksum, a truncated file or an unknown unit.
 
     Parameters
     ----------
-    where : the file and the part of it that is read
-    expected : what should be there, in words
+    where : the file, and the part of it that is read
+    expected : text that describes the expected content
 
     Raises
     ------
     InputError
-        Naming `where`, `expected` and the library's reason.
+        With `where`, `expected` and the message of the library.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -64,7 +64,7 @@ def reading(where: str, expected: str) -> Iterator[None]:
         except InputError:
             raise
         except _RAISED_ON_DAMAGE as error:
-            reason = " ".join(str(error).split())[:_LONGEST_REASON]
+            reason = " ".join(str(error).split())[:_MAX_REASON_LENGTH]
             raise InputError(
                 f"{where}: expected {expected}, found {type(error).__name__}: {reason}"
             ) from error

@@ -1,4 +1,4 @@
-"""FITS files: judged by their headers before any data are read, then read as tables."""
+"""FITS files: check the headers before reading any data, then read all tables."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +16,12 @@ _VALID_LOGICALS = (ord("T"), ord("F"))
 
 @dataclass(frozen=True)
 class FitsFile:
-    """What a FITS file holds.
+    """Contents of a FITS file.
 
     Attributes
     ----------
     primary : the primary header
-    tables : HDU name -> table, in file order; an HDU without a name is `hdu1`, `hdu2`...
+    tables : HDU name -> table, in file order; HDUs without a name are `hdu1`, `hdu2`...
     """
 
     primary: fits.Header
@@ -31,8 +31,8 @@ class FitsFile:
 def read_fits(path: Path) -> FitsFile:
     """Read the primary header and every table of a FITS file.
 
-    Sizes are compared with the file before any data are read, so that a header cannot
-    ask for more memory than the file holds; checksums, where there are any, must hold.
+    Sizes in the headers are compared with the size of the file before any data are read, so
+    that a wrong header cannot exhaust the memory. Checksums, if present, must be valid.
 
     Parameters
     ----------
@@ -40,23 +40,23 @@ def read_fits(path: Path) -> FitsFile:
 
     Returns
     -------
-    Tables with native byte order, units where the file has them, NaN left as NaN, and
-    masked values where the file has nulls.
+    Tables with native byte order and the units of the file. NaN stays NaN; nulls of the file
+    are masked.
 
     Raises
     ------
     InputError
-        If the file is not whole and valid, naming the HDU.
+        If the file is incomplete or invalid; the message names the HDU.
     """
-    promised = extents(Path(path))
+    expected = extents(Path(path))
     with (
         reading(str(path), "a FITS file"),
         fits.open(path, memmap=False, disable_image_compression=True) as hdus,
     ):
-        # A header that astropy cannot read ends the file for it, with a mere warning.
-        if len(hdus) < len(promised):
+        # astropy stops at a header that it cannot read, with only a warning.
+        if len(hdus) < len(expected):
             raise InputError(
-                f"{promised[len(hdus)].where}: expected a valid header, found a damaged one"
+                f"{expected[len(hdus)].where}: expected a valid header, found a damaged one"
             )
         tables: dict[str, Table] = {}
         for index, hdu in enumerate(hdus):
@@ -85,7 +85,7 @@ def _check_width(where: str, hdu: fits.BinTableHDU) -> None:
 
 
 def _check_checksums(path: Path, index: int, hdu: fits.PrimaryHDU) -> None:
-    # astropy only warns, so the sums are asked for one by one; 0 says that one is wrong.
+    # astropy only warns of wrong checksums, so each is verified here; 0 means wrong.
     where = _where(path, index, hdu)
     with reading(where, "valid checksums"):
         wrong = [

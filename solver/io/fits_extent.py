@@ -1,8 +1,8 @@
-"""Extents of the HDUs of a FITS file, from their mandatory cards alone.
+"""Extents of the HDUs of a FITS file, computed from their mandatory cards.
 
-A FITS library believes a header: NAXIS2 = 1000000000 in a small file makes it ask for all
-that memory, and NAXIS = 999999999 keeps it busy for hours. So the cards that give sizes
-are judged here, against the size of the file, before a library opens it.
+astropy trusts the headers: NAXIS2 = 1000000000 in a small file makes it allocate that much
+memory, and NAXIS = 999999999 keeps it busy for hours. The cards that determine sizes are
+therefore checked here against the size of the file, before astropy opens it.
 """
 
 import math
@@ -28,7 +28,7 @@ _BITS = (8, 16, 32, 64, -32, -64)
 
 
 class Extent(NamedTuple):
-    """Where one HDU is: `end` is the byte after its data, padding not counted."""
+    """Location of one HDU; `end` is the byte after its data, without padding."""
 
     where: str
     data_start: int
@@ -36,13 +36,13 @@ class Extent(NamedTuple):
 
 
 def extents(path: Path) -> list[Extent]:
-    """Return the extents of the HDUs of a FITS file, all within the file.
+    """Return the extents of the HDUs of a FITS file, all of them within the file.
 
     Raises
     ------
     InputError
-        If the file does not start as FITS does, a header is damaged, promises more data
-        than the file holds or more than can be read here, or something follows the HDUs.
+        If the file does not start as a FITS file, a header is damaged or specifies more data
+        than the file contains or more than `MAX_BYTES`, or other bytes follow the HDUs.
     """
     size = path.stat().st_size
     found: list[Extent] = []
@@ -77,7 +77,7 @@ def _extent(path: Path, stream: BinaryIO, start: int, index: int, size: int) -> 
 
 
 def _cards(stream: BinaryIO, where: str) -> dict[bytes, bytes]:
-    """Return keyword -> rest of the card; of a repeated keyword the first."""
+    """Return keyword -> rest of the card; the first card of a repeated keyword."""
     cards: dict[bytes, bytes] = {}
     for number, card in enumerate(_header(stream, where)):
         if number == 0 and not _FIRST_CARD.match(card):
@@ -92,8 +92,8 @@ def _cards(stream: BinaryIO, where: str) -> dict[bytes, bytes]:
 def _header(stream: BinaryIO, where: str) -> Iterator[bytes]:
     for _ in range(_MAX_HEADER_BYTES // _BLOCK):
         block = stream.read(_BLOCK)
-        for place in range(0, len(block), _CARD):
-            card = block[place : place + _CARD]
+        for offset in range(0, len(block), _CARD):
+            card = block[offset : offset + _CARD]
             if card.rstrip() == b"END" and len(block) == _BLOCK:
                 return
             yield card
@@ -113,7 +113,7 @@ def _data_length(cards: dict[bytes, bytes], where: str) -> int:
     )
     if not axes:
         return 0
-    # Random groups, of old radio data, say NAXIS1 = 0 and mean that it does not count.
+    # Random groups (old radio data) have NAXIS1 = 0, which is not a factor of the size.
     counted = axes[1:] if b"GROUPS" in cards and axes[0] == 0 else axes
     return abs(bits) // 8 * gcount * (pcount + math.prod(counted))
 

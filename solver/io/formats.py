@@ -1,4 +1,4 @@
-"""Raw tables of one file, whatever its format: names, units and values as they are there."""
+"""Raw tables of one file in any supported format, with its names, units and values."""
 
 import re
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from solver.io.fits import read_fits
 from solver.io.fits_extent import MAX_BYTES, MAX_ROWS
 
 _BYTES_PER_CELL = 8
-# The archive of Gaia writes null where ECSV asks for nothing.
+# The Gaia archive writes null for missing values, where ECSV has an empty field.
 _NO_VALUE = [("", "0"), ("null", "0")]
 
 
@@ -27,17 +27,17 @@ def read_tables(path: Path) -> dict[str, Table]:
 
     Parameters
     ----------
-    path : a FITS, ECSV, CSV, Parquet or VOTable file, told apart by its suffix
+    path : a FITS, ECSV, CSV, Parquet or VOTable file, recognised by its suffix
 
     Returns
     -------
-    Name -> table. FITS and VOTable name their tables; a file of any other format holds
-    one, which has the file's name without the suffix. Missing values are masked.
+    Name -> table. Tables in FITS and VOTable files have names; a file of any other format has
+    one table, named like the file without the suffix. Missing values are masked.
 
     Raises
     ------
     InputError
-        If there is no such file or it is not what its suffix says, whole and valid.
+        If there is no such file, or it is not a complete and valid file of that format.
     """
     path = Path(path)
     read = _READERS.get(path.suffix.lower())
@@ -54,7 +54,7 @@ def read_tables(path: Path) -> dict[str, Table]:
 
 
 def holds_one_table(path: Path) -> bool:
-    """Return whether files of this suffix hold exactly one table, which has no name."""
+    """Return whether files with this suffix contain exactly one table, without a name."""
     return path.suffix.lower() in _ONE_TABLE
 
 
@@ -64,12 +64,12 @@ def is_fits(path: Path) -> bool:
 
 
 def has_reader(path: Path) -> bool:
-    """Return whether files of this suffix can be read."""
+    """Return whether files with this suffix can be read."""
     return path.suffix.lower() in _READERS
 
 
 def place(path: Path, name: str) -> str:
-    """Return the words that tell where table `name` of file `path` is."""
+    """Return the location of table `name` in file `path`, as text for messages."""
     if holds_one_table(path):
         return str(path)
     return f"{path}, {'table' if path.suffix.lower() in _VOTABLE else 'HDU'} {name}"
@@ -129,7 +129,7 @@ def _check_size(path: Path, rows: int, columns: int) -> None:
 
 
 def _check_markup(path: Path) -> None:
-    # Entities can expand without bound, and a stream elsewhere would be fetched.
+    # Entities can expand without limit, and an external stream would be downloaded.
     def refuse_entity(*_: object) -> None:
         raise InputError(f"{path}: expected a VOTable without entity declarations, found one")
 
@@ -168,7 +168,7 @@ def _column(values: pa.ChunkedArray) -> Column:
     if pa.types.is_dictionary(values.type):
         values = values.cast(values.type.value_type)
     missing = values.is_null().to_numpy()
-    # Filled before they become NumPy arrays: integers with gaps would turn into floats.
+    # Nulls are filled before conversion to NumPy: integers with nulls would become floats.
     if pa.types.is_integer(values.type) or pa.types.is_floating(values.type):
         array = values.fill_null(0).to_numpy()
     elif pa.types.is_boolean(values.type):

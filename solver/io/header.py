@@ -1,4 +1,4 @@
-"""FITS headers of a result: what made it, and the figures that its readers look for."""
+"""FITS headers of a result: provenance, settings and summary values."""
 
 import math
 
@@ -15,12 +15,12 @@ FORMAT = 1
 
 _VERSIONS = {"PLATEVIZ": "plateviz", "JAX": "jax", "NUMPY": "numpy", "ASTROPY": "astropy"}
 
-# Keyword, value, comment. Text of any length has no comment, for it may leave no room.
+# Keyword, value, comment. Long text has no comment, since it may leave no room for one.
 Card = tuple[str, object, str]
 
 
 def primary_header(result: FitResult) -> fits.Header:
-    """Return the primary header: format, versions, settings, inputs and figures."""
+    """Return the primary header: format, versions, settings, inputs and summary values."""
     inputs = list(result.provenance.items())
     versions = versions_of(_VERSIONS.values())
     cards: list[Card] = [
@@ -41,7 +41,7 @@ def primary_header(result: FitResult) -> fits.Header:
     cards += [
         *_settings(result.settings),
         ("NITER", int(result.trace["iteration"].max()) if len(result.trace) else 0, "iterations"),
-        *_figures(result),
+        *_summary_cards(result),
     ]
     return _header(cards)
 
@@ -56,26 +56,30 @@ def _settings(settings: FitSettings) -> list[Card]:
 
 
 def versions_in(primary: fits.Header) -> dict[str, str]:
-    """Return the versions of the packages that made a result, from its primary header."""
+    """Return the versions of the packages used for a result, from its primary header."""
     return {package: primary[key] for key, package in _VERSIONS.items() if key in primary}
 
 
 def result_header(result: FitResult) -> fits.Header:
-    """Return the header of RESULT, with the keywords of the published files."""
+    """Return the header of the HDU RESULT, with the keywords of the published files."""
     references = result.sources[result.sources["is_reference"]]
     loss = result.trace["objective"].iloc[-1] if len(result.trace) else math.nan
-    words = "std of offset over prior sigma, references"
+    comment = "std of offset over prior sigma, references"
     return _header(
         [
-            *_figures(result),
+            *_summary_cards(result),
             ("LOSS", loss, "final objective"),
-            ("SIGMA_RA", _scatter(references["offset_ra"], references["prior_sigma_ra"]), words),
-            ("SIGMA_DE", _scatter(references["offset_dec"], references["prior_sigma_dec"]), words),
+            ("SIGMA_RA", _scatter(references["offset_ra"], references["prior_sigma_ra"]), comment),
+            (
+                "SIGMA_DE",
+                _scatter(references["offset_dec"], references["prior_sigma_dec"]),
+                comment,
+            ),
         ]
     )
 
 
-def _figures(result: FitResult) -> list[Card]:
+def _summary_cards(result: FitResult) -> list[Card]:
     sigma_x, sigma_y = result.residuals["sx"].mean(), result.residuals["sy"].mean()
     return [
         ("OBSTIME", result.exposures["obstime"].mean(), "mean epoch, MJD (TCB)"),
@@ -93,7 +97,7 @@ def _header(cards: list[Card]) -> fits.Header:
     header = fits.Header()
     for keyword, value, comment in cards:
         plain = value.item() if isinstance(value, np.generic) else value
-        # A FITS header has no NaN; what is not known is left out.
+        # A FITS header cannot hold NaN; unknown values are omitted.
         if plain is None or (isinstance(plain, float) and not math.isfinite(plain)):
             continue
         if isinstance(plain, str):

@@ -1,4 +1,4 @@
-"""Inspection of files: what each is, what is in it, and everything wrong with it."""
+"""Inspection of files: kind, contents and problems of each file."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ from solver.io.result import is_result, to_result
 from solver.io.table_check import examine, matched_names
 
 _INPUTS = (MEASUREMENT, ENVIRONMENT, CATALOGUE, TRUTH)
-_LEAST_SHARE_OF_COLUMNS = 0.5
+_MIN_COLUMN_SHARE = 0.5
 _ONLY_IN_A_TRUTH = {"ra_epoch", "dec_epoch"}
 _SURVEY_TABLES = {
     "reference.parquet": CATALOGUE,
@@ -32,7 +32,7 @@ _SURVEY_TABLES = {
 
 @dataclass
 class _Finding:
-    """A file under inspection; `frames` are its usable tables: kind, place, rows."""
+    """A file being inspected; `frames` are its usable tables as (kind, location, rows)."""
 
     path: Path
     kind: str = "unknown"
@@ -42,10 +42,10 @@ class _Finding:
 
 
 def inspect_files(paths: Iterable[Path]) -> list[dict]:
-    """Tell what files are and everything wrong with them; a bad file never raises.
+    """Describe files and list their problems; an invalid file does not raise.
 
     Measurements are also checked against the environment, catalogue and truth among the
-    files; what is wrong there is told with the measurements.
+    files; problems of this check are listed with the measurements.
 
     Parameters
     ----------
@@ -53,10 +53,10 @@ def inspect_files(paths: Iterable[Path]) -> list[dict]:
 
     Returns
     -------
-    For each path a dictionary fit for JSON: `file`; `kind` ("observation", "measurement",
-    "environment", "catalogue", "truth", "result", "instrument", "survey" or "unknown");
-    `tables`, each with `name`, `file`, `kind`, `rows` and `columns` (`name`, `unit`,
-    `type`, `min`, `max`, and `canonical`, the name it is read as, or None); `problems`.
+    One dictionary per path, which can be written as JSON: `file`; `kind` ("observation",
+    "measurement", "environment", "catalogue", "truth", "result", "instrument", "survey" or
+    "unknown"); `tables`, each with `name`, `file`, `kind`, `rows` and `columns` (`name`,
+    `unit`, `type`, `min`, `max`, and `canonical`, the name it is read as, or None); `problems`.
     """
     findings = [_inspect(Path(path)) for path in paths]
     _cross_check(findings)
@@ -149,11 +149,11 @@ def _recognise(path: Path, name: str, table: RawTable) -> Table | None:
     kind = named.get(name.lower())
     if kind is None or shares[kind.name] == 0.0:
         kind = max(_INPUTS, key=lambda k: shares[k.name])
-        if shares[kind.name] < _LEAST_SHARE_OF_COLUMNS:
+        if shares[kind.name] < _MIN_COLUMN_SHARE:
             return None
     if kind in (CATALOGUE, TRUTH):
-        says_truth = "truth" in f"{path.stem} {name}".lower()
-        return TRUTH if says_truth or _ONLY_IN_A_TRUTH & set(table.colnames) else CATALOGUE
+        is_named_truth = "truth" in f"{path.stem} {name}".lower()
+        return TRUTH if is_named_truth or _ONLY_IN_A_TRUTH & set(table.colnames) else CATALOGUE
     return kind
 
 
@@ -210,10 +210,12 @@ def _cross_check(findings: list[_Finding]) -> None:
     for finding in findings:
         for kind, where, measured in finding.frames:
             if kind is MEASUREMENT:
-                finding.problems += _against(measured, where, [finding, *findings])
+                finding.problems += _cross_check_problems(measured, where, [finding, *findings])
 
 
-def _against(measured: pd.DataFrame, where: str, findings: list[_Finding]) -> list[str]:
+def _cross_check_problems(
+    measured: pd.DataFrame, where: str, findings: list[_Finding]
+) -> list[str]:
     problems: list[str] = []
     seen: set[str] = set()
     others = (frame for finding in findings for frame in finding.frames)

@@ -1,4 +1,4 @@
-"""Parquet files: written so that they are small, and quick to write and to read."""
+"""Parquet files: small, and fast to write and to read."""
 
 from pathlib import Path
 
@@ -7,17 +7,17 @@ from pyarrow import parquet
 
 
 def write_parquet(table: pa.Table, path: Path) -> None:
-    """Write a table, with numbers by their bytes and all else by a dictionary.
+    """Write a table, with byte-stream split for floats and a dictionary for other columns.
 
-    What is measured hardly repeats, so that a dictionary of it, which Parquet tries by default,
-    is thrown away after half of the time; sign and exponent are alike, and apart from the rest
-    they are compressed to little.
+    Measured values hardly repeat, so a dictionary, which Parquet tries by default, would take
+    half of the time and be discarded. Their sign and exponent bytes are similar, and compress
+    well when stored apart from the other bytes.
     """
-    numbers = [field.name for field in table.schema if pa.types.is_floating(field.type)]
+    floats = [field.name for field in table.schema if pa.types.is_floating(field.type)]
     parquet.write_table(
         table,
         path,
         compression="zstd",
-        use_dictionary=[name for name in table.column_names if name not in numbers],
-        use_byte_stream_split=numbers,
+        use_dictionary=[name for name in table.column_names if name not in floats],
+        use_byte_stream_split=floats,
     )

@@ -1,8 +1,9 @@
-"""The published result layout as data: which of our columns is which of theirs.
+"""The published result layout: HDUs, and the published name of each result column.
 
-The HDUs RESULT, SAMPLE, TELESCOPE, DETECTOR, DISTORTION and TRACE have the columns of the
-published files under the published names; ours follow them. TELESCOPE, DETECTOR and
-DISTORTION repeat what CALIBRATION says in full, for readers of the published layout.
+The HDUs RESULT, SAMPLE, TELESCOPE, DETECTOR, DISTORTION and TRACE start with the columns of
+the published files under their published names, followed by the other columns of this
+project. TELESCOPE, DETECTOR and DISTORTION repeat values of CALIBRATION, for programs that
+read the published layout.
 """
 
 from collections.abc import Mapping
@@ -20,15 +21,14 @@ from solver.units import MAS_PER_DEG, factor_between, unit_named
 
 @dataclass(frozen=True)
 class PublishedTable:
-    """How one table of a result is kept in an HDU.
+    """Layout of one result table in an HDU.
 
     Attributes
     ----------
     hdu : name of the HDU
-    table : the table as we know it
-    published : canonical name -> name in the file, where they differ
-    unitless : canonical names of columns that have no TUNIT in the published files,
-        whose readers would not expect one
+    table : definition of the table
+    published : canonical name -> name in the file, if different
+    unitless : canonical names of columns written without TUNIT, as in the published files
     """
 
     hdu: str
@@ -43,13 +43,13 @@ class PublishedTable:
 
 @dataclass(frozen=True)
 class Derived:
-    """A published column that repeats ours in another form; written, never read.
+    """A published column computed from other columns; written, never read.
 
     Attributes
     ----------
     name : name in the file
     unit : TUNIT; "" for none
-    meaning : one line for people, with the unit
+    meaning : description in one line, with the unit
     values : one per row
     """
 
@@ -114,7 +114,7 @@ PUBLISHED_ORDER = {
 
 
 def source_sigmas(sources: pd.DataFrame) -> list[Derived]:
-    """Return the published sigmas of the sources, in degrees of the coordinate."""
+    """Return the published sigmas of the sources, in degrees of RA and Dec."""
     cos_dec = np.cos(np.radians(sources["dec"].to_numpy()))
     columns = []
     for kind, suffix in (("conditional", "sig"), ("marginal", "marg")):

@@ -1,4 +1,4 @@
-"""Reading an orbit: an observation, a catalogue and perhaps the truth, checked together."""
+"""Read an orbit from an observation, a catalogue and optionally a truth, and check them."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -15,11 +15,11 @@ from solver.io.consistency import catalogue_problems, exposure_problems, truth_p
 from solver.io.formats import has_reader, holds_one_table, place, read_tables
 from solver.io.table_check import conform, refuse
 
-_MOST_ORBITS_LISTED = 10
+_MAX_LISTED_ORBITS = 10
 
 
 class Located(NamedTuple):
-    """A raw table, the words that tell where it is, and the file it is in."""
+    """A raw table, its location as text for messages, and the file it is in."""
 
     table: RawTable
     where: str
@@ -29,30 +29,30 @@ class Located(NamedTuple):
 def read_orbit(
     obs: Path, reference: Path, truth: Path | None = None, orbit: int | None = None
 ) -> OrbitData:
-    """Read one orbit and check its tables, each alone and all together.
+    """Read one orbit and check its tables, separately and for consistency.
 
-    Row order means nothing in any of the files. Exposures without a measurement are
-    dropped; the catalogue keeps all its rows, and so does a truth, which may lack some of
-    the measured sources.
+    The order of rows in the files does not matter. Exposures without measurements are
+    dropped; the catalogue and the truth keep all rows. The truth need not contain every
+    measured source.
 
     Parameters
     ----------
-    obs : a FITS or VOTable file with the tables `measurement` and `environment`; or the
-        measurement table in a file of its own, with a file `environment` beside it; or
-        the folder of two such files
-    reference : the catalogue: the first table with rows of the file
-    truth : the true catalogue, likewise
-    orbit : the `orbit_id` to read, needed if there are several
+    obs : a FITS or VOTable file with the tables `measurement` and `environment`; or a file
+        with the measurement table alone, with a file `environment` in the same folder; or
+        a folder with these two files
+    reference : file of the catalogue; its first table that has rows is read
+    truth : file of the true catalogue, likewise
+    orbit : the `orbit_id` to read; required if there are several
 
     Returns
     -------
-    Tables as in `solver.data.schema`, with the observation first in the provenance and the
+    Tables as in `solver.data.schema`. In the provenance the observation is first and the
     catalogue second.
 
     Raises
     ------
     InputError
-        If anything is wrong with a file, a table, or what they say of each other.
+        If a file or table is invalid, or the tables are inconsistent.
     """
     measured, environment = find_observation(Path(obs))
     catalogue = find_catalogue(Path(reference))
@@ -84,7 +84,7 @@ def find_observation(obs: Path) -> tuple[Located, Located]:
     Raises
     ------
     InputError
-        If either is missing, or there are several to choose from.
+        If either is missing or ambiguous.
     """
     if obs.is_dir():
         return _one_table(_file_in(obs, MEASUREMENT)), _one_table(_file_in(obs, ENVIRONMENT))
@@ -100,7 +100,7 @@ def find_catalogue(path: Path) -> Located:
     Raises
     ------
     InputError
-        If no table has any.
+        If no table has rows.
     """
     tables = read_tables(path)
     for name, table in tables.items():
@@ -113,7 +113,7 @@ def find_catalogue(path: Path) -> Located:
 
 
 def names_of(table: schema.Table) -> tuple[str, ...]:
-    """Return the names that a table of this kind may have in a file, in lower case."""
+    """Return the names by which a table is recognised in a file, in lower case."""
     return (table.name.lower(), *(alias.lower() for alias in table.aliases))
 
 
@@ -156,12 +156,12 @@ def _file_in(folder: Path, wanted: schema.Table, preferred_suffix: str = "") -> 
 
 def _choose(measurements: pd.DataFrame, orbit: int | None, where: str) -> int:
     orbits = sorted(int(o) for o in measurements["orbit_id"].unique())
-    listed = ", ".join(str(o) for o in orbits[:_MOST_ORBITS_LISTED])
-    if len(orbits) > _MOST_ORBITS_LISTED:
-        listed += f" and {len(orbits) - _MOST_ORBITS_LISTED} more"
+    listed = ", ".join(str(o) for o in orbits[:_MAX_LISTED_ORBITS])
+    if len(orbits) > _MAX_LISTED_ORBITS:
+        listed += f" and {len(orbits) - _MAX_LISTED_ORBITS} more"
     if orbit is None and len(orbits) > 1:
         raise InputError(
-            f"{where}, column orbit_id: expected one orbit, or the one to read to be chosen, "
+            f"{where}, column orbit_id: expected one orbit, or a choice of the orbit to read, "
             f"found the orbits {listed}"
         )
     chosen = orbits[0] if orbit is None else orbit
@@ -185,7 +185,7 @@ def _hashes(
     files = [measured.path, catalogue.path, *([truth.path] if truth else []), environment.path]
     hashes: dict[str, str] = {}
     for path in dict.fromkeys(file.resolve() for file in files):
-        # Files of the same name in different folders keep the folder's name as well.
+        # Files of the same name in different folders are told apart by the folder's name.
         name = path.name if path.name not in hashes else f"{path.parent.name}/{path.name}"
         hashes[name] = sha256_of(path)
     return hashes

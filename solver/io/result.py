@@ -1,4 +1,4 @@
-"""Result files: the published result layout in FITS, written and read without loss."""
+"""Result files: write and read the published result layout in FITS, without loss."""
 
 import json
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ from solver.io.published import Derived, PublishedTable
 
 _SUMMARY = "SUMMARY"
 _SECTIONS = ("summary", "settings", "provenance")
-# Tables that not every result has.
+# Tables that a result may lack.
 _OPTIONAL = {
     "true_places": layout.TRUE_PLACES,
     "losses": layout.LOSSES,
@@ -36,12 +36,12 @@ _KINDS = {"int64": "iu", "float64": "f", "bool": "b", "str": "SU"}
 
 
 def write_result(result: FitResult, path: Path) -> None:
-    """Write a fitted orbit in the published result layout, in one step.
+    """Write a fitted orbit in the published result layout, atomically.
 
     Parameters
     ----------
-    result : what to write; `read_result` reads back every table and value of it
-    path : the FITS file; one that exists is replaced once the new one is whole
+    result : the fitted orbit; `read_result` reads back all tables and values
+    path : the FITS file; an existing file is replaced when the new one is complete
 
     Raises
     ------
@@ -68,10 +68,10 @@ def write_result(result: FitResult, path: Path) -> None:
                 _derived_hdu(_SUMMARY, _summary_columns(result)),
             ]
         )
-        for name, kept in _OPTIONAL.items():
+        for name, hdu_layout in _OPTIONAL.items():
             frame = getattr(result, name)
             if frame is not None:
-                hdus.append(_table_hdu(kept, frame))
+                hdus.append(_table_hdu(hdu_layout, frame))
         hdus.writeto(temporary, overwrite=True, checksum=True)
 
 
@@ -81,7 +81,7 @@ def read_result(path: Path) -> FitResult:
     Raises
     ------
     InputError
-        If the file is not such a result, is damaged or incomplete, or has a newer format.
+        If the file is not a result, is damaged or incomplete, or has a newer format.
     """
     path = Path(path)
     if not path.is_file():
@@ -90,7 +90,7 @@ def read_result(path: Path) -> FitResult:
 
 
 def read_versions(path: Path) -> dict[str, str]:
-    """Return the versions of the packages that made a result; raises as `read_result`."""
+    """Return the versions of the packages used for a result; raises as `read_result`."""
     with reading(str(path), "a FITS file"):
         primary = fits.getheader(path)
     _check_format(path, primary)
@@ -98,7 +98,7 @@ def read_versions(path: Path) -> dict[str, str]:
 
 
 def to_result(path: Path, file: FitsFile) -> FitResult:
-    """Return the fitted orbit that the contents of `path` are; raises as `read_result`."""
+    """Convert the contents of the file `path` to a fitted orbit; raises as `read_result`."""
     _check_format(path, file.primary)
     sections = _read_summary(path, _table(path, file, _SUMMARY))
     with reading(f"{path}, HDU {_SUMMARY}", "the settings of a fit"):
@@ -113,14 +113,14 @@ def to_result(path: Path, file: FitsFile) -> FitResult:
         settings=settings,
         provenance=sections["provenance"],
         **{
-            name: _frame(path, file, kept) if kept.hdu in file.tables else None
-            for name, kept in _OPTIONAL.items()
+            name: _frame(path, file, hdu_layout) if hdu_layout.hdu in file.tables else None
+            for name, hdu_layout in _OPTIONAL.items()
         },
     )
 
 
 def is_result(primary: fits.Header) -> bool:
-    """Return whether a primary header is that of a result of ours, of any version."""
+    """Return whether a primary header is that of a plateviz result, of any version."""
     return primary.get("ORIGIN") == ORIGIN and isinstance(primary.get("FORMAT"), int)
 
 
@@ -139,24 +139,24 @@ def _check_format(path: Path, primary: fits.Header) -> None:
 
 
 def _table_hdu(
-    kept: PublishedTable,
+    hdu_layout: PublishedTable,
     frame: pd.DataFrame,
     extra: list[Derived] | None = None,
     header: fits.Header | None = None,
 ) -> fits.BinTableHDU:
     columns = [
         Derived(
-            kept.name(column),
-            "" if column.name in kept.unitless else column.unit,
+            hdu_layout.name(column),
+            "" if column.name in hdu_layout.unitless else column.unit,
             f"[{column.unit}] {column.meaning}" if column.unit else column.meaning,
             _stored(frame[column.name], column),
         )
-        for column in kept.table
+        for column in hdu_layout.table
     ]
     columns += extra or []
-    order = {name: rank for rank, name in enumerate(layout.PUBLISHED_ORDER.get(kept.hdu, ()))}
+    order = {name: rank for rank, name in enumerate(layout.PUBLISHED_ORDER.get(hdu_layout.hdu, ()))}
     columns.sort(key=lambda column: order.get(column.name, len(order)))
-    return _derived_hdu(kept.hdu, columns, header)
+    return _derived_hdu(hdu_layout.hdu, columns, header)
 
 
 def _derived_hdu(
@@ -184,7 +184,7 @@ def _text_array(texts: list[str]) -> np.ndarray:
 
 
 def _escape(text: str) -> str:
-    # FITS tables hold ASCII and drop spaces at the end.
+    # FITS tables store ASCII and drop trailing spaces.
     plain = text.encode("unicode_escape").decode("ascii")
     bare = plain.rstrip(" ")
     return bare + r"\x20" * (len(plain) - len(bare))
@@ -215,7 +215,7 @@ def _summary_columns(result: FitResult) -> list[Derived]:
 def _plain(value: object) -> object:
     if isinstance(value, np.generic):
         return value.item()
-    raise TypeError(f"expected plain numbers and words, got {type(value).__name__}")
+    raise TypeError(f"expected plain numbers and text, got {type(value).__name__}")
 
 
 def _read_summary(path: Path, table: RawTable) -> Mapping[str, dict]:
@@ -236,16 +236,21 @@ def _table(path: Path, file: FitsFile, name: str) -> RawTable:
     return file.tables[name]
 
 
-def _frame(path: Path, file: FitsFile, kept: PublishedTable) -> pd.DataFrame:
-    table = _table(path, file, kept.hdu)
-    missing = [kept.name(c) for c in kept.table if kept.name(c) not in table.colnames]
+def _frame(path: Path, file: FitsFile, hdu_layout: PublishedTable) -> pd.DataFrame:
+    table = _table(path, file, hdu_layout.hdu)
+    missing = [
+        hdu_layout.name(c) for c in hdu_layout.table if hdu_layout.name(c) not in table.colnames
+    ]
     if missing:
         raise InputError(
-            f"{path}, HDU {kept.hdu}: expected the columns of a result, "
+            f"{path}, HDU {hdu_layout.hdu}: expected the columns of a result, "
             f"found none called {', '.join(missing)}"
         )
     return pd.DataFrame(
-        {c.name: _restored(table[kept.name(c)], c, f"{path}, HDU {kept.hdu}") for c in kept.table}
+        {
+            c.name: _restored(table[hdu_layout.name(c)], c, f"{path}, HDU {hdu_layout.hdu}")
+            for c in hdu_layout.table
+        }
     )
 
 

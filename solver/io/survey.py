@@ -1,12 +1,12 @@
-"""Survey directories: the tables of many orbits that share one reference catalogue.
+"""Survey directories: tables of many orbits with one reference catalogue.
 
     survey.toml                        format, versions, instrument, settings; written last
     reference.parquet                  `schema.CATALOGUE`
-    truth.parquet                      `schema.TRUTH`, where there is truth
+    truth.parquet                      `schema.TRUTH`, if there is truth
     exposures.parquet                  `schema.ENVIRONMENT` of all orbits
     measurements/orbit=0000.parquet    `schema.MEASUREMENT` of one orbit
 
-A directory without `survey.toml` is not read: it is unfinished, or something else.
+A directory without `survey.toml` is not read: it is unfinished or not a survey.
 """
 
 import json
@@ -41,7 +41,7 @@ _ORBIT_FILE = re.compile(r"orbit=(\d{4,})\.parquet")
 
 
 def measurement_path(directory: Path, orbit_id: int) -> Path:
-    """Return where the measurements of an orbit are kept."""
+    """Return the path of the measurements of an orbit."""
     return Path(directory) / MEASUREMENTS / f"orbit={orbit_id:04d}.parquet"
 
 
@@ -51,7 +51,7 @@ def survey_orbits(directory: Path) -> list[int]:
     Raises
     ------
     InputError
-        If the directory is not a whole survey.
+        If the directory is not a complete survey.
     """
     read_header(directory)
     folder = Path(directory) / MEASUREMENTS
@@ -64,14 +64,14 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
 
     Returns
     -------
-    The orbit's tables; of the catalogue and the truth only the measured sources; in the
-    provenance the hash of every file read, the measurements first.
+    The tables of the orbit. The catalogue and the truth contain only the measured sources; the
+    provenance lists every file read, the measurements first.
 
     Raises
     ------
     InputError
-        If the directory is not a whole survey, has no such orbit, or anything is wrong
-        with a table or with what the tables say of each other.
+        If the directory is not a complete survey or has no such orbit, or if a table is
+        invalid or the tables are inconsistent.
     """
     directory = Path(directory)
     orbits = survey_orbits(directory)
@@ -109,12 +109,12 @@ def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
 
     Parameters
     ----------
-    name : of the file, for a survey that is not finished
+    name : file name; differs for an unfinished survey
 
     Raises
     ------
     InputError
-        If there is none, it cannot be read, or its format is not one this program knows.
+        If the file is missing or unreadable, or its format is not supported.
     """
     path = Path(directory) / name
     try:
@@ -133,13 +133,13 @@ def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
 
 
 def section(header: Mapping[str, object], name: str) -> Mapping[str, object]:
-    """Return a section of a header; an empty one where there is none of that name."""
+    """Return a section of a header; an empty one if it is absent."""
     found = header.get(name)
     return found if isinstance(found, Mapping) else {}
 
 
 def write_header(directory: Path, content: Mapping[str, object], name: str = HEADER) -> None:
-    """Write a survey's header: text, numbers, lists, and mappings as tables of them.
+    """Write a survey's header; values are text, numbers, lists and mappings (TOML tables).
 
     Raises
     ------
@@ -156,12 +156,12 @@ def write_header(directory: Path, content: Mapping[str, object], name: str = HEA
 
 
 def read_survey_table(path: Path, schema: Table) -> pd.DataFrame:
-    """Read one table of a survey as `schema` asks.
+    """Read one table of a survey and convert it to `schema`.
 
     Raises
     ------
     InputError
-        If the file is missing or its table is not of the schema.
+        If the file is missing or its table does not conform to the schema.
     """
     return conform(find_catalogue(path).table, schema, str(path))
 
@@ -198,7 +198,7 @@ def _check_orbit(measurements: pd.DataFrame, orbit_id: int, path: Path) -> None:
 
 def _ranges(orbits: list[int]) -> str:
     if not orbits:
-        return "none, for there are no measurements"
+        return "none, since there are no measurements"
     consecutive = orbits == list(range(orbits[0], orbits[-1] + 1))
     return f"{orbits[0]} to {orbits[-1]}" if consecutive else ", ".join(map(str, orbits))
 
@@ -217,6 +217,6 @@ def _toml(value: object) -> str:
         return f'"""\n{text}"""'
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
-    # A text, number or truth value is written alike in JSON and in TOML, but for the one
-    # control character that JSON leaves as it is.
+    # Text, numbers and booleans have the same form in JSON and TOML, except for the one control
+    # character that JSON does not escape.
     return json.dumps(value).replace("\x7f", "\\u007f")

@@ -1,4 +1,4 @@
-"""Table checks: a raw table against its schema, with everything wrong said at once."""
+"""Table checks: convert a raw table to its schema and report all problems at once."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,25 +12,25 @@ from solver.data.columns import Column, Table
 from solver.errors import InputError
 from solver.io.column_check import convert
 
-_MOST_IN_ONE_MESSAGE = 5
+_MAX_LISTED_PROBLEMS = 5
 
 
 def conform(raw: RawTable, schema: Table, where: str) -> pd.DataFrame:
-    """Return a raw table as `schema` asks: its columns, in its order, types and units.
+    """Convert a raw table to the columns, order, types and units of `schema`.
 
-    Columns are found without regard to case, the canonical name first and then the
-    aliases in order; other columns are left out, and absent optional ones are filled.
+    Column names are matched ignoring case, the canonical name first and then the aliases in
+    order. Other columns are dropped; absent optional columns get their default.
 
     Parameters
     ----------
-    raw : a table as it was in a file
-    schema : what it should be
+    raw : a table as read from a file
+    schema : definition of the expected table
     where : the file and table, for messages
 
     Raises
     ------
     InputError
-        If anything in `problems` is wrong with it.
+        If the table has any of `problems`.
     """
     frame, found = examine(raw, schema, where)
     refuse(found)
@@ -38,22 +38,22 @@ def conform(raw: RawTable, schema: Table, where: str) -> pd.DataFrame:
 
 
 def problems(raw: RawTable, schema: Table, where: str) -> list[str]:
-    """Return everything that keeps `raw` from being a table of `schema`, one message each."""
+    """Return one message for each reason why `raw` does not conform to `schema`."""
     return examine(raw, schema, where)[1]
 
 
 def refuse(found: list[str]) -> None:
-    """Raise one `InputError` that tells the first few of the problems `found`, if any."""
+    """Raise one `InputError` that lists the first few of the problems `found`, if any."""
     if not found:
         return
-    message = "; ".join(found[:_MOST_IN_ONE_MESSAGE])
-    if len(found) > _MOST_IN_ONE_MESSAGE:
-        message += f"; and {len(found) - _MOST_IN_ONE_MESSAGE} more"
+    message = "; ".join(found[:_MAX_LISTED_PROBLEMS])
+    if len(found) > _MAX_LISTED_PROBLEMS:
+        message += f"; and {len(found) - _MAX_LISTED_PROBLEMS} more"
     raise InputError(message)
 
 
 def examine(raw: RawTable, schema: Table, where: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return the columns of `schema` that `raw` has in a usable state, and every problem."""
+    """Return the usable columns of `schema` in `raw`, and all problems."""
     names = matched_names(raw.colnames, schema)
     found = _missing(raw.colnames, names, schema, where)
     if len(raw) == 0:
@@ -74,9 +74,9 @@ def examine(raw: RawTable, schema: Table, where: str) -> tuple[pd.DataFrame, lis
 
 
 def matched_names(present: list[str], schema: Table) -> dict[str, str]:
-    """Return canonical name -> name in the file, for the columns of `schema` that are there.
+    """Return canonical name -> name in the file, for the columns of `schema` that are present.
 
-    The canonical name goes before its aliases, and the same case before another.
+    The canonical name has priority over aliases, and a match of case over one without.
     """
     names = {name.strip().lower(): name for name in reversed(present)}
     names.update({name: name for name in present})
@@ -91,7 +91,7 @@ def matched_names(present: list[str], schema: Table) -> dict[str, str]:
 
 
 def _relaxed(column: Column) -> Column:
-    # Where absence would be filled with NaN, a NaN in the file says no less.
+    # If an absent column would be filled with NaN, NaN in the file is valid too.
     nan_if_absent = not column.required and column.dtype == "float64" and column.default is None
     return replace(column, may_be_nan=column.may_be_nan or nan_if_absent)
 
@@ -107,10 +107,10 @@ def _missing(present: list[str], names: Mapping[str, str], schema: Table, where:
     if not missing:
         return []
     spare = [name for name in present if name not in names.values()]
-    told = ", ".join(_with_close_match(column, spare) for column in missing)
+    listed = ", ".join(_with_close_match(column, spare) for column in missing)
     return [
-        f"{where}: expected the columns of a {schema.name} table, found none for {told}; "
-        f"the columns there are: {', '.join(present) or 'none'}"
+        f"{where}: expected the columns of a {schema.name} table, found none for {listed}; "
+        f"the columns found are: {', '.join(present) or 'none'}"
     ]
 
 
@@ -131,8 +131,8 @@ def _repeated(frame: pd.DataFrame, schema: Table, where: str) -> list[str]:
     if not repeated.any():
         return []
     example = frame.loc[repeated.idxmax(), key]
-    told = ", ".join(f"{name} {value}" for name, value in example.items())
+    key_text = ", ".join(f"{name} {value}" for name, value in example.items())
     return [
         f"{where}: expected each {', '.join(key)} once, found {int(repeated.sum())} rows that "
-        f"repeat another, for example {told} in row {int(repeated.idxmax()) + 1}"
+        f"repeat another, for example {key_text} in row {int(repeated.idxmax()) + 1}"
     ]

@@ -1,4 +1,4 @@
-"""The observation model, one equation of the paper per file: from the sky to detector pixels.
+"""The observation model, from the sky to detector pixels; one equation of the paper per file.
 
 Imports `solver.data`.
 """

@@ -1,7 +1,7 @@
-"""Stellar aberration by the observer's velocity, in the form of ERFA's `ab`.
+"""Stellar aberration by the observer's velocity, as in ERFA's `ab`.
 
-Left out of the model it hides in the quadratic distortion terms, up to 0.36 mas at the
-corners of the field; so it is applied here, per exposure.
+It is applied per exposure. If it were omitted, the quadratic distortion terms would absorb
+it, up to 0.36 mas at the corners of the field.
 """
 
 import jax.numpy as jnp
@@ -20,11 +20,11 @@ def aberrate(
     lorentz: Float[Array, "*#obs"],
     sun_distance: Float[Array, "*#obs"],
 ) -> Components:
-    """Return apparent directions, not normalised, along the same axes.
+    """Return apparent directions along the same axes, not normalised.
 
     Parameters
     ----------
-    components : of unit vectors towards the sources
+    components : unit vectors towards the sources
     velocity : of the observer, in c, along the same axes
     speed_along : dot product of source direction and velocity, in c
     lorentz : sqrt(1 - v^2)

@@ -1,4 +1,4 @@
-"""The apparent motion of a source: proper motion and parallax, as offsets on the sky."""
+"""Apparent motion of a source: proper motion and parallax, as offsets on the sky."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000
 
 N_PARAMETERS = 5
 
-# An array for an array, a scalar for a scalar.
+# An array for array input, a scalar for scalar input.
 AnyFloat = Any
 
 
@@ -34,7 +34,7 @@ def parallax_factors(
 
     Parameters
     ----------
-    ra, dec : deg, one or shape (n,)
+    ra, dec : deg, scalar or shape (n,)
     observer : barycentric position, au, shape (3,) or (n, 3)
     """
     a, d = np.radians(ra), np.radians(dec)
@@ -47,22 +47,22 @@ def parallax_factors(
 def motion_design(
     ra: np.ndarray | float, dec: np.ndarray | float, mjd: np.ndarray, epoch: float
 ) -> np.ndarray:
-    """Return how its five parameters move a source at some times.
+    """Return the design matrix of a source's motion for its five astrometric parameters.
 
     Parameters
     ----------
-    ra, dec : of one source, or of that of each time, deg
+    ra, dec : position of the source, one for all times or one per time, deg
     mjd : times, MJD in TCB, shape (n,)
-    epoch : of the parameters, Julian year
+    epoch : epoch of the parameters, Julian year
 
     Returns
     -------
-    Shape (n, 2, 5): offsets in ra cos(dec) and dec, mas, by one unit of each of
+    Shape (n, 2, 5): offsets in ra cos(dec) and dec, mas, per unit of each of
     `survey_schema.MOTION_PARAMETERS`
     """
-    # Many sources share the times of few orbits.
-    times, which = np.unique(mjd, return_inverse=True)
-    observer = observer_at(times).position[which]
+    # The ephemeris is computed once per distinct time: many sources share those of an orbit.
+    times, inverse = np.unique(mjd, return_inverse=True)
+    observer = observer_at(times).position[inverse]
     years = julian_year(mjd) - epoch
     design = np.zeros((len(years), 2, N_PARAMETERS))
     design[:, 0, 0] = design[:, 1, 1] = 1.0

@@ -1,8 +1,8 @@
-"""Catalogue sources at an epoch: directions and the covariance of their positions.
+"""Propagation of catalogue sources to an epoch: directions and position covariances.
 
 Paper, Eqs. (exp:survey:alpha_p) to (exp:survey:sigma_delta_p), in vector form: uniform
-space motion from a Julian epoch in TCB and the parallax of the observer's barycentric
-position, without aberration. Errors are those of alpha* = alpha cos(dec) and delta.
+space motion from a Julian epoch in TCB and parallax from the observer's barycentric
+position, without aberration. Errors are in alpha* = alpha cos(dec) and delta.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000, RAD_PER_DEG, RAD_PER_M
 
 
 class Places(NamedTuple):
-    """Sources at one epoch.
+    """Positions of sources at one epoch.
 
     `frame` holds direction, east and north; `covariance` is that of (alpha*, delta), mas^2.
     """
@@ -29,7 +29,7 @@ class Places(NamedTuple):
 def propagate(
     catalogue: pd.DataFrame, mjd_tcb: float, observer_position: Float[np.ndarray, " 3"]
 ) -> Places:
-    """Return where the sources of a catalogue are seen from `observer_position`, and how surely.
+    """Return positions of catalogue sources seen from `observer_position`, with covariances.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def frames_at(
 ) -> Float[np.ndarray, "src 3 3"]:
     """Return direction, east and north of sources at an epoch; arguments as `propagate`.
 
-    The columns of uncertainties are not used, so that a true catalogue will do.
+    The uncertainty columns are not used and may be absent, as in a true catalogue.
     """
     years = years_since_epoch(catalogue, mjd_tcb)
     start = tangent_frame(catalogue["ra"].to_numpy(), catalogue["dec"].to_numpy())
@@ -67,7 +67,7 @@ def sky_position(
     """Return right ascension in [0, 360) and declination, deg, of vectors of any length."""
     x, y, z = direction.T
     ra = np.mod(np.arctan2(y, x) / RAD_PER_DEG, 360.0)
-    # A hair below zero is rounded up to the full turn.
+    # `mod` rounds an angle just below zero up to 360.
     return np.where(ra < 360.0, ra, 0.0), np.arctan2(z, np.hypot(x, y)) / RAD_PER_DEG
 
 
@@ -93,13 +93,13 @@ def jacobian_at(
     years: Float[np.ndarray, " n"],
     observer_position: Float[np.ndarray, "n 3"] | Float[np.ndarray, " 3"],
 ) -> Float[np.ndarray, "n 2 5"]:
-    """Return the derivative of (alpha*, delta) by the five astrometric parameters.
+    """Return the derivatives of (alpha*, delta) with respect to the five astrometric parameters.
 
     Parameters
     ----------
     frame : direction, east and north of each source
-    years : since the epoch of its parameters
-    observer_position : barycentric, au, one for all or for each
+    years : time since the epoch of the parameters
+    observer_position : barycentric, au, one for all sources or one per source
     """
     jacobian = np.zeros((len(frame), 2, 5))
     jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0

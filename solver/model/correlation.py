@@ -1,4 +1,4 @@
-"""Correlations of the five astrometric parameters, as a catalogue's columns give them."""
+"""Correlations of the five astrometric parameters, from the columns of a catalogue."""
 
 from itertools import combinations
 
@@ -15,7 +15,7 @@ def correlation_matrices(catalogue: pd.DataFrame) -> Float[np.ndarray, "src 5 5"
 
     Parameters
     ----------
-    catalogue : has the columns `CORRELATIONS`
+    catalogue : table with the columns `CORRELATIONS`
     """
     matrices = np.tile(np.eye(5), (len(catalogue), 1, 1))
     for (i, j), name in zip(combinations(range(5), 2), CORRELATIONS, strict=True):
@@ -26,8 +26,8 @@ def correlation_matrices(catalogue: pd.DataFrame) -> Float[np.ndarray, "src 5 5"
 def square_roots(matrices: Float[np.ndarray, "src 5 5"]) -> Float[np.ndarray, "src 5 5"]:
     """Return the symmetric square root of each correlation or covariance matrix.
 
-    It is the only root that does not depend on the order of the parameters. Eigenvalues
-    that rounded correlations have put below zero count as zero, and so does an error of zero.
+    Unlike a Cholesky factor it does not depend on the order of the parameters. Negative
+    eigenvalues, which come from rounded correlations, are set to zero.
     """
     values, vectors = np.linalg.eigh(matrices)
     scaled = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]

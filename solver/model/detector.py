@@ -10,12 +10,12 @@ def to_pixel(
     rotation: Float[Array, "*#obs"],
     pitch: tuple[Float[Array, "*#obs"], Float[Array, "*#obs"]],
 ) -> tuple[Float[Array, "*obs"], Float[Array, "*obs"]]:
-    """Return detector coordinates of positions on the distorted focal plane.
+    """Return the detector coordinates of positions on the distorted focal plane.
 
     Parameters
     ----------
     focal : x and y, um
-    centre : place of the detector's centre, um
+    centre : position of the detector's centre, um
     rotation : rad
     pitch : pixel pitch along the detector's axes, um
 
@@ -25,5 +25,5 @@ def to_pixel(
     """
     x, y = focal[0] - centre[0], focal[1] - centre[1]
     c, s = jnp.cos(rotation), jnp.sin(rotation)
-    # The factors belong to the detector; only the products to each measurement.
+    # The parenthesised factors are per detector, only the products are per measurement.
     return (c / pitch[0]) * x - (s / pitch[0]) * y, (s / pitch[1]) * x + (c / pitch[1]) * y

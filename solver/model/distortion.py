@@ -1,9 +1,9 @@
 """Legendre distortion of any order: ideal to distorted focal plane.
 
-Paper, Eqs. (model:Lx, model:Ly, model:A0, model:B0, model:first). The first order is
-zero, since pointing, focal length and position angle carry it, and the constant term is
-fixed such that the optical centre is not displaced. Both hold for every order when each
-term is taken as L_k(x) L_l(y) - L_k(0) L_l(0), with total degree from 2 upwards.
+Paper, Eqs. (model:Lx, model:Ly, model:A0, model:B0, model:first). The first-order terms
+are zero, since pointing, focal length and position angle describe them, and the constant
+term is such that the optical centre is not displaced. Both conditions are satisfied by
+using the terms L_k(x) L_l(y) - L_k(0) L_l(0) with total degree from 2 upwards.
 """
 
 import jax.numpy as jnp
@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 def terms(order: int) -> list[tuple[int, int]]:
     """Return the degrees (k, l) of the terms up to `order`.
 
-    They are ordered by total degree, then by falling power of x, so that the terms of a
+    They are sorted by total degree, then by decreasing degree in x, so that the terms of a
     lower order come first.
     """
     return [(n - j, j) for n in range(2, order + 1) for j in range(n + 1)]

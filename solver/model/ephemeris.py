@@ -1,7 +1,7 @@
-"""Where the observer is and how it moves: the Earth from ERFA, a satellite on top.
+"""Position and velocity of the observer: the Earth from ERFA, plus a satellite's velocity.
 
-The Earth's analytical ephemeris is good to 4.9 mm/s and 13 km, 3.4 uas of absolute
-aberration and far less across a field.
+The Earth's analytical ephemeris is accurate to 4.9 mm/s and 13 km, which is 3.4 uas of
+absolute aberration and far less across a field.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,7 @@ _AU_PER_DAY_IN_C = erfa.DAU / erfa.DAYSEC / erfa.CMPS
 
 
 class Observer(NamedTuple):
-    """State of the observer at some times, BCRS axes.
+    """State of the observer at n times, BCRS axes.
 
     `position` is barycentric, au; `velocity` is barycentric, in c; `sun_distance` is in au.
     """
@@ -30,13 +30,13 @@ class Observer(NamedTuple):
 def observer_at(
     mjd_tcb: Float[np.ndarray, " n"], satellite_velocity: Float[np.ndarray, "n 3"] | float = 0.0
 ) -> Observer:
-    """Return the state of an observer at the Earth or on a satellite of it.
+    """Return the state of an observer at the geocentre or on an Earth satellite.
 
     Parameters
     ----------
     mjd_tcb : MJD in TCB
-    satellite_velocity : geocentric, km/s, BCRS axes. A low orbit's position matters below
-        0.05 uas per mas of parallax and is left out.
+    satellite_velocity : geocentric, km/s, BCRS axes. The satellite's position is neglected:
+        in a low orbit it changes a source by less than 0.05 uas per mas of parallax.
     """
     tdb = erfa.tcbtdb(_MJD_ZERO, np.asarray(mjd_tcb, dtype=np.float64))
     heliocentric, barycentric = erfa.epv00(*tdb)

@@ -1,12 +1,12 @@
-"""The one observation model: parameters and geometry in, pixel positions out.
+"""The observation model: pixel positions predicted from parameters and geometry.
 
-Paper, section "Observation model". Parameters are offsets from the origins kept in
-`Geometry`, in the units of `solver.data.parameters`; a new parameter group is an entry there
-and a term here. Simulator, engines and diagnostics all call `predict`.
+Paper, section "Observation model". Parameters are offsets from the origins in `Geometry`, in
+the units of `solver.data.parameters`; a new parameter group needs an entry there and a term
+here. The simulator, the engines and the diagnostics all use this model.
 
-What belongs to each measurement is kept component by component, x apart from y, and an
-index may be broadcast over many measurements: then all loops run along contiguous memory,
-which was measured to be ten times faster than arrays of small vectors.
+Quantities per measurement are stored one array per component, x separate from y, and an
+index may broadcast over many measurements. All loops then run along contiguous memory, which
+was measured to be ten times faster than arrays of small vectors.
 """
 
 from collections.abc import Mapping
@@ -22,25 +22,25 @@ from solver.model.distortion import basis, terms
 from solver.model.projection import displace, focal_axes, project
 from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
 
-# A NumPy or a JAX array: tables come as the one, what is computed from them is the other.
+# A NumPy array (from a table) or a JAX array (computed).
 AnyArray = Any
 Offsets = Mapping[str, AnyArray]
 Pair = tuple[Float[AnyArray, "*obs"], Float[AnyArray, "*obs"]]
 
 
 class Geometry(eqx.Module):
-    """The origins from which the parameters are offsets, and what is not a parameter.
+    """Origins of the parameter offsets, and inputs of the model that are not parameters.
 
     Attributes
     ----------
     source_frame : direction, east and north at each source's origin
-    pointing_frame : the same at each exposure's origin
-    origin : group name -> whole value at offset zero, in the group's unit; every group but
-        the sources and the pointing, whose origins are the frames
-    velocity : of the observer, in c; zero switches aberration off
-    sun_distance : of the observer, au
+    pointing_frame : direction, east and north at each exposure's origin
+    origin : group name -> value at offset zero, in the group's unit; without the sources and
+        the pointing, whose origins are the frames
+    velocity : velocity of the observer, in c; zero switches aberration off
+    sun_distance : distance of the observer from the Sun, au
     distortion_scale : 1/s, um
-    order : highest degree of the distortion that is computed
+    order : highest degree of the distortion
     """
 
     source_frame: Float[AnyArray, "src 3 3"]
@@ -61,15 +61,15 @@ class Geometry(eqx.Module):
         }
 
     def value(self, offsets: Offsets, name: str) -> Float[Array, " _"]:
-        """Return the whole value of a group, in its unit."""
+        """Return the value (origin plus offset) of a group, in its unit."""
         return self.origin[name] + offsets[name]
 
 
 class Index(NamedTuple):
-    """Which source, exposure and detector each measurement belongs to.
+    """Indices of the source, exposure and detector of each measurement.
 
-    Of any common shape; `exposure` and `detector` may have axes of length one where all
-    measurements along an axis share them.
+    The arrays have any common shape; `exposure` and `detector` may have length one along an
+    axis whose measurements all share them.
     """
 
     source: Int[AnyArray, "*obs"]
@@ -78,7 +78,7 @@ class Index(NamedTuple):
 
 
 class Prediction(NamedTuple):
-    """Where each measurement should lie, x and y apart.
+    """Predicted position of each measurement, as separate arrays of x and y.
 
     `ideal` and `focal` are on the undistorted and distorted focal plane, um; `pixel` is
     from the detector's centre; `basis` holds the value of each distortion term.
@@ -93,14 +93,14 @@ class Prediction(NamedTuple):
 class Directions(NamedTuple):
     """Unit vectors to the sources, and the axes of each exposure's focal plane on the sky.
 
-    They are the same for all measurements, and computed before those.
+    They do not depend on the measurement and are computed once.
     """
 
     source: tuple[Float[AnyArray, " src"], Float[AnyArray, " src"], Float[AnyArray, " src"]]
     axes: Float[AnyArray, "exp 3 3"]
 
 
-# The groups of the exposures that `directions` takes.
+# The groups of the exposures that `directions` uses.
 DIRECTING = ("pointing_ra", "pointing_dec", "position_angle")
 
 
@@ -109,15 +109,15 @@ def predict(offsets: Offsets, geometry: Geometry, index: Index) -> Prediction:
 
     Parameters
     ----------
-    offsets : group name -> offsets in the group's unit; "sources" is (src, 2), the others
-        have one value per element of their axis
+    offsets : group name -> offsets in the group's unit; "sources" has shape (src, 2), the
+        others have one value per element of their axis
     """
     ideal = ideal_position(directions(offsets, geometry), offsets, geometry, index)
     return image(ideal, offsets, geometry, index)
 
 
 def directions(offsets: Offsets, geometry: Geometry) -> Directions:
-    """Return where sources and exposures are on the sky."""
+    """Return the directions of the sources and of the focal-plane axes of the exposures."""
     east, north = RAD_PER_MAS * offsets["sources"].T
     x, y, z = displace(geometry.source_frame, east, north).T
     centre = displace(
@@ -146,7 +146,7 @@ def image(
 
     Parameters
     ----------
-    ideal : um
+    ideal : positions on the undistorted focal plane, um
     displacement : um, added to the distorted position. The derivative with respect to it,
         times `basis`, is the derivative with respect to the distortion coefficients.
     """
@@ -170,7 +170,7 @@ def image(
 def _pair(
     offsets: Offsets, geometry: Geometry, name: str
 ) -> tuple[Float[Array, " _"], Float[Array, " _"]]:
-    """Return the values of a pair of groups, one for each direction."""
+    """Return the values of the x and y groups of a parameter."""
     return geometry.value(offsets, f"{name}_x"), geometry.value(offsets, f"{name}_y")
 
 
@@ -190,7 +190,7 @@ def _apparent(seen: Directions, geometry: Geometry, index: Index) -> Components:
 
 
 def _take(vectors: Float[AnyArray, "_ 3"], index: Int[AnyArray, "*#obs"]) -> Components:
-    """Return the components of the vectors that an index names."""
+    """Return the components of the vectors at an index."""
     x, y, z = (jnp.asarray(vectors[:, axis])[index] for axis in range(3))
     return x, y, z
 

@@ -1,8 +1,8 @@
 """Sky to the ideal focal plane: displaced directions, pointing axes, gnomonic projection.
 
 Paper, section "Observation model", Eqs. (method:projection) and (method:ideal), written
-with unit vectors: trigonometry belongs to sources and exposures, and what is left for
-each measurement is three dot products.
+with unit vectors: trigonometric functions are computed per source and per exposure, and
+each measurement needs only three dot products.
 """
 
 import jax.numpy as jnp
@@ -39,7 +39,7 @@ def focal_axes(
     centre : unit vectors of the pointings
     position_angle : rad
     """
-    # East is the pole crossed with the direction, and has no third component.
+    # East is the cross product of the pole and the direction; its third component is zero.
     east = jnp.stack([-centre[:, 1], centre[:, 0], jnp.zeros_like(centre[:, 0])], axis=-1)
     east = east / jnp.linalg.norm(east, axis=-1, keepdims=True)
     north = jnp.cross(centre, east)
@@ -55,7 +55,7 @@ def project(
 
     Parameters
     ----------
-    components : x, y and z along the axes of `focal_axes`; any common length
+    components : x, y and z along the axes of `focal_axes`; vectors of any length
     focal_length : um
 
     Returns

@@ -1,4 +1,4 @@
-"""The machine that a fit runs on: device, memory, threads and package versions.
+"""The machine that runs a fit: device, memory, threads and package versions.
 
 Imports `solver.errors` only.
 """

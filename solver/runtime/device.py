@@ -1,7 +1,7 @@
-"""The device that JAX computes on, a processor or an accelerator: JAX_PLATFORMS chooses it.
+"""The device that JAX computes on, CPU or accelerator, as chosen by JAX_PLATFORMS.
 
-Nothing in the solver asks for one by name. What it hands to JAX goes to JAX's default device,
-and what comes back is NumPy's, in whose BLAS the dense algebra is done.
+The solver uses JAX's default device. Results are converted to NumPy arrays, and the dense
+linear algebra is done by NumPy's BLAS.
 """
 
 import jax
@@ -15,13 +15,13 @@ def require_device() -> str:
     Raises
     ------
     InputError
-        If there is none of the kind that was asked for.
+        If the requested device does not exist.
     """
     try:
         return jax.devices()[0].platform
-    # An assertion of JAX's own fails where the plug-in of an accelerator is missing.
+    # JAX raises AssertionError if the plug-in of an accelerator is missing.
     except (RuntimeError, AssertionError) as error:
-        reason = str(error).partition("\n")[0] or "JAX has none such"
+        reason = str(error).partition("\n")[0] or "JAX has no such device"
         raise InputError(
             f"JAX_PLATFORMS: expected a device that JAX can compute on here, "
             f"found {jax.config.values['jax_platforms']!r}: {reason}"

@@ -1,8 +1,8 @@
-"""Memory: what a fit has freed is kept for its next large array.
+"""Memory allocation: reuse freed memory for the next large array.
 
-The C library gives every array of some megabytes memory of its own, and gives it back when the
-array goes; the next one then costs a page fault for each 4 KiB, which was measured to take a
-fifth of a fit, and more on a machine whose host takes returned pages away.
+By default glibc maps memory for every array of some megabytes and unmaps it when the array is
+freed. Each new array then costs a page fault per 4 KiB, which was measured to take a fifth of
+a fit, and more on a virtual machine whose host reclaims freed pages.
 """
 
 import ctypes
@@ -14,15 +14,15 @@ _NEVER = 2**31 - 1
 
 
 def keep_memory() -> None:
-    """Let this process keep the memory that it frees; where there is no glibc, do nothing.
+    """Configure glibc to keep freed memory in this process; without glibc, do nothing.
 
-    Call it at the start of a program that fits orbits, before it starts threads.
+    Call it at the start of a program that fits orbits, before threads are started.
     """
     if sys.platform != "linux":
         return
-    choose = getattr(ctypes.CDLL(None), "mallopt", None)
-    if choose is None:
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is None:
         return
-    # A thread's own arena is too small for these arrays, and would return them all the same.
+    # One arena only: arenas of threads are too small for these arrays and would unmap them.
     for parameter, value in ((_MMAP_MAX, 0), (_TRIM_THRESHOLD, _NEVER), (_ARENA_MAX, 1)):
-        choose(parameter, value)
+        mallopt(parameter, value)

@@ -1,7 +1,8 @@
-"""Threads: one for each survey worker, so that a result does not depend on their number.
+"""Threads: one per survey worker, so that results do not depend on the number of cores.
 
-A sum over several threads is rounded by how the work was cut, so that the last digits hang
-on the cores at hand. One thread to each of many processes also wastes none of them.
+The rounding of a sum over several threads depends on how the work is divided, so the last
+digits would depend on the number of cores. With many processes, one thread each also uses
+all cores efficiently.
 """
 
 import os
@@ -11,10 +12,10 @@ _POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR
 
 
 def use_one_thread() -> None:
-    """Keep BLAS and XLA of this process to one thread each; call before JAX is imported.
+    """Limit BLAS and XLA of this process to one thread each; call before JAX is imported.
 
-    XLA makes as many threads as the process has cores when it starts: for as long as that takes
-    it has one. Where a system does not tell cores apart (macOS) XLA keeps its threads.
+    XLA starts one thread per core of the process, so the process is limited to one core while
+    XLA starts. On systems without CPU affinity (macOS) XLA keeps its threads.
     """
     for variable in _POOLS:
         os.environ[variable] = "1"
@@ -40,10 +41,10 @@ def _cores() -> set[int]:
 
 
 def _free_threads(cores: set[int]) -> None:
-    """Let every thread of this process run on any of the cores again."""
+    """Allow every thread of this process to run on any of `cores`."""
     for thread in os.listdir("/proc/self/task"):
         try:
             os.sched_setaffinity(int(thread), cores)
         except ProcessLookupError:
-            # It ended since the folder was listed.
+            # The thread ended after the folder was listed.
             continue

@@ -1,11 +1,11 @@
-"""Versions of the packages that made a result, for its provenance."""
+"""Versions of the packages used for a result, for its provenance."""
 
 from collections.abc import Iterable
 from importlib import metadata
 
 
 def versions_of(packages: Iterable[str]) -> dict[str, str]:
-    """Return the version of each package; of one that runs without being installed, "unknown"."""
+    """Return the version of each package; "unknown" for one that is not installed."""
     return {package: _version(package) for package in packages}
 
 

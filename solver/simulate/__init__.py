@@ -1,18 +1,18 @@
 """The mini-mock survey of the paper's section "Experiment", for any number of orbits.
 
-| file         | what                                                              |
+| file         | content                                                           |
 |--------------|-------------------------------------------------------------------|
-| settings.py  | every number of the survey, with its source                       |
+| settings.py  | all numbers of the survey, with their sources                     |
 | sky.py       | Galactic coordinates to ICRS and back                             |
 | seasons.py   | the observation periods                                           |
-| population.py| stars like those that Gaia sees towards the Galactic centre       |
+| population.py| synthetic stars towards the Galactic centre, as observed by Gaia  |
 | gaia.py      | stars of the Gaia archive                                         |
 | catalogue.py | the true catalogue and the reference catalogue resampled from it  |
-| schedule.py  | when and where each exposure is taken, and where it really pointed|
-| placement.py | where the detectors really are                                    |
+| schedule.py  | schedule and true attitude of the exposures                       |
+| placement.py | true positions of the detectors                                   |
 | measure.py   | the measurements of one orbit                                     |
 | survey.py    | a survey directory                                                |
 
-Imports `solver.problem` and below. Only `measure.py` and `survey.py` import JAX. Every optical
-step is that of `solver.model.forward`.
+Imports `solver.problem` and below. Only `measure.py` and `survey.py` import JAX. The optical
+model is `solver.model.forward`.
 """

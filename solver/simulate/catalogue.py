@@ -1,4 +1,4 @@
-"""The true catalogue of a survey, and the reference catalogue resampled from it.
+"""True catalogue of a survey, and the reference catalogue resampled from it.
 
 Paper, sections "Ground truth catalog" and "Reference catalog".
 """
@@ -18,24 +18,24 @@ from solver.simulate.settings import Stream, SurveySettings
 from solver.simulate.sky import galactic_to_icrs, icrs_to_galactic
 from solver.units import MAS_PER_DEG
 
-# Gaia's ids of this part of the sky lie near 4e18 and stay below 6.9e18, so that the ids
-# of artificial sources, which the paper assigns by hand, cannot be a star's.
+# Gaia's ids in this part of the sky are near 4e18 and always below 6.9e18, so they cannot
+# collide with the ids of artificial sources, which the paper assigns by hand.
 FIRST_STAR_ID = 4_040_000_000_000_000_000
 FIRST_ARTIFICIAL_ID = 9_000_000_000_000_000_000
-_LONGEST_ID_STEP = 2**33
+_MAX_ID_STEP = 2**33
 
 _ERRORS = ("ra", "dec", "pmra", "pmdec", "parallax")
-# Correlations rounded to three digits may have an eigenvalue this far below zero.
-_ROUNDING = 5e-3
+# Rounding correlations to three digits may make an eigenvalue negative by this much.
+_EIGENVALUE_TOLERANCE = 5e-3
 
 
 def truth_catalogue(settings: SurveySettings) -> pd.DataFrame:
-    """Return a synthetic true catalogue: stars as Gaia sees them, and artificial sources.
+    """Return a synthetic true catalogue: stars as observed by Gaia, and artificial sources.
 
     Returns
     -------
-    `schema.TRUTH`, in order of id: exactly `n_stars` stars, of which exactly `n_reference`
-    satisfy the paper's cuts, and `n_artificial` sources that do not move
+    `schema.TRUTH`, sorted by id: exactly `n_stars` stars, of which exactly `n_reference`
+    satisfy the paper's cuts, and `n_artificial` sources without motion
     """
     rng = settings.rng(Stream.TRUTH)
     references, others = draw_stars(settings, rng)
@@ -43,7 +43,7 @@ def truth_catalogue(settings: SurveySettings) -> pd.DataFrame:
         [_star_table(references, True, settings), _star_table(others, False, settings)]
     )
     stars = stars.iloc[rng.permutation(len(stars))]
-    stars["source_id"] = FIRST_STAR_ID + np.cumsum(rng.integers(1, _LONGEST_ID_STEP, len(stars)))
+    stars["source_id"] = FIRST_STAR_ID + np.cumsum(rng.integers(1, _MAX_ID_STEP, len(stars)))
     return _canonical([stars, _artificial(settings, rng)])
 
 
@@ -52,25 +52,25 @@ def truth_from_gaia(
 ) -> pd.DataFrame:
     """Select the true catalogue from a table of the Gaia archive, as the paper does.
 
-    Stars are kept that lie in the extended science field and whose parallax is well
-    measured; `n_stars` and `n_reference` play no part. Artificial sources are added.
+    Stars are kept if they are in the extended science field and their parallax is well
+    measured; `n_stars` and `n_reference` are not used. Artificial sources are added.
 
     Parameters
     ----------
-    table : columns named as in the archive, in any unit that it states, else in that of
-        the archive: source_id, ra, dec (deg), parallax (mas), pmra, pmdec (mas/yr), their
-        `_error`, ref_epoch (yr), and perhaps their correlations
-    name : what messages call the table
+    table : columns named as in the archive: source_id, ra, dec (deg), parallax (mas), pmra,
+        pmdec (mas/yr), their `_error`, ref_epoch (yr) and optionally their correlations;
+        in the units that the table specifies, or else in those of the archive
+    name : name of the table in messages
 
     Returns
     -------
-    `schema.TRUTH`, in order of id, and beside it the columns `CORRELATIONS`, which only
-    `reference_catalogue` reads: the truth itself is exact
+    `schema.TRUTH`, sorted by id, with the additional columns `CORRELATIONS`. Only
+    `reference_catalogue` uses these: the truth itself is exact
 
     Raises
     ------
     InputError
-        If a column is missing or cannot be used, or no reference star is left.
+        If a column is missing or invalid, or no reference star remains.
     """
     stars = gaia_stars(table, name)
     _check_ids(stars, name)
@@ -98,9 +98,9 @@ def truth_from_gaia(
 def reference_catalogue(truth: pd.DataFrame, settings: SurveySettings) -> pd.DataFrame:
     """Resample a true catalogue by Table (exp:resampling).
 
-    Reference stars scatter by their own uncertainties, and by their correlations where
-    `truth` has the columns `CORRELATIONS`; all other sources by the vague ones of the
-    settings, which replace their uncertainties and are not correlated.
+    Reference stars are drawn with their own uncertainties, and with their correlations if
+    `truth` has the columns `CORRELATIONS`. The other sources are drawn with the large
+    uncertainties of the settings (`vague_*`), which replace their own and are uncorrelated.
 
     Returns
     -------
@@ -127,8 +127,8 @@ def reference_catalogue(truth: pd.DataFrame, settings: SurveySettings) -> pd.Dat
 def _correlated(
     pulls: dict[str, Float[np.ndarray, " src"]], catalogue: pd.DataFrame
 ) -> dict[str, Float[np.ndarray, " src"]]:
-    """Return unit deviates with the catalogue's correlations, made of independent ones."""
-    # Rows without correlations are not computed, so that their deviates stay what they are.
+    """Return normal deviates with the catalogue's correlations from independent ones."""
+    # Rows without correlations are skipped, so that their deviates remain bit-identical.
     chosen = (catalogue[list(CORRELATIONS)] != 0.0).any(axis=1).to_numpy()
     roots = square_roots(correlation_matrices(catalogue[chosen]))
     independent = np.stack([pulls[name][chosen] for name in ASTROMETRY], axis=-1)
@@ -150,7 +150,7 @@ def _vague_errors(settings: SurveySettings) -> dict[str, float]:
 
 
 def _per_mas(name: str, truth: pd.DataFrame) -> Float[np.ndarray, " src"] | float:
-    """Return what 1 mas of alpha*, delta or anything else is in the column's unit."""
+    """Return 1 mas (of alpha* for ra) in the unit of column `name`; 1 for other units."""
     if name == "ra":
         return 1.0 / (MAS_PER_DEG * np.cos(np.radians(truth["dec"].to_numpy())))
     return 1.0 / MAS_PER_DEG if name == "dec" else 1.0
@@ -174,7 +174,7 @@ def _star_table(stars: Stars, is_reference: bool, settings: SurveySettings) -> p
 
 
 def _artificial(settings: SurveySettings, rng: np.random.Generator) -> pd.DataFrame:
-    """Return sources without motion or parallax about the target, exactly known."""
+    """Return exactly known sources without motion or parallax around the target."""
     number, spread = settings.n_artificial, settings.artificial_spread_deg
     l_deg, b_deg = (centre + rng.uniform(-spread, spread, number) for centre in settings.target_deg)
     ra, dec = galactic_to_icrs(l_deg, b_deg)
@@ -192,9 +192,9 @@ def _artificial(settings: SurveySettings, rng: np.random.Generator) -> pd.DataFr
     )
 
 
-def _canonical(parts: list[pd.DataFrame], more: tuple[str, ...] = ()) -> pd.DataFrame:
+def _canonical(parts: list[pd.DataFrame], extra: tuple[str, ...] = ()) -> pd.DataFrame:
     types = {column.name: numpy_dtype(column) for column in TRUTH}
-    names = [*TRUTH.names, *more]
+    names = [*TRUTH.names, *extra]
     whole = pd.concat([part[names].astype(types) for part in parts if len(part)])
     return whole.sort_values("source_id", ignore_index=True)
 
@@ -202,16 +202,16 @@ def _canonical(parts: list[pd.DataFrame], more: tuple[str, ...] = ()) -> pd.Data
 def _check_ids(stars: pd.DataFrame, name: str) -> None:
     if (stars["source_id"] >= FIRST_ARTIFICIAL_ID).any():
         raise InputError(
-            f"{name}, column source_id: expected ids below {FIRST_ARTIFICIAL_ID}, which are "
-            f"kept for artificial sources, found {stars['source_id'].max()}"
+            f"{name}, column source_id: expected ids below {FIRST_ARTIFICIAL_ID}, the "
+            f"first id of artificial sources, found {stars['source_id'].max()}"
         )
 
 
 def _check_correlations(stars: pd.DataFrame, name: str) -> None:
     lowest = np.linalg.eigvalsh(correlation_matrices(stars))[:, 0]
-    if (bad := lowest < -_ROUNDING).any():
+    if (bad := lowest < -_EIGENVALUE_TOLERANCE).any():
         raise InputError(
-            f"{name}, columns *_corr: expected correlations that five parameters can have "
-            f"together, found others in {int(bad.sum())} reference stars, "
+            f"{name}, columns *_corr: expected correlations that form a positive semidefinite "
+            f"matrix, found others in {int(bad.sum())} reference stars, "
             f"the first is {stars['source_id'].to_numpy()[np.argmax(bad)]}"
         )

@@ -1,4 +1,4 @@
-"""Stars of the Gaia archive: the columns that the simulator takes, checked and converted."""
+"""Stars of the Gaia archive: check and convert the columns that the simulator uses."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from solver.io.table_check import conform, matched_names
 
 _FLAGS = ("is_reference", "is_artificial")
 
-# The archive says nothing of flags, but always how sure a parallax is.
+# The archive has no flags, but always an uncertainty of the parallax.
 GAIA = Table(
     "Gaia",
     tuple(
@@ -29,34 +29,34 @@ GAIA = Table(
 def gaia_stars(table: RawTable | pd.DataFrame, where: str) -> pd.DataFrame:
     """Return the stars of a table of the Gaia archive that have all five parameters.
 
-    Columns are found without regard to case and converted to the units of the archive,
-    which are also assumed where a column has none. Rows that lack a value in any of the
-    columns are left out, as the archive's sources without a parallax do.
+    Column names are matched ignoring case. Values are converted to the units of the archive,
+    which are assumed for columns without a unit. Rows with a missing value in any of the
+    columns are dropped, such as the archive's sources without a parallax.
 
     Parameters
     ----------
     table : columns named as in the archive; the ten correlations may be absent
-    where : what messages call the table
+    where : name of the table in messages
 
     Returns
     -------
-    `GAIA`, in the order of the table; a correlation that the table lacks is zero
+    `GAIA`, in the order of the table; correlations that the table lacks are zero
 
     Raises
     ------
     InputError
-        If a column is missing or cannot be used, or no row is complete.
+        If a column is missing or invalid, or no row is complete.
     """
     raw = RawTable.from_pandas(table) if isinstance(table, pd.DataFrame) else table
     used = list(matched_names(raw.colnames, GAIA).values())
-    lacking = np.zeros(len(raw), dtype=bool)
+    is_incomplete = np.zeros(len(raw), dtype=bool)
     for name in used:
-        lacking |= missing_rows(raw[name])
-    if len(raw) and lacking.all():
+        is_incomplete |= missing_rows(raw[name])
+    if len(raw) and is_incomplete.all():
         raise InputError(
             f"{where}: expected a row with a value in each of {', '.join(used)}, "
             f"found none among {len(raw)} rows"
         )
-    if lacking.any():
-        where = f"{where}, its {int((~lacking).sum())} rows without gaps"
-    return conform(raw[~lacking], GAIA, where)
+    if is_incomplete.any():
+        where = f"{where}, its {int((~is_incomplete).sum())} complete rows"
+    return conform(raw[~is_incomplete], GAIA, where)

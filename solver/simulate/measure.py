@@ -1,7 +1,7 @@
-"""The measurements of one orbit: where `solver.model.forward` puts the true sources, plus noise.
+"""Measurements of one orbit: true sources projected by `solver.model.forward`, plus noise.
 
-Paper, section "Mock measurements". Of all effects on the way only the aberration by the
-Earth's motion is included, and the sources do not move during an orbit.
+Paper, section "Mock measurements". Aberration by the Earth's motion is included, other effects
+on the light path are not. Sources do not move during an orbit.
 """
 
 from typing import NamedTuple
@@ -28,18 +28,18 @@ from solver.simulate.schedule import environment, orbit_attitude
 from solver.simulate.settings import Stream, SurveySettings
 from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000, RAD_PER_ARCSEC, RAD_PER_MAS
 
-# Sources are sought this far beyond the detectors, for aberration moves them by 21 arcsec.
+# Sources this far outside the detectors are also considered: aberration is up to 21 arcsec.
 _MARGIN_ARCSEC = 30.0
 _CHUNK = 65_536
-_FEWEST_SOURCES = 4_096
+_MIN_PADDED_SOURCES = 4_096
 
 
 class MeasuredOrbit(NamedTuple):
-    """What one orbit yields.
+    """Simulated data of one orbit.
 
-    `measurements` is `schema.MEASUREMENT` in random order, `exposures`
-    `schema.ENVIRONMENT`; `attitude` holds the true pointings and focal lengths beside, as
-    from `solver.simulate.schedule.attitude`.
+    `measurements` is `schema.MEASUREMENT` in random order and `exposures` is
+    `schema.ENVIRONMENT`; `attitude` also has the true pointings and focal lengths, as from
+    `solver.simulate.schedule.attitude`.
     """
 
     measurements: pd.DataFrame
@@ -55,12 +55,12 @@ def measure_orbit(
 ) -> MeasuredOrbit:
     """Measure every source of `truth` that falls on a detector, Eq. (exp:mock).
 
-    Each orbit has random numbers of its own.
+    Each orbit has its own random numbers.
 
     Parameters
     ----------
     truth : `schema.TRUTH`
-    instrument : the nominal one
+    instrument : the nominal instrument
     """
     attitude = orbit_attitude(orbit_id, settings, instrument.focal_length_um)
     rng = settings.rng(Stream.MEASUREMENTS, orbit_id)
@@ -111,8 +111,8 @@ def measurement_sigma(
 ) -> Float[np.ndarray, "det 2"]:
     """Return the uncertainty of a measurement on each detector, pixels.
 
-    It is one angle on the sky for all, turned into pixels by the nominal instrument, as
-    somebody who does not know the true one would.
+    It is the same angle on the sky for all detectors, converted to pixels with the nominal
+    instrument, because the true one is unknown to the observer.
     """
     pitch = np.array([(d.pitch_x_um, d.pitch_y_um) for d in instrument.detectors])
     return settings.measurement_mas * RAD_PER_MAS * instrument.focal_length_um / pitch
@@ -124,13 +124,13 @@ def true_geometry(
     instrument: Instrument,
     settings: SurveySettings,
 ) -> Geometry:
-    """Return the geometry whose origins are the truth, for which all offsets are zero.
+    """Return the geometry with the true values as origins, so that all offsets are zero.
 
     Parameters
     ----------
-    source_frame : true places
+    source_frame : frames at the true positions
     attitude : as from `solver.simulate.schedule.attitude`
-    instrument : the nominal one
+    instrument : the nominal instrument
     """
     order = max((k + j for k, j, _, _ in settings.distortion_um), default=0)
     layout = VectorLayout(len(attitude), len(terms(order)), len(instrument.detectors))
@@ -165,7 +165,7 @@ def _places(truth: pd.DataFrame, mjd_tcb: float) -> Float[np.ndarray, "src 3 3"]
 def _near(
     truth: pd.DataFrame, attitude: pd.DataFrame, instrument: Instrument, settings: SurveySettings
 ) -> Bool[np.ndarray, " src"]:
-    """Return which sources can come onto a detector at all, however they have moved."""
+    """Return which sources may fall on a detector, whatever their motion and the pointing."""
     years = 2000.0 + (attitude["obstime"].max() - MJD_J2000) / DAYS_PER_JULIAN_YEAR
     motion = np.hypot(truth["pmra"], truth["pmdec"]) * np.abs(years - truth["ref_epoch"])
     moved = RAD_PER_MAS * float((motion + truth["parallax"].abs()).max())
@@ -189,7 +189,7 @@ def _candidates(
     instrument: Instrument,
     settings: SurveySettings,
 ) -> tuple[Int[np.ndarray, " cand"], Int[np.ndarray, " cand"]]:
-    """Return sources and exposures, index by index, that are close to each other."""
+    """Return the indices of sources and exposures that are close to each other, in pairs."""
     close = _within(direction, attitude, _radius(attitude, instrument, settings))
     exposure, source = np.nonzero(close.T)
     return source, exposure
@@ -203,10 +203,10 @@ def _within(
 
 
 def _radius(attitude: pd.DataFrame, instrument: Instrument, settings: SurveySettings) -> float:
-    """Return how far from the pointing a source can be seen, rad."""
+    """Return the largest angle from the pointing at which a source can be observed, rad."""
     placed = place_detectors(instrument, settings)
     corners = np.concatenate([detector.corners_um() for detector in placed.detectors])
-    # No term of the distortion exceeds twice its coefficient within the field.
+    # Within the field a distortion term is at most twice its coefficient.
     distortion = 2.0 * sum(abs(a) + abs(b) for _, _, a, b in settings.distortion_um)
     farthest = np.hypot(*corners.T).max() + distortion
     angle = np.arctan(farthest / attitude["true_focal_length"].min())
@@ -219,7 +219,7 @@ def _on_detectors(
     exposure: Int[np.ndarray, " cand"],
     instrument: Instrument,
 ) -> tuple[Int[np.ndarray, " obs"], Int[np.ndarray, " obs"], Float[np.ndarray, "obs 2"]]:
-    """Return the candidates that fall on a detector, which one, and where, pixels."""
+    """Return candidates that fall on a detector, with detector index and position in pixels."""
     half = 0.5 * np.array([(d.n_x, d.n_y) for d in instrument.detectors])
     rows, detectors, pixels = [], [], []
     for start in range(0, len(source), _CHUNK):
@@ -239,8 +239,8 @@ def _on_detectors(
 
 
 def _padded(frame: Float[np.ndarray, "src 3 3"]) -> Float[np.ndarray, "padded 3 3"]:
-    """Repeat the sources up to a power of two: each new shape costs a compilation."""
-    length = max(1 << (len(frame) - 1).bit_length(), _FEWEST_SOURCES)
+    """Repeat the sources up to a power of two, because each new shape is compiled anew."""
+    length = max(1 << (len(frame) - 1).bit_length(), _MIN_PADDED_SOURCES)
     return np.resize(frame, (length, 3, 3))
 
 
@@ -248,7 +248,7 @@ def _padded(frame: Float[np.ndarray, "src 3 3"]) -> Float[np.ndarray, "padded 3 
 def _pixels(
     geometry: Geometry, source: Int[Array, " cand"], exposure: Int[Array, " cand"]
 ) -> Float[Array, "det cand 2"]:
-    """Return where the candidates would lie in the pixels of every detector."""
+    """Return the positions of the candidates in the pixels of every detector."""
     offsets = {name: jnp.zeros_like(values) for name, values in geometry.origin.items()}
     number = {"src": (len(geometry.source_frame), 2), "exp": (len(geometry.pointing_frame),)}
     for group in PARAMETERS:
@@ -259,5 +259,5 @@ def _pixels(
         index = Index(source, exposure, jnp.full_like(source, detector))
         return jnp.stack(predict(offsets, geometry, index).pixel, axis=-1)
 
-    # Mapped over the detectors alone, so that the way to the focal plane is computed once.
+    # Only the detector is mapped, so that the focal-plane position is computed once.
     return jax.vmap(on)(jnp.arange(len(geometry.origin["detector_x"])))

@@ -1,4 +1,4 @@
-"""Where the detectors really are: the instrument's nominal places, displaced once.
+"""True positions of the detectors: the nominal ones, displaced once for the whole mission.
 
 Paper, section "Survey Design": the alignment of the detectors is constant during the
 mission and unknown to the fit.
@@ -11,9 +11,9 @@ from solver.simulate.settings import Stream, SurveySettings
 
 
 def place_detectors(instrument: Instrument, settings: SurveySettings) -> Instrument:
-    """Return the true instrument: detectors displaced, rotated and their pitch changed.
+    """Return the true instrument, with displaced and rotated detectors and changed pitch.
 
-    With the default settings, as in the paper, it is the nominal one.
+    With the default settings, as in the paper, it equals the nominal instrument.
     """
     rng = settings.rng(Stream.DETECTORS)
     detectors = []

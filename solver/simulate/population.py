@@ -1,8 +1,9 @@
-"""Stars like those that Gaia sees towards the Galactic centre, for a survey without Gaia.
+"""Synthetic stars towards the Galactic centre, for a survey without a Gaia catalogue.
 
-The paper's true catalogue is Gaia DR3 itself. Where a person has no copy, stars are drawn
-from the simplest population that gives its numbers: how many have parallaxes five times
-their errors, how many of them are reference stars, and how both thin out in the plane.
+The paper's true catalogue is Gaia DR3. Without a copy of it, stars are drawn from a simple
+population that reproduces three of its properties: the number of stars with parallaxes above
+five times their errors, the number of reference stars among them, and the lower density of
+both in the Galactic plane.
 """
 
 from typing import NamedTuple
@@ -20,33 +21,33 @@ _COUNT_SLOPE = 0.35
 
 # Exponentially decreasing space density (Bailer-Jones et al. 2021), scale length, kpc.
 _SCALE_LENGTH_KPC = 1.5
-# Dust: a star is seen with probability exp(-k d) at distance d (kpc), where k falls off
-# with latitude. Set such that an orbit of the full survey has 6,000 to 8,000 sources and an
-# exposure over 100 reference stars (sections "Parameter inference" and "Discussion").
+# Dust: a star at distance d (kpc) is seen with probability exp(-k d), where k decreases with
+# latitude. The values give 6,000 to 8,000 sources per orbit of the full survey and over 100
+# reference stars per exposure (sections "Parameter inference" and "Discussion").
 _DUST_PER_KPC = 0.6
 _DUST_HEIGHT_DEG = 0.45
 
-# Velocities across the line of sight: the Sun's own (Schonrich et al. 2010), the old
-# disc's dispersion, and Galactic rotation at l = 0, A + B (Bovy 2017).
+# Velocities across the line of sight: that of the Sun (Schonrich et al. 2010), the dispersion
+# of the old disc, and Galactic rotation at l = 0, A + B (Bovy 2017).
 _SUN_KM_S = (12.24, 7.25)
 _DISPERSION_KM_S = (35.0, 20.0)
 _ROTATION_KM_S_KPC = 3.4
 _KM_S_PER_MAS_YR_KPC = 4.740470464
 
-# DR3's uncertainties against G: parallax as the mission's performance model has it, which
-# follows the medians of Lindegren et al. (2021), position and motion in proportion. Stars
-# of one magnitude scatter by 10 %.
+# DR3's uncertainties against G: the parallax follows the mission's performance model, which
+# agrees with the medians of Lindegren et al. (2021); position and motion are proportional to
+# it. Stars of equal magnitude scatter by 10 %.
 _ERROR_RATIO = {"ra": 0.80, "dec": 0.70, "pmra": 1.03, "pmdec": 0.89, "parallax": 1.0}
 _ERROR_SCATTER = 0.1
 
-_MOST_DRAWS = 400
+_MAX_DRAWS = 400
 
 
 class Stars(NamedTuple):
-    """Stars of a population: place in Galactic coordinates (deg), motion and errors.
+    """Stars of a population: Galactic coordinates (deg), motions, parallaxes and errors.
 
-    Motions are those in right ascension (times cos dec) and declination, mas/yr; parallax
-    in mas; `parallax_error` in mas, from which `error_of` gives the others.
+    Motions are in right ascension (times cos dec) and declination, mas/yr; `parallax` and
+    `parallax_error` are in mas. `error_of` derives the other errors from `parallax_error`.
     """
 
     l_deg: Float[np.ndarray, " n"]
@@ -62,7 +63,7 @@ class Stars(NamedTuple):
 
 
 def draw_stars(settings: SurveySettings, rng: np.random.Generator) -> tuple[Stars, Stars]:
-    """Draw exactly `n_reference` reference stars and as many others as make up `n_stars`.
+    """Draw exactly `n_reference` reference stars and `n_stars` - `n_reference` other stars.
 
     Raises
     ------
@@ -73,7 +74,7 @@ def draw_stars(settings: SurveySettings, rng: np.random.Generator) -> tuple[Star
     found: tuple[list[Stars], list[Stars]] = ([], [])
     counts = [0, 0]
     size = 3 * settings.n_stars + 1000
-    for _ in range(_MOST_DRAWS):
+    for _ in range(_MAX_DRAWS):
         stars = _draw(settings, rng, size)
         stars = _select(stars, stars.parallax > settings.parallax_over_error * stars.parallax_error)
         is_reference = satisfies_cuts(
@@ -89,14 +90,14 @@ def draw_stars(settings: SurveySettings, rng: np.random.Generator) -> tuple[Star
             return first, second
     raise InputError(
         f"expected cuts that {wanted[0]} reference stars satisfy and {wanted[1]} stars fail, "
-        f"found {counts[0]} and {counts[1]} among {size * _MOST_DRAWS} stars drawn"
+        f"found {counts[0]} and {counts[1]} among {size * _MAX_DRAWS} stars drawn"
     )
 
 
 def satisfies_cuts(
     errors: dict[str, Float[np.ndarray, " n"]], settings: SurveySettings
 ) -> Bool[np.ndarray, " n"]:
-    """Return which stars are good enough for reference stars, Eq. (exp:error).
+    """Return which stars satisfy the cuts for reference stars, Eq. (exp:error).
 
     Parameters
     ----------
@@ -146,7 +147,7 @@ def _motions(
 
 
 def _parallax_error(magnitude: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Return DR3's parallax uncertainty, mas; no star brighter than G = 13 does better."""
+    """Return DR3's parallax uncertainty, mas; it is constant for G < 13."""
     z = 10.0 ** (0.4 * (np.maximum(magnitude, 13.0) - 15.0))
     return 1e-3 * np.sqrt(40.0 + 800.0 * z + 30.0 * z**2)
 

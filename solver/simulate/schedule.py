@@ -1,4 +1,4 @@
-"""When and where each exposure is taken, and where the telescope really pointed.
+"""Schedule of the exposures, and the true attitude of the telescope.
 
 Paper, section "Survey Design", Table (exp:schedule) and Eqs. (exp:pointing,
 exp:pointing:succeed, exp:efl).
@@ -28,8 +28,8 @@ def schedule(settings: SurveySettings) -> pd.DataFrame:
 def orbit_schedule(orbit_id: int, settings: SurveySettings) -> pd.DataFrame:
     """Return the scheduled exposures of one orbit, in order of time.
 
-    Orbits start at equal steps of the seasons laid end to end, so that times depend on how
-    many orbits there are; where an orbit's fields lie depends on its id alone.
+    Orbits start at equal time steps, counted over the seasons without the breaks between them,
+    so times depend on the number of orbits. The fields of an orbit depend on its id alone.
 
     Returns
     -------
@@ -62,11 +62,11 @@ def attitude(
     focal_length_um: float,
     rng: np.random.Generator,
 ) -> pd.DataFrame:
-    """Return where the telescope pointed during one orbit, and what is known of it.
+    """Return the true pointings and focal lengths of one orbit, with their estimates.
 
-    The pointing starts afresh at each field, Eq. (exp:pointing), and walks from exposure
-    to exposure, Eq. (exp:pointing:succeed); the focal length walks through the whole
-    orbit, Eq. (exp:efl).
+    The pointing error is drawn anew for each field, Eq. (exp:pointing), and follows a random
+    walk from exposure to exposure, Eq. (exp:pointing:succeed). The focal length follows a
+    random walk over the whole orbit, Eq. (exp:efl).
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def attitude(
 
 
 def orbit_attitude(orbit_id: int, settings: SurveySettings, focal_length_um: float) -> pd.DataFrame:
-    """Return schedule and attitude of one orbit, with that orbit's random numbers."""
+    """Return schedule and attitude of one orbit, with the random numbers of that orbit."""
     return attitude(
         orbit_schedule(orbit_id, settings),
         settings,
@@ -112,7 +112,7 @@ def orbit_attitude(orbit_id: int, settings: SurveySettings, focal_length_um: flo
 
 
 def environment(attitudes: pd.DataFrame) -> pd.DataFrame:
-    """Return what an observer knows of the exposures: `schema.ENVIRONMENT`."""
+    """Return the columns known to the observer: `schema.ENVIRONMENT`."""
     return attitudes[ENVIRONMENT.names]
 
 
@@ -130,7 +130,7 @@ def _start(orbit_id: int, settings: SurveySettings) -> tuple[Season, float]:
 def _field_centres(
     orbit_id: int, settings: SurveySettings
 ) -> tuple[Float[np.ndarray, " field"], Float[np.ndarray, " field"]]:
-    """Return Galactic centres of an orbit's fields, deg: pairs that overlap by half."""
+    """Return the field centres (l, b) of an orbit, deg, in pairs of fields that overlap by half."""
     spread = settings.pair_spread_deg
     shifts = settings.rng(Stream.FIELDS, orbit_id).uniform(
         -spread, spread, (len(settings.pair_axes), 2)

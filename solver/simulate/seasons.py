@@ -1,4 +1,4 @@
-"""Season: the observation periods, paper Table (exp:epoch)."""
+"""Observation periods (seasons), paper Table (exp:epoch)."""
 
 import datetime as dt
 import math
@@ -22,7 +22,7 @@ class Season:
     position_angle_deg: float
 
     def __post_init__(self) -> None:
-        """Refuse what is not a period; `InputError` says what is wrong."""
+        """Check the values; raise `InputError` if one is invalid."""
         if not self.start_mjd < self.end_mjd:
             raise InputError(f"expected a season to end after {self.start}, found {self.end}")
         angle = self.position_angle_deg
@@ -36,17 +36,17 @@ class Season:
 
     @property
     def end_mjd(self) -> float:
-        """Day after which nothing starts, MJD."""
+        """End of the season, MJD; no orbit starts later."""
         return _mjd(self.end)
 
 
 def read_season(value: object) -> Season:
-    """Return the season that a table of its attributes describes.
+    """Return the season described by a mapping of its attributes.
 
     Raises
     ------
     InputError
-        If an attribute is missing or unknown, or cannot be used.
+        If an attribute is missing, unknown or invalid.
     """
     names = {item.name for item in fields(Season)}
     if not isinstance(value, Mapping) or set(value) != names:

@@ -1,7 +1,7 @@
-"""SurveySettings: every number of the mini-mock survey in one table, with its source.
+"""SurveySettings: all numbers of the mini-mock survey, with their sources.
 
 Sections, tables and equations named below are those of the paper. "Chosen" marks a
-number that the paper leaves open.
+number that the paper does not give.
 """
 
 import math
@@ -20,7 +20,7 @@ _SECONDS_PER_DAY = 86_400.0
 
 
 class Stream(IntEnum):
-    """Independent streams of random numbers, so that none depends on how much another drew."""
+    """Independent random streams: the numbers of one do not depend on draws from another."""
 
     TRUTH = 0
     REFERENCE = 1
@@ -39,39 +39,39 @@ _DISTORTION_UM = (
     (0, 5, 0.0, 0.5),
 )
 
-# Chosen: an orbit covers 7 % of the field, and its part towards the target holds fewer
-# stars; with 1,250 reference stars in the field about 40 fall on each orbit.
-_FEWEST_REFERENCES = 1_250
-_FEWEST_ARTIFICIAL = 10
+# Chosen: an orbit covers 7 % of the field, and the density of stars is lower towards the
+# target; with 1,250 reference stars in the field an orbit has about 40.
+_MIN_REFERENCES = 1_250
+_MIN_ARTIFICIAL = 10
 
 
 @dataclass(frozen=True)
 class SurveySettings:
-    """The choices of one simulated survey; the defaults are the paper's."""
+    """Settings of one simulated survey; the defaults are the paper's."""
 
-    # What a person changes.
+    # Size of the survey.
     orbits: int = 100  # section "Survey Design"
     seed: int = 0  # chosen
     n_stars: int = 132_651  # section "Ground truth catalog"
     n_reference: int = 10_888  # section "Ground truth catalog"; part of n_stars
-    n_artificial: int = 1_000  # section "Ground truth catalog"; beside n_stars
+    n_artificial: int = 1_000  # section "Ground truth catalog"; in addition to n_stars
 
-    # When: section "Survey Design", Table (exp:epoch), below Eq. (exp:pointing:succeed).
+    # Time: section "Survey Design", Table (exp:epoch), below Eq. (exp:pointing:succeed).
     seasons: tuple[Season, ...] = SEASONS
     exposures_per_field: int = 24
     exposure_s: float = 20.0
     field_change_s: float = 90.0
 
-    # Where: section "Survey Design", Galactic coordinates.
+    # Sky: section "Survey Design", Galactic coordinates.
     target_deg: tuple[float, float] = (-0.3, 0.1)
     field_l_deg: tuple[float, float] = (-1.4, 0.7)
     field_b_deg: tuple[float, float] = (-0.6, 0.6)
     field_margin_deg: float = 0.55
     field_width_deg: float = 0.48
     pair_axes: tuple[str, ...] = ("b", "l")  # the fields of a pair overlap by half along it
-    # Chosen: half width of the square about the target in which the centre of each pair
-    # falls at random, that of the artificial sources' square. The middle is then seen in
-    # over 80 of 100 orbits and its corners in over 30, as in section "Time-series".
+    # Chosen: half width of the square around the target in which the centre of each pair is
+    # drawn, equal to that of the artificial sources. The centre of the square is then observed
+    # in over 80 of 100 orbits and its corners in over 30, as in section "Time-series".
     pair_spread_deg: float = 0.3
 
     # Attitude and focal length: Eqs. (exp:pointing, exp:pointing:succeed, exp:efl).
@@ -79,13 +79,13 @@ class SurveySettings:
     pointing_walk_arcsec: float = 1.0
     focal_length_start: float = 1e-3  # fraction of the nominal one
     focal_length_walk: float = 1e-4
-    # Chosen: the environment's estimates err as much as the pointing itself.
+    # Chosen: the errors of the environment's estimates equal those of the pointing.
     estimate_arcsec: float = 1.0
 
     # Optics and detectors: Eq. (exp:distortion); section "Survey Design".
     distortion_um: tuple[tuple[int, int, float, float], ...] = _DISTORTION_UM
-    # The paper's detectors sit at their nominal places, unknown to the fit only. The
-    # standard deviations below displace them once for the whole mission.
+    # In the paper the detectors are at their nominal positions, which the fit does not know.
+    # The standard deviations below displace them once for the whole mission.
     detector_offset_um: float = 0.0
     detector_rotation_deg: float = 0.0
     pitch_relative: float = 0.0
@@ -101,13 +101,13 @@ class SurveySettings:
     reference_epoch_yr: float = 2016.0
     artificial_spread_deg: float = 0.3
 
-    # What is known of the other sources: Table (exp:resampling).
+    # Catalogue uncertainties of the other sources: Table (exp:resampling).
     vague_position_mas: float = 1_000.0
     vague_motion_mas_yr: float = 1.0
     vague_parallax_mas: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse what no survey can be made with; `InputError` names the setting."""
+        """Check all settings; raise `InputError` that names an invalid one."""
         for item in fields(self):
             _check_kind(item.name, getattr(self, item.name), item.default)
         self._check_counts()
@@ -182,25 +182,23 @@ class SurveySettings:
         return sum(season.end_mjd - season.start_mjd for season in self.seasons)
 
     def rng(self, stream: Stream, *key: int) -> np.random.Generator:
-        """Return the generator of a stream; `key` (an orbit, say) gives independent ones."""
+        """Return the generator of a stream; different keys (such as orbits) are independent."""
         return np.random.default_rng(
             np.random.SeedSequence(self.seed, spawn_key=(int(stream), *key))
         )
 
     def scaled(self, stars: int) -> "SurveySettings":
-        """Return the same survey with `stars` stars, the other sources in proportion.
+        """Return the same survey with `stars` stars and the other sources in proportion.
 
-        Of the reference stars at least 1,250 are kept, or all stars where there are fewer,
-        so that about 40 fall on each orbit: the anchors of the solution must not thin out
-        with the stars. At least 10 artificial sources are kept.
+        At least 1,250 reference stars are kept (all stars if there are fewer), so that an
+        orbit has about 40 of them, which the solution needs whatever the number of stars. At
+        least 10 artificial sources are kept.
         """
         if stars < 1:
             raise InputError(f"expected at least 1 star, found {stars}")
         share = stars / self.n_stars
-        references = max(round(share * self.n_reference), min(_FEWEST_REFERENCES, self.n_reference))
-        artificial = max(
-            round(share * self.n_artificial), min(_FEWEST_ARTIFICIAL, self.n_artificial)
-        )
+        references = max(round(share * self.n_reference), min(_MIN_REFERENCES, self.n_reference))
+        artificial = max(round(share * self.n_artificial), min(_MIN_ARTIFICIAL, self.n_artificial))
         return replace(
             self,
             n_stars=stars,
@@ -219,7 +217,7 @@ class SurveySettings:
         Raises
         ------
         InputError
-            If a setting is unknown or a value cannot be used.
+            If a setting is unknown or a value is invalid.
         """
         if unknown := sorted(set(values) - {item.name for item in fields(SurveySettings)}):
             raise InputError(f"expected settings of a survey, found {', '.join(unknown)}")
@@ -234,7 +232,7 @@ def _is_number(value: object) -> bool:
 
 
 def _check_kind(name: str, value: object, default: object) -> None:
-    """Refuse a value of another kind than the default, and a negative number."""
+    """Reject a value of another type than the default, and negative numbers."""
     if isinstance(default, tuple):
         valid, expected = isinstance(value, tuple), "a sequence"
     else:

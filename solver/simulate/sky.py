@@ -1,7 +1,7 @@
 """Galactic coordinates to ICRS and back, for positions, position angles and motions.
 
-The Galactic frame is that of the Hipparcos catalogue, which Gaia uses too. The exposures
-are scheduled in it; everything after the schedule is in ICRS.
+The Galactic frame is that of the Hipparcos catalogue, which Gaia also uses. The schedule
+of the exposures uses it; all later steps use ICRS.
 """
 
 import erfa
@@ -38,7 +38,7 @@ def position_angle_to_icrs(
     b_deg: Float[np.ndarray, " n"],
     angle_deg: Float[np.ndarray, " n"],
 ) -> Float[np.ndarray, " n"]:
-    """Return ICRS position angles in [-180, 180), deg, of Galactic ones at (l, b)."""
+    """Convert Galactic position angles at (l, b) to ICRS, deg in [-180, 180)."""
     return np.mod(angle_deg + north_angle(l_deg, b_deg) + 180.0, 360.0) - 180.0
 
 
@@ -48,7 +48,7 @@ def motion_to_icrs(
     motion_l: Float[np.ndarray, " n"],
     motion_b: Float[np.ndarray, " n"],
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return motions in RA cos(dec) and Dec of motions in l cos(b) and b, any unit."""
+    """Convert motions in l cos(b) and b to RA cos(dec) and Dec, in any unit."""
     angle = np.radians(north_angle(l_deg, b_deg))
     c, s = np.cos(angle), np.sin(angle)
     return c * motion_l + s * motion_b, -s * motion_l + c * motion_b

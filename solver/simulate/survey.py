@@ -1,4 +1,4 @@
-"""A simulated survey on disk: catalogue, exposures and the measurements of every orbit."""
+"""Simulate a survey to disk: catalogue, exposures and the measurements of every orbit."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -45,25 +45,25 @@ def simulate_survey(
     catalogue: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Simulate a survey into `directory`, or finish one that was interrupted.
+    """Simulate a survey into `directory`, or resume one that was interrupted.
 
-    Each orbit is whole once its file exists, and is kept when the simulation is called
-    again with the same choices. The directory becomes a survey with its last file.
+    Files of orbits are written atomically, and existing ones are kept when the simulation is
+    resumed with the same settings. `survey.toml`, written last, marks a complete survey.
 
     Parameters
     ----------
-    directory : made if there is none
-    settings : the defaults are the paper's
+    directory : created if absent
+    settings : defaults to those of the paper
     instrument : nominal focal plane
-    catalogue : table of the Gaia archive to take as the truth; without it stars are drawn
-    progress : called with the number of finished orbits and that of all orbits; what it
-        raises stops the simulation
+    catalogue : table of the Gaia archive to use as the truth; without it stars are synthetic
+    progress : called with the number of finished orbits and of all orbits; an exception from
+        it stops the simulation
 
     Raises
     ------
     InputError
-        If the directory holds anything but this survey unfinished, the catalogue cannot
-        be used, an orbit sees no reference star, or JAX has no device.
+        If the directory contains anything except the same survey unfinished, the catalogue is
+        invalid, an orbit has no reference star, or JAX has no device.
     """
     require_device()
     directory, settings = Path(directory), settings or SurveySettings()
@@ -101,7 +101,7 @@ def _header(
 
 
 def _claim(directory: Path, header: Mapping[str, object]) -> None:
-    """Mark `directory` as this survey, unfinished; refuse it if it holds anything else."""
+    """Mark `directory` as this survey, unfinished; reject it if it contains anything else."""
     if directory.exists() and not directory.is_dir():
         raise InputError(f"{directory}: expected a directory for the survey, found a file")
     if (directory / HEADER).exists():
@@ -121,20 +121,20 @@ def _claim(directory: Path, header: Mapping[str, object]) -> None:
 
 
 def _check_same(directory: Path, header: Mapping[str, object]) -> None:
-    """Refuse an unfinished survey that was begun with other choices."""
-    begun = read_header(directory, UNFINISHED)
+    """Reject an unfinished survey that was started with other settings."""
+    started = read_header(directory, UNFINISHED)
     wanted, found = (
         {
             **section(content, "settings"),
             "instrument": content.get("instrument"),
             "catalogue": content.get("catalogue"),
         }
-        for content in (header, begun)
+        for content in (header, started)
     )
     different = [name for name in {**wanted, **found} if wanted.get(name) != found.get(name)]
     if different:
         raise InputError(
-            f"{directory / UNFINISHED}: expected the choices with which this survey was begun, "
+            f"{directory / UNFINISHED}: expected the settings with which this survey was started, "
             f"found other {', '.join(different)}"
         )
 

@@ -1,4 +1,4 @@
-"""A small orbit and its solution, and the same posterior as one dense matrix."""
+"""Fixtures: a small orbit, its solution, and its posterior as a dense matrix."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -23,13 +23,13 @@ from solver.problem.tiles import CHUNK as WHOLE_CHUNK
 from solver.results.tables import solved_problem
 from tests.solver.small_orbit import make_orbit, true_offsets
 
-# Tiles; one length for all, since each costs a compilation. A small orbit fills it twice.
+# Tiles per chunk; the same in all tests, since each length is compiled. A small orbit has two.
 CHUNK = 16
 
 
 @pytest.fixture(scope="package", autouse=True)
 def _small_chunks():
-    """Linearise a small orbit a little at a time, in more than one chunk."""
+    """Linearise a small orbit in more than one chunk."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("solver.problem.tiles.CHUNK", CHUNK)
         yield
@@ -37,7 +37,7 @@ def _small_chunks():
 
 @pytest.fixture(scope="package", autouse=True)
 def _small_patches():
-    """Keep the fields of a small orbit apart, though that would save it nothing."""
+    """Keep the fields of a small orbit in separate blocks, although it is too small to benefit."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("solver.problem.source_blocks.OF_ONE_BLOCK", 0.0)
         yield
@@ -45,7 +45,7 @@ def _small_patches():
 
 @pytest.fixture(scope="module")
 def optimised():
-    """Compile with all optimisations, for those who run what they compile for long."""
+    """Compile with all optimisations, for tests with long computations."""
     before = jax.config.values["jax_disable_most_optimizations"]
     jax.config.update("jax_disable_most_optimizations", False)
     yield
@@ -59,8 +59,8 @@ def small_orbit():
 
 
 # With the default priors the common shift, roll and scale of the detectors are so weakly
-# held that a dense inverse has but seven digits to compare with.
-HELD = {
+# constrained that a dense inverse is accurate to only seven digits.
+TIGHT_PRIORS = {
     "detector_x": 10.0,
     "detector_y": 10.0,
     "detector_rotation": 60.0,
@@ -71,8 +71,8 @@ HELD = {
 
 @pytest.fixture(scope="package")
 def problem(small_orbit):
-    """The small orbit, its detectors held more tightly than by default."""
-    settings = FitSettings(prior_widths=HELD)
+    """The problem of the small orbit, with tighter priors of the detectors than by default."""
+    settings = FitSettings(prior_widths=TIGHT_PRIORS)
     return build_problem(small_orbit.data, small_orbit.instrument, settings)
 
 
@@ -97,7 +97,7 @@ def result(small_orbit):
 
 @pytest.fixture(scope="package")
 def mocks():
-    """Truth and solution of orbits whose every parameter is drawn from its prior."""
+    """Truth and solution of orbits with all parameters drawn from their priors."""
     orbits = [make_orbit(seed=seed, scatter=1.0) for seed in range(100, 116)]
     return [(orbit, solve(orbit)) for orbit in orbits]
 
@@ -113,10 +113,10 @@ def sample_orbit(sample_orbit_dir):
 
 
 class Dense(NamedTuple):
-    """Whole whitened Jacobian, Hessian with priors and its inverse, calibration first.
+    """Whitened Jacobian, Hessian with priors and its inverse; calibration parameters first.
 
-    `jacobian` has a row for each coordinate, in working order; `gradient` is minus that of
-    half the penalised chi2.
+    `jacobian` has one row per coordinate, in the order of the problem; `gradient` is minus
+    the gradient of half the penalised chi2.
     """
 
     residual: np.ndarray
@@ -139,7 +139,7 @@ def _dense_jacobian(offsets, geometry, index):
 
 
 def dense_jacobian(problem, theta, sources):
-    """Return the derivatives of all pixels by all parameters, shape (2 obs, parameters)."""
+    """Return the Jacobian of all pixels, shape (2 obs, parameters)."""
     offsets = {**problem.layout.scatter(theta), SOURCES.name: sources}
     blocks = _dense_jacobian(offsets, unpadded(problem), problem.measurements.index)
     n_rows = 2 * problem.n_obs
@@ -152,7 +152,7 @@ def dense_jacobian(problem, theta, sources):
 
 
 def unpadded(problem):
-    """Return the geometry with as many sources and exposures as there are."""
+    """Return the geometry without padded sources and exposures."""
     geometry, n_exp = problem.geometry, problem.layout.n_exp
     return replace(
         geometry,
@@ -177,7 +177,7 @@ def matrix_root(matrix):
 
 
 def inverse_of_normal(jacobian):
-    """Return (J'J)^-1 by a QR decomposition of J, with half the condition of J'J."""
+    """Return (J'J)^-1 by QR of J, whose condition number is the square root of that of J'J."""
     scale = 1.0 / np.linalg.norm(jacobian, axis=0)
     triangle = np.linalg.qr(jacobian * scale, mode="r")
     root = sl.solve_triangular(triangle, np.eye(len(scale))) * scale[:, None]
@@ -213,7 +213,7 @@ def make_dense():
 
 @pytest.fixture(scope="package")
 def expansion_point(small_orbit, problem):
-    """The truth: about one sigma away from the mode, and nowhere at an origin."""
+    """The truth: about one sigma from the mode, and with no parameter at its origin."""
     return true_offsets(small_orbit, problem)
 
 
@@ -235,7 +235,7 @@ def reduced(problem, equations, expansion_point):
 
 @pytest.fixture
 def fit():
-    """Return the function that fits a small orbit with some settings."""
+    """Return the function that fits a small orbit with given settings."""
 
     def run(orbit, **settings):
         return fit_orbit(orbit.data, orbit.instrument, FitSettings(**settings))
@@ -245,7 +245,7 @@ def fit():
 
 @pytest.fixture(scope="package")
 def fit_whole():
-    """Return the function that fits an orbit of full size, in chunks as long as ever."""
+    """Return the function that fits an orbit of full size, with chunks of normal length."""
 
     def run(data, settings=None):
         with pytest.MonkeyPatch.context() as patch:

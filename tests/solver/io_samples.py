@@ -1,4 +1,4 @@
-"""A small orbit as raw tables and in files, and a small result, for the tests of solver.io."""
+"""A small orbit as raw tables and files, and a small result, for the tests of solver.io."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +20,7 @@ ELEMENTS = {"exp": N_EXPOSURES, "coef": 18, "det": 4}
 
 
 def measurement(orbit=1, seed=0):
-    """Return the raw measurement table: every source once on every exposure."""
+    """Return the raw measurement table, with every source once per exposure."""
     rng = np.random.default_rng(seed)
     exposure = np.repeat(np.arange(N_EXPOSURES), N_SOURCES)
     n = exposure.size
@@ -65,7 +65,7 @@ def environment(orbit=1):
 
 
 def catalogue(seed=1):
-    """Return the raw catalogue: the measured sources and one more; the first two are references."""
+    """Return the raw catalogue: measured sources and one more; the first two are references."""
     rng = np.random.default_rng(seed)
     n = N_SOURCES + 1
     table = Table(
@@ -106,14 +106,14 @@ def write_fits(path: Path, **tables: Table) -> Path:
 
 
 def write_table(table: Table, path: Path) -> Path:
-    """Write one table in the format of the suffix of `path`."""
+    """Write one table in the format given by the suffix of `path`."""
     formats = {".ecsv": "ascii.ecsv", ".csv": "ascii.csv", ".xml": "votable"}
     table.write(path, format=formats.get(path.suffix, path.suffix[1:]), overwrite=True)
     return path
 
 
 def write_orbit(folder: Path, measured=None, exposed=None, listed=None) -> tuple[Path, Path]:
-    """Write OBS.fits and REF.fits, with some tables other than the default; return both."""
+    """Write OBS.fits and REF.fits, with given tables instead of the default; return both paths."""
     obs = write_fits(
         folder / "OBS.fits",
         measurement=measurement() if measured is None else measured,
@@ -124,7 +124,7 @@ def write_orbit(folder: Path, measured=None, exposed=None, listed=None) -> tuple
 
 
 def small_result(seed=2) -> FitResult:
-    """Return a result of the right shape with random contents."""
+    """Return a result with the right columns and random values."""
     rng = np.random.default_rng(seed)
     measured, exposed = measurement().to_pandas(), environment().to_pandas()
     sources = random_table(SOURCES, N_SOURCES, rng).assign(
@@ -163,7 +163,7 @@ def small_result(seed=2) -> FitResult:
 
 
 def without_truth(result: FitResult) -> FitResult:
-    """Return the result of a fit that knew no truth."""
+    """Return the result as fitted without a truth."""
     return replace(result, true_places=None)
 
 

@@ -1,8 +1,8 @@
-"""A small orbit with known truth: an observation model of its own, in NumPy and ERFA.
+"""A small orbit with known truth, from an independent observation model in NumPy and ERFA.
 
-Written from the paper's section "Observation model" and sharing no code with
-`solver.model.forward`: spherical trigonometry where the solver has unit vectors,
-`numpy.polynomial.legendre` where it has a recursion, ERFA where it has its own aberration.
+It follows the paper's section "Observation model" and shares no code with
+`solver.model.forward`: spherical trigonometry instead of unit vectors,
+`numpy.polynomial.legendre` instead of a recursion, and ERFA's aberration.
 """
 
 from dataclasses import dataclass, replace
@@ -31,11 +31,12 @@ PRIOR_FOCAL_LENGTH = 100.0 * np.degrees(1.0)
 
 @dataclass(frozen=True)
 class Design:
-    """What a small orbit is made of.
+    """Design of a small orbit.
 
-    `scatter` is that of the true calibration about its nominal values, in units of the
-    default priors' widths; `pointing_error` that of the pointings, arcsec; `focal_error` is a
-    common error of the estimated focal lengths; `velocity` the satellite's largest, km/s.
+    `scatter` is the scatter of the true calibration about its nominal values, in units of the
+    default prior widths; `pointing_error` the scatter of the pointings, arcsec; `focal_error` a
+    common relative error of the estimated focal lengths; `velocity` the largest velocity of
+    the satellite, km/s.
     """
 
     seed: int = 0
@@ -59,7 +60,7 @@ class Design:
 
 
 class Truth(NamedTuple):
-    """True values: deg, um; directions at the mean epoch, as `predict_pixels` takes them."""
+    """True values in deg and um, as used by `predict_pixels`; directions at the mean epoch."""
 
     ra: np.ndarray
     dec: np.ndarray
@@ -77,7 +78,7 @@ class Truth(NamedTuple):
 
 
 class SmallOrbit(NamedTuple):
-    """The tables of an orbit, its truth, and the sources, exposures, detectors of its rows."""
+    """Tables and truth of an orbit, and the source, exposure and detector index of its rows."""
 
     data: OrbitData
     truth: Truth
@@ -104,7 +105,7 @@ def ideal_plane(xi, eta, angle, focal_length):
 
 
 def displacement(x, y, coefficients, scale):
-    """Eqs. (model:Lx, model:A0): one direction, with no displacement at the centre."""
+    """Eqs. (model:Lx, model:A0) for one direction, without displacement at the centre."""
     degree = max((k + j for k, j in coefficients), default=0)
     matrix = np.zeros((degree + 1, degree + 1))
     for (k, j), value in coefficients.items():
@@ -122,7 +123,7 @@ def detector_pixels(x, y, centre_x, centre_y, angle, pitch_x, pitch_y):
 
 
 def apparent_places(ra, dec, velocity, sun_distance):
-    """Return apparent right ascension and declination, rad; a zero velocity changes nothing."""
+    """Return apparent right ascension and declination, rad; zero velocity has no effect."""
     lorentz = np.sqrt(1.0 - np.sum(velocity**2, axis=-1))
     natural = erfa.s2c(np.radians(ra), np.radians(dec))
     return erfa.c2s(erfa.ab(natural, velocity, sun_distance, lorentz))
@@ -178,8 +179,8 @@ def observer_of(exposures, aberration):
 def epoch_places(catalogue, mjd_tcb):
     """Return right ascension and declination, deg, at an epoch by ERFA's `pmpx`.
 
-    ERFA counts proper motion until light arrives at the barycentre, up to 0.016 uas per
-    mas/yr; the time is given such that this cancels.
+    ERFA adds the light travel time to the barycentre to the proper motion, up to 0.016 uas per
+    mas/yr; the time passed to it compensates for this.
     """
     ra, dec = np.radians(catalogue["ra"].to_numpy()), np.radians(catalogue["dec"].to_numpy())
     position = earth(mjd_tcb)[0]
@@ -201,7 +202,7 @@ def epoch_places(catalogue, mjd_tcb):
 
 def _true_catalogue(design, rng):
     n = design.n_sources
-    # The layout is that of every seed, so that all have the same measurements in common.
+    # The layout does not depend on the seed, so all orbits have nearly the same measurements.
     x, y = np.random.default_rng(1234).uniform(-1.0, 1.0, (2, n))
     ra = design.ra + 0.3 * x / np.cos(np.radians(design.dec))
     is_reference = np.arange(n) < design.n_reference
@@ -230,8 +231,8 @@ def _true_catalogue(design, rng):
 
 
 def _resampled(truth, design, rng):
-    """Draw the catalogue that is known from its covariance about the true one."""
-    known = truth.copy()
+    """Draw the reference catalogue from its covariance about the true one."""
+    catalogue = truth.copy()
     draws = {name: rng.normal(size=len(truth)) for name in ASTROMETRY}
     rho = truth["ra_pmra_corr"].to_numpy()
     draws["pmra"] = rho * draws["ra"] + np.sqrt(1.0 - rho**2) * draws["pmra"]
@@ -239,9 +240,9 @@ def _resampled(truth, design, rng):
         error = draws[name] * truth[f"{name}_error"].to_numpy()
         if name == "ra":
             error /= np.cos(np.radians(truth["dec"].to_numpy()))
-        known[name] = truth[name] + (error / 3.6e6 if name in ("ra", "dec") else error)
-    known["ra"] %= 360.0
-    return known
+        catalogue[name] = truth[name] + (error / 3.6e6 if name in ("ra", "dec") else error)
+    catalogue["ra"] %= 360.0
+    return catalogue
 
 
 def _exposures(design):
@@ -338,9 +339,9 @@ def make_orbit(design=None, **changes):
             "sy": sigma[:, 1],
         }
     )
-    known = _resampled(true_catalogue, design, rng)
+    catalogue = _resampled(true_catalogue, design, rng)
     correlations = [c for c in true_catalogue if c.endswith("_corr")]
-    data = OrbitData(measurements, exposures, known, true_catalogue.drop(columns=correlations))
+    data = OrbitData(measurements, exposures, catalogue, true_catalogue.drop(columns=correlations))
     return SmallOrbit(data, truth, design.instrument, source, exposure, detector, pixels)
 
 

@@ -1,4 +1,4 @@
-"""A made-up history of sources through many orbits, whose motions and noise are known."""
+"""A synthetic history of sources in many orbits, with known motions and noise."""
 
 import numpy as np
 import pandas as pd
@@ -16,22 +16,22 @@ PIXELS_MAS = 0.6
 
 
 def epochs_of(n_orbits):
-    """Return epochs in spring and autumn of three years, MJD."""
+    """Return `n_orbits` epochs in spring and autumn of three years, MJD."""
     start = 61_800.0 + 182.6 * np.arange(6)
     return np.sort(np.concatenate([start + 7.0 * k for k in range(-(-n_orbits // 6))]))[:n_orbits]
 
 
 def design_at(epoch):
-    """Return how the five parameters move one source at some epochs."""
+    """Return the design matrix of the five parameters of one source at some epochs."""
     frame = np.broadcast_to(tangent_frame(np.array([RA]), np.array([DEC])), (len(epoch), 3, 3))
     return jacobian_at(frame, julian_year(epoch) - EPOCH, observer_at(epoch).position)
 
 
 def make_history(motions, n_orbits, *, noise=PIXELS_MAS, draws=None, seed=0, artificial=False):
-    """Return HISTORY with SHARED_ERRORS of sources that move as `motions` (source, 5).
+    """Return HISTORY and SHARED_ERRORS of sources with the parameters `motions` (source, 5).
 
-    `draws` are errors of the five parameters in each draw, (source, draw, 5), which the
-    position inherits in every orbit; the truth differs from the catalogue by the motion.
+    `draws` are errors of the five parameters in each draw, shape (source, draw, 5), which
+    affect the position in every orbit. The truth differs from the catalogue by the motion.
     """
     rng = np.random.default_rng(seed)
     epoch = epochs_of(n_orbits)

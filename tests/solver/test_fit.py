@@ -11,7 +11,7 @@ from solver.fit import fit_orbit
 from tests.solver.small_orbit import FIRST_ID, make_orbit
 
 MAS = ["offset_ra", "offset_dec", "sigma_ra_marginal", "sigma_dec_marginal"]
-# Far below the uncertainties of 1 mas, above the last step's tolerance of 1e-3 of them.
+# Far below the uncertainties of 1 mas, but above the tolerance of the last step (1e-3 of them).
 SAME_MAS = 1e-4
 
 
@@ -30,14 +30,14 @@ def test_fit_converges_in_few_iterations(result):
     assert result.summary["iterations"] <= 6
 
 
-def test_fit_leaves_its_input_alone(small_orbit):
+def test_fit_does_not_modify_its_input(small_orbit):
     before = {n: getattr(small_orbit.data, n).copy() for n in ("measurements", "exposures")}
     fit_orbit(small_orbit.data)
     for name, frame in before.items():
         pd.testing.assert_frame_equal(getattr(small_orbit.data, name), frame)
 
 
-def test_ids_of_gaias_size_are_kept(result):
+def test_gaia_ids_are_exact(result):
     assert result.sources["source_id"].min() >= FIRST_ID
     assert (result.sources["source_id"] % 2 == 0).any()
     assert (result.sources["source_id"] % 2 == 1).any()
@@ -45,7 +45,7 @@ def test_ids_of_gaias_size_are_kept(result):
 
 @pytest.fixture(scope="module")
 def by_order():
-    """Fits of every order to one orbit whose distortion is of the fifth."""
+    """Fits of every order to one orbit with fifth-order distortion."""
     orbit = make_orbit()
     return [
         fit_orbit(orbit.data, orbit.instrument, FitSettings(order=order))
@@ -66,7 +66,7 @@ def test_evidence_is_highest_at_the_true_order(by_order):
 
 
 @pytest.mark.slow
-def test_orders_without_terms_are_the_same(by_order):
+def test_orders_0_and_1_give_the_same_solution(by_order):
     assert_same_sources(by_order[0].sources, by_order[1].sources)
 
 
@@ -76,7 +76,7 @@ def test_higher_order_adds_terms_without_renaming_the_lower_ones(by_order):
     assert list(higher["label"])[: len(lower)] == list(lower["label"])
 
 
-def test_order_of_the_rows_does_not_matter(small_orbit, result, fit, with_tables):
+def test_row_order_does_not_change_the_solution(small_orbit, result, fit, with_tables):
     shuffled = with_tables(
         small_orbit,
         measurements=small_orbit.data.measurements.sample(frac=1.0, random_state=1),
@@ -94,7 +94,7 @@ def test_order_of_the_rows_does_not_matter(small_orbit, result, fit, with_tables
     np.testing.assert_array_equal(found.exposures["plate_id"], result.exposures["plate_id"])
 
 
-def test_renumbering_the_exposures_moves_their_rows_alone(small_orbit, result, fit, with_tables):
+def test_renumbered_exposures_only_reorder_the_rows(small_orbit, result, fit, with_tables):
     new = {0: 30, 1: 10, 2: 0, 3: 20}
     tables = {
         name: getattr(small_orbit.data, name).assign(
@@ -110,7 +110,7 @@ def test_renumbering_the_exposures_moves_their_rows_alone(small_orbit, result, f
     )
 
 
-def test_detector_that_is_not_measured_changes_nothing_else(small_orbit, with_tables, fit):
+def test_unmeasured_detector_does_not_change_the_solution(small_orbit, with_tables, fit):
     rows = small_orbit.data.measurements
     kept = with_tables(small_orbit, measurements=rows[rows["detector_id"] != 2])
     fewer = replace(
@@ -123,11 +123,11 @@ def test_detector_that_is_not_measured_changes_nothing_else(small_orbit, with_ta
     np.testing.assert_allclose(unused["offset"], 0.0, atol=1e-9)
 
 
-def test_exposure_that_is_not_measured_changes_nothing_else(small_orbit, with_tables, fit):
+def test_unmeasured_exposure_does_not_change_the_solution(small_orbit, with_tables, fit):
     exposures = small_orbit.data.exposures.assign(obstime=61_822.0)
     rows = small_orbit.data.measurements
-    gone = (rows["field_id"] == 1) & (rows["plate_id"] == 2)
-    kept = with_tables(small_orbit, measurements=rows[~gone], exposures=exposures)
+    is_removed = (rows["field_id"] == 1) & (rows["plate_id"] == 2)
+    kept = with_tables(small_orbit, measurements=rows[~is_removed], exposures=exposures)
     dropped = with_tables(kept, exposures=exposures.drop(index=6))
     widths = {"position_angle": 3600.0}
     with_it, without = fit(kept, prior_widths=widths), fit(dropped, prior_widths=widths)
@@ -136,7 +136,7 @@ def test_exposure_that_is_not_measured_changes_nothing_else(small_orbit, with_ta
 
 
 def test_field_across_zero_hours_has_the_same_solution(small_orbit, with_tables, fit):
-    """Turned about the pole; what does not turn along, the Earth, is left out."""
+    """Rotated about the pole, without the Earth's position and velocity, which are not rotated."""
 
     def turned(by):
         catalogue = small_orbit.data.catalogue.assign(parallax=0.0, parallax_error=0.0)
@@ -156,7 +156,7 @@ def test_field_across_zero_hours_has_the_same_solution(small_orbit, with_tables,
     assert there.summary["chi2"] == pytest.approx(here.summary["chi2"], rel=1e-6)
 
 
-def test_truth_across_zero_hours_is_met(fit):
+def test_field_across_zero_hours_recovers_the_truth(fit):
     result = fit(make_orbit(ra=0.02))
     joined = result.sources.merge(result.true_places, on="source_id", suffixes=("", "_true"))
     turn = (joined["ra"] - joined["ra_true"] + 180.0) % 360.0 - 180.0
@@ -165,8 +165,8 @@ def test_truth_across_zero_hours_is_met(fit):
     assert pull.abs().max() < 5.0
 
 
-def test_aberration_left_out_hides_in_the_quadratic_distortion(small_orbit, result, fit):
-    """Up to some nm; a small orbit holds the other orders too weakly to leave them alone."""
+def test_quadratic_distortion_absorbs_omitted_aberration(small_orbit, result, fit):
+    """By some nm; in a small orbit the other orders are weakly constrained and change too."""
     without = fit(small_orbit, aberration=False)
     moved = np.abs(coefficients(without) - coefficients(result))
     assert 2e-3 < moved[:3].max() < 2e-2
@@ -174,7 +174,7 @@ def test_aberration_left_out_hides_in_the_quadratic_distortion(small_orbit, resu
     assert without.summary["chi2"] == pytest.approx(result.summary["chi2"], rel=1e-3)
 
 
-def test_mock_without_aberration_is_fitted_without(fit):
+def test_mock_without_aberration_recovers_the_distortion(fit):
     orbit = make_orbit(aberration=False)
     result = fit(orbit, aberration=False)
     degrees = [(n - j, j) for n in range(2, 6) for j in range(n + 1)]
@@ -183,8 +183,8 @@ def test_mock_without_aberration_is_fitted_without(fit):
     assert np.abs((rows["value"] - truth) / rows["sigma_marginal"]).max() < 4.5
 
 
-def test_velocity_of_the_satellite_is_needed(with_tables, fit):
-    """Seen with measurements of 0.04 mas, since it is worth some 50 uas in a field."""
+def test_satellite_velocity_improves_the_fit(with_tables, fit):
+    """The effect is some 50 uas in a field, so the measurement noise here is 0.04 mas."""
     orbit = make_orbit(velocity=7.6, noise_pix=1e-4)
     still = orbit.data.exposures.assign(satellite_vx=0.0, satellite_vy=0.0, satellite_vz=0.0)
     used, left_out = fit(orbit), fit(with_tables(orbit, exposures=still))
@@ -199,8 +199,8 @@ def test_better_measurements_give_better_positions(fit):
     np.testing.assert_allclose(ratio[free], 10.0, rtol=1e-3)
 
 
-def test_conditional_sigma_is_the_measurements_over_the_root_of_their_number(small_orbit, result):
-    """The paper's sigma/sqrt(N), for a source with next to no prior."""
+def test_conditional_sigma_is_sigma_over_root_n(small_orbit, result):
+    """The paper's sigma/sqrt(N), for sources with a negligible prior."""
     free = result.sources[~result.sources["is_reference"]]
     scale = np.degrees(10.0 / 4.86e6) * 3.6e6
     rows = small_orbit.data.measurements
@@ -208,31 +208,31 @@ def test_conditional_sigma_is_the_measurements_over_the_root_of_their_number(sma
     weight = (1.0 / variance).groupby(rows["source_id"]).sum()
     expected = scale / np.sqrt(weight[free["source_id"]].to_numpy())
     found = np.sqrt(free["sigma_ra_conditional"] * free["sigma_dec_conditional"])
-    # Less exact as sx and sy differ, by up to 1.25/0.8 here.
+    # Approximate, because sx and sy differ by up to 1.25/0.8 here.
     np.testing.assert_allclose(found, expected, rtol=0.08)
     assert np.median(found / expected) == pytest.approx(1.0, abs=0.02)
 
 
-def test_limit_of_iterations_is_told(small_orbit, fit):
+def test_iteration_limit_is_reported(small_orbit, fit):
     result = fit(small_orbit, max_iterations=1)
     assert result.summary["converged"] is False
     assert result.summary["reason"] == FitStatus.MAX_ITERATIONS.value
     assert result.summary["iterations"] == 1
 
 
-def test_singular_orbit_has_no_result(small_orbit, fit):
+def test_singular_orbit_raises(small_orbit, fit):
     names = ("focal_length", "pitch_x", "pitch_y", "detector_x", "detector_y")
     with pytest.raises(FitError, match="orbit 7: .* leave a direction of the solution open"):
         fit(small_orbit, prior_widths=dict.fromkeys(names, np.inf))
 
 
-def test_measurements_that_are_no_numbers_have_no_result(small_orbit, with_tables, fit):
+def test_nan_measurements_raise(small_orbit, with_tables, fit):
     broken = small_orbit.data.measurements.assign(ny=np.nan)
     with pytest.raises(FitError, match="orbit 7: the residuals are not finite"):
         fit(with_tables(small_orbit, measurements=broken))
 
 
-def test_progress_may_stop_the_fit(small_orbit):
+def test_exception_in_progress_stops_the_fit(small_orbit):
     seen = []
 
     def stop(iteration):
@@ -253,7 +253,7 @@ def test_settings_and_provenance_are_kept(small_orbit):
     assert result.orbit_id == 7
 
 
-def test_tight_prior_holds_its_parameters(small_orbit, fit):
-    held = fit(small_orbit, prior_widths={"distortion_x": 1e-6})
-    assert np.abs(coefficients(held)[:, 0]).max() < 1e-3
-    assert np.abs(coefficients(held)[:, 1]).max() > 0.3
+def test_tight_prior_constrains_its_parameters(small_orbit, fit):
+    tight = fit(small_orbit, prior_widths={"distortion_x": 1e-6})
+    assert np.abs(coefficients(tight)[:, 0]).max() < 1e-3
+    assert np.abs(coefficients(tight)[:, 1]).max() > 0.3

@@ -1,4 +1,4 @@
-"""The sample orbit: made by a program that shares no code with the project."""
+"""The sample orbit, simulated by a program that shares no code with the project."""
 
 import numpy as np
 import pandas as pd
@@ -21,7 +21,7 @@ def sample_result(sample_orbit, fit_whole):
 
 @pytest.fixture(scope="module")
 def deviations(sample_result):
-    """Estimate minus truth, mas, of sources with ten measurements or more."""
+    """Estimate minus truth, mas, of sources with at least ten measurements."""
     joined = sample_result.sources.merge(
         sample_result.true_places, on="source_id", suffixes=("", "_true")
     )
@@ -40,21 +40,21 @@ def test_fit_converges_within_six_iterations(sample_result):
     assert sample_result.summary["iterations"] <= 6
 
 
-def test_chi2_is_that_of_the_degrees_of_freedom(sample_result):
+def test_chi2_agrees_with_the_degrees_of_freedom(sample_result):
     dof = sample_result.summary["dof"]
     error = np.sqrt(2.0 / dof)
     assert sample_result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=4.0 * error)
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])
-def test_standardised_residuals_scatter_by_one(sample_result, axis):
+def test_standardised_residuals_have_unit_scatter(sample_result, axis):
     values = sample_result.residuals[f"standardised_{axis}"]
     assert values.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * len(values)))
 
 
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("kind", CLASSES)
-def test_pulls_scatter_by_one(deviations, kind, axis):
+def test_pulls_have_unit_scatter(deviations, kind, axis):
     rows = deviations[deviations["class"] == kind]
     pulls = rows[f"deviation_{axis}"] / rows[f"sigma_{axis}_marginal"]
     assert 0.92 < pulls.std(ddof=0) < 1.10
@@ -62,22 +62,22 @@ def test_pulls_scatter_by_one(deviations, kind, axis):
 
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("kind", CLASSES)
-def test_mean_deviation_is_what_the_reference_stars_errors_induce(deviations, kind, axis):
-    """But for what the noise leaves: of each source and of the calibration they share."""
+def test_mean_deviation_is_induced_by_reference_errors(deviations, kind, axis):
+    """Up to noise: that of each source, and that of the calibration common to all."""
     rows = deviations[deviations["class"] == kind]
-    left = rows[f"deviation_{axis}"].mean() - rows[f"induced_{axis}"].mean()
+    remainder = rows[f"deviation_{axis}"].mean() - rows[f"induced_{axis}"].mean()
     own = np.sqrt((rows[f"sigma_{axis}_conditional"] ** 2).sum()) / len(rows)
-    assert abs(left) < 4.0 * own * calibration_share(deviations, axis)
+    assert abs(remainder) < 4.0 * own * calibration_share(deviations, axis)
 
 
 def calibration_share(deviations, axis):
-    """Return how much more a source's error is than its own measurements leave."""
+    """Return the mean ratio of marginal to conditional sigma."""
     free = deviations[deviations["class"] != "reference"]
     return float((free[f"sigma_{axis}_marginal"] / free[f"sigma_{axis}_conditional"]).mean())
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_summary_gives_the_same_figures(sample_result, deviations, axis):
+def test_summary_agrees_with_the_deviations(sample_result, deviations, axis):
     for kind in CLASSES:
         rows, figures = (
             deviations[deviations["class"] == kind],
@@ -89,7 +89,7 @@ def test_summary_gives_the_same_figures(sample_result, deviations, axis):
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_true_places_are_those_of_the_truth_file(sample_orbit_dir, sample_result, axis):
+def test_true_positions_agree_with_the_truth_file(sample_orbit_dir, sample_result, axis):
     table = Table.read(sample_orbit_dir / "sample_truth.fits").to_pandas()
     expected = table.set_index("source_id").loc[sample_result.true_places["source_id"]]
     difference = sample_result.true_places[axis].to_numpy() - expected[f"{axis}_epoch"].to_numpy()
@@ -109,32 +109,30 @@ def test_true_distortion_is_within_its_uncertainty(sample_result):
     assert (rows["sigma_marginal"] < 0.1).all()
 
 
-def test_aberration_left_out_hides_in_the_quadratic_distortion(
-    sample_orbit, sample_result, fit_whole
-):
+def test_quadratic_distortion_absorbs_omitted_aberration(sample_orbit, sample_result, fit_whole):
     without = fit_whole(sample_orbit, FitSettings(aberration=False))
     moved = without.values_on("coef").to_numpy() - sample_result.values_on("coef").to_numpy()
     quadratic, others = np.abs(moved[:3]), np.abs(moved[3:])
-    # The scale changes by 1e-4, and with it a true cubic term of 3 um by less than 1 nm.
+    # The scale changes by 1e-4, which changes a true cubic term of 3 um by less than 1 nm.
     assert 3e-3 < quadratic.max() < 1e-2
     assert others.max() < 1e-3
     assert without.summary["chi2"] == pytest.approx(sample_result.summary["chi2"], rel=1e-5)
 
 
-def test_true_flags_are_read(sample_result):
+def test_flags_are_read(sample_result):
     assert sample_result.summary["n_reference"] == 58
     assert sample_result.sources["is_artificial"].any()
 
 
-def test_modes_that_the_measurements_leave_open_are_those_of_geometry(sample_result):
+def test_weak_directions_are_those_of_the_geometry(sample_result):
     modes = sample_result.modes
-    is_open = modes["data_share"] < 1e-3
+    is_weak = modes["data_share"] < 1e-3
     # Shift, roll and scale of the detectors against the pointings; shift, roll, scale and
     # stretch of the sky; and the two quadratic maps that pointings, focal lengths, position
-    # angles and the distortion can follow.
-    assert is_open.sum() == 11
-    weakest = modes[is_open].head(4)
+    # angles and the distortion can compensate.
+    assert is_weak.sum() == 11
+    weakest = modes[is_weak].head(4)
     assert (weakest["relative_information"] < 1e-6).all()
-    assert (modes[is_open]["relative_information"].iloc[4:] > 1e-3).all()
-    assert (modes[is_open]["reference_share"].iloc[4:] > 0.999).all()
+    assert (modes[is_weak]["relative_information"].iloc[4:] > 1e-3).all()
+    assert (modes[is_weak]["reference_share"].iloc[4:] > 0.999).all()
     assert weakest["name"].str.contains("detector").all()

@@ -84,7 +84,7 @@ def test_what_if_starts_from_the_choices_of_its_solution(solution, orbit):
 def test_choice_that_cannot_be_used_changes_nothing(solution, orbit):
     with pytest.raises(InputError, match="order from 0 to 9"):
         orbit.fit(order=11)
-    with pytest.raises(InputError, match="some measurements of orbit 1 to be left"):
+    with pytest.raises(InputError, match="some measurements of orbit 1 to remain"):
         orbit.fit(exclude=[f"detector={number}" for number in range(4)])
     assert orbit.solution is solution
 

@@ -11,12 +11,12 @@ def measurements(small_orbit):
     return small_orbit.data.measurements
 
 
-def test_nothing_excluded_is_the_orbit_itself(small_orbit):
+def test_empty_exclusions_return_the_same_orbit(small_orbit):
     assert Exclusions().without(small_orbit.data) is small_orbit.data
 
 
 @pytest.mark.parametrize("column", ["source_id", "detector_id"])
-def test_excluded_value_is_measured_no_more(small_orbit, measurements, column):
+def test_excluded_source_or_detector_is_removed(small_orbit, measurements, column):
     value = int(measurements[column].iloc[0])
     name = {"source_id": "sources", "detector_id": "detectors"}[column]
     left = Exclusions(**{name: frozenset([value])}).without(small_orbit.data).measurements
@@ -24,7 +24,7 @@ def test_excluded_value_is_measured_no_more(small_orbit, measurements, column):
     np.testing.assert_array_equal(left.index, expected.index)
 
 
-def test_excluded_exposure_loses_its_environment_too(small_orbit, measurements):
+def test_excluded_exposure_is_removed_from_both_tables(small_orbit, measurements):
     plate = tuple(measurements[["field_id", "plate_id"]].iloc[0].tolist())
     left = Exclusions(exposures=frozenset([plate])).without(small_orbit.data)
     for table in (left.measurements, left.exposures):
@@ -41,18 +41,18 @@ def test_excluded_exposure_loses_its_environment_too(small_orbit, measurements):
     ],
     ids=["source", "detector", "exposure"],
 )
-def test_what_was_not_measured_cannot_be_excluded(small_orbit, exclusions, named):
+def test_excluding_unmeasured_items_raises(small_orbit, exclusions, named):
     with pytest.raises(InputError, match=f"excluded {named}: expected one with measurements"):
         exclusions.without(small_orbit.data)
 
 
-def test_not_everything_can_be_excluded(small_orbit, measurements):
+def test_excluding_everything_raises(small_orbit, measurements):
     everything = Exclusions(detectors=frozenset(measurements["detector_id"].tolist()))
     with pytest.raises(InputError, match="expected some measurements"):
         everything.without(small_orbit.data)
 
 
-def test_exclusions_are_read_as_written_by_a_person():
+def test_exclusions_are_parsed():
     found = parse_exclusions(["source=12", " detector=3", "exposure=1/20", "source=-4"])
     assert found == Exclusions(frozenset([12, -4]), frozenset([(1, 20)]), frozenset([3]))
 
@@ -60,23 +60,23 @@ def test_exclusions_are_read_as_written_by_a_person():
 @pytest.mark.parametrize(
     "text", ["", "source", "source=x", "exposure=3", "plate=1/2", "source=1.5"]
 )
-def test_anything_else_is_refused(text):
+def test_invalid_exclusion_raises(text):
     with pytest.raises(InputError, match="expected source=ID, detector=ID or exposure=FIELD/PLATE"):
         parse_exclusions([text])
 
 
-def test_settings_keep_exclusions_as_plain_values():
+def test_exclusions_round_trip_in_settings():
     settings = FitSettings(exclusions=parse_exclusions(["source=12", "exposure=1/20"]))
     assert FitSettings.from_dict(settings.to_dict()) == settings
 
 
-def test_settings_written_before_there_were_exclusions_are_read():
+def test_settings_without_exclusions_are_read():
     values = FitSettings().to_dict()
     del values["exclusions"]
     assert FitSettings.from_dict(values) == FitSettings()
 
 
-def test_exclusions_have_names_for_people():
+def test_exclusions_have_names():
     found = parse_exclusions(["source=12", "exposure=1/20", "detector=3"]).names()
     assert found == ["source 12", "exposure 1/20", "detector 3"]
 
@@ -93,7 +93,7 @@ def test_thinned_orbit_keeps_a_share_of_each_class(small_orbit):
     assert thinned_orbit(data, data, 1) is data
 
 
-def test_thinned_orbit_keeps_the_same_sources_whatever_is_excluded(small_orbit):
+def test_thinned_sources_do_not_depend_on_exclusions(small_orbit):
     data = small_orbit.data
     kept = thinned_orbit(data, data, 3).measurements["source_id"].unique()
     left = Exclusions(sources=frozenset([int(kept[0])])).without(data)

@@ -25,7 +25,7 @@ def changed(old, new):
     return text.replace(old, new, 1)
 
 
-def test_mini_mock_is_the_papers():
+def test_mini_mock_agrees_with_the_paper():
     assert MINI_MOCK.focal_length_um == 4.86e6
     assert MINI_MOCK.distortion_scale_um == 21_000.0
     assert [(d.n_x, d.n_y, d.pitch_x_um) for d in MINI_MOCK.detectors] == [(1920, 1920, 10.0)] * 4
@@ -36,7 +36,7 @@ def test_mini_mock_has_gaps_of_three_millimetres():
     np.testing.assert_allclose(np.unique(np.abs(corners).round(6)), [1500.0, 20_700.0])
 
 
-def test_instrument_survives_a_file(read_text):
+def test_instrument_round_trips(read_text):
     assert read_text(write_instrument(MINI_MOCK)) == MINI_MOCK
 
 
@@ -45,18 +45,18 @@ def test_instrument_survives_a_file(read_text):
     ['the "great" one', "back\\slash", "two\nlines", "café"],
     ids=["quotes", "backslash", "newline", "accent"],
 )
-def test_any_name_survives_a_file(read_text, name):
+def test_special_characters_in_the_name_round_trip(read_text, name):
     instrument = replace(MINI_MOCK, name=name)
     assert read_text(write_instrument(instrument)) == instrument
 
 
-def test_ids_need_not_be_counted_from_zero(read_text):
+def test_detector_ids_may_be_arbitrary(read_text):
     detectors = tuple(replace(d, detector_id=10 * d.detector_id + 3) for d in MINI_MOCK.detectors)
     instrument = read_text(write_instrument(replace(MINI_MOCK, detectors=detectors)))
     np.testing.assert_array_equal(instrument.index_of(np.array([33, 3, 4, 13])), [3, 0, -1, 1])
 
 
-def test_whole_numbers_stand_for_lengths_too(read_text):
+def test_integer_lengths_are_accepted(read_text):
     assert (
         read_text(changed("focal_length_um = 4860000.0", "focal_length_um = 4860000")) == MINI_MOCK
     )
@@ -85,7 +85,7 @@ def test_whole_numbers_stand_for_lengths_too(read_text):
         ("name = ", "name = = ", "line 1"),
     ],
 )
-def test_value_that_is_not_usable_is_refused_with_the_file(read_text, old, new, complaint):
+def test_invalid_value_is_refused_with_the_file_name(read_text, old, new, complaint):
     with pytest.raises(InputError, match=rf"instrument\.toml: expected.*(?s:.)*{complaint}"):
         read_text(changed(old, new))
 
@@ -99,12 +99,12 @@ def test_file_without_detectors_is_refused(read_text, detectors):
         read_text(head + detectors)
 
 
-def test_file_that_is_not_there_is_refused(tmp_path):
+def test_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="absent.toml: expected an instrument"):
         read_instrument(tmp_path / "absent.toml")
 
 
-def test_file_that_is_no_text_is_refused(tmp_path):
+def test_binary_file_is_refused(tmp_path):
     path = tmp_path / "image.toml"
     path.write_bytes(b"\xff\xfe\x00\x01")
     with pytest.raises(InputError, match="image.toml"):

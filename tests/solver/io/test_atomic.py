@@ -1,4 +1,4 @@
-"""Atomic writing: the whole file or none, and refusal before any work."""
+"""Atomic writing: a complete file or none, and checks before the work."""
 
 import hashlib
 import os
@@ -62,7 +62,7 @@ def test_missing_folder_is_refused_before_the_block(tmp_path):
 
 
 def test_read_only_folder_is_refused(tmp_path, monkeypatch):
-    # Permissions do not bind the superuser, so the answer of the system is set.
+    # The superuser may write anywhere, so the answer of the system is replaced.
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     with pytest.raises(InputError, match="read-only"):
         require_writable(tmp_path / "out.txt")

@@ -1,4 +1,4 @@
-"""Raw tables: every format gives the same, and a damaged file only an InputError."""
+"""Raw tables: all formats give the same values, and damaged files raise InputError."""
 
 import zlib
 
@@ -27,7 +27,7 @@ def _write(table, path):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_formats_hold_the_same(tmp_path, suffix):
+def test_formats_read_the_same_values(tmp_path, suffix):
     table = catalogue()
     (read,) = read_tables(_write(table, tmp_path / f"stars{suffix}")).values()
     assert read.colnames == table.colnames
@@ -177,9 +177,9 @@ def test_truncated_fits(tmp_path, keep):
 def test_flipped_byte_under_a_checksum(tmp_path):
     obs, _ = write_orbit(tmp_path)
     with fits.open(obs) as hdus:
-        place = hdus["environment"].fileinfo()["datLoc"]
+        offset = hdus["environment"].fileinfo()["datLoc"]
     content = bytearray(obs.read_bytes())
-    content[place + 40] ^= 1
+    content[offset + 40] ^= 1
     obs.write_bytes(content)
     with pytest.raises(InputError, match=r"OBS\.fits, HDU ENVIRONMENT: .*DATASUM.*corrupt"):
         read_tables(obs)
@@ -190,8 +190,8 @@ def _with_card(path, hdu_name, card):
     with fits.open(path) as hdus:
         start = hdus[hdu_name].fileinfo()["hdrLoc"]
     content = bytearray(path.read_bytes())
-    place = content.index(card[:8].encode(), start)
-    content[place : place + 80] = card.ljust(80).encode()
+    offset = content.index(card[:8].encode(), start)
+    content[offset : offset + 80] = card.ljust(80).encode()
     path.write_bytes(content)
 
 
@@ -208,7 +208,7 @@ def _with_card(path, hdu_name, card):
         "DATASUM = 'abc     '",
     ],
 )
-def test_header_that_lies(tmp_path, card):
+def test_wrong_header_is_refused(tmp_path, card):
     obs, _ = write_orbit(tmp_path)
     _with_card(obs, "measurement", card)
     with pytest.raises(InputError, match=r"OBS\.fits"):

@@ -1,4 +1,4 @@
-"""Inspection: what a file is, what is in it, everything wrong with it, and never a traceback."""
+"""Inspection: kind, contents and problems of files, without exceptions."""
 
 import json
 
@@ -23,7 +23,7 @@ from tests.solver.io_samples import (
 
 def _inspect(*paths):
     found = inspect_files(paths)
-    # What is told must be fit for strict JSON.
+    # The result must be valid strict JSON.
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     return found
 
@@ -57,7 +57,7 @@ def test_columns_have_unit_range_and_canonical_name(tmp_path):
     assert columns["note"]["min"] is None
 
 
-def test_range_leaves_out_what_is_not_finite(tmp_path):
+def test_range_ignores_non_finite_values(tmp_path):
     table = catalogue()
     table["parallax"] = [1.0, np.nan, np.inf, 2.0, 1.5, 1.5, 1.5]
     table["nothing"] = np.full(7, np.nan)
@@ -80,13 +80,13 @@ def test_range_of_times(tmp_path):
     )
 
 
-def test_everything_wrong_is_told(tmp_path):
+def test_all_problems_are_listed(tmp_path):
     measured, listed = measurement(), catalogue()
     measured["nx"][0] = np.nan
     measured["sx"][:] = 0.0
     listed["is_reference"][:] = False
     obs, ref = _inspect(*write_orbit(tmp_path, measured, environment()[:2], listed[1:]))
-    told = "\n".join(obs["problems"])
+    listed_problems = "\n".join(obs["problems"])
     assert len(obs["problems"]) == 5
     for part in (
         "'nx': expected finite",
@@ -95,7 +95,7 @@ def test_everything_wrong_is_told(tmp_path):
         "every measured source in",
         "at least one reference source",
     ):
-        assert part in told
+        assert part in listed_problems
     assert ref["problems"] == []
 
 
@@ -117,13 +117,13 @@ def test_folder_of_an_observation(tmp_path):
     assert found["problems"] == []
 
 
-@pytest.mark.parametrize("told_by", ["file", "column", "table"])
-def test_truth(tmp_path, told_by):
+@pytest.mark.parametrize("named_by", ["file", "column", "table"])
+def test_truth(tmp_path, named_by):
     table = catalogue()
-    if told_by == "column":
+    if named_by == "column":
         table["ra_epoch"] = table["ra"]
-    name = {"file": "my_truth.fits"}.get(told_by, "b.fits")
-    hdu = {"table": "ground_truth"}.get(told_by, "stars")
+    name = {"file": "my_truth.fits"}.get(named_by, "b.fits")
+    hdu = {"table": "ground_truth"}.get(named_by, "stars")
     obs, truth = _inspect(write_orbit(tmp_path)[0], write_fits(tmp_path / name, **{hdu: table}))
     assert truth["kind"] == "truth"
     assert obs["problems"] == []
@@ -182,7 +182,7 @@ def test_survey_with_a_broken_table(tmp_path):
         ("none.fits", None),
     ],
 )
-def test_bad_files_are_told_not_raised(tmp_path, name, content):
+def test_bad_files_are_described_without_raising(tmp_path, name, content):
     if content is not None:
         (tmp_path / name).write_bytes(content)
     (found,) = _inspect(tmp_path / name)
@@ -197,13 +197,13 @@ def test_empty_folder(tmp_path):
     assert "expected a survey or the tables of an observation" in found["problems"][0]
 
 
-def test_table_of_something_else(tmp_path):
+def test_table_with_other_columns_is_unknown(tmp_path):
     (found,) = _inspect(write_fits(tmp_path / "a.fits", lines=environment()["plate_id", "pa_est"]))
     assert found["kind"] == "unknown"
     assert "found LINES with other columns" in found["problems"][0]
 
 
-def test_misspelt_measurement_is_still_one(tmp_path):
+def test_table_with_misspelt_column_is_recognised(tmp_path):
     table = measurement()
     table.rename_column("ny", "y")
     obs, _ = _inspect(*write_orbit(tmp_path, table))

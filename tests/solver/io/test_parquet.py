@@ -20,14 +20,14 @@ def table():
     )
 
 
-def test_table_comes_back_bit_for_bit(table, tmp_path):
+def test_table_round_trips_bit_for_bit(table, tmp_path):
     write_parquet(pa.Table.from_pandas(table, preserve_index=False), tmp_path / "t.parquet")
     back = pd.read_parquet(tmp_path / "t.parquet")
     pd.testing.assert_frame_equal(back, table)
     assert np.array_equal(np.signbit(back["residual"]), np.signbit(table["residual"]))
 
 
-def test_numbers_are_split_by_bytes_and_the_rest_has_a_dictionary(table, tmp_path):
+def test_floats_use_byte_stream_split_and_the_rest_a_dictionary(table, tmp_path):
     write_parquet(pa.Table.from_pandas(table, preserve_index=False), tmp_path / "t.parquet")
     group = parquet.ParquetFile(tmp_path / "t.parquet").metadata.row_group(0)
     encodings = {group.column(i).path_in_schema: group.column(i).encodings for i in range(4)}

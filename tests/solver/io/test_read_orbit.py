@@ -1,4 +1,4 @@
-"""Reading an orbit: every layout gives the same, every mistake an InputError."""
+"""Reading an orbit: all layouts give the same tables, and mistakes raise InputError."""
 
 import numpy as np
 import pandas as pd
@@ -205,7 +205,7 @@ def test_one_of_several_orbits(tmp_path, expected):
     ],
     ids=["several", "many", "unknown"],
 )
-def test_orbit_not_to_be_told(tmp_path, numbers, orbit, message):
+def test_ambiguous_or_unknown_orbit_is_refused(tmp_path, numbers, orbit, message):
     paths = write_orbit(tmp_path, *_orbits(*numbers))
     with pytest.raises(InputError, match=message):
         read_orbit(*paths, orbit=orbit)
@@ -306,7 +306,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_mistakes_are_told_and_nothing_is_written(tmp_path, mistake):
+def test_mistakes_are_refused_and_nothing_is_written(tmp_path, mistake):
     tables, message = MISTAKES[mistake]
     paths = write_orbit(tmp_path, **tables)
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}

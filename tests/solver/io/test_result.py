@@ -1,4 +1,4 @@
-"""Result files: lossless, in the published layout, and refused when they are not ours."""
+"""Result files: lossless, in the published layout; other files are refused."""
 
 import json
 from dataclasses import fields, replace
@@ -112,7 +112,7 @@ def test_round_trip_with_modes(tmp_path, result, table, rows):
     pd.testing.assert_frame_equal(back, frame, check_exact=True)
 
 
-def test_a_result_from_before_there_were_modes_has_none(written):
+def test_result_without_eigenmodes_has_none(written):
     back = read_result(written)
     assert [getattr(back, table.name) for table in schema.EIGENMODE_TABLES] == [None] * 3
 
@@ -152,7 +152,7 @@ def test_summary_keeps_types(written):
 
 
 def test_summary_must_be_plain(tmp_path, result):
-    with pytest.raises(TypeError, match="plain numbers and words"):
+    with pytest.raises(TypeError, match="plain numbers and text"):
         write_result(replace(result, summary={"a": object()}), tmp_path / "result.fits")
     assert list(tmp_path.iterdir()) == []
 
@@ -172,7 +172,7 @@ def test_published_hdus_come_first(written):
         assert [hdu.name for hdu in hdus][:7] == ["PRIMARY", *PUBLISHED]
 
 
-def test_files_are_valid_for_their_readers(written):
+def test_files_are_valid_fits(written):
     with fits.open(written, checksum=True) as hdus:
         hdus.verify("exception")
         assert all("CHECKSUM" in hdu.header and "DATASUM" in hdu.header for hdu in hdus)
@@ -212,18 +212,18 @@ def test_sample_is_in_the_order_of_the_measurements(written, result):
         ("DISTORTION", "opt_B_loc", "distortion_y"),
     ],
 )
-def test_published_calibration_is_ours(written, result, hdu, name, group):
+def test_published_calibration_agrees_with_the_result(written, result, hdu, name, group):
     rows = result.calibration[result.calibration["group"] == group]
     np.testing.assert_array_equal(fits.getdata(written, hdu)[name], rows["value"])
 
 
-def test_telescope_rows_carry_their_exposure(written, result):
+def test_telescope_rows_have_exposure_ids(written, result):
     telescope = fits.getdata(written, "TELESCOPE")
     for name in ("orbit_id", "field_id", "plate_id"):
         np.testing.assert_array_equal(telescope[name], result.exposures[name])
 
 
-def test_primary_header_says_what_made_it(written, result):
+def test_primary_header_has_provenance(written, result):
     cards = fits.getheader(written)
     assert (cards["ORIGIN"], cards["FORMAT"]) == ("plateviz", header.FORMAT)
     assert (cards["ENGINE"], cards["ORDER"], cards["ABERR"]) == ("gauss-newton", 5, True)
@@ -235,7 +235,7 @@ def test_primary_header_says_what_made_it(written, result):
 
 
 @pytest.mark.parametrize("hdu", ["PRIMARY", "RESULT"])
-def test_figures_that_readers_look_for(written, result, hdu):
+def test_headers_have_mean_epoch_and_uncertainties(written, result, hdu):
     cards = fits.getheader(written, hdu)
     assert cards["OBSTIME"] == pytest.approx(result.exposures["obstime"].mean(), abs=1e-9)
     assert cards["SIGMA_X"] == pytest.approx(result.residuals["sx"].mean())
@@ -343,7 +343,7 @@ def test_flipped_byte_is_refused(tmp_path, written, hdu):
         read_result(path)
 
 
-def test_observation_is_no_result(tmp_path):
+def test_observation_is_refused_as_a_result(tmp_path):
     obs, _ = write_orbit(tmp_path)
     with pytest.raises(InputError, match="expected a result file, with ORIGIN = 'plateviz'"):
         read_result(obs)
@@ -354,6 +354,6 @@ def test_missing_result(tmp_path):
         read_result(tmp_path / "none.fits")
 
 
-def test_fits_without_tables_is_no_result(tmp_path):
+def test_fits_without_tables_is_refused_as_a_result(tmp_path):
     with pytest.raises(InputError, match="expected a result file"):
         read_result(write_fits(tmp_path / "empty.fits"))

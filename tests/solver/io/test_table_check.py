@@ -1,4 +1,4 @@
-"""Table checks: names, types, units and values, with everything wrong said at once."""
+"""Table checks: names, types, units and values, with all problems in one message."""
 
 import numpy as np
 import pandas as pd
@@ -44,7 +44,7 @@ def test_absent_errors_of_a_truth_are_nan_and_nan_is_accepted():
     assert not frame["is_reference"].any()
 
 
-def test_other_columns_are_left_out():
+def test_other_columns_are_dropped():
     table = _replaced(catalogue(), ra_epoch=np.zeros(7), phot=Column(np.zeros(7), unit="mag"))
     assert list(conform(table, TRUTH, WHERE).columns) == TRUTH.names
 
@@ -71,14 +71,14 @@ def test_aliases(canonical, alias, table, schema):
     np.testing.assert_array_equal(conform(table, schema, WHERE)[canonical], table[alias])
 
 
-def test_estimated_pointing_goes_before_the_true_one_whatever_the_case():
+def test_estimated_pointing_has_priority_in_any_case():
     table = environment()
     table.rename_column("ra_est", "RA EST")
     table["ra"] = Column(np.zeros(len(table)), unit="deg")
     np.testing.assert_array_equal(conform(table, ENVIRONMENT, WHERE)["ra_est"], table["RA EST"])
 
 
-def test_same_case_goes_before_another():
+def test_same_case_has_priority():
     table = measurement()
     table["NX"] = np.zeros(len(table))
     np.testing.assert_array_equal(conform(table, MEASUREMENT, WHERE)["nx"], table["nx"])
@@ -101,7 +101,7 @@ def test_units_are_converted(name, unit, factor):
     np.testing.assert_allclose(conform(table, CATALOGUE, WHERE)[name], factor * values, rtol=1e-14)
 
 
-def test_values_in_the_canonical_unit_are_not_touched():
+def test_values_in_the_canonical_unit_are_unchanged():
     table = catalogue()
     np.testing.assert_array_equal(conform(table, CATALOGUE, WHERE)["ra"], table["ra"])
 
@@ -215,7 +215,7 @@ def test_unknown_unit():
         conform(table, MEASUREMENT, WHERE)
 
 
-def test_unknown_unit_of_a_column_not_read_is_nobodys_concern():
+def test_unknown_unit_of_an_unused_column_is_ignored():
     table = measurement()
     table["flux"] = Column(np.ones(len(table)), unit=u.Unit("pxl", parse_strict="silent"))
     assert problems(table, MEASUREMENT, WHERE) == []
@@ -281,7 +281,7 @@ def test_no_problem_in_a_good_table():
     assert problems(measurement(), MEASUREMENT, WHERE) == []
 
 
-def test_message_of_many_problems_says_how_many_more():
+def test_message_of_many_problems_counts_the_rest():
     table = measurement()
     for name in ("nx", "ny", "sx", "sy", "orbit_id", "field_id", "plate_id"):
         table[name] = ["x"] * len(table)
@@ -289,7 +289,7 @@ def test_message_of_many_problems_says_how_many_more():
         conform(table, MEASUREMENT, WHERE)
 
 
-def test_a_conformed_table_conforms():
+def test_conform_is_idempotent():
     frame = conform(catalogue(), CATALOGUE, WHERE)
     again = conform(Table.from_pandas(frame), CATALOGUE, WHERE)
     pd.testing.assert_frame_equal(frame, again, check_exact=True)

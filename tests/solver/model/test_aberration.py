@@ -31,7 +31,7 @@ latitudes = st.floats(-1.5, 1.5)
 
 @settings(deadline=None, max_examples=60)
 @given(angles, latitudes, angles, latitudes, st.floats(0.0, 2e-4), st.floats(0.98, 1.02))
-def test_apparent_direction_is_that_of_erfa(ra, dec, v_ra, v_dec, speed, sun_distance):
+def test_apparent_direction_agrees_with_erfa(ra, dec, v_ra, v_dec, speed, sun_distance):
     direction, velocity = erfa.s2c(ra, dec), speed * erfa.s2c(v_ra, v_dec)
     expected = erfa.ab(direction, velocity, sun_distance, np.sqrt(1.0 - velocity @ velocity))
     ours = apparent(direction, velocity, sun_distance)
@@ -48,5 +48,5 @@ def test_aberration_is_the_speed_times_the_sine_to_first_order():
     assert moved[0] == pytest.approx(1e-4, rel=1e-6)
 
 
-def test_lorentz_factor_is_the_inverse_one():
+def test_lorentz_factor_is_the_inverse():
     np.testing.assert_allclose(lorentz_factor(jnp.array([[0.6, 0.0, 0.0]])), 0.8)

@@ -28,7 +28,7 @@ def one_source(**changes):
     st.floats(0.0, 100.0),
     st.floats(60_000.0, 63_000.0),
 )
-def test_direction_is_that_of_erfas_space_motion(ra, dec, pmra, pmdec, parallax, mjd):
+def test_direction_agrees_with_erfa_space_motion(ra, dec, pmra, pmdec, parallax, mjd):
     source = one_source(ra=ra, dec=dec, pmra=pmra, pmdec=pmdec, parallax=parallax)
     expected = erfa.s2c(*np.radians(epoch_places(source, mjd)))[0]
     ours = propagate(source, mjd, earth(mjd)[0]).frame[0, 0]
@@ -36,7 +36,7 @@ def test_direction_is_that_of_erfas_space_motion(ra, dec, pmra, pmdec, parallax,
 
 
 def test_epoch_is_a_julian_year():
-    """J2016.0 is MJD 57388.5; half a day would be 1.4 uas per mas/yr."""
+    """J2016.0 is MJD 57388.5; an error of half a day would be 1.4 uas per mas/yr."""
     source = one_source(pmra=1000.0)
     start = tangent_frame(source["ra"].to_numpy(), source["dec"].to_numpy())[0]
     still = propagate(source, 57_388.5, np.zeros(3)).frame[0, 0]
@@ -51,7 +51,7 @@ def test_parallax_moves_the_source_away_from_the_observer():
     assert moved[1] == pytest.approx(-10.0 * MAS, rel=1e-9)
 
 
-def test_covariance_is_that_of_sampled_catalogues():
+def test_covariance_agrees_with_sampled_catalogues():
     source = one_source(
         parallax=5.0,
         ra_error=0.3,
@@ -84,7 +84,7 @@ def test_covariance_is_that_of_sampled_catalogues():
     np.testing.assert_allclose(found, expected, atol=5.0 / np.sqrt(n))
 
 
-def test_covariance_at_the_reference_epoch_is_the_catalogues():
+def test_covariance_at_the_reference_epoch_is_that_of_the_catalogue():
     source = one_source(ra_error=0.3, dec_error=0.2, pmra_error=9.0, ra_dec_corr=0.5)
     covariance = propagate(source, 57_388.5, np.zeros(3)).covariance[0]
     np.testing.assert_allclose(covariance, [[0.09, 0.03], [0.03, 0.04]], atol=1e-12)
@@ -92,7 +92,7 @@ def test_covariance_at_the_reference_epoch_is_the_catalogues():
 
 @settings(deadline=None, max_examples=40)
 @given(st.floats(0.0, 359.999999), st.floats(-89.9, 89.9), st.floats(0.1, 10.0))
-def test_sky_position_undoes_the_direction(ra, dec, length):
+def test_sky_position_inverts_tangent_frame(ra, dec, length):
     direction = length * tangent_frame(np.array([ra]), np.array([dec]))[:, 0]
     found_ra, found_dec = sky_position(direction)
     turn = (found_ra[0] - ra + 180.0) % 360.0 - 180.0
@@ -101,7 +101,7 @@ def test_sky_position_undoes_the_direction(ra, dec, length):
 
 
 @pytest.mark.parametrize("ra", [-1e-9, -1e-17, 0.0, 360.0], ids=str)
-def test_right_ascension_lies_within_one_turn(ra):
+def test_right_ascension_is_below_360_degrees(ra):
     found, _ = sky_position(tangent_frame(np.array([ra]), np.array([12.0]))[:, 0])
     assert 0.0 <= found[0] < 360.0
 
@@ -114,7 +114,7 @@ def test_sources_of_an_orbit_keep_their_order():
     np.testing.assert_allclose(dec, expected[1], atol=3e-13)
 
 
-def test_true_catalogue_without_uncertainties_has_places(small_orbit):
+def test_catalogue_without_uncertainties_has_frames(small_orbit):
     errors = [c for c in small_orbit.data.truth if c.endswith("_error")]
     truth = small_orbit.data.truth.drop(columns=errors)
     ra, _ = sky_position(frames_at(truth, MJD, earth(MJD)[0])[:, 0])

@@ -13,7 +13,7 @@ lengths = st.floats(-2e4, 2e4)
 
 @settings(deadline=None, max_examples=30)
 @given(lengths, lengths, lengths, lengths, st.floats(-7.0, 7.0), st.floats(5.0, 20.0))
-def test_pixels_are_those_of_the_papers_matrix(x, y, centre_x, centre_y, angle, pitch):
+def test_pixels_agree_with_the_papers_matrix(x, y, centre_x, centre_y, angle, pitch):
     expected = detector_pixels(x, y, centre_x, centre_y, angle, pitch, 1.1 * pitch)
     ours = to_pixel(
         (jnp.array([x]), jnp.array([y])),

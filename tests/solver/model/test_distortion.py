@@ -26,7 +26,7 @@ def numpy_basis(points, order):
 
 
 def stacked(x, y, order):
-    """Return the basis with a column for each term."""
+    """Return the basis with one column per term."""
     values = basis(jnp.asarray(x), jnp.asarray(y), order)
     return np.stack(values, axis=-1) if values else np.empty((len(x), 0))
 
@@ -34,7 +34,7 @@ def stacked(x, y, order):
 @pytest.mark.parametrize("order", range(2, MAX_ORDER + 1))
 @settings(deadline=None, max_examples=8)
 @given(points=positions)
-def test_basis_is_that_of_numpy(order, points):
+def test_basis_agrees_with_numpy(order, points):
     ours = stacked(points[:, 0], points[:, 1], order)
     np.testing.assert_allclose(ours, numpy_basis(points, order), atol=1e-13)
 
@@ -60,13 +60,13 @@ def test_lower_order_is_a_prefix_of_the_next(order):
     np.testing.assert_array_equal(lower, higher[:, : lower.shape[1]])
 
 
-def test_fifth_order_has_the_papers_eighteen_coefficients_in_the_published_order():
+def test_fifth_order_has_18_coefficients_in_the_published_order():
     assert len(terms(5)) == 18
     assert terms(5)[:7] == [(2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)]
     assert terms(5)[-1] == (0, 5)
 
 
-def test_constant_term_is_the_papers_up_to_the_fifth_order():
+def test_constant_term_agrees_with_the_paper():
     """Eq. (model:A0), evaluated at the centre for random coefficients."""
     values = np.random.default_rng(0).normal(size=18)
     named = dict(zip(terms(5), values, strict=True))

@@ -9,7 +9,7 @@ from solver.model.ephemeris import observer_at
 MJD = np.array([61_800.0, 61_822.3, 62_100.7])
 
 
-def test_state_is_that_of_astropys_earth():
+def test_state_agrees_with_astropy():
     when = Time(MJD, format="mjd", scale="tcb")
     position, velocity = get_body_barycentric_posvel("earth", when, ephemeris="builtin")
     ours = observer_at(MJD)
@@ -18,14 +18,14 @@ def test_state_is_that_of_astropys_earth():
     np.testing.assert_allclose(ours.velocity, expected, atol=1e-15)
 
 
-def test_distance_of_the_sun_is_that_of_astropy():
+def test_sun_distance_agrees_with_astropy():
     when = Time(MJD, format="mjd", scale="tcb")
     earth, sun = (get_body_barycentric(b, when, ephemeris="builtin") for b in ("earth", "sun"))
     expected = (earth - sun).norm().to_value(u.au)
     np.testing.assert_allclose(observer_at(MJD).sun_distance, expected, atol=1e-12)
 
 
-def test_satellite_adds_its_velocity_and_nothing_else():
+def test_satellite_only_adds_its_velocity():
     satellite = np.array([[7.6, 0.0, 0.0], [0.0, -7.6, 0.0], [0.0, 0.0, 3.0]])
     still, moving = observer_at(MJD), observer_at(MJD, satellite)
     difference = (moving.velocity - still.velocity) * constants.c.to_value(u.km / u.s)
@@ -34,7 +34,7 @@ def test_satellite_adds_its_velocity_and_nothing_else():
 
 
 def test_time_scale_is_barycentric_coordinate_time():
-    """TCB runs ahead of TDB by some 25 s in 2028; the Earth moves 740 km in that time."""
+    """TCB is ahead of TDB by some 25 s in 2028, in which the Earth moves 740 km."""
     as_tdb = Time(MJD, format="mjd", scale="tdb").tcb.mjd
     moved = observer_at(as_tdb).position - observer_at(MJD).position
     kilometres = np.linalg.norm(moved, axis=1) * u.au.to(u.km)

@@ -19,7 +19,7 @@ _predict = jax.jit(predict)
 
 
 def predicted(problem, theta, sources):
-    """Predict in one shape for all orbits, which spares compilations."""
+    """Predict with the same shapes for all orbits, to avoid recompilation."""
     take = np.minimum(np.arange(512), problem.n_obs - 1)
     index = Index(*(column[take] for column in problem.measurements.index))
     at = _predict(problem.offsets(theta, sources), problem.geometry, index)
@@ -39,7 +39,7 @@ def predicted(problem, theta, sources):
     ],
     ids=["paper", "zero-hours", "high-dec", "no-aberration", "satellite", "order-9", "far-off"],
 )
-def test_prediction_at_the_truth_is_that_of_the_papers_equations(changes):
+def test_prediction_agrees_with_the_papers_equations(changes):
     orbit = make_orbit(**changes)
     settings = FitSettings(
         order=changes.get("max_degree", 5), aberration=changes.get("aberration", True)
@@ -49,7 +49,7 @@ def test_prediction_at_the_truth_is_that_of_the_papers_equations(changes):
     np.testing.assert_allclose(pixels, orbit.pixels[problem.measurements.row], atol=PIXEL)
 
 
-def test_prediction_gives_the_positions_between_sky_and_pixel(problem, expansion_point):
+def test_prediction_includes_ideal_and_focal_positions(problem, expansion_point):
     at = predicted(problem, *expansion_point)
     values = problem.layout.scatter(expansion_point[0])
     coefficients = np.stack([values["distortion_x"], values["distortion_y"]], axis=-1)
@@ -92,8 +92,8 @@ def test_every_group_of_the_table_is_an_offset_of_the_model(problem, expansion_p
     assert set(problem.offsets(*expansion_point)) == {g.name for g in PARAMETERS}
 
 
-def test_turning_sky_and_pointing_together_changes_nothing(problem, expansion_point):
-    """A rotation about the pole, with the velocity turned along."""
+def test_common_rotation_of_sky_and_pointing_changes_nothing(problem, expansion_point):
+    """Rotation about the pole, including the velocity."""
     turn = Rotation.from_euler("z", 37.0, degrees=True).as_matrix()
     geometry = replace(
         problem.geometry,

@@ -36,7 +36,7 @@ def astropy_plane(source, pointing, angle_deg):
 
 @settings(deadline=None, max_examples=40)
 @given(longitudes, latitudes, separations, separations, st.floats(-180.0, 180.0))
-def test_ideal_plane_is_that_of_astropys_wcs(ra, dec, east, north, angle):
+def test_ideal_plane_agrees_with_astropy_wcs(ra, dec, east, north, angle):
     source = ((ra + east / np.cos(np.radians(dec))) % 360.0, dec + north)
     ours = project_one(source, (ra, dec), angle)
     # 1e-6 um is 0.04 uas; WCSLIB works in degrees.
@@ -45,7 +45,7 @@ def test_ideal_plane_is_that_of_astropys_wcs(ra, dec, east, north, angle):
 
 @settings(deadline=None, max_examples=40)
 @given(longitudes, latitudes, separations, separations, st.floats(-180.0, 180.0))
-def test_ideal_plane_is_that_of_the_papers_trigonometry(ra, dec, east, north, angle):
+def test_ideal_plane_agrees_with_the_papers_trigonometry(ra, dec, east, north, angle):
     source = (ra + east / np.cos(np.radians(dec)), dec + north)
     coordinates = standard_coordinates(*np.radians([*source, ra, dec]))
     expected = ideal_plane(*coordinates, np.radians(angle), FOCAL_LENGTH)
@@ -74,7 +74,7 @@ def test_tangent_frame_is_orthonormal_and_right_handed(ra, dec):
 
 @settings(deadline=None, max_examples=20)
 @given(longitudes, latitudes)
-def test_east_and_north_point_to_rising_coordinates(ra, dec):
+def test_east_and_north_point_to_increasing_coordinates(ra, dec):
     step = 1e-4
     at = np.array([ra, ra + step / np.cos(np.radians(dec)), ra])
     directions = tangent_frame(at, np.array([dec, dec, dec + step]))

@@ -11,9 +11,9 @@ from solver.linear.leverage import residuals
 from solver.linear.normal_equations import accumulate
 from solver.runtime.device import require_device
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[3]
 
-# A fit on the second of two devices, watched where it computes.
+# A fit on the second of two devices, which records the devices used.
 ON_ANOTHER_DEVICE = """
 import jax
 from solver.linear import normal_equations as normal
@@ -23,15 +23,15 @@ from tests.solver.small_orbit import make_orbit
 
 used = set()
 
-def watched(compute):
-    def work(*arguments):
+def recording(compute):
+    def wrapper(*arguments):
         found = compute(*arguments)
         used.update(*(array.devices() for array in jax.tree.leaves(found)))
         return found
-    return work
+    return wrapper
 
-normal.linearise = watched(normal.linearise)
-objective._of_chunk = watched(objective._of_chunk)
+normal.linearise = recording(normal.linearise)
+objective._of_chunk = recording(objective._of_chunk)
 jax.config.update("jax_default_device", jax.devices()[1])
 orbit = make_orbit()
 summary = fit_orbit(orbit.data, orbit.instrument).summary
@@ -50,7 +50,7 @@ def run(*command, **variables):
     )
 
 
-def test_device_is_that_of_jax():
+def test_device_is_the_jax_backend():
     assert require_device() == jax.default_backend()
 
 
@@ -65,7 +65,7 @@ def test_command_refuses_a_device_that_is_absent(tmp_path):
 
 
 def test_tests_refuse_a_device_that_is_absent():
-    done = run("-m", "pytest", "--device", "nowhere", "tests/solver/test_detector.py")
+    done = run("-m", "pytest", "--device", "nowhere", "tests/solver/model/test_detector.py")
     assert done.returncode == pytest.ExitCode.USAGE_ERROR
     assert (
         "JAX_PLATFORMS: expected a device that JAX can compute on here, found 'nowhere'"
@@ -74,7 +74,7 @@ def test_tests_refuse_a_device_that_is_absent():
     assert "Traceback" not in done.stderr
 
 
-def test_fit_stays_on_the_device_it_is_given(result):
+def test_fit_uses_only_the_default_device(result):
     done = run(
         "-c",
         ON_ANOTHER_DEVICE,
@@ -85,7 +85,7 @@ def test_fit_stays_on_the_device_it_is_given(result):
     assert done.stdout.split() == ["1", f"{result.summary['chi2']:.4f}"], done.stderr
 
 
-def test_what_comes_back_is_of_numpy_in_double_precision(problem, solution):
+def test_results_are_float64_numpy_arrays(problem, solution):
     theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
     found = accumulate(problem, theta, sources)
     found_residuals = residuals(

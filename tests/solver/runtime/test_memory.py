@@ -3,7 +3,7 @@ import sys
 
 import pytest
 
-# Page faults of arrays made and dropped again and again, beyond those of the first two.
+# Page faults of repeated allocations of an array, without those of the first two.
 FAULTS = """
 import resource, sys
 import numpy as np
@@ -28,6 +28,6 @@ def faults(*arguments):
     return int(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="there is no glibc elsewhere")
-def test_what_was_freed_serves_the_next_array():
+@pytest.mark.skipif(sys.platform != "linux", reason="needs glibc")
+def test_freed_memory_is_reused():
     assert faults("keep") < faults() / 10

@@ -19,7 +19,7 @@ print(names.count('tf_XLAEigen'), max(pool['num_threads'] for pool in threadpool
 """
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not tell cores apart")
+@pytest.mark.skipif(sys.platform != "linux", reason="needs CPU affinity")
 def test_a_worker_has_one_thread_and_may_run_on_any_core():
     run = subprocess.run([sys.executable, "-c", COUNT], capture_output=True, text=True)
     assert run.stdout.split() == ["1", "1"], run.stderr

@@ -18,7 +18,7 @@ from solver.simulate.settings import SurveySettings
 from solver.simulate.sky import icrs_to_galactic
 
 SETTINGS = SurveySettings(n_stars=6000, n_reference=1500, n_artificial=200)
-WORDS = ("ra", "dec", "pmra", "pmdec", "parallax")
+ASTROMETRY = ("ra", "dec", "pmra", "pmdec", "parallax")
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_reference_stars_are_those_that_satisfy_the_cuts(truth: pd.DataFrame) ->
     assert (stars["parallax"] > 5.0 * stars["parallax_error"]).all()
 
 
-def test_stars_fill_the_extended_field_and_thin_out_in_the_plane(truth: pd.DataFrame) -> None:
+def test_stars_fill_the_extended_field_and_are_sparser_in_the_plane(truth: pd.DataFrame) -> None:
     stars = truth[~truth["is_artificial"]]
     l_deg, b_deg = icrs_to_galactic(stars["ra"].to_numpy(), stars["dec"].to_numpy())
     assert -1.95 <= l_deg.min() < -1.85
@@ -63,7 +63,7 @@ def test_stars_fill_the_extended_field_and_thin_out_in_the_plane(truth: pd.DataF
     assert (np.abs(b_deg) < 0.3).mean() < 0.75 * 0.6 / 2.3
 
 
-def test_artificial_sources_stand_still_about_the_target(truth: pd.DataFrame) -> None:
+def test_artificial_sources_are_fixed_around_the_target(truth: pd.DataFrame) -> None:
     sources = truth[truth["is_artificial"]]
     assert (sources[["pmra", "pmdec", "parallax"]] == 0.0).all(axis=None)
     l_deg, b_deg = icrs_to_galactic(sources["ra"].to_numpy(), sources["dec"].to_numpy())
@@ -81,7 +81,7 @@ def test_ids_are_unique_and_too_long_for_float64(truth: pd.DataFrame) -> None:
     assert ((ids >= FIRST_ARTIFICIAL_ID) == truth["is_artificial"]).all()
 
 
-def test_seed_decides(truth: pd.DataFrame) -> None:
+def test_truth_depends_on_the_seed(truth: pd.DataFrame) -> None:
     pd.testing.assert_frame_equal(truth, truth_catalogue(replace(SETTINGS, orbits=3)))
     other = truth_catalogue(replace(SETTINGS, seed=1))
     assert not np.isin(other["ra"], truth["ra"]).any()
@@ -99,7 +99,7 @@ def test_reference_stars_scatter_by_their_own_errors(
 ) -> None:
     assert list(reference.columns) == CATALOGUE.names
     chosen = truth["is_reference"]
-    for name in WORDS:
+    for name in ASTROMETRY:
         error = truth.loc[chosen, f"{name}_error"]
         pull = offset(name, truth, reference)[chosen] / error
         assert pull.std() == pytest.approx(1.0, abs=0.08)
@@ -110,15 +110,15 @@ def test_other_sources_scatter_by_the_vague_errors(
     truth: pd.DataFrame, reference: pd.DataFrame
 ) -> None:
     chosen = ~truth["is_reference"]
-    for name, error in zip(WORDS, (1000.0, 1000.0, 1.0, 1.0, 1.0), strict=True):
+    for name, error in zip(ASTROMETRY, (1000.0, 1000.0, 1.0, 1.0, 1.0), strict=True):
         assert offset(name, truth, reference)[chosen].std() == pytest.approx(error, rel=0.05)
         assert (reference.loc[chosen, f"{name}_error"] == error).all()
 
 
-def test_separations_at_the_observation_epoch_are_the_papers(
+def test_separations_at_the_observation_epoch_agree_with_the_paper(
     truth: pd.DataFrame, reference: pd.DataFrame
 ) -> None:
-    offsets = {name: offset(name, truth, reference) for name in WORDS}
+    offsets = {name: offset(name, truth, reference) for name in ASTROMETRY}
     separation = np.hypot(
         offsets["ra"] + 13.0 * offsets["pmra"], offsets["dec"] + 13.0 * offsets["pmdec"]
     )
@@ -140,7 +140,7 @@ def gaia(truth: pd.DataFrame) -> pd.DataFrame:
     return stars.assign(phot_g_mean_mag=15.0).sample(frac=1.0, random_state=1)
 
 
-def test_gaia_selection_keeps_what_the_paper_keeps(gaia: pd.DataFrame) -> None:
+def test_gaia_selection_follows_the_paper(gaia: pd.DataFrame) -> None:
     gaia = gaia.reset_index(drop=True)
     gaia.loc[0, "parallax"] = 4.9 * gaia.loc[0, "parallax_error"]
     gaia.loc[1, "dec"] += 5.0
@@ -168,6 +168,6 @@ def test_gaia_selection_keeps_what_the_paper_keeps(gaia: pd.DataFrame) -> None:
     ],
     ids=["missing", "text", "float-ids", "repeated", "reserved", "no-reference"],
 )
-def test_unusable_gaia_tables_are_refused(gaia: pd.DataFrame, change: object, message: str) -> None:
+def test_invalid_gaia_tables_are_refused(gaia: pd.DataFrame, change: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         truth_from_gaia(change(gaia), SETTINGS, "my.csv")

@@ -1,4 +1,4 @@
-"""Tables of the Gaia archive as a truth: every format, unit and spelling; correlations used."""
+"""Tables of the Gaia archive as a truth: formats, units, spellings and correlations."""
 
 from dataclasses import replace
 
@@ -22,8 +22,8 @@ from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 
 SETTINGS = SurveySettings(orbits=1, n_stars=3000, n_reference=1500, n_artificial=40)
-N_GAPS = 7
-# A loading matrix gives correlations that five parameters can have together.
+N_INCOMPLETE = 7
+# A loading matrix gives a valid correlation matrix of five parameters.
 LOADINGS = np.array([[1, 0.4], [-0.3, 1], [0.9, -0.5], [0.2, 0.7], [-0.6, -0.1]])
 
 
@@ -47,12 +47,12 @@ def stars():
 
 @pytest.fixture
 def archive(stars):
-    """The same as the archive gives it: units, a text column, and stars without a parallax."""
+    """The same stars as in the archive: with units, a text column and stars without parallax."""
     table = Table.from_pandas(stars)
     for column in GAIA:
         table[column.name].unit = column.unit or None
     gaps = np.zeros(len(table), dtype=bool)
-    gaps[:N_GAPS] = True
+    gaps[:N_INCOMPLETE] = True
     for name in ("parallax", "parallax_error", "pmra", "pmdec", "ra_parallax_corr"):
         table[name] = MaskedColumn(table[name], mask=gaps)
     table["designation"] = [f"Gaia DR3 {number}" for number in stars["source_id"]]
@@ -92,7 +92,7 @@ def read(path):
 @pytest.mark.parametrize("suffix", WRITERS)
 def test_archive_tables_are_read_from_every_format(suffix, stars, archive, tmp_path):
     found = read(written(archive, tmp_path / f"gaia{suffix}"))
-    pd.testing.assert_frame_equal(found, stars.iloc[N_GAPS:].reset_index(drop=True))
+    pd.testing.assert_frame_equal(found, stars.iloc[N_INCOMPLETE:].reset_index(drop=True))
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
@@ -100,7 +100,7 @@ def test_column_names_may_be_in_upper_case(suffix, stars, archive, tmp_path):
     archive.rename_columns(archive.colnames, [name.upper() for name in archive.colnames])
     found = read(written(archive, tmp_path / f"gaia{suffix}"))
     assert list(found) == GAIA.names
-    assert found["source_id"].tolist() == stars["source_id"].tolist()[N_GAPS:]
+    assert found["source_id"].tolist() == stars["source_id"].tolist()[N_INCOMPLETE:]
 
 
 @pytest.mark.parametrize("suffix", [s for s in WRITERS if s != ".csv"])
@@ -111,11 +111,11 @@ def test_other_units_are_converted(suffix, stars, archive, tmp_path):
     archive["parallax"].convert_unit_to(u.uas)
     archive["pmra_error"].convert_unit_to(u.arcsec / u.yr)
     found = read(written(archive, tmp_path / f"gaia{suffix}"))
-    expected = stars.iloc[N_GAPS:].reset_index(drop=True)
+    expected = stars.iloc[N_INCOMPLETE:].reset_index(drop=True)
     pd.testing.assert_frame_equal(found, expected, rtol=1e-14)
 
 
-def test_units_of_an_old_votable_are_known(stars, archive, tmp_path):
+def test_units_of_old_votables_are_read(stars, archive, tmp_path):
     document = from_table(archive)
     document.version = "1.3"
     document.to_xml(str(tmp_path / "gaia.vot"))
@@ -123,7 +123,7 @@ def test_units_of_an_old_votable_are_known(stars, archive, tmp_path):
     (tmp_path / "gaia.vot").write_text(text.replace("mas.yr-1", "mas.yr**-1"), "utf-8")
     assert "mas.yr**-1" in (tmp_path / "gaia.vot").read_text("utf-8")
     found = read(tmp_path / "gaia.vot")
-    np.testing.assert_array_equal(found["pmra"], stars["pmra"].iloc[N_GAPS:])
+    np.testing.assert_array_equal(found["pmra"], stars["pmra"].iloc[N_INCOMPLETE:])
 
 
 def test_single_precision_of_the_archive_is_kept(stars, archive):
@@ -131,7 +131,7 @@ def test_single_precision_of_the_archive_is_kept(stars, archive):
         archive[name] = archive[name].astype(np.float32)
     found = gaia_stars(archive, "gaia.fits")
     np.testing.assert_array_equal(
-        found["ra_dec_corr"], stars["ra_dec_corr"].iloc[N_GAPS:].astype(np.float32)
+        found["ra_dec_corr"], stars["ra_dec_corr"].iloc[N_INCOMPLETE:].astype(np.float32)
     )
 
 
@@ -152,18 +152,18 @@ def test_absent_correlations_are_zero(stars):
     ],
     ids=["all-gaps", "declination", "precision", "correlation", "empty"],
 )
-def test_unusable_values_are_refused(change, message, stars):
+def test_invalid_values_are_refused(change, message, stars):
     with pytest.raises(InputError, match=message):
         gaia_stars(change(stars), "my.csv")
 
 
-def test_gaps_are_said_where_another_row_is_wrong(archive):
-    archive["dec"][N_GAPS + 2] = -100.0
-    with pytest.raises(InputError, match="gaia.fits, its 2993 rows without gaps.*is row 3"):
+def test_message_counts_complete_rows(archive):
+    archive["dec"][N_INCOMPLETE + 2] = -100.0
+    with pytest.raises(InputError, match="gaia.fits, its 2993 complete rows.*is row 3"):
         gaia_stars(archive, "gaia.fits")
 
 
-def test_correlations_that_cannot_be_together_are_refused(stars):
+def test_inconsistent_correlations_are_refused(stars):
     with pytest.raises(InputError, match=r"my\.csv, columns \*_corr: .* in 1500 reference stars"):
         truth_from_gaia(
             stars.assign(ra_dec_corr=0.9, ra_parallax_corr=0.9, dec_parallax_corr=-0.9),
@@ -172,7 +172,7 @@ def test_correlations_that_cannot_be_together_are_refused(stars):
         )
 
 
-def test_square_roots_give_the_matrices_back(stars):
+def test_square_roots_reproduce_the_matrices(stars):
     matrices = correlation_matrices(stars.iloc[:3])
     np.testing.assert_allclose(matrices, np.tile(correlated_matrix(), (3, 1, 1)))
     roots = square_roots(matrices)
@@ -180,7 +180,7 @@ def test_square_roots_give_the_matrices_back(stars):
     np.testing.assert_allclose(roots, roots.transpose(0, 2, 1), atol=1e-15)
 
 
-def test_full_correlation_has_a_root():
+def test_full_correlation_has_a_square_root():
     roots = square_roots(np.ones((1, 5, 5)))
     np.testing.assert_allclose(roots @ roots, np.ones((1, 5, 5)), atol=1e-14)
 
@@ -209,7 +209,7 @@ def test_reference_stars_scatter_with_the_correlations_of_their_errors(stars):
     )
 
 
-def test_other_sources_are_drawn_as_without_correlations(stars):
+def test_correlations_do_not_change_other_sources(stars):
     with_them, without = (
         reference_catalogue(truth_from_gaia(table, SETTINGS), SETTINGS)
         for table in (stars, stars.drop(columns=list(CORRELATIONS)))
@@ -220,7 +220,7 @@ def test_other_sources_are_drawn_as_without_correlations(stars):
     assert not np.isin(with_them.loc[~other, "ra"], without.loc[~other, "ra"]).any()
 
 
-def test_stars_without_correlations_are_drawn_as_the_synthetic_ones(stars):
+def test_stars_without_correlations_are_drawn_as_synthetic_ones(stars):
     synthetic = truth_catalogue(SETTINGS)
     table = synthetic.query("~is_artificial").drop(columns=["is_reference", "is_artificial"])
     truth = truth_from_gaia(table, SETTINGS)
@@ -229,7 +229,7 @@ def test_stars_without_correlations_are_drawn_as_the_synthetic_ones(stars):
     )
 
 
-def test_survey_keeps_the_correlations_in_its_reference_catalogue_alone(archive, tmp_path):
+def test_survey_stores_correlations_only_in_the_reference_catalogue(archive, tmp_path):
     table = written(archive, tmp_path / "gaia.fits")
     simulate_survey(tmp_path / "survey", SETTINGS, catalogue=table)
     assert parquet.read_schema(tmp_path / "survey" / "truth.parquet").names == TRUTH.names

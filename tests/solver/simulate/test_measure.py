@@ -1,4 +1,4 @@
-"""Simulated measurements against an independent computation, and their noise."""
+"""Simulated measurements and their noise, compared with an independent computation."""
 
 from dataclasses import replace
 
@@ -49,7 +49,7 @@ def noisy(truth: pd.DataFrame) -> MeasuredOrbit:
 def independent_pixel(
     star: pd.Series, exposure: pd.Series, epoch: float, detector: Detector
 ) -> np.ndarray:
-    """The paper's chain with ERFA, astropy's WCS and NumPy's Legendre polynomials."""
+    """The paper's observation model with ERFA, astropy's WCS and NumPy's Legendre polynomials."""
     mas = np.radians(1.0 / 3.6e6)
     centre = erfa.epv00(*erfa.tcbtdb(2400000.5, epoch))[1]["p"]
     a, d = np.radians([star["ra"], star["dec"]])
@@ -74,7 +74,7 @@ def independent_pixel(
     wcs.wcs.crval = exposure["ra"], exposure["dec"]
     wcs.wcs.crpix = 0.0, 0.0
     t = np.radians(exposure["position_angle"])
-    # X = F (-xi cos + eta sin), Y = F (xi sin + eta cos): its inverse is itself over F^2.
+    # X = F (-xi cos + eta sin), Y = F (xi sin + eta cos): the inverse is itself over F^2.
     matrix = np.array([[-np.cos(t), np.sin(t)], [np.sin(t), np.cos(t)]])
     wcs.wcs.cd = np.degrees(matrix / exposure["true_focal_length"])
     ideal = np.array(wcs.wcs_world2pix([[ra, dec]], 0)[0]) + 1.0
@@ -131,7 +131,7 @@ def test_true_places_are_without_aberration(truth: pd.DataFrame) -> None:
         observer,
     )
     ra, dec = erfa.c2s(direction)
-    # ERFA adds the light's way across the Earth's orbit, 0.016 uas per mas/yr.
+    # ERFA adds the light travel time across the Earth's orbit, 0.016 uas per mas/yr.
     np.testing.assert_allclose(places["ra"], np.degrees(erfa.anp(ra)), rtol=0, atol=2e-9)
     np.testing.assert_allclose(places["dec"], np.degrees(dec), rtol=0, atol=2e-9)
     np.testing.assert_array_equal(places["source_id"], stars["source_id"])
@@ -162,7 +162,7 @@ def test_tables_are_canonical_and_in_random_order(noisy: MeasuredOrbit) -> None:
     [((2, 0, 5.0, 0.0), "nx", 1.0), ((0, 2, 0.0, -5.0), "ny", -1.0)],
     ids=["A20", "B02"],
 )
-def test_distortion_moves_images_the_right_way(
+def test_distortion_has_the_right_sign(
     row: tuple, column: str, sign: float, truth: pd.DataFrame
 ) -> None:
     without, with_term = (
@@ -171,7 +171,7 @@ def test_distortion_moves_images_the_right_way(
         )
         for rows in ((), (row,))
     )
-    # Detector 0 is not turned; L_2(x) - L_2(0) = 1.5 x^2 is positive everywhere.
+    # Detector 0 is not rotated; L_2(x) - L_2(0) = 1.5 x^2 is positive everywhere.
     moved = (with_term[column] - without[column]).dropna().xs(0, level="detector_id")
     assert (sign * moved > 0.0).mean() > 0.99
     assert 0.5 < (sign * moved).max() < 5.0 * 1.5 / 10.0
@@ -213,7 +213,7 @@ def test_detectors_of_other_sizes_and_ids_are_respected(truth: pd.DataFrame) -> 
     assert narrow["ny"].abs().max() > 900.0
 
 
-def test_an_orbit_depends_on_nothing_but_its_id_and_the_seed(
+def test_orbit_depends_only_on_its_id_and_the_seed(
     truth: pd.DataFrame, noisy: MeasuredOrbit
 ) -> None:
     measure_orbit(0, truth, SETTINGS)
@@ -223,5 +223,5 @@ def test_an_orbit_depends_on_nothing_but_its_id_and_the_seed(
     assert not np.isin(other.measurements["nx"], noisy.measurements["nx"]).any()
 
 
-def test_a_truth_out_of_sight_gives_no_measurements(truth: pd.DataFrame) -> None:
+def test_sources_outside_the_field_give_no_measurements(truth: pd.DataFrame) -> None:
     assert measure_orbit(0, truth.assign(dec=60.0), QUIET).measurements.empty

@@ -1,4 +1,4 @@
-"""When and where exposures are scheduled, and how the telescope wanders from there."""
+"""Schedule of the exposures, and random walks of pointing and focal length."""
 
 from dataclasses import replace
 
@@ -24,8 +24,11 @@ def attitudes() -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def wander(attitudes: pd.DataFrame) -> np.ndarray:
-    """Arcsec from the schedule in l cos(b), b and position angle: orbit, field, plate, axis."""
+def pointing_offsets(attitudes: pd.DataFrame) -> np.ndarray:
+    """Offsets from the schedule in l cos(b), b and position angle, arcsec.
+
+    The axes are orbit, field, plate and coordinate.
+    """
     l_deg, b_deg = icrs_to_galactic(attitudes["ra"].to_numpy(), attitudes["dec"].to_numpy())
     scheduled = position_angle_to_icrs(l_deg, b_deg, attitudes["pa"].to_numpy())
     pa = attitudes["position_angle"] - scheduled
@@ -40,7 +43,7 @@ def wander(attitudes: pd.DataFrame) -> np.ndarray:
     return 3600.0 * offsets.reshape(SETTINGS.orbits, 4, 24, 3)
 
 
-def test_schedule_holds_every_exposure_once() -> None:
+def test_schedule_has_every_exposure_once() -> None:
     settings = SurveySettings(orbits=3)
     table = schedule(settings)
     assert len(table) == 3 * 96
@@ -98,12 +101,14 @@ def test_middle_and_corner_of_the_artificial_square_are_observed_often_enough() 
     assert seen[1] > 0.3
 
 
-def test_pointing_starts_and_walks_with_the_stated_scatter(wander: np.ndarray) -> None:
-    starts, steps = wander[:, :, 0], np.diff(wander, axis=2)
+def test_pointing_starts_and_walks_with_the_stated_scatter(pointing_offsets: np.ndarray) -> None:
+    starts, steps = pointing_offsets[:, :, 0], np.diff(pointing_offsets, axis=2)
     np.testing.assert_allclose(starts.std(axis=(0, 1)), 1.0, atol=0.12)
     np.testing.assert_allclose(steps.std(axis=(0, 1, 2)), 1.0, atol=0.03)
-    # A walk that restarts at each field: the last exposure is 24 steps from the schedule.
-    np.testing.assert_allclose(wander[:, :, -1].std(axis=(0, 1)), np.sqrt(24.0), rtol=0.12)
+    # The walk restarts at each field: the last exposure is 24 steps from the schedule.
+    np.testing.assert_allclose(
+        pointing_offsets[:, :, -1].std(axis=(0, 1)), np.sqrt(24.0), rtol=0.12
+    )
 
 
 def test_focal_length_walks_through_the_whole_orbit(attitudes: pd.DataFrame) -> None:
@@ -115,7 +120,7 @@ def test_focal_length_walks_through_the_whole_orbit(attitudes: pd.DataFrame) -> 
     assert (attitudes["focal_length"] == NOMINAL_UM).all()
 
 
-def test_estimates_err_by_an_arcsecond(attitudes: pd.DataFrame) -> None:
+def test_estimates_have_errors_of_one_arcsecond(attitudes: pd.DataFrame) -> None:
     cosine = np.cos(np.radians(attitudes["dec"]))
     for error in (
         (attitudes["ra_est"] - attitudes["ra"]) * cosine,
@@ -125,11 +130,11 @@ def test_estimates_err_by_an_arcsecond(attitudes: pd.DataFrame) -> None:
         assert 3600.0 * error.std() == pytest.approx(1.0, rel=0.03)
 
 
-def test_environment_tells_no_truth(attitudes: pd.DataFrame) -> None:
+def test_environment_has_no_true_values(attitudes: pd.DataFrame) -> None:
     assert list(environment(attitudes).columns) == ENVIRONMENT.names
 
 
-def test_number_of_orbits_moves_only_the_times() -> None:
+def test_number_of_orbits_changes_only_the_times() -> None:
     few, many = (orbit_attitude(2, replace(SETTINGS, orbits=n), NOMINAL_UM) for n in (6, 12))
     same = ["orbit_id", "field_id", "plate_id", "glon", "glat", "true_focal_length"]
     pd.testing.assert_frame_equal(few[same], many[same])

@@ -1,4 +1,4 @@
-"""The settings of a simulated survey: the paper's numbers, what is refused, round trips."""
+"""Settings of a simulated survey: the paper's numbers, invalid values and round trips."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ from solver.simulate.seasons import Season
 from solver.simulate.settings import Stream, SurveySettings
 
 
-def test_defaults_are_the_papers() -> None:
+def test_defaults_agree_with_the_paper() -> None:
     settings = SurveySettings()
     assert (settings.n_stars, settings.n_reference, settings.n_artificial) == (132651, 10888, 1000)
     assert settings.orbits == 100
@@ -57,7 +57,7 @@ def test_dict_round_trip_keeps_every_setting() -> None:
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
 )
-def test_unusable_settings_are_refused(changes: dict[str, object], message: str) -> None:
+def test_invalid_settings_are_refused(changes: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         replace(SurveySettings(), **changes)
 
@@ -85,7 +85,7 @@ def test_unusable_settings_are_refused(changes: dict[str, object], message: str)
     ],
     ids=["unknown", "seasons", "axes", "distortion", "attributes", "date", "order", "angle"],
 )
-def test_unusable_dicts_are_refused(values: dict[str, object], message: str) -> None:
+def test_invalid_dicts_are_refused(values: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         SurveySettings.from_dict(values)
 
@@ -100,7 +100,7 @@ def test_scaled_keeps_enough_reference_stars(stars: int, counts: tuple[int, int]
     assert (settings.n_reference, settings.n_artificial) == counts
 
 
-def test_scaled_refuses_no_stars() -> None:
+def test_scaled_refuses_zero_stars() -> None:
     with pytest.raises(InputError, match="at least 1 star"):
         SurveySettings().scaled(0)
 

@@ -1,4 +1,4 @@
-"""Galactic coordinates against astropy, which knows them by way of FK5."""
+"""Galactic coordinates compared with astropy, which defines them through FK5."""
 
 import astropy.units as u
 import numpy as np
@@ -15,16 +15,16 @@ from solver.simulate.sky import (
 L_DEG = np.array([-1.9, -0.3, 0.0, 1.2, 95.0, -170.0])
 B_DEG = np.array([-1.1, 0.1, 0.0, 1.1, 40.0, -75.0])
 # The two definitions of the frame differ by some 20 mas.
-DEFINITION = 50 * u.mas
+TOLERANCE = 50 * u.mas
 
 
 def test_positions_agree_with_astropy() -> None:
     ours = SkyCoord(*galactic_to_icrs(L_DEG, B_DEG), unit="deg")
     theirs = SkyCoord(L_DEG, B_DEG, unit="deg", frame="galactic").icrs
-    assert np.all(ours.separation(theirs) < DEFINITION)
+    assert np.all(ours.separation(theirs) < TOLERANCE)
 
 
-def test_positions_return() -> None:
+def test_positions_round_trip() -> None:
     l_deg, b_deg = icrs_to_galactic(*galactic_to_icrs(L_DEG, B_DEG))
     np.testing.assert_allclose(l_deg, L_DEG, atol=1e-11)
     np.testing.assert_allclose(b_deg, B_DEG, atol=1e-11)

@@ -1,4 +1,4 @@
-"""Survey directories: written whole or not at all, resumed, refused."""
+"""Survey directories: written completely or resumed, and refused if invalid."""
 
 import tomllib
 from dataclasses import replace
@@ -21,7 +21,7 @@ SETTINGS = SurveySettings(orbits=3, n_stars=1500, n_reference=400, n_artificial=
 
 
 class InterruptionError(Exception):
-    """Stands for a person's Ctrl-C."""
+    """Stands for an interruption by the user (Ctrl-C)."""
 
 
 def interrupt_after(orbits: int) -> object:
@@ -40,7 +40,7 @@ def survey(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-def test_directory_holds_what_the_design_says(survey: Path) -> None:
+def test_directory_has_the_designed_files(survey: Path) -> None:
     assert sorted(str(p.relative_to(survey)) for p in survey.rglob("*") if p.is_file()) == [
         "exposures.parquet",
         "measurements/orbit=0000.parquet",
@@ -52,7 +52,7 @@ def test_directory_holds_what_the_design_says(survey: Path) -> None:
     ]
 
 
-def test_header_tells_how_the_survey_was_made(survey: Path) -> None:
+def test_header_has_settings_and_versions(survey: Path) -> None:
     header = tomllib.loads((survey / "survey.toml").read_text(encoding="utf-8"))
     assert header["format"] == 1
     assert SurveySettings.from_dict(header["settings"]) == SETTINGS
@@ -79,13 +79,13 @@ def test_orbits_read_back_as_simulated(survey: Path) -> None:
     assert len(data.provenance) == 4
 
 
-def test_ids_survive_the_file(survey: Path) -> None:
+def test_ids_round_trip(survey: Path) -> None:
     ids = parquet.read_table(survey / "measurements" / "orbit=0000.parquet")["source_id"]
     assert str(ids.type) == "int64"
     assert np.isin(ids.to_numpy(), truth_catalogue(SETTINGS)["source_id"]).all()
 
 
-def test_columns_carry_their_units(survey: Path) -> None:
+def test_columns_have_units(survey: Path) -> None:
     columns = parquet.read_schema(survey / "reference.parquet")
     assert columns.field("pmra").metadata == {b"unit": b"mas / yr"}
     assert columns.field("source_id").metadata is None
@@ -116,7 +116,7 @@ def test_interrupted_survey_is_not_read_and_resumes_to_the_same_bytes(
     ],
     ids=["settings", "instrument"],
 )
-def test_unfinished_survey_of_other_choices_is_refused(
+def test_unfinished_survey_with_other_settings_is_refused(
     change: dict[str, object], message: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InterruptionError):
@@ -130,7 +130,7 @@ def test_finished_survey_is_refused(survey: Path) -> None:
         simulate_survey(survey, SETTINGS)
 
 
-def test_directory_with_other_files_is_refused_and_left_alone(tmp_path: Path) -> None:
+def test_directory_with_other_files_is_refused_and_unchanged(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("mine")
     with pytest.raises(InputError, match=r"an empty directory .* found thesis\.tex"):
         simulate_survey(tmp_path, SETTINGS)
@@ -148,7 +148,7 @@ def test_survey_without_reference_stars_in_an_orbit_is_refused(tmp_path: Path) -
         simulate_survey(tmp_path, SurveySettings(orbits=1, n_stars=2, n_reference=1))
 
 
-def test_a_users_gaia_table_becomes_the_truth(tmp_path: Path) -> None:
+def test_gaia_table_becomes_the_truth(tmp_path: Path) -> None:
     stars = truth_catalogue(replace(SETTINGS, n_artificial=0, seed=3))
     table = tmp_path / "gaia.csv"
     stars.drop(columns=["is_reference", "is_artificial"]).to_csv(table, index=False)
@@ -159,7 +159,7 @@ def test_a_users_gaia_table_becomes_the_truth(tmp_path: Path) -> None:
     assert read_header(tmp_path / "survey")["catalogue"]["name"] == "gaia.csv"
 
 
-def test_a_users_unusable_gaia_table_is_named(tmp_path: Path) -> None:
+def test_invalid_gaia_table_is_named(tmp_path: Path) -> None:
     table = tmp_path / "gaia.csv"
     table.write_text("source_id,ra\n1,2.0\n")
     with pytest.raises(InputError, match=r"gaia\.csv: expected the columns"):
@@ -180,7 +180,7 @@ def test_unknown_orbit_is_refused(survey: Path) -> None:
     ],
     ids=["newer", "none", "damaged"],
 )
-def test_unusable_headers_are_refused(text: str, message: str, tmp_path: Path) -> None:
+def test_invalid_headers_are_refused(text: str, message: str, tmp_path: Path) -> None:
     (tmp_path / "survey.toml").write_text(text)
     with pytest.raises(InputError, match=message):
         survey_orbits(tmp_path)
@@ -203,7 +203,7 @@ def test_survey_without_truth_is_read(survey: Path, tmp_path: Path) -> None:
     assert read_survey_orbit(tmp_path, 0).truth is None
 
 
-def test_header_keeps_awkward_text(tmp_path: Path) -> None:
+def test_header_round_trips_special_characters(tmp_path: Path) -> None:
     content = {
         "line": 'a "quoted" \\ back\x7fslash, µ and \x01',
         "lines": 'a """ b\n\\n "c"\n',

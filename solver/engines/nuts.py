@@ -84,8 +84,8 @@ def sample(
     start = find_mode(problem, settings)
     if start.reduced is None:
         return Estimate(start)
-    bend = curvature_at(problem, start, start.reduced)
-    coordinates, trace = replace(whitened(start.reduced), bend=bend), list[Iteration]()
+    curvature = curvature_at(problem, start, start.reduced)
+    coordinates, trace = replace(whitened(start.reduced), curvature=curvature), list[Iteration]()
 
     def report(done: int, chi2: float) -> None:
         elapsed = time.perf_counter() - begin

@@ -16,7 +16,7 @@ from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, downhill, largest_step, objective
 from solver.linear.chi2 import gradient
 from solver.linear.normal_equations import accumulate
-from solver.linear.source_elimination import POORLY_HELD, eliminate_sources
+from solver.linear.source_elimination import POORLY_CONSTRAINED, eliminate_sources
 from solver.linear.update import update_equations
 from solver.problem.problem import Problem
 
@@ -86,7 +86,7 @@ def solve_what_if(
             # What the Jacobians have changed by since is amplified most where the data tell
             # least: so that stays, which the first step took to its place, until the rest is right.
             # It follows then, by more than this step perhaps, but by less than the first.
-            step = reduced.solve(*right, reduced.weak_directions(POORLY_HELD))
+            step = reduced.solve(*right, reduced.weak_directions(POORLY_CONSTRAINED))
         else:
             # The second step puts right what the first left behind, and is shorter.
             limit = 1.1 * largest

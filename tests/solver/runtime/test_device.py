@@ -31,7 +31,7 @@ def watched(compute):
     return work
 
 normal.linearise = watched(normal.linearise)
-objective._of_chunk = watched(objective._of_chunk)
+objective._value_and_gradient = watched(objective._value_and_gradient)
 jax.config.update("jax_default_device", jax.devices()[1])
 orbit = make_orbit()
 summary = fit_orbit(orbit.data, orbit.instrument).summary

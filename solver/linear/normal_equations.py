@@ -34,7 +34,7 @@ from solver.problem.tiles import Gathering
 class DetectorSums:
     """Contributions of the measurements on each detector to g, chi2_0 and the blocks.
 
-    Of W they comprise only the rows of the distortion, since the second_half each belong to one
+    Of W they comprise only the rows of the distortion, since the others each belong to one
     detector; the sources of W are in block order.
     """
 

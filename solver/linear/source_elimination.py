@@ -239,7 +239,7 @@ def eliminate_sources(
     Returns
     -------
     None if the system is singular: the data and the priors leave a direction unconstrained, or
-    constrain it less than rounding errors do.
+    constrain it so weakly that rounding hides it.
     """
     prior_hessian = priors.hessian_diagonal(equations.at[0])
     try:

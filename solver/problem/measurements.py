@@ -88,7 +88,7 @@ def sort_measurements(
     Raises
     ------
     InputError
-        If a detector is not subset of the instrument.
+        If a detector is not part of the instrument.
     """
     source = np.searchsorted(source_ids, measurements["source_id"].to_numpy())
     keys = pd.MultiIndex.from_frame(exposures[KEY])

@@ -88,7 +88,7 @@ def solve_what_if(
             # They follow in the next step, which may be longer than this one, not than the first.
             step = reduced.solve(*right, reduced.weak_directions(POORLY_CONSTRAINED))
         else:
-            # The next step corrects this one and must be shorter.
+            # The next step corrects this one and may be at most 10 % longer.
             limit = 1.1 * largest
         theta, sources = theta + step[0], sources + step[1]
         if largest >= settings.tolerance:

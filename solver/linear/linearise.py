@@ -1,6 +1,6 @@
 """Whitened residuals and exact Jacobians of the observation model.
 
-Each measurement touches one source, one exposure and one detector, so the derivative by
+Each measurement depends on one source, exposure and detector, so the derivative with respect to
 a whole group is one forward-mode pass with every element of the group moved at once.
 The distortion coefficients are shared by all measurements, but act only through the
 displacement they add, so its derivative and the basis replace theirs.

@@ -75,7 +75,7 @@ class Coordinates(eqx.Module):
         return self.origin[0] + moved[0], self.origin[1] + moved[1]
 
     def covariance(self, scale: Float[np.ndarray, "2 src"]) -> Float[np.ndarray, "src 2 2"]:
-        """Return the covariance of each source whose free coordinates scatter by `scale`."""
+        """Return the covariance of each source if its free coordinates scatter by `scale`."""
         half = np.asarray(self.source) * scale
         return np.einsum("aks,bks->sab", half, half)
 

@@ -3,7 +3,7 @@
     python tests/benchmarks/bench_scaling.py [--measurements 10000 100000] [--exposures 24 384]
                                              [--repeat 3] [--write assets/docs]
 
-Each size is simulated in one process and measured in another, new one, so that its peak
+Each size is simulated in one process and measured in another, new process, so that its peak
 memory is that of the fit alone. All times are medians of warm runs. The unit is that of
 `bench_fit.py`, timed for each size. `--write` writes `scaling.csv` and `scaling.svg` to the
 folder, and the table into its `scaling.md`.

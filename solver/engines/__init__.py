@@ -1,4 +1,4 @@
-"""The engines that solve a problem: gauss-newton, svi, nuts, and the what-if re-solution.
+"""The engines that solve a problem: gauss-newton, svi and nuts, and the what-if.
 
 Imports `solver.linear` and below.
 """

@@ -1,4 +1,4 @@
-"""A file in which an svi run is kept between blocks, so that a later run goes on from there."""
+"""The checkpoint file of an svi fit, from which a later fit resumes."""
 
 import hashlib
 import json
@@ -19,17 +19,17 @@ _ARRAYS = ("theta", "sources", "scale", "losses")
 
 
 def resume_from(path: Path, data: OrbitData, settings: FitSettings) -> Resumption:
-    """Return where a run is to go on, and have it kept in the same file.
+    """Return the state to resume from, and save later states to the same file.
 
     Parameters
     ----------
-    path : a file that does not exist yet, or that an earlier run of the same fit has left
-    data : the orbit that is fitted; its files are known again by their contents
+    path : checkpoint of the same fit, or a path that does not exist yet
+    data : orbit to fit; its files are recognised by their contents
 
     Raises
     ------
     InputError
-        If the file is none of these, or cannot be written.
+        If the file is not a checkpoint of this fit, or cannot be written.
     """
     require_writable(path)
     fit = _fingerprint(data, settings)
@@ -39,8 +39,8 @@ def resume_from(path: Path, data: OrbitData, settings: FitSettings) -> Resumptio
 
 
 def _fingerprint(data: OrbitData, settings: FitSettings) -> str:
-    said = [settings.identity(), sorted(data.provenance.values()), data.orbit_id]
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+    identity = [settings.identity(), sorted(data.provenance.values()), data.orbit_id]
+    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
 
 def _write(path: Path, fit: str, state: SviState) -> None:
@@ -52,12 +52,12 @@ def _write(path: Path, fit: str, state: SviState) -> None:
 
 
 def _read(path: Path, fit: str) -> SviState:
-    said = reading(str(path), "the checkpoint of an svi run")
-    with said, path.open("rb") as stream, np.load(stream) as file:
+    failures = reading(str(path), "the checkpoint of an svi run")
+    with failures, path.open("rb") as stream, np.load(stream) as file:
         head = json.loads(str(file["head"]))
         if head["fit"] != fit:
             raise InputError(
-                f"{path}: expected the checkpoint of this very fit, found that of other files "
+                f"{path}: expected the checkpoint of this fit, found that of other files "
                 "or settings"
             )
         trace = [Iteration(**row) for row in head["trace"]]

@@ -1,4 +1,4 @@
-"""Estimate: where an engine ended, whichever it was."""
+"""Estimate: the result of any engine."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -10,15 +10,15 @@ from solver.engines.gauss_newton import Mode
 
 
 class Estimate(NamedTuple):
-    """The answer of an engine; what it does not say itself the linearised problem does.
+    """Result of an engine; covariances that are None come from the linearised problem.
 
     Attributes
     ----------
-    mode : the point it found, and the problem linearised there
-    conditional, marginal : covariance of each source, mas^2, where the engine has its own
-    calibration : marginal covariance of the calibration, likewise
-    losses : of every step, of an engine that has one
-    figures : what the engine says of itself, for the summary
+    mode : estimate, and the problem linearised there
+    conditional, marginal : covariance of each source, mas^2, if the engine computes it
+    calibration : marginal covariance of the calibration, if the engine computes it
+    losses : loss of every step, if the engine has a loss
+    figures : further entries of the summary, specific to the engine
     """
 
     mode: Mode

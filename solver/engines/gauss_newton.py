@@ -1,10 +1,9 @@
 """The gauss-newton engine: the exact posterior mode in a few steps.
 
 Each iteration solves the linearised model with the sources eliminated and takes the full
-step, or half of it, or a quarter, if the posterior's chi2 would rise. The gradient is exact
-at every point; the Jacobians are made anew as soon as those before give no small step. The
-fit has converged when every step is below the tolerance times the uncertainty of its
-parameter, which is what "nothing changes any more" means to somebody who reads the result.
+step, which is halved until the posterior's chi2 does not rise. The gradient is exact at every
+point; the Jacobians are reused while the steps stay small. The fit has converged when every
+step is below the tolerance times the uncertainty of its parameter.
 """
 
 import time
@@ -23,18 +22,18 @@ from solver.linear.normal_equations import NormalEquations, accumulate
 from solver.linear.source_elimination import ReducedSystem, eliminate_sources
 from solver.problem.problem import Problem, thinned
 
-_SMALLEST_SHARE = 1e-6
-# The Jacobians are kept as long as they give steps of at most so many sigmas, each so much
-# smaller than the one before. More would not do: what pointings and detectors have in common
-# is held by the priors alone, and in that direction the smallest change of the Jacobians is
-# amplified by its uncertainty.
-_KEEP_BELOW = 1.0
-_KEEP_SHRINKING = 0.1
-# Fits of more sources than this start from a fit of about so many of them, done to within
-# some sigmas of its own, which is as good as a step of the whole at a fraction of its cost.
+_MIN_STEP_FRACTION = 1e-6
+# The Jacobians are reused while steps are at most this many sigmas long, and at most this
+# fraction of the step before. Larger values fail: only the priors constrain common changes of
+# pointings and detectors, and along these directions small changes of the Jacobians are
+# amplified by the uncertainty.
+_REUSE_BELOW = 1.0
+_REUSE_RATIO = 0.1
+# Fits of more sources than this start from a fit of about this many of them, to a tolerance
+# of this many sigmas, which replaces a step of the full fit at a fraction of its cost.
 _ROUGH_SOURCES = 1000
 _ROUGH_TOLERANCE = 1e4
-# Rounding moves chi2 by about this fraction; a rise below it is none.
+# Relative rounding error of chi2; a smaller rise is ignored.
 _ROUNDING = 1e-9
 
 
@@ -51,10 +50,10 @@ class Iteration(NamedTuple):
 
 
 class Mode(NamedTuple):
-    """Where the engine ended.
+    """The posterior mode, or the last point of a fit that failed.
 
     `theta` and `sources` are offsets from the origins; `reduced` is the posterior
-    factorised at the last linearisation point, and `equations` those of the data there.
+    factorised at the last linearisation point, and `equations` are those of the data there.
     """
 
     theta: Float[np.ndarray, " calib"]
@@ -78,33 +77,33 @@ def find_mode(
     progress: Callable[[Iteration], None] = lambda _: None,
     start: Mode | None = None,
 ) -> Mode:
-    """Find the posterior mode from the origins of all parameters.
+    """Find the posterior mode, starting at the origins of all parameters.
 
     Parameters
     ----------
-    progress : called after every iteration; what it raises stops the fit
-    start : where to begin instead, of a problem with the same parameters
+    progress : called after every iteration; an exception it raises stops the fit
+    start : warm start, of a problem with the same parameters
     """
     begin = time.perf_counter()
     if start is not None:
         equations = accumulate(problem, start.theta, start.sources)
         return _iterate(problem, settings, equations, progress, begin)
     theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
-    few = _rough_selection(problem)
-    if not few.all():
+    is_sampled = _rough_sample(problem)
+    if not is_sampled.all():
         rough = replace(settings, tolerance=max(settings.tolerance, _ROUGH_TOLERANCE))
-        part = thinned(problem, few)
-        at_origin = accumulate(part, theta, sources[few])
-        mode = _iterate(part, rough, at_origin, lambda _: None, begin)
+        sample = thinned(problem, is_sampled)
+        at_origin = accumulate(sample, theta, sources[is_sampled])
+        mode = _iterate(sample, rough, at_origin, lambda _: None, begin)
         if mode.status is FitStatus.CONVERGED:
-            theta, sources[few] = mode.theta, mode.sources
+            theta, sources[is_sampled] = mode.theta, mode.sources
     return _iterate(problem, settings, accumulate(problem, theta, sources), progress, begin)
 
 
-def _rough_selection(problem: Problem) -> Bool[np.ndarray, " src"]:
-    """Return the sources to start with: the reference stars and a share of the others."""
-    every = max(problem.n_src // _ROUGH_SOURCES, 1)
-    return (np.arange(problem.n_src) % every == 0) | problem.sources["is_reference"].to_numpy(bool)
+def _rough_sample(problem: Problem) -> Bool[np.ndarray, " src"]:
+    """Return the sources of the rough fit: the reference sources and a sample of the others."""
+    stride = max(problem.n_src // _ROUGH_SOURCES, 1)
+    return (np.arange(problem.n_src) % stride == 0) | problem.sources["is_reference"].to_numpy(bool)
 
 
 def _iterate(
@@ -138,7 +137,7 @@ def _iterate(
         step = reduced.solve(*downhill(problem, *point[:3]))
         largest, parameter = largest_step(problem, step, reduced)
         if largest > limit:
-            # Given back first: they are large, and memory that was in use is quicker than fresh.
+            # Freed first, because they are large and reusing memory is faster than allocating it.
             del equations, reduced
             equations = accumulate(problem, point.theta, point.sources)
             reduced, limit = eliminate_sources(equations, problem.priors), np.inf
@@ -152,7 +151,7 @@ def _iterate(
         moved, damping = _descend(problem, point, step)
         if moved is None:
             return end(point, reduced, FitStatus.STUCK)
-        point, limit = moved, min(_KEEP_BELOW, _KEEP_SHRINKING * largest)
+        point, limit = moved, min(_REUSE_BELOW, _REUSE_RATIO * largest)
         report(point, largest, parameter, damping)
 
 
@@ -171,7 +170,7 @@ def objective(
     sources: Float[np.ndarray, "src 2"],
     at: Gradient,
 ) -> float:
-    """Return the posterior's chi2: the data's, and the priors' penalty."""
+    """Return the posterior's chi2: that of the data plus the penalty of the priors."""
     return at.chi2 + problem.priors.penalty(theta, sources)
 
 
@@ -191,18 +190,18 @@ def _descend(
     point: _Point,
     step: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
 ) -> tuple[_Point | None, float]:
-    """Take the step, or as much of it as it takes for the objective not to rise.
+    """Take the step, halved until the objective does not rise.
 
-    The step points downhill, so that a short enough part of it always does.
+    The step points downhill, so a short enough fraction of it always succeeds.
     """
-    share = 1.0
-    while share > _SMALLEST_SHARE:
-        theta, sources = point.theta + share * step[0], point.sources + share * step[1]
+    fraction = 1.0
+    while fraction > _MIN_STEP_FRACTION:
+        theta, sources = point.theta + fraction * step[0], point.sources + fraction * step[1]
         moved = _point(problem, theta, sources, gradient(problem, theta, sources))
         if moved.objective <= point.objective * (1.0 + _ROUNDING):
-            return moved, 1.0 - share
-        share *= 0.5
-    return None, 1.0 - share
+            return moved, 1.0 - fraction
+        fraction *= 0.5
+    return None, 1.0 - fraction
 
 
 def largest_step(
@@ -210,22 +209,22 @@ def largest_step(
     step: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
     reduced: ReducedSystem,
 ) -> tuple[float, str]:
-    """Return the largest step over its uncertainty, and the parameter's name.
+    """Return the largest ratio of step to uncertainty, and the parameter's name.
 
-    Marginal uncertainties for the calibration; for the sources the conditional ones,
-    which are smaller by a few per cent and cost nothing.
+    Uncertainties are marginal for the calibration. For the sources they are conditional:
+    smaller by a few per cent, but available at no cost.
     """
-    of_theta, of_sources = (
+    theta_step, source_step = (
         np.abs(moved) / sigma for moved, sigma in zip(step, reduced.sigmas, strict=True)
     )
-    if of_theta.max() > of_sources.max():
-        column = int(of_theta.argmax())
-        return float(of_theta[column]), _name_of(problem, column)
-    source = int(of_sources.max(axis=1).argmax())
-    return float(of_sources.max()), f"source {problem.sources['source_id'].iloc[source]}"
+    if theta_step.max() > source_step.max():
+        column = int(theta_step.argmax())
+        return float(theta_step[column]), _parameter_name(problem, column)
+    source = int(source_step.max(axis=1).argmax())
+    return float(source_step.max()), f"source {problem.sources['source_id'].iloc[source]}"
 
 
-def _name_of(problem: Problem, column: int) -> str:
+def _parameter_name(problem: Problem, column: int) -> str:
     for group in CALIBRATION_GROUPS:
         place = np.flatnonzero(problem.layout.columns(group) == column)
         if len(place):

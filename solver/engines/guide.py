@@ -1,8 +1,9 @@
-"""The variational guide of the paper: a normal for every source, a point for all else.
+"""The variational guide of the paper: a normal for every source, a point for the calibration.
 
-Paper, Eq. (method:svi). A draw lies one deviation from the mean in every coordinate, on a side
-that is drawn: the two nodes of the Gauss-Hermite rule. With its mirror image the evidence lower
-bound and its gradient are exact wherever the posterior is Gaussian, so that far fewer steps do.
+Paper, Eq. (method:svi). A draw lies one standard deviation from the mean in every coordinate, on
+a random side: the two nodes of the Gauss-Hermite rule. Averaged with its mirror image, the
+evidence lower bound and its gradient are exact where the posterior is Gaussian, which saves most
+of the steps.
 """
 
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from numpyro.infer import Trace_ELBO
 from solver.engines.numpyro_model import CALIBRATION, FREE_SOURCES
 from solver.model.forward import AnyArray
 
-# The names of the fields of `Means` as numpyro's parameters.
+# Numpyro parameter names of the fields of `Means`.
 SITES = ("calibration_loc", "sources_loc", "sources_scale")
 
 
@@ -30,7 +31,7 @@ class Means(NamedTuple):
 
 
 def guide(means: Means, draw: Float[Array, "2 src"]) -> None:
-    """Say the paper's guide: a point for the calibration, a normal for each source."""
+    """Define the paper's guide: a point for the calibration, a normal for each source."""
     calibration = numpyro.param(SITES[0], means.calibration)
     loc = numpyro.param(SITES[1], means.sources)
     scale = numpyro.param(SITES[2], means.scale, constraint=dist.constraints.positive)
@@ -39,7 +40,7 @@ def guide(means: Means, draw: Float[Array, "2 src"]) -> None:
 
 
 class _Drawn(dist.Normal):
-    """A normal distribution whose next draw is known."""
+    """A normal distribution with a prescribed draw."""
 
     def __init__(self, loc: AnyArray, scale: AnyArray, draw: AnyArray) -> None:
         super().__init__(loc, scale)
@@ -50,7 +51,7 @@ class _Drawn(dist.Normal):
 
 
 class MirroredElbo(Trace_ELBO):
-    """Minus the evidence lower bound: the mean over a draw and its mirror image."""
+    """Minus the evidence lower bound, averaged over a draw and its mirror image."""
 
     def loss(  # noqa: PLR0913 as numpyro calls it
         self,
@@ -60,12 +61,12 @@ class MirroredElbo(Trace_ELBO):
         guide: Callable[[AnyArray], None],
         draw: Float[AnyArray, "2 src"],
     ) -> Float[Array, ""]:
-        """Return it for the draw with which model and guide are called."""
-        one = super().loss(rng_key, param_map, model, guide, draw)
-        other = super().loss(rng_key, param_map, model, guide, -draw)
-        return 0.5 * (one + other)
+        """Return the loss for one draw, with which model and guide are called."""
+        direct = super().loss(rng_key, param_map, model, guide, draw)
+        mirrored = super().loss(rng_key, param_map, model, guide, -draw)
+        return 0.5 * (direct + mirrored)
 
 
 def draws(key: PRNGKeyArray, count: int, shape: tuple[int, ...]) -> Float[Array, "count ..."]:
-    """Return draws of mean zero and unit variance, each value of which is 1 or -1."""
+    """Return draws of mean zero and unit variance, with values 1 and -1."""
     return jax.random.rademacher(key, (count, *shape), float)

@@ -1,8 +1,8 @@
 """The posterior of one orbit as a numpyro model, generated from the parameter table.
 
-Paper, Eqs. (method:posterior) and (exp:priors): a prior for every group, and the measurements
-given the observation model. The engines that sample or optimise work in other coordinates
-than the groups' own (`solver.linear.whitening`); `in_coordinates` is the same model in those.
+Paper, Eqs. (method:posterior) and (exp:priors): a prior for every group, and the likelihood of
+the measurements under the observation model. `in_coordinates` is the same model in the
+coordinates in which the svi and nuts engines work (`solver.linear.whitening`).
 """
 
 from collections.abc import Callable
@@ -27,15 +27,15 @@ CALIBRATION, FREE_SOURCES = "calibration", "free_sources"
 
 
 class Evidence(eqx.Module):
-    """What the model is given, as arrays that JAX can take: one orbit and its priors.
+    """Input of the model as JAX arrays: the measurements and priors of one orbit.
 
     Attributes
     ----------
-    index, measured, weight : as of `solver.problem.tiles.Tiles`
-    width, centre : of the calibration's priors, per group
-    precision : of the sources' priors, mas^-2
-    log_norm : logarithm of the likelihood of measurements with no residual
-    flat : groups without a prior
+    index, measured, weight : as in `solver.problem.tiles.Tiles`
+    width, centre : width and centre of the calibration's priors, per group
+    precision : inverse covariance of the sources' priors, mas^-2
+    log_norm : logarithm of the likelihood where all residuals are zero
+    flat : groups with flat priors
     """
 
     geometry: Geometry
@@ -51,7 +51,7 @@ class Evidence(eqx.Module):
 
 
 def evidence_of(problem: Problem) -> Evidence:
-    """Return what the model needs of a problem."""
+    """Return the input of the model for a problem."""
     layout, priors, tiles = problem.layout, problem.priors, problem.measurements.tiles
     width = layout.scatter(priors.width)
     return Evidence(
@@ -70,7 +70,7 @@ def evidence_of(problem: Problem) -> Evidence:
 
 
 def plate_analysis(evidence: Evidence) -> None:
-    """Say how the measurements of an orbit come about: the numpyro model."""
+    """Define the posterior of an orbit: the numpyro model."""
     offsets = {g.name: numpyro.sample(g.name, _prior(evidence, g)) for g in PARAMETERS}
     half_chi2 = half_chi2_of_chunks(
         _padded(offsets, evidence.geometry),
@@ -83,10 +83,10 @@ def plate_analysis(evidence: Evidence) -> None:
 
 
 def in_coordinates(evidence: Evidence, coordinates: Coordinates) -> None:
-    """Say the same of other coordinates: the groups' offsets are functions of these."""
-    of_theta = numpyro.sample(CALIBRATION, _improper(evidence.layout.size))
-    of_sources = numpyro.sample(FREE_SOURCES, _improper(2, len(evidence.precision)))
-    theta, sources = coordinates.place(of_theta, of_sources)
+    """Define the same model in coordinates that determine the offsets of all groups."""
+    free_theta = numpyro.sample(CALIBRATION, _improper(evidence.layout.size))
+    free_sources = numpyro.sample(FREE_SOURCES, _improper(2, len(evidence.precision)))
+    theta, sources = coordinates.place(free_theta, free_sources)
     offsets = {**evidence.layout.scatter(theta), SOURCES.name: sources}
     with numpyro.handlers.condition(data=offsets):
         plate_analysis(evidence)
@@ -115,9 +115,9 @@ def _normal(width: Float[AnyArray, " _"], _: Float[AnyArray, " _"]) -> dist.Dist
 
 
 def _gamma(width: Float[AnyArray, " _"], centre: Float[AnyArray, " _"]) -> dist.Distribution:
-    """Return a gamma distribution of the whole value, with that mean and deviation."""
-    whole = dist.Gamma((centre / width) ** 2, centre / width**2)
-    return dist.TransformedDistribution(whole, dist.transforms.AffineTransform(-centre, 1.0))
+    """Return a gamma distribution of the absolute value with this mean and standard deviation."""
+    absolute = dist.Gamma((centre / width) ** 2, centre / width**2)
+    return dist.TransformedDistribution(absolute, dist.transforms.AffineTransform(-centre, 1.0))
 
 
 _FAMILIES: dict[str, Callable[[AnyArray, AnyArray], dist.Distribution]] = {
@@ -127,7 +127,7 @@ _FAMILIES: dict[str, Callable[[AnyArray, AnyArray], dist.Distribution]] = {
 
 
 def _padded(offsets: dict[str, AnyArray], geometry: Geometry) -> dict[str, AnyArray]:
-    """Return the offsets as long as the geometry is; what is added belongs to nothing."""
+    """Return the offsets padded with zeros to the sizes of the geometry."""
     lengths = {g.name: geometry.sizes.get(g.axis, len(offsets[g.name])) for g in PARAMETERS}
     return {
         name: jnp.pad(values, [(0, lengths[name] - len(values)), *[(0, 0)] * (values.ndim - 1)])

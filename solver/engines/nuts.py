@@ -1,8 +1,8 @@
-"""The nuts engine: the posterior sampled, with no approximation, to check the others by.
+"""The nuts engine: samples of the exact posterior, to check the other engines.
 
-Every sample costs a dozen passes over the measurements, so this is for orbits cut down to a
-share of their sources. It moves in coordinates whitened at the mode (`solver.linear.whitening`),
-where the posterior is all but a unit ball and no mass matrix is left to adapt.
+Every sample costs about a dozen passes over the measurements, so this engine is meant for orbits
+thinned to a fraction of their sources. It moves in coordinates whitened at the mode
+(`solver.linear.whitening`), where the posterior is nearly a unit ball and needs no mass matrix.
 """
 
 import importlib
@@ -35,17 +35,17 @@ from solver.linear.source_elimination import eliminate_sources
 from solver.linear.whitening import Coordinates, whitened
 from solver.problem.problem import Problem
 
-# Samples between two reports, at most.
+# Maximum number of samples between two reports.
 _BLOCK = 250
-# Chains agree when R-hat is nowhere above this (Vehtari et al. 2021), for as many
-# parameters as there are here a little more than for one.
+# Largest R-hat of chains that agree (Vehtari et al. 2021), raised a little for the maximum
+# over many parameters.
 _LARGEST_R_HAT = 1.05
 _SITES = (CALIBRATION, FREE_SOURCES)
-_FIELDS = ("num_steps", "potential_energy", "diverging")
+_EXTRA_FIELDS = ("num_steps", "potential_energy", "diverging")
 
 
 class Chains(NamedTuple):
-    """Samples of the free coordinates, and how they were come by."""
+    """Samples of the free coordinates, with the number of divergences and leapfrog steps."""
 
     calibration: Float[np.ndarray, "chain sample calib"]
     sources: Float[np.ndarray, "chain sample 2 src"]
@@ -54,9 +54,9 @@ class Chains(NamedTuple):
 
 
 class _Mixing(NamedTuple):
-    """Worst figures of all parameters, and which library they come from.
+    """Worst mixing figures of all parameters, and the library that computed them.
 
-    `of_sigmas` counts the samples that the standard deviations are worth.
+    `of_sigmas` is the effective sample size of the standard deviations.
     """
 
     r_hat: float
@@ -70,23 +70,23 @@ def sample(
     settings: FitSettings,
     progress: Callable[[Iteration], None] = lambda _: None,
 ) -> Estimate:
-    """Sample the posterior from about its mode.
+    """Sample the posterior, starting near its mode.
 
     Parameters
     ----------
-    progress : called after every block of samples; what it raises stops the run
+    progress : called after every block of samples; an exception it raises stops the fit
 
     Returns
     -------
-    The mean of the samples with their covariances; the conditional ones are those of the
-    linearised problem there. `figures` holds divergences, R-hat and effective sample size.
+    The mean of the samples with their covariances; conditional covariances come from the
+    problem linearised there. `figures` has divergences, R-hat and effective sample size.
     """
     begin, options = time.perf_counter(), settings.nuts
     start = find_mode(problem, settings)
     if start.reduced is None:
         return Estimate(start)
-    bend = curvature_at(problem, start, start.reduced)
-    coordinates, trace = replace(whitened(start.reduced), bend=bend), list[Iteration]()
+    curvature = curvature_at(problem, start, start.reduced)
+    coordinates, trace = replace(whitened(start.reduced), curvature=curvature), list[Iteration]()
 
     def report(done: int, chi2: float) -> None:
         elapsed = time.perf_counter() - begin
@@ -97,7 +97,7 @@ def sample(
     mixing = _mixing(chains)
     mixed = chains.diverging == 0 and not mixing.r_hat > _LARGEST_R_HAT
     status = FitStatus.SAMPLED if mixed else FitStatus.UNMIXED
-    theta, sources = _placed(coordinates, chains)
+    theta, sources = _as_offsets(coordinates, chains)
     at = theta.mean(axis=0), sources.mean(axis=0)
     equations = accumulate(problem, *at)
     residual = sources - at[1]
@@ -118,7 +118,7 @@ def _run_chains(
     kernel = NUTS(in_coordinates, adapt_mass_matrix=False)
     block = -(-options.samples // -(-options.samples // _BLOCK))
     arguments = jax.device_put((evidence, coordinates))
-    parts: list[list[Mapping[str, np.ndarray]]] = []
+    blocks: list[list[Mapping[str, np.ndarray]]] = []
     keys = jax.random.split(jax.random.key(options.seed), options.chains)
     shapes = {
         CALIBRATION: coordinates.origin[0].shape,
@@ -132,47 +132,49 @@ def _run_chains(
         jit_model_args=True,
     )
     for chain, key in enumerate(keys):
-        # Chains start as far apart as samples are.
+        # The starting points of the chains scatter like samples.
         scattered = {
             name: jax.random.normal(jax.random.fold_in(key, i), shapes[name])
             for i, name in enumerate(_SITES)
         }
         engine.post_warmup_state = None
-        parts.append([])
+        blocks.append([])
         for first in range(0, options.samples, block):
-            engine.run(key, *arguments, init_params=scattered, extra_fields=_FIELDS)
+            engine.run(key, *arguments, init_params=scattered, extra_fields=_EXTRA_FIELDS)
             engine.post_warmup_state = engine.last_state
-            key = engine.last_state.rng_key  # noqa: PLW2901 the chain's own from here on
+            key = engine.last_state.rng_key  # noqa: PLW2901 continues the chain's own sequence
             fields = engine.get_extra_fields()
-            parts[-1].append(jax.tree.map(np.asarray, {**engine.get_samples(), **fields}))
+            blocks[-1].append(jax.tree.map(np.asarray, {**engine.get_samples(), **fields}))
             done = chain * options.samples + first + block
             report(done, 2.0 * float(fields["potential_energy"].mean()))
-    return _joined(parts, options.samples)
+    return _concatenated(blocks, options.samples)
 
 
-def _joined(parts: list[list[Mapping[str, np.ndarray]]], count: int) -> Chains:
-    def together(name: str) -> np.ndarray:
-        return np.stack([np.concatenate([part[name] for part in chain])[:count] for chain in parts])
+def _concatenated(blocks: list[list[Mapping[str, np.ndarray]]], count: int) -> Chains:
+    def joined(name: str) -> np.ndarray:
+        return np.stack(
+            [np.concatenate([block[name] for block in chain])[:count] for chain in blocks]
+        )
 
     return Chains(
-        together(CALIBRATION),
-        together(FREE_SOURCES),
-        int(together("diverging").sum()),
-        int(together("num_steps").sum()),
+        joined(CALIBRATION),
+        joined(FREE_SOURCES),
+        int(joined("diverging").sum()),
+        int(joined("num_steps").sum()),
     )
 
 
-def _placed(
+def _as_offsets(
     coordinates: Coordinates, chains: Chains
 ) -> tuple[Float[np.ndarray, "sample calib"], Float[np.ndarray, "sample src 2"]]:
-    """Return all samples in offsets."""
-    joined = (np.concatenate(values) for values in (chains.calibration, chains.sources))
-    theta, sources = jax.lax.map(lambda free: coordinates.place(*free), tuple(joined))
+    """Return all samples as offsets from the origins."""
+    samples = (np.concatenate(values) for values in (chains.calibration, chains.sources))
+    theta, sources = jax.lax.map(lambda free: coordinates.place(*free), tuple(samples))
     return np.asarray(theta), np.asarray(sources)
 
 
 def _mixing(chains: Chains) -> _Mixing:
-    """Return the worst R-hat and effective sample size, by ArviZ where it is installed."""
+    """Return the worst R-hat and effective sample size, from ArviZ if it is installed."""
     n_chains, n_samples = chains.calibration.shape[:2]
     flat = chains.sources.reshape(n_chains, n_samples, -1)
     free = np.concatenate([chains.calibration, flat], axis=-1)

@@ -1,9 +1,9 @@
-"""Robust fitting: outliers are found by a heavy-tailed likelihood, and left out.
+"""Robust fitting: outliers are found with a heavy-tailed likelihood and left out.
 
-Under Student's t a measurement weighs the less the farther it lies from its prediction, so
-that a few bad ones draw the solution hardly at all. What is then farther away than any of
-as many good ones would be is an outlier; the others are fitted as if it had not been
-measured, with a normal likelihood, for which uncertainties and diagnostics are exact.
+Under Student's t the weight of a measurement falls with its residual, so a few bad measurements
+hardly affect the solution. Measurements with larger residuals than expected of any good one are
+outliers; the others are fitted without them, with a normal likelihood, for which uncertainties
+and diagnostics are exact.
 """
 
 from collections.abc import Callable
@@ -22,24 +22,25 @@ from solver.linear.leverage import of_slots
 from solver.linear.normal_equations import chunks
 from solver.problem.problem import Problem, of_rows
 
-# Degrees of freedom: few, so that outliers weigh next to nothing.
+# Degrees of freedom of Student's t: few, so that outliers have little weight.
 _NU = 4.0
-# The weights have settled when none changes by more than this, or after so many rounds.
-_SETTLED = 1e-3
+# Largest change of converged weights, and the maximum number of iterations.
+_WEIGHT_TOLERANCE = 1e-3
 _MAX_ROUNDS = 30
-# So many good measurements are taken for outliers in an orbit, on average.
+# Mean number of good measurements per orbit that are taken for outliers.
 _FALSE_ALARMS = 0.01
 
 
 class Outliers(NamedTuple):
-    """The measurements that do not belong to the others, in working order.
+    """Outliers among the measurements, in working order.
 
     Attributes
     ----------
-    found : of every measurement, whether it is one
+    found : whether each measurement is an outlier
     residual : measured minus predicted, pixels
-    distance : that over its uncertainty, both coordinates together
-    shift : of its source in alpha* and delta, if it were used, over the marginal sigma
+    distance : length of the residual in sigmas
+    shift : shift of its source in alpha* and delta if the outlier were used, over the marginal
+        sigma
     """
 
     found: Bool[np.ndarray, " obs"]
@@ -53,11 +54,11 @@ def find_outliers(
     settings: FitSettings,
     progress: Callable[[Iteration], None] = lambda _: None,
 ) -> Outliers | None:
-    """Fit with Student's t and return what lies too far away.
+    """Fit with Student's t and return the outliers.
 
     Returns
     -------
-    None if the problem has no solution; the fit of the rest will say why.
+    None if the problem has no solution; the fit that follows reports the reason.
     """
     mode = find_mode(problem, settings, progress)
     weight = np.ones(problem.n_obs)
@@ -66,23 +67,23 @@ def find_outliers(
             return None
         squares = (_whitened(problem, mode) ** 2).sum(axis=1)
         before, weight = weight, (_NU + 2.0) / (_NU + squares)
-        if np.abs(weight - before).max() < _SETTLED:
+        if np.abs(weight - before).max() < _WEIGHT_TOLERANCE:
             break
         mode = find_mode(_weighted(problem, weight), settings, progress, start=mode)
-    # Of a good measurement the square is exponential with mean two.
+    # The squared distance of a good measurement is exponentially distributed with mean two.
     limit = 2.0 * np.log(problem.n_obs / _FALSE_ALARMS)
     found = squares > limit
-    return _described(problem, mode, found)
+    return _outliers(problem, mode, found)
 
 
 def outlier_table(
     outliers: Outliers | None, problem: Problem, data: OrbitData
 ) -> pd.DataFrame | None:
-    """Return `schema.OUTLIERS`, the farthest first, labelled as the measurements are.
+    """Return `schema.OUTLIERS`, most distant first, with the index labels of the measurements.
 
     Parameters
     ----------
-    data : what the problem was built from
+    data : tables that the problem was built from
     """
     if outliers is None:
         return None
@@ -103,26 +104,29 @@ def _weighted(problem: Problem, weight: Float[np.ndarray, " obs"]) -> Problem:
 
 
 def _whitened(problem: Problem, mode: Mode) -> Float[np.ndarray, "obs 2"]:
-    parts = [of_slots(c.residual) for c in chunks(problem, mode.theta, mode.sources)]
-    return np.concatenate(parts)[problem.measurements.tiles.place]
+    residuals = [of_slots(c.residual) for c in chunks(problem, mode.theta, mode.sources)]
+    return np.concatenate(residuals)[problem.measurements.tiles.place]
 
 
-def _described(problem: Problem, mode: Mode, found: Bool[np.ndarray, " obs"]) -> Outliers:
+def _outliers(problem: Problem, mode: Mode, found: Bool[np.ndarray, " obs"]) -> Outliers:
     if mode.reduced is None or not found.any():
         return Outliers(found, np.empty((0, 2)), np.empty(0), np.empty((0, 2)))
-    few = of_rows(problem, found)
-    place = few.measurements.tiles.place
+    outlier_problem = of_rows(problem, found)
+    place = outlier_problem.measurements.tiles.place
     whitened, jacobian = [], []
-    for chunk in chunks(few, mode.theta, mode.sources):
+    for chunk in chunks(outlier_problem, mode.theta, mode.sources):
         whitened.append(of_slots(chunk.residual))
         jacobian.append(np.stack([of_slots(pair) for pair in chunk.source], axis=-1))
     residual, by_source = np.concatenate(whitened)[place], np.concatenate(jacobian)[place]
-    covariance = mode.reduced.marginal_covariance()[few.measurements.index.source]
-    # As one more measurement of the source moves it: gain times residual.
+    covariance = mode.reduced.marginal_covariance()[outlier_problem.measurements.index.source]
+    # One more measurement of a source moves it by gain times residual.
     spread = by_source @ covariance @ by_source.swapaxes(1, 2) + np.eye(2)
     gain = covariance @ by_source.swapaxes(1, 2) @ np.linalg.inv(spread)
     moved = np.einsum("oab,ob->oa", gain, residual)
     sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     return Outliers(
-        found, residual * few.measurements.sigma, np.sqrt((residual**2).sum(axis=1)), moved / sigma
+        found,
+        residual * outlier_problem.measurements.sigma,
+        np.sqrt((residual**2).sum(axis=1)),
+        moved / sigma,
     )

@@ -1,6 +1,6 @@
-"""The engines by name: one problem in, one estimate out, whichever is asked for.
+"""Run an engine by name: one problem in, one estimate out.
 
-What only one of them needs (numpyro, optax) is loaded when that one is asked for.
+Libraries that only one engine needs (numpyro, optax) are imported when that engine runs.
 """
 
 from collections.abc import Callable
@@ -13,12 +13,12 @@ from solver.problem.problem import Problem
 
 
 class Resumption(NamedTuple):
-    """Where an engine that works in blocks is to go on, and who keeps what it has done.
+    """State from which an engine that works in blocks resumes, and a function to save later ones.
 
     Attributes
     ----------
-    state : what `keep` was given last by a run of the same problem, or None
-    keep : given the state after every block
+    state : last state that the same fit passed to `keep`, or None
+    keep : called with the state after every block
     """
 
     state: Any = None
@@ -31,11 +31,11 @@ def run_engine(
     progress: Callable[[Iteration], None] = lambda _: None,
     resumption: Resumption = Resumption(),  # noqa: B008 it never changes
 ) -> Estimate:
-    """Solve a problem with the engine that `settings` name.
+    """Solve a problem with the engine of `settings`.
 
     Parameters
     ----------
-    progress : called after every iteration or block; what it raises stops the engine
+    progress : called after every iteration or block; an exception it raises stops the engine
     """
     return _ENGINES[settings.engine](problem, settings, progress, resumption)
 

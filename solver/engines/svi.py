@@ -1,10 +1,11 @@
 """The svi engine: the paper's stochastic variational inference, in whitened coordinates.
 
 Paper, Eq. (method:svi) and section "Optimization": the guide is normal for the sources and a
-point for everything else, the loss is minus the evidence lower bound, and Adam follows its
-gradient with a rate that falls over seven decades. In the published code's own units Adam
-gets nowhere near the mode; here it moves in coordinates whitened by the linearised problem
-(`solver.linear.whitening`), made anew after every block of steps, when Adam starts afresh as well.
+point for the calibration, the loss is minus the evidence lower bound, and Adam follows its
+gradient with a learning rate that falls over seven decades. In the units of the published code
+Adam does not get near the mode; here it moves in coordinates whitened by the linearised problem
+(`solver.linear.whitening`). After every block of steps the coordinates are recomputed and Adam's
+averages are reset.
 """
 
 import time
@@ -35,26 +36,26 @@ from solver.problem.problem import Problem
 
 # Paper, table "Parameters of the ADAM optimizer".
 _BETA_1, _BETA_2, _EPSILON = 0.99, 0.999, 1e-4
-# No step moves a parameter by more than this share of its prior's width: where the priors
-# alone hold a direction, one unit of whitened coordinates is as wide as they are.
-_LARGEST_SHARE = 0.25
-# No step changes the guide's widths by more than this share.
-_LARGEST_CHANGE = 0.05
-# A loss that has fallen by less than this has not changed: the same for all parameters together.
+# Largest step of a parameter, as a fraction of its prior width: along prior-dominated directions
+# one unit of whitened coordinates is as long as the prior is wide.
+_LARGEST_STEP = 0.25
+# Largest relative step of the guide's widths.
+_LARGEST_SCALE_STEP = 0.05
+# Largest fall of a loss that counts as constant.
 _UNCHANGED = 0.1
 
 
 class SviState(NamedTuple):
-    """Where the engine is between two blocks of steps: all it needs to go on.
+    """State between two blocks of steps, from which the engine can resume.
 
     Attributes
     ----------
-    step : how many were made
+    step : number of steps so far
     cycle : step and learning rate at which the rate began to fall
     theta, sources : means of the guide, in offsets from the origins
-    scale : the guide's deviation of the sources, in free coordinates
-    losses : of every step so far
-    trace : a row for each block
+    scale : standard deviations of the guide for the sources, in free coordinates
+    losses : loss of every step so far
+    trace : one row for each block
     """
 
     step: int
@@ -73,68 +74,68 @@ def variational(
     start: SviState | None = None,
     keep: Callable[[SviState], None] = lambda _: None,
 ) -> Estimate:
-    """Fit the guide, from the catalogue or from where an earlier call was stopped.
+    """Fit the guide, starting from the prior centres or from an earlier state.
 
     Parameters
     ----------
-    progress : called after every block of steps; what it raises stops the fit
-    start : the state to go on from
-    keep : given the state after every block, before `progress` is called
+    progress : called after every block of steps; an exception it raises stops the fit
+    start : state to resume from
+    keep : called with the state after every block, before `progress`
 
     Returns
     -------
-    The guide's means and the covariance of its sources, which is the conditional one; the
-    marginal one is that of the linearised problem there.
+    The guide's means and the covariance of its sources, which is conditional; the marginal
+    covariance comes from the problem linearised there.
     """
     options = settings.svi
     state = start or start_state(problem, options)
-    for after in blocks(problem, settings, state):
-        state = after
+    for next_state in blocks(problem, settings, state):
+        state = next_state
         keep(state)
         progress(state.trace[-1])
-    view = _look_ahead(problem, state)
+    ahead = _linearise_ahead(problem, state)
     equations = accumulate(problem, state.theta, state.sources)
     reduced = eliminate_sources(equations, problem.priors)
     mode = Mode(
-        state.theta, state.sources, reduced, _status(state, view, options), state.trace, equations
+        state.theta, state.sources, reduced, _status(state, ahead, options), state.trace, equations
     )
-    if view.reduced is None:
+    if ahead.reduced is None:
         return Estimate(mode, losses=state.losses)
-    covariance = _coordinates(problem, view.reduced, options).covariance(state.scale)
+    covariance = _coordinates(problem, ahead.reduced, options).covariance(state.scale)
     return Estimate(mode, conditional=covariance, losses=state.losses)
 
 
 def start_state(problem: Problem, options: SviSettings) -> SviState:
-    """Return where the engine starts: the centres of all priors."""
+    """Return the initial state, with all parameters at their prior centres."""
     theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
     scale = np.ones((2, problem.n_src))
     if not options.conditioned:
-        # The priors' own widths, in degrees.
+        # Prior widths, in degrees.
         covariance = np.linalg.inv(problem.priors.precision)
         scale = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)).T / SOURCES.per_value_unit
     return SviState(0, (0, options.first_rate), theta, sources, scale, np.empty(0), [])
 
 
 def blocks(problem: Problem, settings: FitSettings, state: SviState) -> Iterator[SviState]:
-    """Go on from `state`, a block of steps at a time, until the loss is at rest.
+    """Yield the state after each further block of steps, until the loss is constant.
 
-    If the rate has fallen and the mode is still away, it falls once more from where that is within
-    reach, as it was restarted by hand for the paper.
+    If the learning rate has fallen but the mode is still distant, the rate is raised to reach it
+    and falls again, as the paper's authors did by hand.
     """
     options, spent = settings.svi, state.trace[-1].seconds if state.trace else 0.0
     begin = time.perf_counter() - spent
     evidence = jax.device_put(evidence_of(problem))
     while state.step < options.max_steps:
-        view = _look_ahead(problem, state)
-        if view.reduced is None:
+        ahead = _linearise_ahead(problem, state)
+        if ahead.reduced is None:
             return
-        is_near = view.distance < options.tolerance or not options.conditioned
-        if is_near and _is_at_rest(state, options):
+        is_near = ahead.distance < options.tolerance or not options.conditioned
+        if is_near and _is_constant(state, options):
             return
-        # With the lowest rate a loss may creep for ever: it need not rest to be too far away.
+        # At the lowest rate the loss may fall slowly for ever, so it need not be constant here.
         if not is_near and _has_fallen(state, options):
-            state = state._replace(cycle=(state.step, min(options.first_rate, view.distance)))
-        coordinates = _coordinates(problem, view.reduced, options)
+            state = state._replace(cycle=(state.step, min(options.first_rate, ahead.distance)))
+        coordinates = _coordinates(problem, ahead.reduced, options)
         moved, losses = _run_block(
             evidence,
             jax.device_put(coordinates),
@@ -147,9 +148,9 @@ def blocks(problem: Problem, settings: FitSettings, state: SviState) -> Iterator
         row = Iteration(
             state.step + options.block,
             2.0 * float(losses.mean()),
-            view.chi2,
-            view.distance,
-            view.parameter,
+            ahead.chi2,
+            ahead.distance,
+            ahead.parameter,
             0.0,
             time.perf_counter() - begin,
         )
@@ -168,7 +169,7 @@ def blocks(problem: Problem, settings: FitSettings, state: SviState) -> Iterator
 def rate(
     options: SviSettings, cycle: tuple[int, float], step: Int[np.ndarray, " step"]
 ) -> Float[np.ndarray, " step"]:
-    """Return Adam's learning rate at some steps: it falls geometrically, and then stays."""
+    """Return Adam's learning rate at some steps: it falls geometrically, then stays constant."""
     first, highest = cycle
     ratio = options.last_rate / options.first_rate
     lowest = min(options.last_rate, highest)
@@ -176,11 +177,11 @@ def rate(
     return np.asarray(schedule(step - first))
 
 
-class _View(NamedTuple):
-    """What the linearised problem says of a state.
+class _Lookahead(NamedTuple):
+    """The linearised problem near a state.
 
-    `distance` is that of its mode, in sigmas, and `parameter` the one that is furthest away;
-    `reduced` is the problem linearised at that mode, with the state itself as its origin.
+    `distance` is the largest distance of a parameter from its mode, in sigmas, and `parameter`
+    its name; `reduced` is the problem linearised at that mode, with the state as its origin.
     """
 
     chi2: float
@@ -189,30 +190,30 @@ class _View(NamedTuple):
     reduced: ReducedSystem | None
 
 
-def _look_ahead(problem: Problem, state: SviState) -> _View:
-    """Linearise the problem at the state, and again where that puts the mode.
+def _linearise_ahead(problem: Problem, state: SviState) -> _Lookahead:
+    """Linearise the problem at the state, and again at the mode found there.
 
-    The second one is the better whitening: the posterior bends by more than its own width in
-    what the priors alone hold.
+    The second linearisation whitens better, because along prior-dominated directions the
+    posterior is curved by more than its width.
     """
-    here = accumulate(problem, state.theta, state.sources)
-    chi2 = here.gradient.chi2
-    reduced = eliminate_sources(here, problem.priors)
+    equations = accumulate(problem, state.theta, state.sources)
+    chi2 = equations.gradient.chi2
+    reduced = eliminate_sources(equations, problem.priors)
     if reduced is None:
-        return _View(chi2, np.inf, "", None)
-    step = reduced.solve(*downhill(problem, state.theta, state.sources, here.gradient))
+        return _Lookahead(chi2, np.inf, "", None)
+    step = reduced.solve(*downhill(problem, state.theta, state.sources, equations.gradient))
     distance, parameter = largest_step(problem, step, reduced)
-    there = accumulate(problem, state.theta + step[0], state.sources + step[1])
-    ahead = eliminate_sources(there, problem.priors)
-    return _View(chi2, distance, parameter, ahead and replace(ahead, at=reduced.at))
+    at_mode = accumulate(problem, state.theta + step[0], state.sources + step[1])
+    ahead = eliminate_sources(at_mode, problem.priors)
+    return _Lookahead(chi2, distance, parameter, ahead and replace(ahead, at=reduced.at))
 
 
 def _coordinates(problem: Problem, reduced: ReducedSystem, options: SviSettings) -> Coordinates:
     return whitened(reduced) if options.conditioned else in_bare_units(problem.layout, reduced.at)
 
 
-def _is_at_rest(state: SviState, options: SviSettings) -> bool:
-    """Return whether the rate has fallen and the loss not changed for as long as asked for."""
+def _is_constant(state: SviState, options: SviSettings) -> bool:
+    """Return whether the rate has fallen and the loss was constant over `patience` steps."""
     if not _has_fallen(state, options):
         return False
     patience = options.patience
@@ -222,28 +223,28 @@ def _is_at_rest(state: SviState, options: SviSettings) -> bool:
 
 
 def _has_fallen(state: SviState, options: SviSettings) -> bool:
-    """Return whether the rate has fallen, over as many steps as a rest is looked for in."""
+    """Return whether the rate has fallen to its end, over at least twice `patience` steps."""
     first, highest = state.cycle
-    # The share of the whole fall that is left from there.
-    share = np.log(highest / options.last_rate) / np.log(options.first_rate / options.last_rate)
-    return bool(state.step >= first + max(share * options.steps, 2 * options.patience))
+    # Fraction of a full fall that starts at the rate of this cycle.
+    fraction = np.log(highest / options.last_rate) / np.log(options.first_rate / options.last_rate)
+    return bool(state.step >= first + max(fraction * options.steps, 2 * options.patience))
 
 
-def _status(state: SviState, view: _View, options: SviSettings) -> FitStatus:
-    if view.reduced is None:
+def _status(state: SviState, ahead: _Lookahead, options: SviSettings) -> FitStatus:
+    if ahead.reduced is None:
         return FitStatus.SINGULAR
-    if not _is_at_rest(state, options):
+    if not _is_constant(state, options):
         return FitStatus.MAX_STEPS
-    return FitStatus.AT_REST if view.distance < options.tolerance else FitStatus.STALLED
+    return FitStatus.AT_REST if ahead.distance < options.tolerance else FitStatus.STALLED
 
 
 def _limits(problem: Problem, coordinates: Coordinates, options: SviSettings) -> Means:
-    """Return the longest step of every parameter of the guide, in free coordinates."""
+    """Return the largest step of every parameter of the guide, in free coordinates."""
     if not options.conditioned:
         return Means(*(np.full(1, np.inf) for _ in Means._fields))
-    of_theta = 1.0 / np.abs(coordinates.calibration / problem.priors.width[:, None]).max(axis=0)
-    free = np.full(1, np.inf)
-    return Means(_LARGEST_SHARE * of_theta, free, np.full(1, _LARGEST_CHANGE))
+    longest = 1.0 / np.abs(coordinates.calibration / problem.priors.width[:, None]).max(axis=0)
+    unlimited = np.full(1, np.inf)
+    return Means(_LARGEST_STEP * longest, unlimited, np.full(1, _LARGEST_SCALE_STEP))
 
 
 @jax.jit
@@ -255,7 +256,7 @@ def _run_block(
     key: PRNGKeyArray,
     rates: Float[AnyArray, " step"],
 ) -> tuple[Means, Float[Array, " step"]]:
-    """Make a block of Adam's steps from a fresh start of its averages."""
+    """Make a block of Adam's steps, with its averages reset."""
 
     def model(draw: AnyArray) -> None:
         in_coordinates(evidence, coordinates)
@@ -265,7 +266,7 @@ def _run_block(
 
     adam = optax.chain(
         optax.scale_by_adam(_BETA_1, _BETA_2, _EPSILON),
-        _bounded(lambda count: rates[count], limits),
+        _limited_steps(lambda count: rates[count], limits),
     )
     engine = SVI(model, guide_with, adam, MirroredElbo())
     shape = means.scale.shape
@@ -279,10 +280,10 @@ def _run_block(
     return Means(*(found[name] for name in SITES)), losses
 
 
-def _bounded(
+def _limited_steps(
     schedule: Callable[[AnyArray], AnyArray], limits: Means
 ) -> optax.GradientTransformation:
-    """Return steps against the gradient, at the schedule's rate or at most at the limits."""
+    """Return a transformation to descent steps, at the rate of the schedule up to the limits."""
     by_site = dict(zip(SITES, limits, strict=True))
 
     def update(updates: dict, state: AnyArray, params: object = None) -> tuple[dict, AnyArray]:

@@ -1,4 +1,4 @@
-"""Starts: solutions kept at hand from which a change of settings is a short way."""
+"""Warm starts: linearised solutions from which changed settings are solved quickly."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -7,12 +7,12 @@ from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Mode
 from solver.problem.problem import Problem
 
-# Beyond this, what is likely to be asked is not kept.
-_MOST_BYTES = 2**29
+# Memory for precomputed warm starts, bytes.
+_MAX_BYTES = 2**29
 
 
 class WarmStart(NamedTuple):
-    """A problem, linearised where it is solved."""
+    """A problem with its solution, linearised there."""
 
     settings: FitSettings
     problem: Problem
@@ -20,25 +20,23 @@ class WarmStart(NamedTuple):
 
 
 def nearest(starts: Iterable[WarmStart], settings: FitSettings) -> WarmStart | None:
-    """Return the start of the lowest order that holds what is asked for; None if none does."""
-    holding = [start for start in starts if start.settings.order >= settings.order]
-    return min(holding, key=lambda start: start.settings.order, default=None)
+    """Return the warm start of the lowest sufficient distortion order, or None."""
+    sufficient = [start for start in starts if start.settings.order >= settings.order]
+    return min(sufficient, key=lambda start: start.settings.order, default=None)
 
 
 def likely(start: WarmStart, order: int) -> list[FitSettings]:
-    """Return what is likely to be asked of a solution and takes longer than other priors do.
-
-    A lower order needs Jacobians of its own.
+    """Return the settings of likely what-ifs that need Jacobians of their own: lower orders.
 
     Parameters
     ----------
-    order : on the screen; the one below it is likely to be next
+    order : the one on the screen; the next lower order is the likeliest
 
     Returns
     -------
-    That order and the other lower ones from there, as many as there is memory for
+    Settings of lower orders, likeliest first, as many as fit in memory
     """
-    # Order 0 has no terms, as the first has none.
+    # Order 0 is omitted: like order 1 it has no terms.
     below = sorted(range(1, start.settings.order), key=lambda lower: abs(lower - (order - 1)))
-    most = _MOST_BYTES // start.mode.equations.cross.nbytes
-    return [start.settings.with_(order=lower) for lower in below[:most]]
+    count = _MAX_BYTES // start.mode.equations.cross.nbytes
+    return [start.settings.with_(order=lower) for lower in below[:count]]

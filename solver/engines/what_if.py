@@ -1,10 +1,10 @@
-"""What if: the solution under other priors, a lower order or less data, without a refit.
+"""What-if: the solution under other priors, a lower order or less data, without a refit.
 
-The posterior is all but Gaussian about its mode. So the normal equations that a fit ended
-with, carried over to the changed problem, give its solution in one step. That step moves
-what pointings and detectors have in common, which nothing but priors holds, so far that
-the rest needs to follow: one or two short steps with the same Jacobians and the exact
-gradient do that, and show whether the first was short enough for a linear model.
+The posterior is nearly Gaussian about its mode, so the final normal equations of a fit, updated
+for the changed problem, give its solution in one step. Along the directions that only priors
+constrain, common to pointings and detectors, this step is so long that the other parameters need
+a correction: one or two short steps with the same Jacobians and the exact gradient. Their length
+shows whether the first step was short enough for a linear model.
 """
 
 import time
@@ -16,33 +16,33 @@ from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, downhill, largest_step, objective
 from solver.linear.chi2 import gradient
 from solver.linear.normal_equations import accumulate
-from solver.linear.source_elimination import POORLY_HELD, eliminate_sources
+from solver.linear.source_elimination import POORLY_CONSTRAINED, eliminate_sources
 from solver.linear.update import update_equations
 from solver.problem.problem import Problem
 
-# Steps that are not small after so many are not those of a nearly linear model.
+# Maximum number of steps; a nearly linear model needs fewer.
 _MAX_STEPS = 5
-# The one after the first, long one.
-_CAREFUL_STEP = 2
+# Number of the step that keeps poorly constrained directions fixed, after the first, long one.
+_CORRECTION_STEP = 2
 
 
 def linearised(problem: Problem, mode: Mode) -> Mode:
-    """Return a solution with normal equations of its own place: a start for further changes."""
+    """Return a solution with normal equations at its own point, as a warm start for what-ifs."""
     equations = accumulate(problem, mode.theta, mode.sources)
     return mode._replace(equations=equations, reduced=None)
 
 
-def _carried(mode: Mode, solved: Problem, changed: Problem) -> Mode | None:
-    """Return the posterior of a changed problem, linearised where that of `solved` was.
+def _updated(mode: Mode, solved: Problem, changed: Problem) -> Mode | None:
+    """Return the posterior of a changed problem, linearised at the same point as `solved`.
 
     Returns
     -------
-    None if `solved` does not hold what `changed` asks for, or that is singular.
+    None if `solved` lacks measurements or terms of `changed`, or if `changed` is singular.
     """
     equations = update_equations(mode.equations, solved, changed)
     if equations is None:
         return None
-    # None of the data's blocks is another where the priors alone have changed.
+    # If only the priors have changed, the blocks of the data are the same objects.
     before = mode.reduced if equations.cross is mode.equations.cross else None
     reduced = eliminate_sources(equations, changed.priors, before)
     if reduced is None:
@@ -53,24 +53,24 @@ def _carried(mode: Mode, solved: Problem, changed: Problem) -> Mode | None:
 def solve_what_if(
     mode: Mode, solved: Problem, changed: Problem, settings: FitSettings
 ) -> Mode | None:
-    """Return the mode of a changed problem, from that of one that was solved.
+    """Return the mode of a changed problem, from the mode of a solved one.
 
     Parameters
     ----------
-    mode : the solution of `solved`; the model is linear about its equations' place
-    settings : those of `changed`
+    mode : solution of `solved`, with normal equations near it
+    settings : settings of `changed`
 
     Returns
     -------
-    None if only a refit can tell: `changed` asks for more data or terms than `solved` had,
-    or is so different that the model is not linear on the way.
+    None if a refit is needed: `changed` has more data or terms than `solved`, or differs so
+    much that the model is not linear in between.
     """
     begin = time.perf_counter()
-    start = _carried(mode, solved, changed)
+    start = _updated(mode, solved, changed)
     if start is None or start.reduced is None:
         return None
     theta, sources, reduced, trace = start.theta, start.sources, start.reduced, start.trace
-    at, held, limit = start.equations.gradient, None, np.inf
+    at, weak, limit = start.equations.gradient, None, np.inf
     largest, parameter = float("nan"), ""
     while len(trace) <= _MAX_STEPS:
         total, elapsed = objective(changed, theta, sources, at), time.perf_counter() - begin
@@ -78,20 +78,20 @@ def solve_what_if(
         if largest < settings.tolerance:
             return Mode(theta, sources, reduced, FitStatus.WHAT_IF, trace, start.equations)
         right = downhill(changed, theta, sources, at)
-        step = reduced.solve(*right, held)
+        step = reduced.solve(*right, weak)
         largest, parameter = largest_step(changed, step, reduced)
         if largest > limit:
             return None
-        if len(trace) == _CAREFUL_STEP and largest >= settings.tolerance:
-            # What the Jacobians have changed by since is amplified most where the data tell
-            # least: so that stays, which the first step took to its place, until the rest is right.
-            # It follows then, by more than this step perhaps, but by less than the first.
-            step = reduced.solve(*right, reduced.weak_directions(POORLY_HELD))
+        if len(trace) == _CORRECTION_STEP and largest >= settings.tolerance:
+            # Errors of the old Jacobians are amplified most along poorly constrained directions.
+            # These stay where the first step put them until the other parameters are corrected.
+            # They follow in the next step, which may be longer than this one, not than the first.
+            step = reduced.solve(*right, reduced.weak_directions(POORLY_CONSTRAINED))
         else:
-            # The second step puts right what the first left behind, and is shorter.
+            # The next step corrects this one and may be at most 10 % longer.
             limit = 1.1 * largest
         theta, sources = theta + step[0], sources + step[1]
         if largest >= settings.tolerance:
             at = gradient(changed, theta, sources)
-        held = reduced.weak_directions() if held is None else held
+        weak = reduced.weak_directions() if weak is None else weak
     return None

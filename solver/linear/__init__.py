@@ -1,4 +1,4 @@
-"""The linearised problem: Jacobians, normal equations, elimination of the sources, whitening.
+"""Linear algebra of a problem: Jacobians, normal equations, source elimination and whitening.
 
 Imports `solver.problem` and below.
 """

@@ -1,4 +1,4 @@
-"""The data's chi2 and its gradient, without the Hessian: one reverse pass of the model."""
+"""The data's chi2 and its gradient, without the Hessian, in one reverse pass of the model."""
 
 from collections import deque
 from typing import NamedTuple
@@ -25,18 +25,18 @@ from solver.problem.problem import Problem
 
 
 class Gradient(NamedTuple):
-    """chi2 of the data, and minus the gradient of half of it by calibration and sources."""
+    """chi2 of the data, and minus the gradient of chi2 / 2 by calibration and by sources."""
 
     chi2: float
     by_theta: Float[np.ndarray, " calib"]
     by_source: Float[np.ndarray, "src 2"]
 
 
-_TOUCHED = tuple(g.name for g in LOCAL_GROUPS if g.name not in DIRECTING)
+_NON_DIRECTING = tuple(g.name for g in LOCAL_GROUPS if g.name not in DIRECTING)
 _COEFFICIENTS = tuple(g.name for g in PER_COEFFICIENT)
-# So many chunks are on their way at once: one by itself does not keep all cores busy, and all
-# of a large orbit would need memory at once.
-_IN_FLIGHT = 4
+# Maximum number of chunks computed at once: a single one does not keep all cores busy, and all
+# chunks of a large orbit would need too much memory.
+_MAX_PENDING = 4
 
 
 def gradient(
@@ -44,21 +44,23 @@ def gradient(
 ) -> Gradient:
     """Return chi2 of the data and its gradient at one point."""
     offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
-    seen = _directions(offsets, geometry)
-    n_chunks, parts, total = len(problem.measurements.tiles.measured), deque(), None
-    for i in range(n_chunks + _IN_FLIGHT):
+    sky = _directions(offsets, geometry)
+    n_chunks, pending, total = len(problem.measurements.tiles.measured), deque(), None
+    for i in range(n_chunks + _MAX_PENDING):
         if i < n_chunks:
-            parts.append(_of_chunk(seen, offsets, geometry, *problem.measurements.tiles.chunk(i)))
-        if i >= _IN_FLIGHT and parts:
-            part = jax.tree.map(np.asarray, parts.popleft())
-            total = part if total is None else jax.tree.map(np.add, total, part)
-    half, by_group = jax.tree.map(np.asarray, _to_offsets(total, offsets, geometry))
+            pending.append(
+                _value_and_gradient(sky, offsets, geometry, *problem.measurements.tiles.chunk(i))
+            )
+        if i >= _MAX_PENDING and pending:
+            of_chunk = jax.tree.map(np.asarray, pending.popleft())
+            total = of_chunk if total is None else jax.tree.map(np.add, total, of_chunk)
+    half, by_group = jax.tree.map(np.asarray, _with_offset_gradient(total, offsets, geometry))
     by_theta, by_source = problem.gathered(by_group)
     return Gradient(2.0 * float(half), -by_theta, -by_source)
 
 
 def half_chi2(
-    seen: Directions,
+    sky: Directions,
     offsets: Offsets,
     displacement: Pair,
     geometry: Geometry,
@@ -66,21 +68,21 @@ def half_chi2(
     measured: Float[AnyArray, "2 ..."],
     weight: Float[AnyArray, "2 ..."],
 ) -> tuple[Float[Array, ""], list[Float[Array, "..."]]]:
-    """Return half of the data's chi2: minus the logarithm of the likelihood, but a constant.
+    """Return half of the data's chi2: minus the log-likelihood, up to a constant.
 
     Parameters
     ----------
-    seen : those of `offsets`
+    sky : directions at `offsets`
     displacement : um, added to the distorted positions
     measured : pixels
     weight : 1/sigma, pixel^-1
 
     Returns
     -------
-    It, and the basis of the distortion: the derivative by `displacement` times the basis is that
-    by the coefficients
+    Half of chi2, and the distortion basis, which times the derivative by `displacement` gives
+    the derivative by the coefficients
     """
-    ideal = ideal_position(seen, offsets, geometry, index)
+    ideal = ideal_position(sky, offsets, geometry, index)
     prediction = image(ideal, offsets, geometry, index, displacement)
     x, y = prediction.pixel
     whitened = (measured[0] - x) * weight[0], (measured[1] - y) * weight[1]
@@ -95,10 +97,10 @@ def half_chi2_of_chunks(
     measured: Float[AnyArray, "chunk 2 tile slot"],
     weight: Float[AnyArray, "chunk 2 tile slot"],
 ) -> Float[Array, ""]:
-    """Return `half_chi2` of all chunks, for JAX to differentiate once by the offsets.
+    """Return `half_chi2` of all chunks, differentiable once by JAX with respect to the offsets.
 
-    Value and gradient are made together, one chunk after the other, so that neither needs
-    more memory than one chunk does.
+    Value and gradient are computed together, chunk by chunk, so that they need no more memory
+    than one chunk.
     """
     return _with_gradient(offsets, geometry, index, measured, weight)[0]
 
@@ -106,15 +108,15 @@ def half_chi2_of_chunks(
 def _with_gradient(
     offsets: Offsets, geometry: Geometry, *chunks: AnyArray
 ) -> tuple[Float[Array, ""], Offsets]:
-    seen = directions(offsets, geometry)
+    sky = directions(offsets, geometry)
 
-    def add(total: _Part, chunk: tuple) -> tuple[_Part, None]:
-        part = _of_chunk(seen, offsets, geometry, *chunk)
-        return jax.tree.map(jnp.add, total, part), None
+    def add(total: _ValueAndGradient, chunk: tuple) -> tuple[_ValueAndGradient, None]:
+        of_chunk = _value_and_gradient(sky, offsets, geometry, *chunk)
+        return jax.tree.map(jnp.add, total, of_chunk), None
 
-    others = {name: offsets[name] for name in (*_TOUCHED, *_COEFFICIENTS)}
-    start = jax.tree.map(jnp.zeros_like, (jnp.zeros(()), seen, others))
-    return _to_offsets(jax.lax.scan(add, start, chunks)[0], offsets, geometry)
+    other_offsets = {name: offsets[name] for name in (*_NON_DIRECTING, *_COEFFICIENTS)}
+    zero = jax.tree.map(jnp.zeros_like, (jnp.zeros(()), sky, other_offsets))
+    return _with_offset_gradient(jax.lax.scan(add, zero, chunks)[0], offsets, geometry)
 
 
 def _scaled_gradient(gradient: Offsets, scale: Float[Array, ""]) -> tuple:
@@ -124,27 +126,30 @@ def _scaled_gradient(gradient: Offsets, scale: Float[Array, ""]) -> tuple:
 half_chi2_of_chunks.defvjp(_with_gradient, _scaled_gradient)
 
 
-# Value and derivatives of `half_chi2`: by the directions, and by the offsets that are not in them.
-_Part = tuple[Float[Array, ""], Directions, Offsets]
+# Value of `half_chi2`, its derivatives by the directions, and those by the offsets that the
+# directions do not depend on.
+_ValueAndGradient = tuple[Float[Array, ""], Directions, Offsets]
 
 _directions = jax.jit(directions)
 
 
 @jax.jit
-def _of_chunk(
-    seen: Directions, offsets: Offsets, geometry: Geometry, index: Index, *values: AnyArray
-) -> _Part:
-    still = (jnp.zeros_like(values[0][0]),) * 2
+def _value_and_gradient(
+    sky: Directions, offsets: Offsets, geometry: Geometry, index: Index, *values: AnyArray
+) -> _ValueAndGradient:
+    no_displacement = (jnp.zeros_like(values[0][0]),) * 2
 
-    def of(seen: Directions, touched: Offsets, displacement: Pair) -> tuple[Array, list[Array]]:
-        return half_chi2(seen, {**offsets, **touched}, displacement, geometry, index, *values)
+    def half_chi2_at(
+        sky: Directions, moved: Offsets, displacement: Pair
+    ) -> tuple[Array, list[Array]]:
+        return half_chi2(sky, {**offsets, **moved}, displacement, geometry, index, *values)
 
-    touched = {name: offsets[name] for name in _TOUCHED}
+    moved = {name: offsets[name] for name in _NON_DIRECTING}
     (half, basis), (by_directions, by_touched, by_displacement) = jax.value_and_grad(
-        of, argnums=(0, 1, 2), has_aux=True
-    )(seen, touched, still)
-    # Both directions at once, and each term where it is: one product with all terms would need
-    # them copied side by side first, which takes longer than the products.
+        half_chi2_at, argnums=(0, 1, 2), has_aux=True
+    )(sky, moved, no_displacement)
+    # One product per term, for both directions: a single product with all terms would need them
+    # copied into one array first, which takes longer than the products.
     pair = jnp.stack(by_displacement).reshape(2, -1)
     by_terms = [pair @ term.reshape(-1) for term in basis]
     by_coefficients = jnp.stack(by_terms, axis=1) if basis else jnp.zeros((2, 0))
@@ -156,10 +161,10 @@ def _of_chunk(
 
 
 @jax.jit
-def _to_offsets(
-    total: _Part, offsets: Offsets, geometry: Geometry
+def _with_offset_gradient(
+    total: _ValueAndGradient, offsets: Offsets, geometry: Geometry
 ) -> tuple[Float[Array, ""], Offsets]:
-    """Return the derivatives by all offsets."""
-    half, by_directions, by_others = total
-    _, back = jax.vjp(lambda moved: directions(moved, geometry), offsets)
-    return half, {**back(by_directions)[0], **by_others}
+    """Return the value and the derivatives by all offsets."""
+    half, by_directions, by_other_offsets = total
+    _, pull_back = jax.vjp(lambda moved: directions(moved, geometry), offsets)
+    return half, {**pull_back(by_directions)[0], **by_other_offsets}

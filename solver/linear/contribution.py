@@ -1,7 +1,7 @@
-"""Contribution: what some of the measurements add to normal equations.
+"""Contribution: the terms that some of the measurements add to the normal equations.
 
-All of them are sums over the measurements, so that what is taken out is what would not be
-added. Those of whole detectors are at hand; any others have to be linearised again.
+Normal equations are sums over the measurements, so removing measurements subtracts their
+contribution. It is already summed for whole detectors; other subsets are linearised again.
 """
 
 from collections.abc import Callable
@@ -17,66 +17,78 @@ from solver.problem.problem import Problem, of_rows
 
 
 class Contribution(NamedTuple):
-    """Blocks of some measurements, in the order of sources of the whole `NormalEquations`.
+    """Contribution of some measurements, with the sources in the order of the full equations.
 
-    Instead of W it has `left`: a row of W without what these measurements added to it.
+    Instead of their contribution to W, `remaining_cross` returns a row of W without it.
     """
 
     gradient: Gradient
     theta: Float[np.ndarray, "calib calib"]
     source: Float[np.ndarray, "src 2 2"]
-    left: Callable[[int], Float[np.ndarray, "2 src"]]
+    remaining_cross: Callable[[int], Float[np.ndarray, "2 src"]]
 
 
 def contribution_of(
-    equations: NormalEquations, problem: Problem, gone: Bool[np.ndarray, " obs"]
+    equations: NormalEquations, problem: Problem, removed: Bool[np.ndarray, " obs"]
 ) -> Contribution:
-    """Return what the measurements `gone` have added to the equations of a problem."""
-    index, own = problem.measurements.index, equations.by_detector
-    detectors = np.bincount(index.detector[gone], minlength=problem.layout.n_det) > 0
-    if own is not None and np.array_equal(gone, detectors[index.detector]):
-        seen = index.exposure * problem.n_src + index.source
-        share = np.ones(problem.layout.n_exp * problem.n_src)
-        share[seen[gone]] = 0.0
-        # Where detectors overlap, an exposure's row is not of one detector for each source.
-        if share[seen[~gone]].all():
-            share = share.reshape(problem.layout.n_exp, -1)[:, equations.source_blocks.order]
-            return _of_detectors(equations, own, problem.layout, detectors, share)
-    # With the patches of the whole, so that the sources stand in their order.
-    part = accumulate(of_rows(problem, gone), *equations.at)
+    """Return the contribution of the measurements `removed` to the equations of a problem."""
+    index, sums = problem.measurements.index, equations.by_detector
+    detectors = np.bincount(index.detector[removed], minlength=problem.layout.n_det) > 0
+    if sums is not None and np.array_equal(removed, detectors[index.detector]):
+        pair = index.exposure * problem.n_src + index.source
+        kept_share = np.ones(problem.layout.n_exp * problem.n_src)
+        kept_share[pair[removed]] = 0.0
+        # If detectors overlap, several of them can contribute to the row of an exposure.
+        if kept_share[pair[~removed]].all():
+            kept_share = kept_share.reshape(problem.layout.n_exp, -1)[
+                :, equations.source_blocks.order
+            ]
+            return _detectors_contribution(equations, sums, problem.layout, detectors, kept_share)
+    # The source blocks of the full problem keep the order of its sources.
+    removed_equations = accumulate(of_rows(problem, removed), *equations.at)
 
-    def left(column: int) -> Float[np.ndarray, "2 src"]:
-        return equations.cross[column] - part.cross[column]
+    def remaining_cross(column: int) -> Float[np.ndarray, "2 src"]:
+        return equations.cross[column] - removed_equations.cross[column]
 
-    return Contribution(part.gradient, part.theta, part.source, left)
+    return Contribution(
+        removed_equations.gradient,
+        removed_equations.theta,
+        removed_equations.source,
+        remaining_cross,
+    )
 
 
-def _of_detectors(
+def _detectors_contribution(
     equations: NormalEquations,
-    own: DetectorSums,
+    sums: DetectorSums,
     layout: VectorLayout,
     detectors: Bool[np.ndarray, " det"],
-    share: Float[np.ndarray, "exp src"],
+    kept_share: Float[np.ndarray, "exp src"],
 ) -> Contribution:
-    """Return the part of some detectors; the others have a share in what exposures have seen."""
-    whose = np.empty(layout.size, dtype=np.int64)
+    """Return the contribution of some detectors.
+
+    Parameters
+    ----------
+    kept_share : 1 where other detectors contribute to the rows of an exposure, 0 elsewhere
+    """
+    owner = np.empty(layout.size, dtype=np.int64)
     for groups, count in ((PER_EXPOSURE, layout.n_exp), (PER_DETECTOR, layout.n_det)):
         for group in groups:
-            whose[layout.columns(group)] = np.arange(count)
-    coefficients = own.coefficients[detectors].sum(axis=0)
+            owner[layout.columns(group)] = np.arange(count)
+    coefficients = sums.coefficients[detectors].sum(axis=0)
 
-    def left(column: int) -> Float[np.ndarray, "2 src"]:
+    def remaining_cross(column: int) -> Float[np.ndarray, "2 src"]:
         row = equations.cross[column]
         if column < layout.first_coefficient:
-            return row * share[whose[column]]
+            return row * kept_share[owner[column]]
         if column < layout.first_detector:
             return row - coefficients[column - layout.first_coefficient]
-        return row * (not detectors[whose[column]])
+        return row * (not detectors[owner[column]])
 
     gradient = Gradient(
-        float(own.chi2[detectors].sum()),
-        own.by_theta[detectors].sum(axis=0),
-        own.by_source[detectors].sum(axis=0).T,
+        float(sums.chi2[detectors].sum()),
+        sums.by_theta[detectors].sum(axis=0),
+        sums.by_source[detectors].sum(axis=0).T,
     )
-    of_sources = own.source[detectors].sum(axis=0).transpose(2, 0, 1)
-    return Contribution(gradient, own.theta[detectors].sum(axis=0), of_sources, left)
+    source = sums.source[detectors].sum(axis=0).transpose(2, 0, 1)
+    return Contribution(gradient, sums.theta[detectors].sum(axis=0), source, remaining_cross)

@@ -1,12 +1,12 @@
-"""Leverage: how far each measurement pulls its own prediction, and residuals freed of it.
+"""Leverage: how far each measurement pulls its own prediction, and residuals corrected for it.
 
 With the whitened Jacobian J_k of measurement k and the marginal covariance C of all
 parameters, H_k = J_k C J_k' (2 x 2). The expected chi2 of the measurement is
 2 - tr H_k, and (I - H_k)^(-1/2) r_k has unit covariance if model and sigmas are right.
 
 A measurement depends on few parameters, and on the distortion's many coefficients only
-through the displacement that they add at its place; so C is first brought down to the
-covariance of the source, the touched parameters and that displacement.
+through the displacement that they add at its position; so C is first projected onto the
+source, the parameters of `LOCAL_GROUPS` and that displacement.
 """
 
 from collections import deque
@@ -29,7 +29,7 @@ from solver.problem.source_blocks import SourceBlocks
 class Residuals(NamedTuple):
     """Residuals of the measurements, in working order.
 
-    `whitened` is (measured minus predicted) / sigma; `standardised` the same freed of
+    `whitened` is (measured minus predicted) / sigma; `standardised` the same corrected for
     leverage, NaN where a measurement determines its own prediction; `trace` is that of H;
     the positions are those of `solver.model.forward.Prediction`.
     """
@@ -45,8 +45,8 @@ class Residuals(NamedTuple):
 class Covariances(NamedTuple):
     """Marginal covariances of sources, calibration, and between the two.
 
-    `at` is where the model was linearised, calibration and sources. The sources of `cross` are in
-    the order of `patches`.
+    `at` is the linearisation point, calibration and sources. The sources of `cross` are in
+    block order.
     """
 
     at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
@@ -74,28 +74,28 @@ def residuals(
     sources: Float[np.ndarray, "src 2"],
     covariance: Covariances,
 ) -> Residuals:
-    """Return the residuals at a point, with their leverage."""
+    """Return the residuals and their leverage at a point."""
     tiles = problem.measurements.tiles
 
     def of_chunk(
         i: int, chunk: Linearised, jacobians: Linearised
     ) -> list[Float[np.ndarray, "..."]]:
-        index = Index(*(part[i] for part in tiles.index))
+        index = Index(*(column[i] for column in tiles.index))
         leverage = _leverage(index, jacobians, problem.layout, covariance)
         at = chunk.prediction
         return [leverage, *map(of_slots, (chunk.residual, at.pixel, at.ideal, at.focal))]
 
-    parts, under_way = [], deque()
+    parts, pending = [], deque()
     with one_blas_thread(), ThreadPoolExecutor(max_workers=2) as helpers:
-        # Large variances cancel in what the priors alone hold, and do so only with the very
-        # Jacobians from which the covariances were made.
+        # Along prior-dominated directions large variances cancel, but only with the Jacobians
+        # from which the covariances were computed.
         both = zip(chunks(problem, theta, sources), chunks(problem, *covariance.at), strict=True)
         for i, (chunk, jacobians) in enumerate(both):
-            under_way.append(helpers.submit(of_chunk, i, chunk, jacobians))
-            # Only so many at a time: they are large.
-            if len(under_way) > 2:
-                parts.append(under_way.popleft().result())
-        parts += [work.result() for work in under_way]
+            pending.append(helpers.submit(of_chunk, i, chunk, jacobians))
+            # Few at a time, because chunks are large.
+            if len(pending) > 2:
+                parts.append(pending.popleft().result())
+        parts += [work.result() for work in pending]
     leverage, residual, pixel, ideal, focal = (
         np.concatenate(columns)[tiles.place] for columns in zip(*parts, strict=True)
     )
@@ -144,7 +144,7 @@ def _between(
     covariance: Float[np.ndarray, "tile i j slot"],
     columns: Float[np.ndarray, "tile j 2 slot"],
 ) -> Float[np.ndarray, "tile 2 2 slot"]:
-    # The slots last, along which all loops run.
+    # All loops run along the slots, which are the last axis.
     spread = np.einsum("tijs,tjqs->tiqs", covariance, columns)
     return np.einsum("tips,tiqs->tpqs", rows, spread)
 
@@ -159,9 +159,9 @@ def _calibration_covariance(
     Float[np.ndarray, "tile local 2 slot"],
     Float[np.ndarray, "tile 2 2 slot"],
 ]:
-    """Return the covariances of the touched parameters and of the displacement.
+    """Return the covariances of the parameters of `LOCAL_GROUPS` and of the displacement.
 
-    In the order: among the former, between the two, of the latter.
+    In this order: of the parameters, between parameters and displacement, of the displacement.
     """
     own, shared = layout.touched(index.exposure[:, 0], index.detector[:, 0]), layout.coefficients()
     n_tiles, n_slots = index.source.shape
@@ -184,7 +184,7 @@ def _source_covariance(
     layout: VectorLayout,
     cross: Float[np.ndarray, "calib 2 src"],
 ) -> tuple[Float[np.ndarray, "tile local 2 slot"], Float[np.ndarray, "tile 2 2 slot"]]:
-    """Return the covariances of touched parameters and displacement with the source."""
+    """Return the covariances of these parameters and of the displacement with the source."""
     own = layout.touched(index.exposure[:, 0], index.detector[:, 0])
     source = index.source[:, None, :]
     of_local = np.stack([cross[own[:, :, None], a, source] for a in range(2)], axis=2)
@@ -210,7 +210,7 @@ def _standardised(
     """Return (I - H)^(-1/2) r, by the closed form of a 2 x 2 root."""
     rest = np.eye(2) - leverage
     determinant = rest[:, 0, 0] * rest[:, 1, 1] - rest[:, 0, 1] * rest[:, 1, 0]
-    # Below this the measurement alone decides its prediction, and rounding its residual.
+    # Below this the measurement determines its own prediction, and its residual is rounding noise.
     usable = (determinant > 1e-12) & (np.trace(rest, axis1=1, axis2=2) > 0.0)
     root = np.sqrt(np.where(usable, determinant, 1.0))
     trace = np.where(usable, np.trace(rest, axis1=1, axis2=2), 1.0)

@@ -1,9 +1,9 @@
 """Whitened residuals and exact Jacobians of the observation model.
 
-Each measurement touches one source, one exposure and one detector, so the derivative by
+Each measurement depends on one source, exposure and detector, so the derivative with respect to
 a whole group is one forward-mode pass with every element of the group moved at once.
 The distortion coefficients are shared by all measurements, but act only through the
-displacement they add: its derivative and the basis stand for theirs.
+displacement they add, so its derivative and the basis replace theirs.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ from solver.problem.parameter_vector import LOCAL_GROUPS
 
 
 class Linearised(NamedTuple):
-    """A run of tiles, linearised; all but `prediction` divided by sigma, x and y apart.
+    """A chunk of tiles, linearised; all but `prediction` divided by sigma, x and y separately.
 
     `residual` is measured minus predicted. The others are derivatives of the prediction:
     by the source's two offsets (mas^-1), by the groups of `LOCAL_GROUPS` (per group unit),
@@ -45,13 +45,13 @@ class Linearised(NamedTuple):
     prediction: Prediction
 
     def with_terms(self, n_coef: int) -> "Linearised":
-        """Return the same with that many distortion terms."""
+        """Return the same with the first `n_coef` distortion terms."""
         kept = self.prediction._replace(basis=self.prediction.basis[:n_coef])
         return self._replace(prediction=kept)
 
 
 class Imaged(NamedTuple):
-    """The prediction of a run of tiles, and how its pixels move with the ideal positions.
+    """The prediction of a chunk of tiles, and its derivatives by the ideal positions.
 
     `along` holds the derivatives of `prediction.pixel` by x and by y, pixel/um.
     """
@@ -61,11 +61,11 @@ class Imaged(NamedTuple):
 
 
 class Turning(NamedTuple):
-    """The directions and how they turn, which is the same for all chunks.
+    """The directions and their derivatives, which all chunks share.
 
     Attributes
     ----------
-    at : at the offsets
+    at : the directions at the offsets
     source : derivatives of `at.source` by a source's two offsets, mas^-1
     axes : group name -> derivative of `at.axes`, per group unit
     """
@@ -109,8 +109,8 @@ def linearise(
     measured : pixels
     weight : 1/sigma, pixel^-1; zero removes a coordinate
     """
-    # Compiled apart: within one program XLA would make these anew for each of the twenty
-    # derivatives that are chained to them, which was measured to double its work.
+    # Compiled separately: within one program XLA would recompute these for each of the twenty
+    # derivatives chained to them, which was measured to double its work.
     at = _imaged(turn, offsets, geometry, index)
     residual, source, local, displacement = _derivatives(
         turn, offsets, geometry, index, measured, weight, at
@@ -135,25 +135,25 @@ def _derivatives(
     weight: Float[AnyArray, "2 tile slot"],
     imaged: Imaged,
 ) -> tuple[Pair, list[Pair], list[Pair], list[Pair]]:
-    """Return all of `Linearised` but the prediction, of which this would make a copy."""
+    """Return the fields of `Linearised` except the prediction, which would be copied here."""
     prediction, (along_x, along_y) = imaged
     ideal = prediction.ideal
 
-    def of_plane(shift: Pair) -> Pair:
-        """Chain a derivative through the ideal plane, where both stages are narrow."""
+    def through_plane(shift: Pair) -> Pair:
+        """Chain a derivative through the ideal plane, where both stages have two components."""
         return tuple(along_x[i] * shift[0] + along_y[i] * shift[1] for i in (0, 1))
 
-    def turned(part: str, tangent: AnyArray) -> Pair:
-        """Return the derivative by what turns a part of the directions."""
+    def by_directions(field: str, tangent: AnyArray) -> Pair:
+        """Return the pixel derivative along a tangent of one field of the directions."""
 
         def moved(values: AnyArray) -> Pair:
-            return ideal_position(turn.at._replace(**{part: values}), offsets, geometry, index)
+            return ideal_position(turn.at._replace(**{field: values}), offsets, geometry, index)
 
-        return of_plane(jax.jvp(moved, (getattr(turn.at, part),), (tangent,))[1])
+        return through_plane(jax.jvp(moved, (getattr(turn.at, field),), (tangent,))[1])
 
     def by_group(name: str) -> Pair:
         if name in turn.axes:
-            return whiten(*turned("axes", turn.axes[name]))
+            return whiten(*by_directions("axes", turn.axes[name]))
         values, one = jnp.asarray(offsets[name]), jnp.ones_like(offsets[name])
         on_plane, on_detector = (
             jax.jvp(stage, (values,), (one,))[1]
@@ -162,7 +162,7 @@ def _derivatives(
                 lambda moved: image(ideal, {**offsets, name: moved}, geometry, index).pixel,
             )
         )
-        return whiten(*jax.tree.map(jnp.add, of_plane(on_plane), on_detector))
+        return whiten(*jax.tree.map(jnp.add, through_plane(on_plane), on_detector))
 
     def whiten(x: Float[Array, "*#obs"], y: Float[Array, "*#obs"]) -> Pair:
         return weight[0] * x, weight[1] * y
@@ -172,13 +172,13 @@ def _derivatives(
 
     x, y = prediction.pixel
     residual = whiten(measured[0] - x, measured[1] - y)
-    source = [whiten(*turned("source", tangent)) for tangent in turn.source]
+    source = [whiten(*by_directions("source", tangent)) for tangent in turn.source]
     local = [by_group(g.name) for g in LOCAL_GROUPS]
     displacement = [whiten(*by) for by in _by_axes(displaced, jax.tree.map(jnp.zeros_like, ideal))]
     return residual, source, local, displacement
 
 
-def _by_axes(of: Callable[[Pair], Pair], at: Pair) -> list[Pair]:
+def _by_axes(function: Callable[[Pair], Pair], at: Pair) -> list[Pair]:
     """Return the derivatives of a function by the two components of its argument."""
     one, zero = jnp.ones_like(at[0]), jnp.zeros_like(at[0])
-    return [jax.jvp(of, (at,), (unit,))[1] for unit in ((one, zero), (zero, one))]
+    return [jax.jvp(function, (at,), (unit,))[1] for unit in ((one, zero), (zero, one))]

@@ -2,7 +2,7 @@
 
 With calibration theta and sources s, half the data's chi2 has the Hessian blocks
 U (theta, theta), W (theta, source) and V (source, source). V is block-diagonal, 2 x 2
-for each source, since a measurement belongs to one source: this makes the sources cheap to
+for each source, since a measurement belongs to one source, which makes the sources cheap to
 eliminate (`solver.linear.source_elimination`). Priors are added there, so that these blocks
 stay valid when the priors change.
 """
@@ -32,10 +32,10 @@ from solver.problem.tiles import Gathering
 
 @dataclass(frozen=True)
 class DetectorSums:
-    """What the measurements on each detector add to g, chi2_0 and the blocks.
+    """Contributions of the measurements on each detector to g, chi2_0 and the blocks.
 
-    Of W it is the rows of the distortion alone: the others are each of one detector. Its sources
-    are in the order of the patches here, too.
+    Of W they comprise only the rows of the distortion, since the others each belong to one
+    detector; the sources of W are in block order.
     """
 
     chi2: Float[np.ndarray, " det"]
@@ -52,13 +52,13 @@ class NormalEquations:
 
     Attributes
     ----------
-    at : where the model was linearised, calibration and sources
+    at : linearisation point, calibration and sources
     gradient : g, with chi2_0
     theta : U
     source : V
-    source_blocks : in whose order the sources of W stand
+    source_blocks : blocks whose order the sources of W follow
     cross : W
-    by_detector : of what they are the sums; None where some of it was taken out
+    by_detector : the same by detector; None if measurements were removed from the sums
     """
 
     at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
@@ -75,29 +75,29 @@ def chunks(
 ) -> Iterator[Linearised]:
     """Linearise the measurements a chunk of tiles at a time.
 
-    The next chunk is under way in JAX while the caller works on this one.
+    JAX computes the next chunk while the caller works on this one.
     """
     n_chunks = len(problem.measurements.tiles.measured)
-    # Once, and not with every chunk.
+    # Transferred once, not with every chunk.
     offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
     turn = turning(offsets, geometry)
 
-    def start(i: int) -> Linearised:
+    def launch(i: int) -> Linearised:
         chunk = linearise(turn, offsets, geometry, *problem.measurements.tiles.chunk(i))
         return chunk.with_terms(problem.layout.n_coef)
 
-    ahead = start(0)
+    ahead = launch(0)
     for i in range(n_chunks):
         current = ahead
         if i + 1 < n_chunks:
-            ahead = start(i + 1)
+            ahead = launch(i + 1)
         yield jax.tree.map(np.asarray, current)
 
 
 def one_blas_thread() -> AbstractContextManager[object]:
-    """Keep BLAS to one thread while many small products are made.
+    """Limit BLAS to one thread while many small products are computed.
 
-    Its threads wait in a busy loop between products; beside JAX or a browser, on few
+    BLAS threads wait in a busy loop between products; next to JAX or a browser, on few
     cores, that was measured to make a pass up to twenty times slower.
     """
     return _thread_pools().limit(limits=1, user_api="blas")
@@ -118,44 +118,48 @@ def accumulate(
 
     Parameters
     ----------
-    coefficients : the blocks between the distortion's own terms, of each detector, where they are
-        known: they depend on where the sources are seen, and not on how far each is displaced
+    coefficients : the blocks between the distortion terms, by detector, if already computed;
+        they depend on the ideal positions, not on the distortion
     """
     layout, n_src, index = problem.layout, problem.n_src, problem.measurements.tiles.index
     n_det, n_coef = layout.n_det, layout.n_coef
     cross = np.zeros((layout.size, 2, n_src))
     source, by_source = np.zeros((n_det, 2, 2, n_src)), np.zeros((n_det, 2, n_src))
     is_known = coefficients is not None
-    of_terms = coefficients if is_known else np.zeros((n_det, 2, n_coef, 2, n_coef))
+    term_blocks = coefficients if is_known else np.zeros((n_det, 2, n_coef, 2, n_coef))
     sums = TileSums.empty(index.source.shape, n_coef)
     with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
-        under_way = helper.submit(lambda: None)
+        pending = helper.submit(lambda: None)
         for i, chunk in enumerate(chunks(problem, theta, sources)):
-            here, rows = Index(*(part[i] for part in index)), rows_of(chunk)
+            chunk_index, rows = Index(*(column[i] for column in index)), rows_of(chunk)
             sums.keep_slots(chunk, rows, i)
-            # One chunk at a time: they are large.
-            under_way.result()
-            summed = None if is_known else of_terms
-            under_way = helper.submit(_sum_in_tiles, rows, i, here.detector, sums, summed)
+            # One chunk at a time, because chunks are large.
+            pending.result()
+            summed = None if is_known else term_blocks
+            pending = helper.submit(_sum_in_tiles, rows, i, chunk_index.detector, sums, summed)
             by_row = one_by_one(rows.local, rows.source)
-            _add_sources(here, rows.source, by_row[-1], source, by_source)
-            in_order = here._replace(source=problem.source_blocks.position[here.source])
+            _add_sources(chunk_index, rows.source, by_row[-1], source, by_source)
+            in_order = chunk_index._replace(
+                source=problem.source_blocks.position[chunk_index.source]
+            )
             _add_cross_local(in_order, by_row, layout, cross)
-        under_way.result()
-        of_coefficients = np.empty((n_det, 2 * n_coef, 2, n_src))
-        some, others = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)
-        # Made here, or both threads would make it.
+        pending.result()
+        cross_by_detector = np.empty((n_det, 2 * n_coef, 2, n_src))
+        first_half, second_half = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)
+        # A cached property, computed before both threads need it.
         places = problem.measurements.by_source
-        under_way = helper.submit(_cross_coefficients, places, sums, some, of_coefficients)
-        hessian, by_theta, chi2 = _assemble(index, layout, sums, of_terms)
-        _cross_coefficients(places, sums, others, of_coefficients)
-        under_way.result()
-    np.sum(of_coefficients, axis=0, out=cross[layout.coefficients()])
-    own = DetectorSums(chi2, by_theta, by_source, hessian, source, of_coefficients)
+        pending = helper.submit(_cross_coefficients, places, sums, first_half, cross_by_detector)
+        hessian, by_theta, chi2 = _assemble(index, layout, sums, term_blocks)
+        _cross_coefficients(places, sums, second_half, cross_by_detector)
+        pending.result()
+    np.sum(cross_by_detector, axis=0, out=cross[layout.coefficients()])
+    by_detector = DetectorSums(chi2, by_theta, by_source, hessian, source, cross_by_detector)
     gradient = Gradient(float(chi2.sum()), by_theta.sum(axis=0), by_source.sum(axis=0).T.copy())
-    of_sources = source.sum(axis=0).transpose(2, 0, 1).copy()
-    at, of_theta = (theta, sources), hessian.sum(axis=0)
-    return NormalEquations(at, gradient, of_theta, of_sources, problem.source_blocks, cross, own)
+    source_hessian = source.sum(axis=0).transpose(2, 0, 1).copy()
+    at, theta_hessian = (theta, sources), hessian.sum(axis=0)
+    return NormalEquations(
+        at, gradient, theta_hessian, source_hessian, problem.source_blocks, cross, by_detector
+    )
 
 
 def _sum_in_tiles(
@@ -165,7 +169,7 @@ def _sum_in_tiles(
     sums: TileSums,
     coefficients: Float[np.ndarray, "det 2 coef 2 coef"] | None,
 ) -> None:
-    """Sum the products of chunk `i` that are of a whole tile, and add those between the terms."""
+    """Sum the products of chunk `i` over each tile, and add those between distortion terms."""
     sums.sum_local(rows, i)
     sums.sum_mixed(rows, i)
     if coefficients is not None:
@@ -217,7 +221,7 @@ def _add_cross_local(
     layout: VectorLayout,
     cross: Float[np.ndarray, "calib 2 src"],
 ) -> None:
-    """Add the blocks between the sources and what each of their measurements touches."""
+    """Add the blocks between the sources and the local parameters of their measurements."""
     n_src, flat = cross.shape[-1], cross.reshape(-1)
     for number, groups in ((index.exposure, PER_EXPOSURE), (index.detector, PER_DETECTOR)):
         for group in groups:
@@ -233,23 +237,23 @@ def _cross_coefficients(
     detectors: slice,
     cross: Float[np.ndarray, "det two_coef 2 src"],
 ) -> None:
-    """Fill in the blocks between sources and distortion, shared by all measurements.
+    """Fill in the blocks between sources and distortion.
 
-    They are sums over the measurements of a source of a 2 x 2 matrix times the basis: a
-    sparse matrix that gathers them, times the dense basis.
+    Each is a sum over the measurements of a source of a 2 x 2 matrix times the basis; together
+    they are the product of a sparse matrix and the dense basis.
     """
-    n_src, n_coef, found = cross.shape[-1], sums.basis.shape[-1], cross[detectors]
-    # Its rows are the values of each source, detector after detector.
+    n_src, n_coef, filled = cross.shape[-1], sums.basis.shape[-1], cross[detectors]
+    # Rows of the sparse matrix: four values of each source, detector after detector.
     begin = 4 * n_src * detectors.indices(len(cross))[0]
-    first = places.first[begin : begin + 4 * n_src * len(found) + 1]
+    first = places.first[begin : begin + 4 * n_src * len(filled) + 1]
     entries = slice(first[0], first[-1])
     weight = np.take(sums.shared.reshape(-1), places.value[entries])
     basis = sums.basis.reshape(sums.shared[0, 0].size, n_coef)
     gather = sp.csr_array(
         (weight, places.slot[entries], first - first[0]), shape=(len(first) - 1, len(basis))
     )
-    summed = (gather @ basis).reshape(len(found), n_src, 2, 2, n_coef)
-    found.reshape(len(found), 2, n_coef, 2, n_src)[...] = summed.transpose(0, 2, 4, 3, 1)
+    summed = (gather @ basis).reshape(len(filled), n_src, 2, 2, n_coef)
+    filled.reshape(len(filled), 2, n_coef, 2, n_src)[...] = summed.transpose(0, 2, 4, 3, 1)
 
 
 def _assemble(
@@ -260,20 +264,20 @@ def _assemble(
 ) -> tuple[
     Float[np.ndarray, "det calib calib"], Float[np.ndarray, "det calib"], Float[np.ndarray, " det"]
 ]:
-    """Return Hessian, gradient and chi2 of the calibration, of each detector."""
-    size, n_det, shared, own = layout.size, layout.n_det, layout.coefficients(), slice(N_LOCAL)
+    """Return Hessian, gradient and chi2 of the calibration for each detector."""
+    size, n_det, shared, local = layout.size, layout.n_det, layout.coefficients(), slice(N_LOCAL)
     detector = index.detector[..., 0]
     columns = layout.touched(index.exposure[..., 0], detector)
-    # Where the vectors of the detectors stand one after the other.
+    # Start of each detector's vector in the concatenated vectors.
     first = size * detector[..., None]
     rows = size * (first + columns)[..., :, None]
     n_values = n_det * size * size
-    hessian = _sum_at(rows + columns[..., None, :], sums.local[..., own, own], n_values)
-    hessian += _sum_at(rows + np.arange(size)[shared], sums.mixed[..., own, :], n_values)
+    hessian = _sum_at(rows + columns[..., None, :], sums.local[..., local, local], n_values)
+    hessian += _sum_at(rows + np.arange(size)[shared], sums.mixed[..., local, :], n_values)
     hessian = hessian.reshape(n_det, size, size)
     hessian[:, shared, :] = hessian[:, :, shared].swapaxes(1, 2)
     hessian[:, shared, shared] = coefficients.reshape(n_det, 2 * layout.n_coef, 2 * layout.n_coef)
-    gradient = _sum_at(first + columns, sums.local[..., -1, own], n_det * size)
+    gradient = _sum_at(first + columns, sums.local[..., -1, local], n_det * size)
     gradient += _sum_at(first + np.arange(size)[shared], sums.mixed[..., -1, :], n_det * size)
     chi2 = _sum_at(detector, sums.local[..., -1, -1], n_det)
     return hessian, gradient.reshape(n_det, size), chi2
@@ -282,6 +286,6 @@ def _assemble(
 def _sum_at(
     places: Int[np.ndarray, "..."], values: Float[np.ndarray, "..."], length: int
 ) -> Float[np.ndarray, " _"]:
-    """Return the sums of the values that fall on each place."""
-    # Of nothing at all NumPy counts integers.
+    """Return the sum of the values at each place."""
+    # NumPy returns integers for empty input.
     return np.bincount(places.ravel(), values.ravel(), length).astype(np.float64, copy=False)

@@ -1,7 +1,8 @@
 """Products of the derivatives of a chunk, summed over the two coordinates of each measurement.
 
-The derivatives of one tile stand together, so that all its products are made while they are in
-the caches: XLA goes through the whole chunk once for each of fifty, and takes nearly twice as long.
+The derivatives of one tile are contiguous, so that all its products are computed while they are
+in the caches. XLA passes over the whole chunk for each of fifty products, which takes nearly
+twice as long.
 """
 
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from solver.model.forward import Pair
 
 
 class Rows(NamedTuple):
-    """The parts of `Linearised`, tile after tile; the last row of `local` is the residual."""
+    """The fields of `Linearised` by tile; the last row of `local` is the residual."""
 
     local: Float[np.ndarray, "tile local 2 slot"]
     source: Float[np.ndarray, "tile 2 2 slot"]
@@ -28,7 +29,7 @@ def rows_of(chunk: Linearised) -> Rows:
 
 
 def side_by_side(pairs: list[Pair]) -> Float[np.ndarray, "tile row 2 slot"]:
-    """Return the derivatives of each tile together."""
+    """Return derivatives as one array, contiguous for each tile."""
     flat = np.stack([values for pair in pairs for values in pair], axis=1)
     return flat.reshape(len(flat), len(pairs), 2, -1)
 
@@ -36,13 +37,13 @@ def side_by_side(pairs: list[Pair]) -> Float[np.ndarray, "tile row 2 slot"]:
 def one_by_one(
     first: Float[np.ndarray, "tile i 2 slot"], second: Float[np.ndarray, "tile j 2 slot"]
 ) -> Float[np.ndarray, "i j tile slot"]:
-    """Return the product of each row with each, over all tiles."""
+    """Return the products of all pairs of rows, with the tiles on an inner axis."""
     return np.einsum("tics,tjcs->ijts", first, second)
 
 
 def in_tiles(
     first: Float[np.ndarray, "tile i 2 slot"], second: Float[np.ndarray, "tile j 2 slot"]
 ) -> Float[np.ndarray, "tile i_j slot"]:
-    """Return the products of each tile together, those of the first row first."""
+    """Return the products of all pairs of rows, contiguous for each tile."""
     products = np.einsum("tics,tjcs->tijs", first, second)
     return products.reshape(len(first), -1, products.shape[-1])

@@ -2,8 +2,8 @@
 
 With priors added, V_i = L_i L_i' and Z = W L'^-1, the calibration alone obeys
 S = U - Z Z' (the Schur complement); its inverse is the marginal covariance of the
-calibration, and that of source i is V_i^-1 + V_i^-1 W_i' S^-1 W_i V_i^-1. Z is kept in blocks,
-each of a patch of sources and the columns that they touch (`solver.problem.source_blocks`).
+calibration, and that of source i is V_i^-1 + V_i^-1 W_i' S^-1 W_i V_i^-1. Z is stored as one
+dense matrix per source block (`solver.problem.source_blocks`).
 """
 
 from collections.abc import Iterator
@@ -20,12 +20,12 @@ from solver.linear.triangular import lower_solve, rows_solved, upper_solve
 from solver.problem.priors import Priors
 from solver.problem.source_blocks import SourceBlock, SourceBlocks
 
-# Directions with less than this share of the information that their parameters have alone are
-# held by the priors only; and those with less than that are held poorly.
-_WEAK, POORLY_HELD = 1e-6, 1e-3
-# At most so many of them are looked for.
-_BLOCK = 16
-# More would wait for memory.
+# Limits on the information along a direction, relative to that of its parameters taken alone:
+# of weak directions, which only the priors constrain, and of poorly constrained ones.
+_WEAK, POORLY_CONSTRAINED = 1e-6, 1e-3
+# Maximum number of weak directions searched for.
+_MAX_WEAK = 16
+# More threads would be limited by memory bandwidth.
 _WORKERS = 2
 
 
@@ -35,11 +35,11 @@ class ReducedSystem:
 
     Attributes
     ----------
-    at : where the model was linearised, calibration and sources
+    at : linearisation point, calibration and sources
     theta : U with priors
     source_factor : lower Cholesky factor of V with priors
-    source_blocks : of the sources
-    whitened : Z, the block of each patch
+    source_blocks : blocks of the sources
+    whitened : Z, one matrix per source block
     of_data : S without the calibration's priors
     matrix : S
     factor : upper Cholesky factor R of S = R'R
@@ -58,24 +58,24 @@ class ReducedSystem:
         self,
         by_theta: Float[np.ndarray, " calib"],
         by_source: Float[np.ndarray, "src 2"],
-        held: Float[np.ndarray, "calib weak"] | None = None,
+        fixed: Float[np.ndarray, "calib weak"] | None = None,
     ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
         """Solve the whole system for one right-hand side.
 
         Parameters
         ----------
-        held : directions, as from `weak_directions`, in which the calibration does not move
+        fixed : directions, as from `weak_directions`, along which the calibration is kept fixed
         """
         whitened = lower_solve(self.source_factor, by_source.T)
-        pull = self.onto_calibration(whitened[None])[0]
-        theta = sl.cho_solve((self.factor, False), by_theta - pull)
-        if held is not None:
-            theta = theta - held @ (held.T @ (np.diag(self.theta) * theta))
+        by_calibration = self.onto_calibration(whitened[None])[0]
+        theta = sl.cho_solve((self.factor, False), by_theta - by_calibration)
+        if fixed is not None:
+            theta = theta - fixed @ (fixed.T @ (np.diag(self.theta) * theta))
         remainder = whitened - self.onto_sources(theta[None])[0]
         return theta, upper_solve(self.source_factor, remainder).T.copy()
 
     def pulled(self, by_source: Float[np.ndarray, "k src 2"]) -> Float[np.ndarray, "k src 2"]:
-        """Return the shifts of the sources that pulls on them alone cause, for k sets of pulls."""
+        """Return the shifts of the sources for k right-hand sides on the sources only."""
         whitened = lower_solve(self.source_factor, by_source.swapaxes(1, 2))
         theta = sl.cho_solve((self.factor, False), -self.onto_calibration(whitened).T)
         remainder = whitened - self.onto_sources(theta.T)
@@ -87,20 +87,20 @@ class ReducedSystem:
         """Return Z x for k vectors over the sources."""
         ordered = whitened[:, :, self.source_blocks.order]
         found = np.zeros((len(whitened), len(self.factor)))
-        for patch, block in self._blocks():
-            part = ordered[:, :, patch.places].reshape(len(whitened), -1)
-            found[:, patch.columns] += part @ block.reshape(len(block), -1).T
+        for block, matrix in self._block_matrices():
+            values = ordered[:, :, block.places].reshape(len(whitened), -1)
+            found[:, block.columns] += values @ matrix.reshape(len(matrix), -1).T
         return found
 
     def onto_sources(self, theta: Float[np.ndarray, "k calib"]) -> Float[np.ndarray, "k 2 src"]:
         """Return Z' x for k vectors over the calibration."""
         found = np.empty((len(theta), 2, len(self.source_factor)))
-        for patch, block in self._blocks():
-            part = theta[:, patch.columns] @ block.reshape(len(block), -1)
-            found[:, :, patch.places] = part.reshape(len(theta), *block.shape[1:])
+        for block, matrix in self._block_matrices():
+            product = theta[:, block.columns] @ matrix.reshape(len(matrix), -1)
+            found[:, :, block.places] = product.reshape(len(theta), *matrix.shape[1:])
         return found[:, :, self.source_blocks.position]
 
-    def _blocks(self) -> Iterator[tuple[SourceBlock, Float[np.ndarray, "_ 2 _"]]]:
+    def _block_matrices(self) -> Iterator[tuple[SourceBlock, Float[np.ndarray, "_ 2 _"]]]:
         return zip(self.source_blocks.blocks, self.whitened, strict=True)
 
     @cached_property
@@ -111,38 +111,35 @@ class ReducedSystem:
         return np.sqrt(np.einsum("ij,ij->i", inverse, inverse)), np.sqrt(of_sources)
 
     def conditional_covariance(self) -> Float[np.ndarray, "src 2 2"]:
-        """Return the covariance of each source with the calibration held fixed, mas^2."""
+        """Return the covariance of each source with the calibration fixed, mas^2."""
         unit = np.broadcast_to(np.eye(2)[:, :, None], (2, 2, len(self.source_factor)))
         inverse = lower_solve(self.source_factor, unit)
         return np.einsum("ias,ibs->sab", inverse.swapaxes(0, 1), inverse.swapaxes(0, 1))
 
     def response(self) -> Float[np.ndarray, "calib 2 src"]:
-        """Return W V^-1, minus the shift of each source per unit of the calibration.
-
-        The sources are in the order of the source_blocks.
-        """
+        """Return W V^-1, in block order: minus the shift of each source per unit of calibration."""
         return upper_solve(self.source_factor[self.source_blocks.order], self._dense())
 
     def of_whitened(self, whitened: Float[np.ndarray, "*k 2 src"]) -> Float[np.ndarray, "*k 2 src"]:
-        """Return L_i'^-1 x_i: what stands in units of the sources' own sigmas, in mas."""
+        """Return L_i'^-1 x_i: whitened source vectors converted to mas."""
         return upper_solve(self.source_factor, whitened)
 
     def source_shifts(self, vectors: Float[np.ndarray, "calib k"]) -> Float[np.ndarray, "k 2 src"]:
-        """Return -V_i^-1 W_i' v: the shift of each source (alpha*, delta) with each vector, mas."""
+        """Return -V_i^-1 W_i' v: shift (alpha*, delta) of each source for each vector, mas."""
         return -self.of_whitened(self.onto_sources(vectors.T))
 
     def spread(self) -> Float[np.ndarray, "calib 2 src"]:
-        """Return T = R'^-1 Z, its sources in the order of the source_blocks.
+        """Return T = R'^-1 Z, its sources in block order.
 
         I + T_i' T_i is the whitened marginal covariance of source i.
         """
         return rows_solved(self.factor, self._dense(), trans=True)
 
     def _dense(self) -> Float[np.ndarray, "calib 2 src"]:
-        """Return Z, its sources in the order of the source_blocks."""
+        """Return Z, its sources in block order."""
         dense = np.zeros((len(self.factor), 2, len(self.source_factor)))
-        for patch, block in self._blocks():
-            dense[patch.columns, :, patch.places] = block
+        for block, matrix in self._block_matrices():
+            dense[block.columns, :, block.places] = matrix
         return dense
 
     def marginal_covariance(
@@ -152,7 +149,7 @@ class ReducedSystem:
 
         Parameters
         ----------
-        spread : T, where it is at hand; all of it is more than this needs
+        spread : T, if already computed; otherwise only its nonzero blocks are computed
         """
         inner = np.empty((2, 2, len(self.source_factor)))
         for places, rows in self._spreads() if spread is None else [(slice(None), spread)]:
@@ -163,43 +160,45 @@ class ReducedSystem:
         return upper_solve(self.source_factor, half.swapaxes(0, 1)).transpose(2, 1, 0).copy()
 
     def _spreads(self) -> Iterator[tuple[slice, Float[np.ndarray, "_ 2 _"]]]:
-        """Return T of each patch, as it is where the columns of the patch stand last.
+        """Yield places and T of each source block, with the block's columns ordered last.
 
-        Its other rows are zero then, and the last of R are a factor by themselves.
+        The other rows of T are then zero, and only the last rows and columns of R are needed.
         """
         for chain in self.source_blocks.chains():
             order = self.source_blocks.last(chain, len(self.factor))
-            factor = self._turned(order)
+            factor = self._reordered_factor(order)
             for number in chain:
-                patch, block = self.source_blocks.blocks[number], self.whitened[number]
-                own = slice(len(order) - len(block), None)
-                rows = np.searchsorted(patch.columns, order[own])
-                yield patch.places, rows_solved(factor[own, own], block[rows], trans=True)
+                block, matrix = self.source_blocks.blocks[number], self.whitened[number]
+                own = slice(len(order) - len(matrix), None)
+                rows = np.searchsorted(block.columns, order[own])
+                yield block.places, rows_solved(factor[own, own], matrix[rows], trans=True)
 
-    def _turned(self, order: Int[np.ndarray, " calib"]) -> Float[np.ndarray, "calib calib"]:
-        """Return R where the columns stand in another order."""
+    def _reordered_factor(
+        self, order: Int[np.ndarray, " calib"]
+    ) -> Float[np.ndarray, "calib calib"]:
+        """Return the factor R of S with its rows and columns in another order."""
         if (order[:-1] < order[1:]).all():
             return self.factor
         try:
             return np.linalg.cholesky(self.matrix[np.ix_(order, order)]).T
         except np.linalg.LinAlgError:
-            # Slower, but R can be turned where S is as good as singular.
+            # Slower, but works where S is nearly singular.
             return np.asarray(np.linalg.qr(self.factor[:, order], mode="r"))
 
     def weak_directions(self, below: float = _WEAK) -> Float[np.ndarray, "calib weak"]:
-        """Return the directions of the calibration that only the priors hold.
+        """Return the directions of the calibration that only the priors constrain.
 
         They are eigenvectors of the reduced system, each parameter in units of its
-        conditional sigma, whose eigenvalue all but vanishes: what pointings, roll and focal
-        lengths have in common with the places, rotations and pitches of the detectors.
+        conditional sigma, with eigenvalues near zero: common changes of pointings, roll and
+        focal lengths and of the places, rotations and pitches of the detectors.
 
         Parameters
         ----------
-        below : the eigenvalue; with more than the default, poorly held directions are among them
+        below : limit of the eigenvalues; larger than the default for poorly constrained directions
         """
         scale = 1.0 / np.sqrt(np.diag(self.theta))
-        block = np.random.default_rng(0).standard_normal((len(scale), min(_BLOCK, len(scale))))
-        # So wide is the gap to the other eigenvalues that two inverse iterations do.
+        block = np.random.default_rng(0).standard_normal((len(scale), min(_MAX_WEAK, len(scale))))
+        # Two inverse iterations suffice, because the gap to the other eigenvalues is wide.
         for _ in range(2):
             block = sl.cho_solve((self.factor, False), block / scale[:, None]) / scale[:, None]
             block = np.linalg.qr(block)[0]
@@ -216,13 +215,13 @@ class ReducedSystem:
     ) -> Float[np.ndarray, "calib 2 src"]:
         """Return the covariance of the calibration with each source, -S^-1 W V^-1.
 
-        The sources are in the order of the source_blocks, as those of `spread` are.
+        The sources are in block order, as those of `spread` are.
         """
         solved = rows_solved(self.factor, spread.copy(), trans=False, scale=-1.0)
         return upper_solve(self.source_factor[self.source_blocks.order], solved)
 
     def log_determinant(self) -> float:
-        """Return the logarithm of the determinant of the whole Hessian."""
+        """Return the logarithm of the determinant of the full Hessian."""
         of_sources = np.log(self.source_factor[:, [0, 1], [0, 1]]).sum()
         return float(2.0 * (of_sources + np.log(np.diag(self.factor)).sum()))
 
@@ -234,13 +233,13 @@ def eliminate_sources(
 
     Parameters
     ----------
-    before : of the same equations under other priors. If those of the sources are the same, so
-        is all that is costly.
+    before : reduced system of the same equations under other priors; its costly terms are
+        reused if the priors of the sources are the same
 
     Returns
     -------
-    None if the system is singular: the data and the priors leave a direction open, or hold
-    it so weakly that rounding hides it.
+    None if the system is singular: the data and the priors leave a direction unconstrained, or
+    constrain it so weakly that rounding hides it.
     """
     prior_hessian = priors.hessian_diagonal(equations.at[0])
     try:
@@ -250,18 +249,18 @@ def eliminate_sources(
         else:
             whitened = _whitened(equations, source_factor)
             of_data = equations.theta.copy()
-            for patch, block in zip(equations.source_blocks.blocks, whitened, strict=True):
-                rows = block.reshape(len(block), -1)
-                touched = of_data[patch.columns]
-                touched[:, patch.columns] -= rows @ rows.T
-                of_data[patch.columns] = touched
-        # NumPy's BLAS, as for the product above: SciPy's threads would wait for NumPy's.
+            for block, z_matrix in zip(equations.source_blocks.blocks, whitened, strict=True):
+                rows = z_matrix.reshape(len(z_matrix), -1)
+                touched = of_data[block.columns]
+                touched[:, block.columns] -= rows @ rows.T
+                of_data[block.columns] = touched
+        # NumPy's BLAS, as for the product above, because SciPy's threads would wait for it.
         matrix = _with_diagonal(of_data, prior_hessian)
         factor = np.linalg.cholesky(matrix).T
     except np.linalg.LinAlgError:
         return None
     hessian = _with_diagonal(equations.theta, prior_hessian)
-    # A pivot is what is left of the diagonal once all else is accounted for.
+    # A squared pivot is what remains of the diagonal after eliminating the other parameters.
     smallest = len(hessian) * np.finfo(float).eps * np.diag(hessian)
     if not (np.diag(factor) ** 2 >= smallest).all():
         return None
@@ -280,12 +279,12 @@ def eliminate_sources(
 def _whitened(
     equations: NormalEquations, source_factor: Float[np.ndarray, "src 2 2"]
 ) -> tuple[Float[np.ndarray, "_ 2 _"], ...]:
-    """Return the block of Z of each patch."""
+    """Return the matrix of Z of each source block."""
     ordered = source_factor[equations.source_blocks.order]
 
-    def of_block(patch: SourceBlock) -> Float[np.ndarray, "_ 2 _"]:
-        block = equations.cross[patch.columns, :, patch.places]
-        return lower_solve(ordered[patch.places], block)
+    def of_block(block: SourceBlock) -> Float[np.ndarray, "_ 2 _"]:
+        cross = equations.cross[block.columns, :, block.places]
+        return lower_solve(ordered[block.places], cross)
 
     with ThreadPoolExecutor(max_workers=_WORKERS) as helpers:
         return tuple(helpers.map(of_block, equations.source_blocks.blocks))
@@ -294,7 +293,7 @@ def _whitened(
 def _with_diagonal(
     matrix: Float[np.ndarray, "n n"], added: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, "n n"]:
-    """Return the matrix with something added to its diagonal."""
+    """Return the matrix with `added` on top of its diagonal."""
     total = matrix.copy()
     total[np.diag_indices(len(added))] += added
     return total

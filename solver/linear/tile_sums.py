@@ -1,4 +1,4 @@
-"""Sums of products within each tile, before it is known where they belong."""
+"""Sums of products within each tile, before they are assembled into normal equations."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,14 @@ N_LOCAL = len(LOCAL_GROUPS)
 
 @dataclass(frozen=True)
 class TileSums:
-    """What the measurements of each tile add up to, and what is kept of each slot.
+    """Sums over the measurements of each tile, and values of each slot.
 
     Attributes
     ----------
-    local : products of the derivatives by `LOCAL_GROUPS` and, last, the residual
-    mixed : those with the distortion's two directions, times the terms
-    basis : of each slot, the distortion terms
-    shared : of each slot, the products of a displacement with the source
+    local : products between the derivatives by `LOCAL_GROUPS` and, last, the residual
+    mixed : products of these with the derivatives by the distortion coefficients
+    basis : distortion terms of each slot
+    shared : products of the derivatives by displacement and by source, of each slot
     """
 
     local: Float[np.ndarray, "chunk tile local local"]
@@ -31,7 +31,7 @@ class TileSums:
 
     @classmethod
     def empty(cls, shape: tuple[int, ...], n_coef: int) -> "TileSums":
-        """Return room for the sums of chunks, tiles and slots of some shape."""
+        """Return uninitialised arrays for a shape (chunk, tile, slot)."""
         tiles, rows = shape[:2], N_LOCAL + 1
         return cls(
             np.empty((*tiles, rows, rows)),
@@ -41,7 +41,7 @@ class TileSums:
         )
 
     def keep_slots(self, chunk: Linearised, rows: Rows, i: int) -> None:
-        """Fill in what is kept of each slot of chunk `i`."""
+        """Fill in `basis` and `shared` of chunk `i`."""
         for term, values in enumerate(chunk.prediction.basis):
             self.basis[i, :, :, term] = values
         self.shared[:, :, i] = one_by_one(rows.displacement, rows.source)
@@ -52,6 +52,6 @@ class TileSums:
         np.matmul(flat, flat.swapaxes(1, 2), out=self.local[i])
 
     def sum_mixed(self, rows: Rows, i: int) -> None:
-        """Fill in `mixed` of chunk `i`, whose slots are kept."""
+        """Fill in `mixed` of chunk `i`, after `keep_slots`."""
         mixed = in_tiles(rows.local, rows.displacement) @ self.basis[i]
         self.mixed[i] = mixed.reshape(self.mixed[i].shape)

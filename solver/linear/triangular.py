@@ -1,4 +1,4 @@
-"""Triangular systems: those of each source, 2 x 2, and those of the whole calibration."""
+"""Triangular systems: 2 x 2 ones of each source, and those of the whole calibration."""
 
 import numpy as np
 import scipy.linalg as sl
@@ -30,7 +30,7 @@ def upper_solve(
 
 
 def _triangle(factor: Float[np.ndarray, "src 2 2"]) -> Float[np.ndarray, "3 src"]:
-    """Return the triangles' entries, each contiguous: loops over rows are then twice as fast."""
+    """Return the entries of the triangles, each contiguous, which makes row loops twice as fast."""
     return np.stack([factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1]])
 
 
@@ -40,8 +40,8 @@ def rows_solved(
     trans: bool,
     scale: float = 1.0,
 ) -> Float[np.ndarray, "k 2 n"]:
-    """Return scale R^-1 (or R'^-1) times the rows of `right`, in its place."""
+    """Return scale R^-1 (or R'^-1) times the rows of `right`, which is overwritten."""
     rows = right.reshape(len(factor), -1)
-    # Solved from the right, in place of its transpose: so BLAS has them in its own order.
+    # Solved from the right for the transpose, which has the memory order of BLAS.
     solved = sl.blas.dtrsm(scale, factor, rows.T, trans_a=not trans, side=1, overwrite_b=True)
     return solved.T.reshape(right.shape)

@@ -1,10 +1,10 @@
-"""Carry normal equations over to a changed problem: other priors, a lower order, less data.
+"""Update normal equations for a changed problem: other priors, a lower order or less data.
 
-The blocks of the data know nothing of the priors and are sums over the measurements. So those
-of a problem that was solved before make those of the changed one, but for the small change of
-the Jacobians on the way to its solution. They hold every lower distortion order, too, but bent
-by the terms that are dropped, which neither the leverage of the measurements nor what the
-priors alone hold would forgive: those are made anew, where the fit ended.
+The blocks of the data do not depend on the priors and are sums over the measurements. Those of
+a solved problem therefore give those of the changed one, except for the small change of the
+Jacobians on the way to its solution. They also contain every lower distortion order, but
+linearised with the dropped terms, which is too inaccurate for leverage and for prior-dominated
+directions: for a lower order they are accumulated again, at the point where the fit ended.
 """
 
 from dataclasses import replace
@@ -30,44 +30,48 @@ from solver.units import RAD_PER_MAS
 def update_equations(
     equations: NormalEquations, old: Problem, new: Problem
 ) -> NormalEquations | None:
-    """Return normal equations for `new`, made of those of `old`.
+    """Return normal equations for `new`, made from those of `old`.
 
     Returns
     -------
-    None if `new` has measurements or distortion terms that `old` had not, or another model.
+    None if `new` has measurements or distortion terms that `old` lacks, or another model.
     """
     if new.layout.n_coef > old.layout.n_coef or not _same_model(old, new):
         return None
-    gone = np.zeros(old.n_obs, dtype=bool)
+    removed = np.zeros(old.n_obs, dtype=bool)
     if not np.array_equal(old.measurements.label, new.measurements.label):
-        gone = ~np.isin(old.measurements.label, new.measurements.label)
-    if old.n_obs - gone.sum() != new.n_obs:
+        removed = ~np.isin(old.measurements.label, new.measurements.label)
+    if old.n_obs - removed.sum() != new.n_obs:
         return None
     columns = _columns(old, new)
-    # Both in ascending order.
+    # Both are in ascending order.
     sources = np.searchsorted(old.sources["source_id"], new.sources["source_id"])
     at = _same_point(equations, old, new, columns, sources)
     if new.layout.n_coef < old.layout.n_coef:
-        known = None if gone.any() else _of_lower_terms(equations, old.layout, new.layout.n_coef)
-        return accumulate(new, *at, known)
-    if not gone.any():
+        term_blocks = (
+            None if removed.any() else _lower_term_blocks(equations, old.layout, new.layout.n_coef)
+        )
+        return accumulate(new, *at, term_blocks)
+    if not removed.any():
         return replace(equations, at=at)
-    part = contribution_of(equations, old, gone)
-    return _without(equations, part, at, columns, sources, new.source_blocks)
+    contribution = contribution_of(equations, old, removed)
+    return _without(equations, contribution, at, columns, sources, new.source_blocks)
 
 
-def _of_lower_terms(
+def _lower_term_blocks(
     equations: NormalEquations, layout: VectorLayout, n_coef: int
 ) -> Float[np.ndarray, "det 2 coef 2 coef"] | None:
-    """Return the blocks between the lower terms of the distortion, of each detector.
+    """Return the blocks between the lower distortion terms, by detector.
 
-    They are the same with and without the higher ones, at the same point.
+    At the same point they do not depend on the higher terms.
     """
-    own, shared = equations.by_detector, layout.coefficients()
-    if own is None:
+    by_detector, shared = equations.by_detector, layout.coefficients()
+    if by_detector is None:
         return None
-    of_terms = own.theta[:, shared, shared].reshape(layout.n_det, *2 * (2, layout.n_coef))
-    return of_terms[:, :, :n_coef, :, :n_coef].copy()
+    term_blocks = by_detector.theta[:, shared, shared].reshape(
+        layout.n_det, *2 * (2, layout.n_coef)
+    )
+    return term_blocks[:, :, :n_coef, :, :n_coef].copy()
 
 
 def _same_model(old: Problem, new: Problem) -> bool:
@@ -82,7 +86,7 @@ def _same_point(
     columns: Int[np.ndarray, " calib"],
     rows: Int[np.ndarray, " src"],
 ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
-    """Return where the equations were made, in offsets from the origins of `new`."""
+    """Return the linearisation point of the equations, in offsets from the origins of `new`."""
     theta, sources = equations.at
     moved = old.priors.centre[columns] - new.priors.centre
     declination = np.radians(new.exposures["dec_est"].to_numpy())
@@ -95,28 +99,28 @@ def _same_point(
 
 def _without(
     equations: NormalEquations,
-    part: Contribution,
+    contribution: Contribution,
     at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
     columns: Int[np.ndarray, " calib"],
     sources: Int[np.ndarray, " src"],
     source_blocks: SourceBlocks,
 ) -> NormalEquations:
-    """Return the equations less a part of them, for some of the parameters."""
-    whole, less = equations.gradient, part.gradient
+    """Return the equations minus a contribution, for a subset of the parameters."""
+    whole, removed = equations.gradient, contribution.gradient
     cross = np.empty((len(columns), 2, len(sources)))
     places = equations.source_blocks.position[sources][source_blocks.order]
-    # Row by row, since the whole would be too much for the caches.
+    # Row by row, because the whole block would not fit in the caches.
     for row, column in zip(cross, columns.tolist(), strict=True):
-        np.take(part.left(column), places, axis=1, out=row, mode="clip")
+        np.take(contribution.remaining_cross(column), places, axis=1, out=row, mode="clip")
     return NormalEquations(
         at,
         Gradient(
-            whole.chi2 - less.chi2,
-            (whole.by_theta - less.by_theta)[columns],
-            (whole.by_source - less.by_source)[sources],
+            whole.chi2 - removed.chi2,
+            (whole.by_theta - removed.by_theta)[columns],
+            (whole.by_source - removed.by_source)[sources],
         ),
-        (equations.theta - part.theta)[np.ix_(columns, columns)],
-        (equations.source - part.source)[sources],
+        (equations.theta - contribution.theta)[np.ix_(columns, columns)],
+        (equations.source - contribution.source)[sources],
         source_blocks,
         cross,
         None,
@@ -125,8 +129,8 @@ def _without(
 
 def _columns(old: Problem, new: Problem) -> Int[np.ndarray, " calib"]:
     """Return the column of `old` of each calibration parameter of `new`."""
-    among, wanted = (p.exposures[["field_id", "plate_id"]].to_numpy() for p in (old, new))
-    exposures = (among[:, None] == wanted).all(axis=2).argmax(axis=0)
+    old_keys, new_keys = (p.exposures[["field_id", "plate_id"]].to_numpy() for p in (old, new))
+    exposures = (old_keys[:, None] == new_keys).all(axis=2).argmax(axis=0)
     columns = np.empty(new.layout.size, dtype=np.int64)
     for groups, kept in (
         (PER_EXPOSURE, exposures),

@@ -1,9 +1,9 @@
-"""Coordinates in which engines move: the groups' own units, or whitened by the solver.
+"""Coordinates in which engines move: the units of the published code, or whitened ones.
 
-In the units of the groups the posterior is hopelessly long and thin: a pointing and the place
-of a detector may move together by arcseconds where each alone may by milliarcseconds. Whitened
-by the Cholesky factor of the linearised problem (`solver.linear.source_elimination`), it is a
-sphere of radius one: a step of one is one sigma in every direction.
+In the former the posterior is extremely elongated: a pointing and the place of a detector can
+move together by arcseconds, but each alone only by milliarcseconds. Whitened by the Cholesky
+factor of the linearised problem (`solver.linear.source_elimination`), the posterior is a unit
+sphere: a step of one is one sigma in every direction.
 """
 
 import equinox as eqx
@@ -19,13 +19,14 @@ from solver.problem.parameter_vector import VectorLayout
 
 
 class Curvature(eqx.Module):
-    """How the posterior bends along its weak directions, to second order.
+    """Second-order term of the posterior along its weak directions.
 
     Attributes
     ----------
-    weak : how far a displacement of the calibration leads along each weak direction
-    calibration, sources : the second derivatives of where all else settles, by twice the
-        displacements along two of them; they have no part in the weak directions
+    weak : component of a displacement of the calibration along each weak direction, in sigmas
+    calibration, sources : half the second derivatives of the conditional mode of the other
+        parameters, by the components along two weak directions; without a component along
+        the weak directions themselves
     """
 
     weak: Float[AnyArray, "weak calib"]
@@ -35,7 +36,7 @@ class Curvature(eqx.Module):
     def at(
         self, moved: Float[AnyArray, " calib"]
     ) -> tuple[Float[Array, " calib"], Float[Array, "src 2"]]:
-        """Return what is to be added to a displacement of the calibration."""
+        """Return the second-order correction to a displacement of the calibration."""
         along = self.weak @ moved
         both = jnp.outer(along, along)
         return jnp.tensordot(both, self.calibration, 2), jnp.tensordot(both, self.sources, 2)
@@ -46,11 +47,11 @@ class Coordinates(eqx.Module):
 
     theta = theta_0 + A u and s_i = s_0i + B_i (v_i - C_i' u), with A `calibration`,
     B `source` and C `shared`; u and v are the free coordinates of calibration and sources.
-    To both is added what `bend` says.
+    With a `curvature`, its correction is added to both.
 
     Attributes
     ----------
-    origin : where the free coordinates are zero, calibration and sources
+    origin : calibration and sources where the free coordinates are zero
     log_volume : logarithm of the volume of one unit of all free coordinates
     """
 
@@ -59,22 +60,22 @@ class Coordinates(eqx.Module):
     shared: Float[AnyArray, "calib 2 src"]
     source: Float[AnyArray, "2 2 src"]
     log_volume: Float[AnyArray, ""]
-    bend: "Curvature | None" = None
+    curvature: "Curvature | None" = None
 
     def place(
-        self, of_theta: Float[AnyArray, " calib"], of_sources: Float[AnyArray, "2 src"]
+        self, free_theta: Float[AnyArray, " calib"], free_sources: Float[AnyArray, "2 src"]
     ) -> tuple[Float[AnyArray, " calib"], Float[AnyArray, "src 2"]]:
-        """Return calibration and sources, in offsets, of free coordinates."""
-        rows = jnp.reshape(self.shared, (len(of_theta), -1))
-        v = of_sources - jnp.reshape(of_theta @ rows, of_sources.shape)
+        """Return calibration and sources, in offsets, from free coordinates."""
+        rows = jnp.reshape(self.shared, (len(free_theta), -1))
+        v = free_sources - jnp.reshape(free_theta @ rows, free_sources.shape)
         sources = jnp.stack([self.source[a, 0] * v[0] + self.source[a, 1] * v[1] for a in (0, 1)])
-        moved = self.calibration @ of_theta, sources.T
-        if self.bend is not None:
-            moved = tuple(a + b for a, b in zip(moved, self.bend.at(moved[0]), strict=True))
+        moved = self.calibration @ free_theta, sources.T
+        if self.curvature is not None:
+            moved = tuple(a + b for a, b in zip(moved, self.curvature.at(moved[0]), strict=True))
         return self.origin[0] + moved[0], self.origin[1] + moved[1]
 
     def covariance(self, scale: Float[np.ndarray, "2 src"]) -> Float[np.ndarray, "src 2 2"]:
-        """Return the covariance of each source whose free coordinates scatter by `scale`."""
+        """Return the covariance of each source if its free coordinates scatter by `scale`."""
         half = np.asarray(self.source) * scale
         return np.einsum("aks,bks->sab", half, half)
 
@@ -100,7 +101,7 @@ def whitened(reduced: ReducedSystem) -> Coordinates:
 def in_bare_units(
     layout: VectorLayout, at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
 ) -> Coordinates:
-    """Return the published code's coordinates: degrees and micrometres, each on its own."""
+    """Return the published code's coordinates: degrees and micrometres, without mixing."""
     n_src = len(at[1])
     unit = np.empty(layout.size)
     for group in CALIBRATION_GROUPS:

@@ -1,8 +1,8 @@
-"""Measurements: the measurements of one orbit as arrays, in the order that the engines work in.
+"""Measurements: the measurements of one orbit as arrays, in working order.
 
-Measurements are sorted by exposure, detector and source, so that those which share a run of
-calibration parameters lie together. No setting is in here: all problems of the same
-measurements share what is laid out of them.
+Working order is by exposure, detector and source, so that measurements which depend on the
+same calibration parameters are contiguous. No setting enters, so all problems of the same
+measurements share the arrays derived from them.
 """
 
 from dataclasses import dataclass, replace
@@ -31,9 +31,9 @@ class Measurements:
     measured : pixels from the detector's centre
     sigma : pixels
     row : row of each measurement in the input table
-    label : of that row, the same in a table from which others were taken out
-    n_det : number of detectors, measured on or not
-    sets : the sources by the fields that have seen them
+    label : index label of that row, which stays when other rows are removed from the table
+    n_det : number of detectors of the instrument, with or without measurements
+    sets : the sources grouped by the fields that observed them
     """
 
     index: Index
@@ -51,11 +51,11 @@ class Measurements:
 
     @cached_property
     def by_source(self) -> Gathering:
-        """How a 2 x 2 matrix of each slot is gathered by its detector and place in a patch."""
+        """How to sum a 2 x 2 matrix of each slot by detector and source, in block order."""
         return self.tiles.by_source(self.sets.position, self.n_det, 4)
 
     def of_rows(self, chosen: Bool[np.ndarray, " obs"]) -> "Measurements":
-        """Return some of the measurements, with the sources as they are."""
+        """Return a subset of the measurements, with all sources."""
         return replace(
             self,
             index=Index(*(column[chosen] for column in self.index)),
@@ -66,10 +66,10 @@ class Measurements:
         )
 
     def of_sources(self, keep: Bool[np.ndarray, " src"], exposures: pd.DataFrame) -> "Measurements":
-        """Return the measurements of some sources alone, and no other source."""
-        part = self.of_rows(keep[self.index.source])
-        index = part.index._replace(source=(np.cumsum(keep) - 1)[part.index.source])
-        return replace(part, index=index, sets=field_sets(index, exposures, int(keep.sum())))
+        """Return the measurements of a subset of the sources, with these sources only."""
+        subset = self.of_rows(keep[self.index.source])
+        index = subset.index._replace(source=(np.cumsum(keep) - 1)[subset.index.source])
+        return replace(subset, index=index, sets=field_sets(index, exposures, int(keep.sum())))
 
 
 def sort_measurements(
@@ -78,12 +78,12 @@ def sort_measurements(
     source_ids: Int[np.ndarray, " src"],
     instrument: Instrument,
 ) -> Measurements:
-    """Put the measurements in order.
+    """Sort a table of measurements into working order.
 
     Parameters
     ----------
     exposures : in ascending order of `KEY`
-    source_ids : of all that were measured, ascending
+    source_ids : IDs of all measured sources, ascending
 
     Raises
     ------

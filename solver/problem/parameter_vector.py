@@ -1,8 +1,8 @@
-"""VectorLayout: where each calibration parameter stands in the flat vector the engines solve for.
+"""VectorLayout: columns of the calibration parameters in the flat vector the engines solve for.
 
 Exposures come first, all groups of one exposure together, then the distortion's two
-directions, then the detectors, all groups of one detector together: the parameters that
-one measurement touches lie in three runs of columns.
+directions, then the detectors, all groups of one detector together. The parameters that
+one measurement depends on therefore lie in three contiguous ranges.
 """
 
 from dataclasses import dataclass
@@ -16,9 +16,9 @@ from solver.data.parameters import CALIBRATION_GROUPS, Group, groups_on
 PER_EXPOSURE = groups_on("exp")
 PER_COEFFICIENT = groups_on("coef")
 PER_DETECTOR = groups_on("det")
-# NumPy's or JAX's.
+# A NumPy or JAX array.
 AnyArray = Any
-# The groups of which a measurement touches one element each.
+# Groups of which a measurement depends on one element each.
 LOCAL_GROUPS = PER_EXPOSURE + PER_DETECTOR
 
 
@@ -52,7 +52,7 @@ class VectorLayout:
     def touched(
         self, exposure: Int[np.ndarray, "*n"], detector: Int[np.ndarray, "*n"]
     ) -> Int[np.ndarray, "*n local"]:
-        """Return the columns of `LOCAL_GROUPS` for exposures and detectors, side by side."""
+        """Return the columns of `LOCAL_GROUPS`, as the last axis, of exposures and detectors."""
         return np.stack(
             [
                 self.columns(group)[exposure if group.axis == "exp" else detector]
@@ -74,12 +74,12 @@ class VectorLayout:
         return first + members.index(group) + len(members) * np.arange(count)
 
     def gather(self, values: dict[str, Shaped[np.ndarray, " _"]]) -> Shaped[np.ndarray, " calib"]:
-        """Return the flat vector of values given per group."""
+        """Return the flat vector from values per group."""
         flat = np.empty(self.size)
         for group in CALIBRATION_GROUPS:
             flat[self.columns(group)] = values[group.name]
         return flat
 
     def scatter(self, flat: Shaped[AnyArray, " calib"]) -> dict[str, Shaped[AnyArray, " _"]]:
-        """Return the values per group of a flat vector, of NumPy or JAX."""
+        """Return the values per group from a flat NumPy or JAX vector."""
         return {group.name: flat[self.columns(group)] for group in CALIBRATION_GROUPS}

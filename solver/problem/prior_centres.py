@@ -1,4 +1,4 @@
-"""Where the priors are centred: the inputs' own values, shifted as the settings ask."""
+"""Prior centres: the values of the input data plus the shifts in the settings."""
 
 from collections.abc import Mapping
 
@@ -23,11 +23,11 @@ def calibration_centres(
     Raises
     ------
     InputError
-        If the settings shift the centre of an element that there is not.
+        If the settings shift the prior centre of an element that does not exist.
     """
     centres = {}
     elements = _elements(exposures, instrument, settings.order)
-    # A shift of the pointing in RA is one on the sky.
+    # The settings give a shift of the pointing in RA as a distance on the sky.
     stretch = {"pointing_ra": 1.0 / np.cos(np.radians(exposures["dec_est"].to_numpy()))}
     for group in CALIBRATION_GROUPS:
         if group.origin == "environment":
@@ -47,7 +47,7 @@ def catalogue_shift(settings: FitSettings) -> Float[np.ndarray, " 2"]:
 
 
 def _elements(exposures: pd.DataFrame, instrument: Instrument, order: int) -> dict[Axis, list[str]]:
-    """Return the names of the elements of each axis, as a person writes them."""
+    """Return the names of the elements of each axis, as written in the settings."""
     plates = zip(exposures["field_id"], exposures["plate_id"], strict=True)
     return {
         "exp": [f"{field}/{plate}" for field, plate in plates],
@@ -59,7 +59,7 @@ def _elements(exposures: pd.DataFrame, instrument: Instrument, order: int) -> di
 def _shift(
     group: Group, elements: list[str], shifts: Mapping[str, float]
 ) -> Float[np.ndarray, " _"]:
-    """Return the shifts of a group's centres, in its unit."""
+    """Return the shifts of a group's prior centres, in its unit."""
     total = np.zeros(len(elements))
     for name, shift in shifts.items():
         shifted, element = split_name(name)

@@ -14,9 +14,9 @@ from solver.data.settings import FitSettings
 
 
 class Priors(NamedTuple):
-    """Independent priors of the calibration, and a Gaussian one for every source.
+    """Independent priors of the calibration parameters, and a Gaussian prior per source.
 
-    `centre` is the whole value at offset zero, used by gamma priors; `width` the standard
+    `centre` is the absolute value at offset zero, used by gamma priors; `width` the standard
     deviation, `inf` where flat; `precision` the inverse covariance of (alpha*, delta),
     mas^-2.
     """
@@ -31,33 +31,33 @@ class Priors(NamedTuple):
     ) -> float:
         """Return minus twice the logarithm of the prior density, zero at the centres."""
         normal = np.where(self.is_gamma, 0.0, (theta / self.width) ** 2)
-        on_sources = np.einsum("si,sij,sj->", sources, self.precision, sources)
-        return float(normal.sum() + self._gamma_penalty(theta) + on_sources)
+        source_penalty = np.einsum("si,sij,sj->", sources, self.precision, sources)
+        return float(normal.sum() + self._gamma_penalty(theta) + source_penalty)
 
     def log_normalisation(self) -> float:
         """Return the logarithm of the prior density at the centres.
 
-        Flat priors are improper and count as density one per unit; a gamma prior is as
-        narrow as here a normal one to a part in a million.
+        Flat priors are improper and count as density one per unit. Gamma priors count as
+        normal ones, which at their widths here is accurate to a part in a million.
         """
         finite = self.width[np.isfinite(self.width)]
-        of_theta = -np.sum(np.log(finite) + 0.5 * np.log(2.0 * np.pi))
-        of_sources = 0.5 * np.linalg.slogdet(self.precision)[1].sum()
-        return float(of_theta + of_sources - len(self.precision) * np.log(2.0 * np.pi))
+        log_calibration = -np.sum(np.log(finite) + 0.5 * np.log(2.0 * np.pi))
+        log_sources = 0.5 * np.linalg.slogdet(self.precision)[1].sum()
+        return float(log_calibration + log_sources - len(self.precision) * np.log(2.0 * np.pi))
 
     def gradient(self, theta: Float[np.ndarray, " calib"]) -> Float[np.ndarray, " calib"]:
-        """Return the derivative of half the penalty by the calibration."""
+        """Return the derivative of half the penalty with respect to the calibration."""
         slope = theta / self.width**2
         shape, value = self._gamma(theta)
         slope[self.is_gamma] = 1.0 / self._gamma_scale() - (shape - 1.0) / value
         return slope
 
     def source_gradient(self, sources: Float[np.ndarray, "src 2"]) -> Float[np.ndarray, "src 2"]:
-        """Return the derivative of half the penalty by the sources."""
+        """Return the derivative of half the penalty with respect to the sources."""
         return np.einsum("sij,sj->si", self.precision, sources)
 
     def hessian_diagonal(self, theta: Float[np.ndarray, " calib"]) -> Float[np.ndarray, " calib"]:
-        """Return the second derivative of half the penalty by the calibration."""
+        """Return the second derivative of half the penalty with respect to the calibration."""
         prior_hessian = self.width**-2.0
         shape, value = self._gamma(theta)
         prior_hessian[self.is_gamma] = (shape - 1.0) / value**2
@@ -70,7 +70,8 @@ class Priors(NamedTuple):
         self, theta: Float[np.ndarray, " calib"]
     ) -> tuple[Float[np.ndarray, " gamma"], Float[np.ndarray, " gamma"]]:
         centre = self.centre[self.is_gamma]
-        # A value at or below zero has no density; the engine takes a shorter step then.
+        # The density vanishes at or below zero: the penalty becomes huge, and the engine
+        # shortens its step.
         value = np.maximum(centre + theta[self.is_gamma], np.finfo(float).tiny)
         return centre / self._gamma_scale(), value
 
@@ -88,7 +89,7 @@ def group_widths(
 
     Parameters
     ----------
-    centres : group name -> whole values at offset zero, in the group's unit
+    centres : group name -> absolute values at offset zero, in the group's unit
     """
     widths = {}
     for group in CALIBRATION_GROUPS:

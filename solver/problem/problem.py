@@ -1,6 +1,6 @@
-"""Problem: one orbit under one set of settings: measurements, origins and priors as arrays.
+"""Problem: one orbit under one set of settings, with measurements, origins and priors as arrays.
 
-Shapes are padded to few sizes, because each new one costs JAX a compilation.
+Arrays are padded to a few fixed shapes, because JAX compiles once for each shape.
 """
 
 from collections.abc import Mapping
@@ -29,8 +29,8 @@ from solver.problem.priors import Priors, group_widths
 from solver.problem.source_blocks import SourceBlocks
 from solver.units import ARCSEC_PER_DEG, RAD_PER_MAS
 
-# The terms of lower orders are computed with coefficients of zero: one compilation does for all.
-_LEAST_ORDER = 5
+# Lower orders are computed with additional coefficients of zero, so that they share a compilation.
+_MIN_COMPUTED_ORDER = 5
 
 
 @dataclass(frozen=True)
@@ -70,34 +70,34 @@ class Problem:
 
     @cached_property
     def source_blocks(self) -> SourceBlocks:
-        """The sources in source_blocks, with the columns that each touches."""
+        """The source blocks, with the columns that each depends on."""
         return self.measurements.sets.touching(self.layout)
 
     def offsets(
         self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
     ) -> dict[str, Float[np.ndarray, "..."]]:
-        """Return the parameters as `solver.model.forward.predict` takes them, padded."""
+        """Return the parameters as `solver.model.forward.predict` expects them, padded."""
         values = {**self.layout.scatter(theta), SOURCES.name: sources}
         return {g.name: pad(values[g.name], g.axis, self.geometry.sizes) for g in PARAMETERS}
 
     def gathered(
         self, offsets: Mapping[str, Float[np.ndarray, "..."]]
     ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
-        """Return calibration and sources of what `offsets` gives: its inverse."""
+        """Return calibration and sources from padded parameters: the inverse of `offsets`."""
         sizes = {"exp": self.layout.n_exp, "coef": self.layout.n_coef}
         values = {g.name: offsets[g.name][: sizes.get(g.axis)] for g in CALIBRATION_GROUPS}
         return self.layout.gather(values), offsets[SOURCES.name][: self.n_src]
 
 
 def of_rows(problem: Problem, chosen: Bool[np.ndarray, " obs"]) -> Problem:
-    """Return the problem with some of its measurements, and all of its parameters."""
+    """Return the problem with a subset of its measurements and all of its parameters."""
     return replace(problem, measurements=problem.measurements.of_rows(chosen))
 
 
 def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
-    """Return the problem with the measurements of some sources alone.
+    """Return the problem of a subset of the sources and their measurements.
 
-    Its arrays in JAX have the shapes of the whole problem's, so that nothing is compiled anew.
+    Padded arrays keep the shapes of the full problem, so that JAX does not compile again.
     """
     frames = problem.geometry.source_frame
     kept_first = np.argsort(~np.pad(keep, (0, len(frames) - len(keep))), kind="stable")
@@ -111,13 +111,13 @@ def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
 
 
 def build_problem(data: OrbitData, instrument: Instrument, settings: FitSettings) -> Problem:
-    """Turn the tables of one orbit into a problem to solve.
+    """Build the problem of one orbit from its tables.
 
     Raises
     ------
     InputError
-        If a detector is not part of the instrument, or the measurements cannot hold the
-        distortion order asked for.
+        If a detector is not part of the instrument, or the measurements are too few for the
+        distortion order of the settings.
     """
     exposures = data.exposures.sort_values(KEY, ignore_index=True)
     measured_ids = np.unique(data.measurements["source_id"].to_numpy())
@@ -132,7 +132,7 @@ def rebuilt(problem: Problem, instrument: Instrument, settings: FitSettings) -> 
     Raises
     ------
     InputError
-        If the measurements cannot hold the distortion order asked for.
+        If the measurements are too few for the distortion order of the settings.
     """
     return _build(problem.measurements, problem.sources, problem.exposures, instrument, settings)
 
@@ -163,11 +163,11 @@ def _build(
 
 
 def _check_freedom(n_obs: int, n_src: int, layout: VectorLayout, order: int) -> None:
-    """Refuse a distortion order for which there are more parameters than data."""
+    """Raise InputError unless there are more data than parameters."""
     possible = orders_held(n_obs, n_src, layout)
     if order in possible:
         return
-    hint = f"the highest order they can hold is {max(possible)}" if possible else "no order fits"
+    hint = f"the highest order they allow is {max(possible)}" if possible else "no order fits"
     raise InputError(
         f"distortion order {order}: expected more than {2 * n_src + layout.size} coordinates "
         f"measured for as many parameters, found {2 * n_obs} ({n_obs} measurements); {hint}"
@@ -177,7 +177,7 @@ def _check_freedom(n_obs: int, n_src: int, layout: VectorLayout, order: int) -> 
 def _shifted(
     frame: Float[np.ndarray, "src 3 3"], shift: Float[np.ndarray, " 2"]
 ) -> Float[np.ndarray, "src 3 3"]:
-    """Return the frames with all directions shifted by so many mas."""
+    """Return the frames with all directions shifted by (alpha*, delta), mas."""
     if not shift.any():
         return frame
     east, north = np.broadcast_to(RAD_PER_MAS * shift, (len(frame), 2)).T
@@ -185,11 +185,11 @@ def _shifted(
 
 
 def orders_held(n_obs: int, n_src: int, layout: VectorLayout) -> list[int]:
-    """Return the distortion orders, of any, that leave fewer parameters than data.
+    """Return all distortion orders with fewer parameters than data.
 
     Parameters
     ----------
-    layout : of an order that need not be one of them
+    layout : of any order, whether or not it is returned
     """
     others = 2 * n_src + layout.size - 2 * layout.n_coef
     return [n for n in range(MAX_ORDER + 1) if 2 * n_obs > others + 2 * len(terms(n))]
@@ -207,7 +207,7 @@ def _geometry(
     pointing = tangent_frame(
         centres["pointing_ra"] / ARCSEC_PER_DEG, centres["pointing_dec"] / ARCSEC_PER_DEG
     )
-    order = max(settings.order, _LEAST_ORDER)
+    order = max(settings.order, _MIN_COMPUTED_ORDER)
     sizes = {
         "src": _rounded_up(len(source_frame), 1024),
         "exp": _rounded_up(len(exposures), 16),
@@ -251,14 +251,14 @@ def _priors(
 def pad(
     values: Float[np.ndarray, "n ..."], axis: str, sizes: Mapping[str, int]
 ) -> Float[np.ndarray, "m ..."]:
-    """Return `values` lengthened to the size of their axis, where that has one.
+    """Return `values` padded to the size of their axis, if `sizes` has one for it.
 
-    What is added belongs to no measurement, and repeats the last row; but a coefficient acts
-    on all measurements, and is zero.
+    No measurement depends on the padding, which repeats the last row; added coefficients are
+    zero, because they act on all measurements.
     """
     missing = max(sizes.get(axis, 0) - len(values), 0)
-    more = np.zeros(missing) if axis == "coef" else np.repeat(values[-1:], missing, axis=0)
-    return np.concatenate([values, more])
+    padding = np.zeros(missing) if axis == "coef" else np.repeat(values[-1:], missing, axis=0)
+    return np.concatenate([values, padding])
 
 
 def _rounded_up(length: int, step: int) -> int:

@@ -1,7 +1,7 @@
-"""ProblemCache: the measurements of one orbit that settings choose, as a problem to solve.
+"""ProblemCache: the problems of one orbit under the latest settings.
 
-Sorting the measurements takes longer than everything else that a problem is made of. So what
-was chosen last is kept, for the other settings that choose the same.
+Sorting the measurements takes longer than the rest of building a problem. The latest problems
+are therefore kept and rebuilt for settings that select the same measurements.
 """
 
 from typing import NamedTuple
@@ -14,54 +14,54 @@ from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
 from solver.problem.problem import Problem, build_problem, rebuilt
 
-# That of a fit, and that of what is asked of it.
-_KEPT = 2
+# One problem for the fit and one for the what-ifs that follow it.
+_CAPACITY = 2
 
 
-class _Choice(NamedTuple):
+class _Entry(NamedTuple):
     exclusions: Exclusions
     thin: int
     outliers: pd.DataFrame | None
     data: OrbitData
     problem: Problem
 
-    def is_that_of(self, settings: FitSettings, outliers: pd.DataFrame | None) -> bool:
+    def matches(self, settings: FitSettings, outliers: pd.DataFrame | None) -> bool:
         same = (self.exclusions, self.thin) == (settings.exclusions, settings.thin)
         return same and self.outliers is outliers
 
 
 class ProblemCache:
-    """One orbit, from which settings choose."""
+    """Cache of the problems that settings make of one orbit."""
 
     def __init__(self, data: OrbitData, instrument: Instrument) -> None:
-        """Take checked tables, as from `solver.read_orbit`."""
+        """Start an empty cache for checked tables, as from `solver.read_orbit`."""
         self._data = data
         self._instrument = instrument
-        self._last: list[_Choice] = []
+        self._entries: list[_Entry] = []
 
     def choose(
         self, settings: FitSettings, outliers: pd.DataFrame | None = None
     ) -> tuple[OrbitData, Problem]:
-        """Return the tables of what is chosen, and the problem that they make.
+        """Return the tables after exclusions and thinning, and their problem.
 
         Parameters
         ----------
-        outliers : measurements to leave out, too, by the labels of the orbit's table
+        outliers : further measurements to leave out, by the labels of the orbit's table
 
         Raises
         ------
         InputError
-            If the settings exclude what was not measured, or all that was, or ask for what the
-            rest cannot hold.
+            If the settings exclude something that was not measured, or everything, or if the
+            remaining measurements are too few for the distortion order.
         """
-        for choice in self._last:
-            if choice.is_that_of(settings, outliers):
-                return choice.data, rebuilt(choice.problem, self._instrument, settings)
+        for entry in self._entries:
+            if entry.matches(settings, outliers):
+                return entry.data, rebuilt(entry.problem, self._instrument, settings)
         data = settings.exclusions.without(self._data)
         data = thinned_orbit(data, self._data, settings.thin)
         if outliers is not None:
             data = of_rows(data, ~data.measurements.index.isin(outliers.index))
         problem = build_problem(data, self._instrument, settings)
-        choice = _Choice(settings.exclusions, settings.thin, outliers, data, problem)
-        self._last = [choice, *self._last][:_KEPT]
+        entry = _Entry(settings.exclusions, settings.thin, outliers, data, problem)
+        self._entries = [entry, *self._entries][:_CAPACITY]
         return data, problem

@@ -1,9 +1,9 @@
-"""SourceBlocks: sources that the same fields have seen.
+"""SourceBlocks: sources grouped by the fields that observed them.
 
-What a source and an exposure have in common is zero where that has not seen it. So the
-sources are put in an order in which those of one patch stand together, and what they have in
-common with the calibration is a dense block in the columns of the exposures of its fields:
-where an orbit has four fields, eliminating its sources takes a quarter of the products.
+The cross block between a source and an exposure is zero if the exposure did not observe the
+source. Sources are ordered such that those of one source block are contiguous; their cross block
+with the calibration is then dense in the columns of the exposures of the block's fields. For an
+orbit of four fields, eliminating the sources takes a quarter of the multiplications.
 """
 
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ from jaxtyping import Bool, Float, Int
 from solver.model.forward import Index
 from solver.problem.parameter_vector import PER_EXPOSURE, VectorLayout
 
-# About so many columns are those of all exposures: the distortion of the paper's order, and the
-# detectors. It decides on time alone.
-OF_ALL = 60
-# As many multiplications as take the time of handling one more block.
-OF_ONE_BLOCK = 3e7
-# Only so many sets of fields are told apart, the commonest.
-MOST = 64
+# Approximate number of columns that all source blocks share: the distortion of the paper's order
+# and the detectors. Used only to estimate computing time.
+SHARED_COLUMNS = 60
+# Cost of one more block, in multiplications.
+BLOCK_OVERHEAD = 3e7
+# Maximum number of blocks before merging; the commonest sets of fields have one each.
+MAX_BLOCKS = 64
 
 
 @dataclass(frozen=True)
 class SourceBlock:
-    """The places of some sources in the order of the blocks, and the columns they touch."""
+    """The places of its sources in block order, and the columns they depend on."""
 
     places: slice
     columns: Int[np.ndarray, " touched"]
@@ -34,11 +34,11 @@ class SourceBlock:
 
 @dataclass(frozen=True)
 class SourceBlocks:
-    """All sources of a problem in source_blocks.
+    """All source blocks of a problem.
 
     Attributes
     ----------
-    order : the sources, patch after patch
+    order : the sources in block order, that is block after block
     position : the place of each source in that order
     """
 
@@ -47,9 +47,9 @@ class SourceBlocks:
     blocks: tuple[SourceBlock, ...]
 
     def chains(self) -> list[list[int]]:
-        """Return the numbers of the source_blocks, in chains.
+        """Return the numbers of the blocks in chains of nested columns.
 
-        The columns of each patch are among those of the one before it.
+        Within a chain, the columns of each block are a subset of those of the block before it.
         """
         chains: list[list[int]] = []
         for number in sorted(range(len(self.blocks)), key=lambda n: -len(self.blocks[n].columns)):
@@ -63,7 +63,7 @@ class SourceBlocks:
         return chains
 
     def last(self, chain: list[int], size: int) -> Int[np.ndarray, " calib"]:
-        """Return all columns in an order in which those of every patch of a chain stand last."""
+        """Return all columns, ordered such that those of every block of a chain come last."""
         rank = np.zeros(size, dtype=np.int64)
         for number in chain:
             rank[self.blocks[number].columns] += 1
@@ -72,14 +72,14 @@ class SourceBlocks:
 
 @dataclass(frozen=True)
 class FieldSets:
-    """Sources by the set of fields that has seen them, whatever parameters there are.
+    """Sources grouped by the set of fields that observed them, for any parameters.
 
     Attributes
     ----------
     order : the sources, set after set
     position : the place of each source in that order
-    places : of the sources of each set
-    exposures : those of its fields
+    places : the places of the sources of each set in that order
+    exposures : whether each exposure is of one of the set's fields
     """
 
     order: Int[np.ndarray, " src"]
@@ -88,88 +88,92 @@ class FieldSets:
     exposures: Bool[np.ndarray, "set exp"]
 
     def touching(self, layout: VectorLayout) -> SourceBlocks:
-        """Return each set as a patch, with the columns that it touches."""
-        blocks = zip(self.places, self.exposures, strict=True)
+        """Return each set as a source block, with the columns that it depends on."""
+        sets = zip(self.places, self.exposures, strict=True)
         return SourceBlocks(
             self.order,
             self.position,
-            tuple(SourceBlock(places, _touched(exposures, layout)) for places, exposures in blocks),
+            tuple(SourceBlock(place, _columns_of(exposures, layout)) for place, exposures in sets),
         )
 
 
 def field_sets(index: Index, exposures: pd.DataFrame, n_src: int) -> FieldSets:
-    """Tell the sources apart by the fields that have seen them, as far as that saves time.
+    """Group the sources by the fields that observed them, and merge groups where that saves time.
 
     Parameters
     ----------
-    index : of the measurements, one after the other
-    exposures : with the `field_id` of each
+    index : of the measurements
+    exposures : with the column `field_id`
     """
     field_ids, field = np.unique(exposures["field_id"].to_numpy(), return_inverse=True)
     seen = np.zeros((n_src, len(field_ids)), dtype=bool)
     seen[index.source, field[index.exposure]] = True
-    of_fields = len(PER_EXPOSURE) * np.bincount(field, minlength=len(field_ids))
-    which, by_fields = _joined(*_told_apart(seen), of_fields.astype(np.float64))
-    order = np.argsort(which, kind="stable")
+    columns_of_field = len(PER_EXPOSURE) * np.bincount(field, minlength=len(field_ids))
+    block_of_source, fields_of_block = _merged(
+        *_by_field_set(seen), columns_of_field.astype(np.float64)
+    )
+    order = np.argsort(block_of_source, kind="stable")
     position = np.empty(n_src, dtype=np.int64)
     position[order] = np.arange(n_src)
-    bounds = np.cumsum([0, *np.bincount(which, minlength=len(by_fields))]).tolist()
+    bounds = np.cumsum([0, *np.bincount(block_of_source, minlength=len(fields_of_block))]).tolist()
     places = tuple(map(slice, bounds[:-1], bounds[1:]))
-    return FieldSets(order, position, places, by_fields[:, field])
+    return FieldSets(order, position, places, fields_of_block[:, field])
 
 
-def _told_apart(
+def _by_field_set(
     seen: Bool[np.ndarray, "src field"],
-) -> tuple[Int[np.ndarray, " src"], Bool[np.ndarray, "patch field"]]:
-    """Return the patch of each source, and the fields of each patch: one for every set."""
-    by_fields, which = np.unique(seen, axis=0, return_inverse=True)
-    which = which.reshape(-1)
-    if len(by_fields) <= MOST:
-        return which, by_fields
-    # All others make one patch, that any field may have seen.
-    commonest = np.argsort(-np.bincount(which), kind="stable")[: MOST - 1]
-    number = np.full(len(by_fields), MOST - 1)
-    number[commonest] = np.arange(MOST - 1)
-    everywhere = np.ones((1, by_fields.shape[1]), dtype=bool)
-    return number[which], np.concatenate([by_fields[commonest], everywhere])
+) -> tuple[Int[np.ndarray, " src"], Bool[np.ndarray, "block field"]]:
+    """Return the block of each source and the fields of each block, one block per field set."""
+    fields_of_block, block_of_source = np.unique(seen, axis=0, return_inverse=True)
+    block_of_source = block_of_source.reshape(-1)
+    if len(fields_of_block) <= MAX_BLOCKS:
+        return block_of_source, fields_of_block
+    # The other sources form one block, with all fields.
+    commonest = np.argsort(-np.bincount(block_of_source), kind="stable")[: MAX_BLOCKS - 1]
+    number = np.full(len(fields_of_block), MAX_BLOCKS - 1)
+    number[commonest] = np.arange(MAX_BLOCKS - 1)
+    everywhere = np.ones((1, fields_of_block.shape[1]), dtype=bool)
+    return number[block_of_source], np.concatenate([fields_of_block[commonest], everywhere])
 
 
-def _joined(
-    which: Int[np.ndarray, " src"],
-    by_fields: Bool[np.ndarray, "patch field"],
-    of_fields: Float[np.ndarray, " field"],
+def _merged(
+    block_of_source: Int[np.ndarray, " src"],
+    fields_of_block: Bool[np.ndarray, "block field"],
+    columns_of_field: Float[np.ndarray, " field"],
 ) -> tuple[Int[np.ndarray, " src"], Bool[np.ndarray, "fewer field"]]:
-    """Join patches as long as that saves time, first the two that save most.
+    """Merge pairs of blocks while that saves time, the pair that saves most first.
 
     Parameters
     ----------
-    of_fields : the number of columns that are of exposures of each field
+    columns_of_field : number of columns of the exposures of each field
     """
 
-    def width(by_fields: Bool[np.ndarray, "*n field"]) -> Float[np.ndarray, "*n"]:
-        return OF_ALL + by_fields @ of_fields
+    def width(fields_of_block: Bool[np.ndarray, "*n field"]) -> Float[np.ndarray, "*n"]:
+        return SHARED_COLUMNS + fields_of_block @ columns_of_field
 
-    while len(by_fields) > 1:
-        count = np.bincount(which, minlength=len(by_fields))
-        both = by_fields[:, None] | by_fields
-        alone = count * width(by_fields) ** 2 + OF_ONE_BLOCK
-        together = (count[:, None] + count) * width(both) ** 2 + OF_ONE_BLOCK
+    while len(fields_of_block) > 1:
+        count = np.bincount(block_of_source, minlength=len(fields_of_block))
+        both = fields_of_block[:, None] | fields_of_block
+        alone = count * width(fields_of_block) ** 2 + BLOCK_OVERHEAD
+        together = (count[:, None] + count) * width(both) ** 2 + BLOCK_OVERHEAD
         saved = alone[:, None] + alone - together
         np.fill_diagonal(saved, -np.inf)
-        kept, gone = sorted(np.unravel_index(saved.argmax(), saved.shape))
-        if saved[kept, gone] <= 0.0:
+        kept, merged = sorted(np.unravel_index(saved.argmax(), saved.shape))
+        if saved[kept, merged] <= 0.0:
             break
-        by_fields[kept] = both[kept, gone]
-        by_fields = np.delete(by_fields, gone, axis=0)
-        which = np.where(which == gone, kept, which - (which > gone))
-    return which, by_fields
+        fields_of_block[kept] = both[kept, merged]
+        fields_of_block = np.delete(fields_of_block, merged, axis=0)
+        block_of_source = np.where(
+            block_of_source == merged, kept, block_of_source - (block_of_source > merged)
+        )
+    return block_of_source, fields_of_block
 
 
-def _touched(
+def _columns_of(
     exposures: Bool[np.ndarray, " exp"], layout: VectorLayout
 ) -> Int[np.ndarray, " touched"]:
-    """Return the columns of some exposures, and those that are no exposure's."""
-    touched = np.ones(layout.size, dtype=bool)
+    """Return the columns of the given exposures, and those that belong to no exposure."""
+    is_touched = np.ones(layout.size, dtype=bool)
     for group in PER_EXPOSURE:
-        touched[layout.columns(group)] = exposures
-    return np.flatnonzero(touched)
+        is_touched[layout.columns(group)] = exposures
+    return np.flatnonzero(is_touched)

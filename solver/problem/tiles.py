@@ -1,9 +1,9 @@
-"""Tiles: measurements of one exposure on one detector, side by side.
+"""Tiles: measurements of one exposure on one detector, in contiguous memory.
 
-A tile is a row of slots, filled from the measurements in working order; the last
-one of an exposure and detector is filled up with copies of no weight. What belongs to the
-exposure or the detector is then looked up once for each tile, and every loop over
-measurements runs along contiguous memory. Tiles are worked on a chunk at a time.
+A tile is a row of slots, filled with measurements in working order; the last tile of an
+exposure and detector is padded with copies of weight zero. Values of the exposure or the
+detector are then looked up once per tile, and every loop over measurements runs along
+contiguous memory. Tiles are processed a chunk at a time.
 """
 
 from typing import NamedTuple
@@ -13,16 +13,16 @@ from jaxtyping import Float, Int, Shaped
 
 from solver.model.forward import Index
 
-# Long enough for the vector units, short enough to waste few places; the shorter where an
-# exposure has few measurements on a detector. Each length is a compilation.
+# Slots per tile: enough for the vector units, few enough to leave few slots empty. `FEW_SLOTS`
+# applies where exposures have few measurements on a detector. JAX compiles once for each length.
 SLOTS = 128
 FEW_SLOTS = 16
-# Long enough to keep the cores busy, short enough to stay in their caches. One length means
-# one compilation, whatever the number of measurements.
+# Tiles per chunk: enough to keep the cores busy, few enough to stay in their caches. A fixed
+# length needs one compilation, whatever the number of measurements.
 CHUNK = 256
-# One chunk of so many does for what a single exposure or source adds.
+# Tiles of a problem of one shorter chunk, such as the measurements of one exposure or source.
 FEW_TILES = 128
-# Bytes; what XLA asks of an array that it is to share.
+# Bytes; alignment that XLA needs to use an array without a copy.
 _ALIGNMENT = 64
 
 
@@ -34,7 +34,7 @@ class Tiles(NamedTuple):
     index : `source` (chunk, tile, slot), `exposure` and `detector` (chunk, tile, 1)
     measured : pixels from the detector's centre
     weight : 1/sigma, pixel^-1; zero where there is no measurement
-    place : of each measurement in working order among all slots
+    place : slot of each measurement, in working order, among all slots
     """
 
     index: Index
@@ -44,16 +44,16 @@ class Tiles(NamedTuple):
 
     def chunk(self, i: int) -> tuple[Index, np.ndarray, np.ndarray]:
         """Return index, measured and weight of one chunk."""
-        return Index(*(part[i] for part in self.index)), self.measured[i], self.weight[i]
+        return Index(*(column[i] for column in self.index)), self.measured[i], self.weight[i]
 
     def by_source(
         self, position: Int[np.ndarray, " src"], n_det: int, n_values: int
     ) -> "Gathering":
-        """Return how to gather so many values of each measurement by its detector and source.
+        """Return how to sum `n_values` values of each measurement by detector and source.
 
         Parameters
         ----------
-        position : of each source among the rows
+        position : place of each source in the order of the rows
         """
         pair = self.index.detector * len(position) + position[self.index.source]
         pair = pair.reshape(-1)[self.place]
@@ -69,16 +69,16 @@ class Tiles(NamedTuple):
 
 
 class Gathering(NamedTuple):
-    """Several values of each slot, as rows of a sparse matrix that sums them by their source.
+    """Indices of a sparse matrix that sums several values of each slot by detector and source.
 
-    The rows of one detector and source, one for each value, stand one after the other, so
-    that what they are multiplied with is fetched from memory once for all of them.
+    The rows of one detector and source, one per value, are adjacent, so that the dense factor
+    is fetched from memory once for all of them.
 
     Attributes
     ----------
     value : place of each entry in an array (value, slot)
-    slot : its column
-    first : where each row begins, and where the last one ends
+    slot : column of each entry
+    first : first entry of each row, and the end of the last row
     """
 
     value: Int[np.ndarray, " entries"]
@@ -89,7 +89,7 @@ class Gathering(NamedTuple):
 def lay_tiles(
     index: Index, measured: Float[np.ndarray, "obs 2"], sigma: Float[np.ndarray, "obs 2"]
 ) -> Tiles:
-    """Lay measurements, sorted by exposure and detector, in a whole number of chunks."""
+    """Arrange measurements, sorted by exposure and detector, in a whole number of chunks."""
     n_obs = len(measured)
     changes = np.flatnonzero(np.diff(index.exposure) | np.diff(index.detector)) + 1
     first = np.concatenate([[0], changes])
@@ -99,15 +99,20 @@ def lay_tiles(
     chunk = min(CHUNK, FEW_TILES) if tiles.sum() <= FEW_TILES else CHUNK
     n_chunks = -(-tiles.sum() // chunk)
     place = np.repeat(slots * (np.cumsum(tiles) - tiles) - first, length) + np.arange(n_obs)
-    # Empty slots repeat the measurement before them.
+    # Padding repeats the measurement before it.
     row = np.zeros(n_chunks * chunk * slots, dtype=np.int64)
     row[place] = np.arange(n_obs)
     row = np.maximum.accumulate(row).reshape(n_chunks, chunk, slots)
     weight = np.zeros((2, row.size))
     weight[:, place] = 1.0 / sigma.T
-    head = row[:, :, :1]
+    first_slot = row[:, :, :1]
     return Tiles(
-        Index(*map(_aligned, (index.source[row], index.exposure[head], index.detector[head]))),
+        Index(
+            *map(
+                _aligned,
+                (index.source[row], index.exposure[first_slot], index.detector[first_slot]),
+            )
+        ),
         _aligned(measured.T[:, row].swapaxes(0, 1)),
         _aligned(weight.reshape(2, *row.shape).swapaxes(0, 1)),
         place,
@@ -115,9 +120,9 @@ def lay_tiles(
 
 
 def _aligned(values: Shaped[np.ndarray, "..."]) -> Shaped[np.ndarray, "..."]:
-    """Return a copy that JAX on a CPU takes as it is: from elsewhere it would copy each chunk."""
-    room = np.empty(values.nbytes + _ALIGNMENT, dtype=np.uint8)
-    first = -room.ctypes.data % _ALIGNMENT
-    copy = room[first : first + values.nbytes].view(values.dtype).reshape(values.shape)
+    """Return an aligned copy, which JAX on a CPU uses directly instead of copying each chunk."""
+    buffer = np.empty(values.nbytes + _ALIGNMENT, dtype=np.uint8)
+    first = -buffer.ctypes.data % _ALIGNMENT
+    copy = buffer[first : first + values.nbytes].view(values.dtype).reshape(values.shape)
     copy[...] = values
     return copy

@@ -1,4 +1,4 @@
-"""What an engine found, as tables: estimates, diagnostics, eigenmodes, orders, motions.
+"""Result tables of an engine: estimates, diagnostics, eigenmodes, orders, motions.
 
 Imports `solver.engines` and below.
 """

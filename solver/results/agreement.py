@@ -1,4 +1,4 @@
-"""Whether the engines agree: the same orbit by each of them, compared source by source."""
+"""Agreement of the engines: fits of the same orbit, compared source by source."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -8,15 +8,15 @@ from scipy.stats import norm
 
 from solver.data.result import FitResult
 
-# What svi has to reach, of a marginal sigma and of a conditional one.
+# Limits for svi: of the shifts in marginal sigmas, and of relative changes of conditional sigmas.
 _MEANS, _SIGMAS = 0.05, 0.02
-# A figure of Monte-Carlo origin is refused where chance would give it once in so many runs.
+# Probability that a figure with Monte-Carlo errors exceeds its limit by chance.
 _CHANCE = 1e-3
 _AXES = ("ra", "dec")
 
 
 class Comparison(NamedTuple):
-    """One figure of an engine against gauss-newton, and the largest that agrees."""
+    """One figure that compares an engine with gauss-newton, and its limit."""
 
     engine: str
     what: str
@@ -34,7 +34,7 @@ def compare(results: Mapping[str, FitResult]) -> list[Comparison]:
 
     Parameters
     ----------
-    results : by engine, of the same orbit and settings but for the engine
+    results : results by engine, of the same orbit and otherwise the same settings
     """
     exact = results["gauss-newton"]
     rows = []
@@ -56,11 +56,11 @@ def compare(results: Mapping[str, FitResult]) -> list[Comparison]:
         ]
     if "nuts" in results:
         found = results["nuts"]
-        of_means, of_sigmas = (
+        n_means, n_sigmas = (
             float(found.summary[f"smallest_effective_samples{kind}"]) for kind in ("", "_of_sigmas")
         )
-        shifts = _shifts(found, exact) * np.sqrt(of_means)
-        ratios = (_ratios(found, exact, "marginal") - 1.0) * np.sqrt(2.0 * of_sigmas)
+        shifts = _shifts(found, exact) * np.sqrt(n_means)
+        ratios = (_ratios(found, exact, "marginal") - 1.0) * np.sqrt(2.0 * n_sigmas)
         limit = float(norm.isf(0.5 * _CHANCE / shifts.size))
         rows += [
             Comparison(

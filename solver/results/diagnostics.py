@@ -1,7 +1,7 @@
-"""Figures that say whether a solution can be trusted: arrays in, numbers out.
+"""Diagnostics of a solution, computed from arrays.
 
-Paper, section "Results", Eq. (result:deviation); with expected values beside them,
-because a point estimate of a reference star does not scatter as its prior does.
+Paper, section "Results", Eq. (result:deviation), with expected values, because the estimate of
+a reference source scatters less than its prior.
 """
 
 from typing import NamedTuple
@@ -15,15 +15,15 @@ from solver.linear.source_elimination import ReducedSystem
 from solver.linear.triangular import lower_solve
 from solver.problem.priors import Priors
 
-# Sources of which the covariances with the calibration fit into the caches.
+# Number of sources whose covariances with the calibration fit into the caches.
 _AT_ONCE = 64
 
 
 class NormalisedDeviation(NamedTuple):
-    """Root mean square of (estimate - prior) / prior sigma of the reference stars.
+    """Root mean square of (estimate - prior) / prior sigma of the reference sources.
 
-    `expected` is its expectation, which is below one: the estimate is drawn towards the
-    prior, so that its variance about it is the prior's less the marginal one.
+    `expected` is its expectation, which is below one: the estimate is shrunk towards the
+    prior, so its variance about the prior is the prior variance minus the marginal one.
     """
 
     measured: Float[np.ndarray, " 2"]
@@ -51,12 +51,12 @@ def normalised_deviation(
 def effective_parameters(
     priors: Priors, prior_hessian: Float[np.ndarray, " calib"], covariance: Covariances
 ) -> float:
-    """Return the number of parameters that the data decide: n less the prior shares."""
-    of_sources = 2 * len(priors.precision) - np.einsum(
+    """Return the number of parameters that the data determine: n minus the prior shares."""
+    source_count = 2 * len(priors.precision) - np.einsum(
         "sij,sji->", priors.precision, covariance.source
     )
-    of_theta = len(prior_hessian) - prior_hessian @ np.diag(covariance.theta)
-    return float(of_sources + of_theta)
+    theta_count = len(prior_hessian) - prior_hessian @ np.diag(covariance.theta)
+    return float(source_count + theta_count)
 
 
 def log_evidence(mode: Mode, priors: Priors, log_sigma_sum: float, n_coordinates: int) -> float:
@@ -65,7 +65,7 @@ def log_evidence(mode: Mode, priors: Priors, log_sigma_sum: float, n_coordinates
     Parameters
     ----------
     log_sigma_sum : sum of log sigma over all measured coordinates, pixels
-    n_coordinates : two for each measurement
+    n_coordinates : number of measured coordinates, two for each measurement
     """
     if mode.reduced is None:
         return float("nan")
@@ -80,14 +80,14 @@ def mean_covariance(
 ) -> Float[np.ndarray, "2 2"]:
     """Return the covariance of the mean position error of some sources, mas^2.
 
-    Their errors share the calibration, and with it the reference stars' errors, so this
-    does not fall with their number.
+    The errors share those of the calibration, and with them those of the reference sources, so
+    this does not fall with the number of sources.
     """
     count = max(int(members.sum()), 1)
     conditional = reduced.conditional_covariance()[members].sum(axis=0) / count**2
-    # Of a shift of all members together by one mas, along each axis.
-    together = np.eye(2)[:, :, None] * (members / count)
-    shared = reduced.onto_calibration(lower_solve(reduced.source_factor, together))
+    # Mean shift of the members, along each axis.
+    mean_shift = np.eye(2)[:, :, None] * (members / count)
+    shared = reduced.onto_calibration(lower_solve(reduced.source_factor, mean_shift))
     return conditional + shared @ reduced.theta_covariance() @ shared.T
 
 
@@ -96,25 +96,25 @@ def induced_shift(
     priors: Priors,
     reference_error: Float[np.ndarray, "*k src 2"],
 ) -> Float[np.ndarray, "*k src 2"]:
-    """Return the shift of every source that errors of the reference positions cause, mas.
+    """Return the shift of every source due to errors of the reference positions, mas.
 
     Parameters
     ----------
-    reference_error : catalogue minus truth of reference stars, zero for the others, mas; one
-        set, or several
+    reference_error : catalogue minus truth of the reference sources, zero for the others, mas;
+        one set or several
     """
     pull = np.einsum("sij,...sj->...si", priors.precision, reference_error)
     return reduced.pulled(pull.reshape(-1, *pull.shape[-2:])).reshape(pull.shape)
 
 
 class ErrorBudget(NamedTuple):
-    """The marginal covariance of each source by the origin of its error, mas^2; the three add up.
+    """The marginal covariance of each source as a sum over the causes of its error, mas^2.
 
     Attributes
     ----------
-    noise : of the measurements: the scatter over repeated orbits with the same catalogue
-    catalogue : of the sources' priors, which err by the same in every orbit: an offset
-    calibration : of the centres of the calibration's priors
+    noise : due to the measurements: the scatter over repeated orbits with the same catalogue
+    catalogue : due to the sources' priors, with the same errors in every orbit: an offset
+    calibration : due to the prior centres of the calibration
     """
 
     noise: Float[np.ndarray, "src 2 2"]
@@ -123,11 +123,11 @@ class ErrorBudget(NamedTuple):
 
 
 def error_budget(reduced: ReducedSystem, priors: Priors, covariance: Covariances) -> ErrorBudget:
-    """Split the covariance of each source into what the data and what the priors cause.
+    """Split the covariance of each source into contributions of the data and of the priors.
 
-    With H = H_data + P, the estimate errs by H^-1 times a sum: the data's noise, of
-    covariance H_data, and P times the error of the priors' centres, of covariance P. So H^-1
-    is H^-1 H_data H^-1 plus H^-1 P H^-1, of which these are the sources' blocks.
+    With H = H_data + P, the error of the estimate is H^-1 times a sum: the noise of the data,
+    of covariance H_data, and P times the error of the prior centres, of covariance P. So H^-1
+    is H^-1 H_data H^-1 plus H^-1 P H^-1, whose source blocks these are.
     """
     precision, response = priors.precision, reduced.response()
     conditional, n_calib = reduced.conditional_covariance(), len(reduced.theta)
@@ -137,35 +137,35 @@ def error_budget(reduced: ReducedSystem, priors: Priors, covariance: Covariances
         pulled[:, a] = by_first * response[:, 0] + by_second * response[:, 1]
     shared = pulled.reshape(n_calib, -1) @ response.reshape(n_calib, -1).T
     half = conditional @ precision @ (covariance.source - 0.5 * conditional)
-    by_others, calibration = (
-        part[covariance.source_blocks.position]
-        for part in _between(
+    cross_terms, calibration = (
+        contribution[covariance.source_blocks.position]
+        for contribution in _quadratic_forms(
             covariance.cross, shared, priors.hessian_diagonal(covariance.at[0])[:, None]
         )
     )
-    catalogue = half + half.swapaxes(1, 2) + by_others
+    catalogue = half + half.swapaxes(1, 2) + cross_terms
     return ErrorBudget(covariance.source - catalogue - calibration, catalogue, calibration)
 
 
-def _between(
+def _quadratic_forms(
     cross: Float[np.ndarray, "calib 2 src"],
     shared: Float[np.ndarray, "calib calib"],
     prior_hessian: Float[np.ndarray, "calib 1"],
 ) -> tuple[Float[np.ndarray, "src 2 2"], Float[np.ndarray, "src 2 2"]]:
     """Return C_i' M C_i of each source, for a symmetric matrix and for a diagonal one.
 
-    A few sources at a time, so that all of it stays in the caches.
+    Computed for a few sources at a time, to stay in the caches.
     """
     n_calib, _, n_src = cross.shape
     found = np.empty((2, 2, 2, n_src))
     for first in range(0, n_src, _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        rows = cross[:, :, some].reshape(n_calib, -1)
-        part = rows.reshape(n_calib, 2, -1)
-        for kind, moved in enumerate((shared @ rows, prior_hessian * rows)):
-            other = moved.reshape(part.shape)
+        batch = slice(first, first + _AT_ONCE)
+        rows = cross[:, :, batch].reshape(n_calib, -1)
+        left = rows.reshape(n_calib, 2, -1)
+        for kind, product in enumerate((shared @ rows, prior_hessian * rows)):
+            right = product.reshape(left.shape)
             for a, b in ((0, 0), (0, 1), (1, 1)):
-                found[kind, a, b, some] = np.einsum("ks,ks->s", part[:, a], other[:, b])
+                found[kind, a, b, batch] = np.einsum("ks,ks->s", left[:, a], right[:, b])
     found[:, 1, 0] = found[:, 0, 1]
-    by_others, calibration = found.transpose(0, 3, 1, 2)
-    return by_others, calibration
+    cross_terms, calibration = found.transpose(0, 3, 1, 2)
+    return cross_terms, calibration

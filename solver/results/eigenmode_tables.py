@@ -1,4 +1,4 @@
-"""The tables of the modes: what decides them, and what the weak ones of them move."""
+"""Tables of the eigenmodes: their shares, and the moves of the weak ones."""
 
 import numpy as np
 import pandas as pd
@@ -9,29 +9,29 @@ from solver.data.instrument import Instrument
 from solver.data.parameters import CALIBRATION_GROUPS, Axis, Group
 from solver.linear.source_elimination import ReducedSystem
 from solver.results.eigenmode_names import GroupShare, eigenmode_name
-from solver.results.eigenmodes import MOST_WEAK, Eigenmodes, find_eigenmodes
+from solver.results.eigenmodes import MAX_NAMED, Eigenmodes, find_eigenmodes
 from solver.results.tables import SolvedProblem
 
 
 def eigenmode_tables(
     solution: SolvedProblem, calibration: pd.DataFrame, instrument: Instrument
 ) -> dict[str, pd.DataFrame]:
-    """Return `schema.MODES`, `MODE_PARAMETERS` and `MODE_SHIFTS` by their names.
+    """Return `schema.MODES`, `MODE_PARAMETERS` and `MODE_SHIFTS` by name.
 
     Parameters
     ----------
     calibration : `schema.CALIBRATION` of the solution
-    instrument : gives the detectors' nominal places
+    instrument : instrument with the nominal places of the detectors
     """
     problem, reduced = solution.problem, solution.reduced
     is_reference = problem.sources["is_reference"].to_numpy(bool)
     found = find_eigenmodes(reduced, problem.priors, problem.layout, is_reference)
-    weak = _signed(found.vectors[:, : min(found.n_weak, MOST_WEAK)], reduced)
+    weak = _signed(found.vectors[:, : min(found.n_weak, MAX_NAMED)], reduced)
     parameters = _parameter_table(solution, found, weak, calibration)
     places = _places(solution, instrument)
     names = [_name(rows, places) for _, rows in parameters.groupby("mode")]
     return {
-        MODES.name: _mode_table(found, names),
+        MODES.name: _eigenmode_table(found, names),
         MODE_PARAMETERS.name: parameters,
         MODE_SHIFTS.name: _shift_table(solution, weak),
     }
@@ -40,13 +40,13 @@ def eigenmode_tables(
 def _signed(
     vectors: Float[np.ndarray, "calib weak"], reduced: ReducedSystem
 ) -> Float[np.ndarray, "calib weak"]:
-    """Return the modes such that the largest move in conditional sigmas is positive."""
+    """Return the eigenmodes with the largest move in conditional sigmas positive."""
     scaled = vectors * np.sqrt(np.diag(reduced.theta))[:, None]
     largest = np.argmax(np.abs(scaled), axis=0)
     return vectors * np.sign(scaled[largest, np.arange(vectors.shape[1])])
 
 
-def _mode_table(found: Eigenmodes, names: list[str]) -> pd.DataFrame:
+def _eigenmode_table(found: Eigenmodes, names: list[str]) -> pd.DataFrame:
     count = len(found.data)
     columns = {
         "mode": np.arange(1, count + 1),
@@ -67,12 +67,12 @@ def _parameter_table(
     calibration: pd.DataFrame,
 ) -> pd.DataFrame:
     problem, count = solution.problem, weak.shape[1]
-    # The rows of the table of the calibration stand group by group.
+    # The rows of the calibration table are ordered by group.
     columns = np.concatenate([problem.layout.columns(group) for group in CALIBRATION_GROUPS])
     moves = weak[columns]
     squares = moves**2 * np.diag(solution.reduced.theta)[columns, None]
     prior_hessian = problem.priors.hessian_diagonal(solution.reduced.at[0])[columns, None]
-    of_rows = {
+    labels = {
         name: pd.Series(np.tile(calibration[name], count), dtype=calibration[name].dtype)
         for name in ("group", "element", "label", "unit")
     }
@@ -82,7 +82,7 @@ def _parameter_table(
         "share": (squares / squares.sum(axis=0)).T.ravel(),
         "prior_share": (prior_hessian * moves**2).T.ravel(),
     }
-    return pd.DataFrame({**of_rows, **values})[MODE_PARAMETERS.names]
+    return pd.DataFrame({**labels, **values})[MODE_PARAMETERS.names]
 
 
 def _shift_table(solution: SolvedProblem, weak: Float[np.ndarray, "calib weak"]) -> pd.DataFrame:
@@ -100,31 +100,31 @@ def _shift_table(solution: SolvedProblem, weak: Float[np.ndarray, "calib weak"])
 def _places(
     solution: SolvedProblem, instrument: Instrument
 ) -> dict[Axis, Float[np.ndarray, "n 2"]]:
-    """Return where exposures point, on the sky, and where detectors are, on the focal plane."""
+    """Return the pointings of exposures on the sky and the places of detectors, by axis."""
     frame = np.asarray(solution.problem.geometry.pointing_frame)[: solution.problem.layout.n_exp]
     detectors = [(d.x_um, d.y_um) for d in instrument.detectors]
     return {"exp": frame[:, 0] @ frame[0, 1:].T, "det": np.array(detectors)}
 
 
 def _name(rows: pd.DataFrame, places: dict[Axis, Float[np.ndarray, "n 2"]]) -> str:
-    of_group = dict(list(rows.groupby("group")))
+    rows_of_group = dict(list(rows.groupby("group")))
     return eigenmode_name(
         [
             GroupShare(
                 group,
-                float(of_group[group.name]["share"].sum()),
-                _moves(group, of_group[group.name]),
-                of_group[group.name]["label"].tolist(),
+                float(rows_of_group[group.name]["share"].sum()),
+                _moves(group, rows_of_group[group.name]),
+                rows_of_group[group.name]["label"].tolist(),
                 places.get(group.axis),
             )
             for group in CALIBRATION_GROUPS
-            if group.name in of_group
+            if group.name in rows_of_group
         ]
     )
 
 
 def _moves(group: Group, rows: pd.DataFrame) -> Float[np.ndarray, " n"]:
-    """Return the moves of the elements of a group so that they compare with each other."""
+    """Return the moves of the elements of a group in comparable units."""
     move = rows["move"].to_numpy()
-    # High orders of the distortion take larger coefficients to have the same effect.
+    # High distortion orders need larger coefficients for the same effect.
     return np.sign(move) * np.sqrt(rows["share"].to_numpy()) if group.axis == "coef" else move

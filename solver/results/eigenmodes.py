@@ -1,14 +1,14 @@
-"""The eigen-spectrum of the calibration: which combinations of parameters the data decide.
+"""Eigenmodes of the calibration: which combinations of parameters the data determine.
 
-The reduced matrix S = U + P - sum_i W_i V_i^-1 W_i' is a sum of what the measurements alone
-say, of the calibration's priors P, and of what each source's prior Q_i adds: with the data's
+The reduced matrix S = U + P - sum_i W_i V_i^-1 W_i' is the sum of a term of the measurements
+alone, of the calibration's priors P, and of a term of each source's prior Q_i: with the data's
 V_i, W_i (V_i^-1 - (V_i + Q_i)^-1) W_i'. So along a combination v with v'Sv = 1 the shares of
 measurements, reference sources, other sources and every prior are numbers that add up to one,
-in whatever order they are attributed.
+independent of the order in which they are attributed.
 
-A *mode* is an eigenvector of S_data v = lambda S v, lambda being the share of the measurements.
-Where lambda all but vanishes, eigenvectors are arbitrary axes of the space that the
-measurements leave open; there the modes are the axes of simple structure.
+An *eigenmode* is an eigenvector of S_data v = lambda S v; lambda is the share of the
+measurements. Where lambda is close to zero, eigenvectors are arbitrary axes of the space that the
+measurements do not constrain; there the eigenmodes are the axes of simple structure.
 """
 
 from typing import NamedTuple
@@ -24,28 +24,28 @@ from solver.problem.priors import Priors
 from solver.results.simple_structure import joint_axes
 
 WEAK = 0.5
-"""Share of the measurements below which a mode is weak."""
-MOST_WEAK = 12
-"""At most so many weak modes are told in full."""
-# Share of the measurements below which they are said to leave a combination open.
-_OPEN = 1e-3
-# Modes are only mixed with those whose relative information is within this factor.
+"""Share of the measurements below which an eigenmode is weak."""
+MAX_NAMED = 12
+"""Maximum number of weak eigenmodes with names, parameters and shifts."""
+# Share of the measurements below which an eigenmode counts as unconstrained by them.
+_UNCONSTRAINED = 1e-3
+# Eigenmodes are mixed only if their relative information is within this factor.
 _GAP = 10.0
-# Share of a source's own data below which they say nothing of one of its directions.
-_NOTHING = 1e-12
+# Share of the data below which they do not constrain a direction of a source.
+_NEGLIGIBLE = 1e-12
 
 
 class Eigenmodes(NamedTuple):
-    """All modes, those that the measurements leave open first.
+    """All eigenmodes, the least constrained by the measurements first.
 
     Attributes
     ----------
-    vectors : modes as columns, each as far as one standard deviation of the posterior goes
-    data : share of what is known of the mode that comes from the measurements, lambda
-    references, sources : shares of the priors of reference sources and of all others
+    vectors : eigenmodes as columns, each one posterior standard deviation long
+    data : share of the measurements in the information about the eigenmode, lambda
+    references, sources : shares of the priors of reference sources and of the other sources
     calibration : share of the calibration's priors
-    relative : v'Sv over the sum of v_j^2 / (conditional variance of j): what is known of
-        the mode, relative to what its parameters would have if all else were held fixed
+    relative : v'Sv over the sum of v_j^2 / (conditional variance of j): information about
+        the eigenmode, relative to that of its parameters if the others were fixed
     """
 
     vectors: Float[np.ndarray, "calib calib"]
@@ -57,12 +57,12 @@ class Eigenmodes(NamedTuple):
 
     @property
     def n_weak(self) -> int:
-        """Number of modes of which the measurements decide less than half."""
+        """Number of eigenmodes with a share of the measurements below `WEAK`."""
         return int((self.data < WEAK).sum())
 
 
-class _Parts(NamedTuple):
-    """S^-1/2 (matrix) S^-1/2' of the parts of S that are priors, and R^-1 with S = R'R."""
+class _PriorTerms(NamedTuple):
+    """S^-1/2 (matrix) S^-1/2' of the source priors' terms of S, and R^-1 with S = R'R."""
 
     references: Float[np.ndarray, "calib calib"]
     sources: Float[np.ndarray, "calib calib"]
@@ -75,49 +75,53 @@ def find_eigenmodes(
     layout: VectorLayout,
     is_reference: Bool[np.ndarray, " src"],
 ) -> Eigenmodes:
-    """Return the modes of a factorised posterior.
+    """Return the eigenmodes of a factorised posterior.
 
-    Rounding of S, in whose weakest directions all but 1e-11 of the information of single
-    parameters cancels, hides shares of the measurements below about 1e-3 there.
+    In the weakest directions all but 1e-11 of the information of single parameters cancels in
+    S, so rounding hides shares of the measurements below about 1e-3 there.
 
     Parameters
     ----------
-    reduced : made with `priors`
-    is_reference : of each source
+    reduced : posterior with `priors`
+    is_reference : whether each source is a reference source
     """
     prior_hessian = priors.hessian_diagonal(reduced.at[0])
-    parts = _prior_parts(reduced, priors, is_reference)
-    scaled = parts.root * np.sqrt(prior_hessian)[:, None]
-    decided, axes = np.linalg.eigh(parts.references + parts.sources + scaled.T @ scaled)
-    order = np.argsort(decided)[::-1]
-    decided, axes = decided[order], axes[:, order]
-    n_open = int((1.0 - decided < _OPEN).sum())
+    prior_terms = _prior_terms(reduced, priors, is_reference)
+    scaled = prior_terms.root * np.sqrt(prior_hessian)[:, None]
+    prior_share, axes = np.linalg.eigh(
+        prior_terms.references + prior_terms.sources + scaled.T @ scaled
+    )
+    order = np.argsort(prior_share)[::-1]
+    prior_share, axes = prior_share[order], axes[:, order]
+    n_unconstrained = int((1.0 - prior_share < _UNCONSTRAINED).sum())
     information = np.diag(reduced.theta)
-    if n_open:
-        axes[:, :n_open] = _open_axes(axes[:, :n_open], parts, prior_hessian, information, layout)
-    return _described(parts.root @ axes, axes, parts, prior_hessian, information)
+    if n_unconstrained:
+        axes[:, :n_unconstrained] = _simple_axes(
+            axes[:, :n_unconstrained], prior_terms, prior_hessian, information, layout
+        )
+    return _eigenmodes(prior_terms.root @ axes, axes, prior_terms, prior_hessian, information)
 
 
-def _prior_parts(
+def _prior_terms(
     reduced: ReducedSystem, priors: Priors, is_reference: Bool[np.ndarray, " src"]
-) -> _Parts:
+) -> _PriorTerms:
     rows, order = reduced.spread(), reduced.source_blocks.order
     weighted = _weighted(rows, _prior_root(reduced, priors)[order])
     is_reference = is_reference[order]
-    of_references = _gram(weighted[:, :, is_reference])
+    reference_gram = _gram(weighted[:, :, is_reference])
     weighted[:, :, is_reference] = 0.0
     root = sl.solve_triangular(reduced.factor, np.eye(len(rows)))
-    return _Parts(of_references, _gram(weighted), root)
+    return _PriorTerms(reference_gram, _gram(weighted), root)
 
 
 def _prior_root(reduced: ReducedSystem, priors: Priors) -> Float[np.ndarray, "src 2 2"]:
     """Return H_i with Z_i H_i H_i' Z_i' = W_i (V_i^-1 - (V_i + Q_i)^-1) W_i'."""
     lower = np.linalg.inv(reduced.source_factor)
     share, axes = np.linalg.eigh(lower @ priors.precision @ lower.swapaxes(1, 2))
-    of_data = 1.0 - share
-    # A direction of a source that no measurement sees is of no use to the calibration either.
-    seen = of_data > _NOTHING
-    weight = np.where(seen, share, 0.0) / np.where(seen, of_data, 1.0)
+    data_share = 1.0 - share
+    # A direction of a source without measurements does not constrain the calibration either.
+    is_measured = data_share > _NEGLIGIBLE
+    weight = np.where(is_measured, share, 0.0) / np.where(is_measured, data_share, 1.0)
     return axes * np.sqrt(np.maximum(weight, 0.0))[:, None, :]
 
 
@@ -136,66 +140,66 @@ def _gram(rows: Float[np.ndarray, "calib 2 _"]) -> Float[np.ndarray, "calib cali
     return flat @ flat.T
 
 
-def _open_axes(
+def _simple_axes(
     axes: Float[np.ndarray, "calib n"],
-    parts: _Parts,
+    prior_terms: _PriorTerms,
     prior_hessian: Float[np.ndarray, " calib"],
     information: Float[np.ndarray, " calib"],
     layout: VectorLayout,
 ) -> Float[np.ndarray, "calib n"]:
-    """Turn the axes of the open space until each has few deciders and few groups.
+    """Rotate the axes of the unconstrained space to simple structure.
 
-    First those are split off whose parameters move by orders of magnitude more than those of
-    others, then as few priors as can be decide each, then as few groups as can be take part.
+    Axes are first separated by the size of their parameters' moves, then concentrated on as few
+    priors as possible, then, among axes of similar size, on few priors and few parameter groups.
     """
-    vectors = parts.root @ axes
-    deciders = np.array(
+    vectors = prior_terms.root @ axes
+    prior_grams = np.array(
         [
-            axes.T @ parts.references @ axes,
-            axes.T @ parts.sources @ axes,
+            axes.T @ prior_terms.references @ axes,
+            axes.T @ prior_terms.sources @ axes,
             *_group_grams(vectors * np.sqrt(prior_hessian)[:, None], layout),
         ]
     )
-    members = np.array(_group_grams(vectors * np.sqrt(information)[:, None], layout))
-    turn = np.linalg.eigh(members.sum(axis=0))[1][:, ::-1]
-    turn = turn @ joint_axes(turn.T @ deciders @ turn)
-    size = np.diag(turn.T @ members.sum(axis=0) @ turn)
+    group_grams = np.array(_group_grams(vectors * np.sqrt(information)[:, None], layout))
+    rotation = np.linalg.eigh(group_grams.sum(axis=0))[1][:, ::-1]
+    rotation = rotation @ joint_axes(rotation.T @ prior_grams @ rotation)
+    size = np.diag(rotation.T @ group_grams.sum(axis=0) @ rotation)
     order = np.argsort(size)[::-1]
-    turn, size = turn[:, order], size[order]
-    for alike in np.split(np.arange(len(size)), 1 + np.flatnonzero(size[:-1] > _GAP * size[1:])):
-        part = turn[:, alike]
-        both = np.concatenate([deciders, members / size[alike].mean()])
-        turn[:, alike] = part @ joint_axes(part.T @ both @ part)
-    size = np.diag(turn.T @ members.sum(axis=0) @ turn)
-    return axes @ turn[:, np.argsort(size)[::-1]]
+    rotation, size = rotation[:, order], size[order]
+    for similar in np.split(np.arange(len(size)), 1 + np.flatnonzero(size[:-1] > _GAP * size[1:])):
+        axes_of_set = rotation[:, similar]
+        both = np.concatenate([prior_grams, group_grams / size[similar].mean()])
+        rotation[:, similar] = axes_of_set @ joint_axes(axes_of_set.T @ both @ axes_of_set)
+    size = np.diag(rotation.T @ group_grams.sum(axis=0) @ rotation)
+    return axes @ rotation[:, np.argsort(size)[::-1]]
 
 
 def _group_grams(
     vectors: Float[np.ndarray, "calib n"], layout: VectorLayout
 ) -> list[Float[np.ndarray, "n n"]]:
-    parts = (vectors[layout.columns(group)] for group in CALIBRATION_GROUPS)
-    return [part.T @ part for part in parts]
+    by_group = (vectors[layout.columns(group)] for group in CALIBRATION_GROUPS)
+    return [rows.T @ rows for rows in by_group]
 
 
-def _described(
+def _eigenmodes(
     vectors: Float[np.ndarray, "calib calib"],
     axes: Float[np.ndarray, "calib calib"],
-    parts: _Parts,
+    prior_terms: _PriorTerms,
     prior_hessian: Float[np.ndarray, " calib"],
     information: Float[np.ndarray, " calib"],
 ) -> Eigenmodes:
-    of_priors = np.stack(
+    prior_shares = np.stack(
         [
-            np.einsum("ik,ik->k", axes, parts.references @ axes),
-            np.einsum("ik,ik->k", axes, parts.sources @ axes),
+            np.einsum("ik,ik->k", axes, prior_terms.references @ axes),
+            np.einsum("ik,ik->k", axes, prior_terms.sources @ axes),
             prior_hessian @ vectors**2,
         ]
     )
-    of_data = np.maximum(1.0 - of_priors.sum(axis=0), 0.0)
-    # More than all by what S lost to rounding.
-    known = of_data + of_priors.sum(axis=0)
-    relative = known / (information @ vectors**2)
-    references, sources, calibration = of_priors / known
+    data_share = np.maximum(1.0 - prior_shares.sum(axis=0), 0.0)
+    # Exceeds one by the rounding errors of S.
+    total = data_share + prior_shares.sum(axis=0)
+    relative = total / (information @ vectors**2)
+    references, sources, calibration = prior_shares / total
     return Eigenmodes(
-        vectors / np.sqrt(known), of_data / known, references, sources, calibration, relative
+        vectors / np.sqrt(total), data_share / total, references, sources, calibration, relative
     )

@@ -1,10 +1,10 @@
 """Motion fits: position, proper motion and parallax of each source over the orbits.
 
-All is linear in five offsets from the catalogue, q = (alpha*, delta, parallax, mu_alpha*,
-mu_delta): an orbit's position is y_k = A_k q + e_k. Only the part of e_k that scatters from
-orbit to orbit is noise and gives the weights. The part that the catalogue's errors cause is
-the same function of the same errors in every orbit: it does not average out, and goes through
-the fit as the positions do. What it does to q is therefore found by fitting the shifts of
+The model is linear in five offsets from the catalogue, q = (alpha*, delta, parallax, mu_alpha*,
+mu_delta): an orbit's position is y_k = A_k q + e_k. Only the component of e_k that scatters from
+orbit to orbit is noise and determines the weights. The component due to errors of the catalogue
+is the same function of the same errors in every orbit: it does not average out and propagates
+through the fit like the positions. Its effect on q is therefore found by fitting the shifts of
 `solver.results.shared_errors` draw by draw.
 """
 
@@ -17,24 +17,24 @@ from jaxtyping import Bool, Float, Int
 from solver.model.apparent_motion import motion_design
 from solver.results.shared_errors import draws_of
 
-# Beyond this the orbits leave a combination of the parameters open.
+# Condition number above which the orbits leave a combination of the parameters unconstrained.
 _LARGEST_CONDITION = 1e10
 
 
 class MotionFit(NamedTuple):
-    """Motions of the sources, and the orbits' positions about them; mas and mas/yr.
+    """Fitted motions of the sources, and residuals of the orbits' positions; mas and mas/yr.
 
     Attributes
     ----------
-    source_id : of each source, ascending
-    first : row of the history at which each source begins
+    source_id : ID of each source, ascending
+    first : first row of the history of each source
     motion : fitted minus catalogue
     true : truth minus catalogue
-    noise, catalogue : covariance of the fit by its two causes
-    chi2 : weighted by the noise
-    residual : of each row of the history
+    noise, catalogue : covariance of the fit due to noise and to catalogue errors
+    chi2 : chi2 of the residuals, weighted by the noise
+    residual : residual of each row of the history
     expected : variance of each residual
-    drawn : shifts of the rows in each draw of the catalogue's errors
+    drawn : shifts of the rows for each draw of the catalogue errors
     """
 
     source_id: Int[np.ndarray, " src"]
@@ -54,13 +54,13 @@ def fit_motions(history: pd.DataFrame, epoch: float) -> MotionFit:
 
     Parameters
     ----------
-    history : `survey_schema.HISTORY` with `SHARED_ERRORS` beside it, in order of source_id and
-        epoch, each source whole
-    epoch : of the positions, Julian year in TCB
+    history : `survey_schema.HISTORY` joined with `SHARED_ERRORS`, in order of source_id and
+        epoch, with all rows of each source
+    epoch : epoch of the positions, Julian year in TCB
 
     Returns
     -------
-    The motions; NaN of a source whose orbits leave a parameter open.
+    The motions; NaN if the orbits of a source leave a parameter unconstrained.
     """
     ids, first = np.unique(history["source_id"].to_numpy(), return_index=True)
     ra, dec, epochs = history[["ra", "dec", "epoch"]].to_numpy().T
@@ -73,20 +73,20 @@ def fit_motions(history: pd.DataFrame, epoch: float) -> MotionFit:
     position = history[["offset_ra", "offset_dec"]].to_numpy()
     truth = history[["true_offset_ra", "true_offset_dec"]].to_numpy()
     drawn = draws_of(history)
-    right = np.concatenate([position[:, None], truth[:, None], drawn], axis=1)
-    pulls = np.add.reduceat(np.einsum("nip,nki->nkp", weighted, right), first)
-    solved = np.einsum("spq,skq->skp", covariance, pulls)
+    positions = np.concatenate([position[:, None], truth[:, None], drawn], axis=1)
+    right_sides = np.add.reduceat(np.einsum("nip,nki->nkp", weighted, positions), first)
+    solved = np.einsum("spq,skq->skp", covariance, right_sides)
     rows = np.repeat(np.arange(len(ids)), np.diff(first, append=len(history)))
     residual = position - np.einsum("nip,np->ni", design, solved[rows, 0])
     fitted = np.einsum("nip,npq,niq->ni", design, covariance[rows], design)
-    of_draws = solved[:, 2:]
+    by_draw = solved[:, 2:]
     return MotionFit(
         ids,
         first,
         solved[:, 0],
         solved[:, 1],
         covariance,
-        np.einsum("skp,skq->spq", of_draws, of_draws) / of_draws.shape[1],
+        np.einsum("skp,skq->spq", by_draw, by_draw) / by_draw.shape[1],
         np.add.reduceat(np.einsum("ni,nij,nj->n", residual, weight, residual), first),
         residual,
         np.diagonal(noise, axis1=1, axis2=2) - fitted,
@@ -103,9 +103,9 @@ def _noise(history: pd.DataFrame) -> Float[np.ndarray, "row 2 2"]:
 
 
 def _inverse(normal: Float[np.ndarray, "src 5 5"]) -> Float[np.ndarray, "src 5 5"]:
-    """Return the inverses; NaN of those that are singular."""
+    """Return the inverses, NaN for singular matrices."""
     diagonal = np.diagonal(normal, axis1=1, axis2=2)
-    # One orbit at the very epoch says nothing of a motion: that is singular, too.
+    # A zero diagonal, as of one orbit exactly at the epoch, is singular too.
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     outer = scale[:, :, None] * scale[:, None, :]
     scaled = normal * outer

@@ -1,29 +1,29 @@
-"""Choosing the order of the distortion: what evidence and reserved sources say of each.
+"""Comparison of distortion orders by evidence and by reserved sources.
 
-Every order is the highest one with the coefficients above it held at zero, so that one
-compiled model and one set of tiles serve all, and the solution of each is where the next
-lower one begins.
+Every order is fitted as the highest one with the coefficients above it fixed at zero, so that
+one compiled model and one set of tiles serve all orders. The solution of each order is the warm
+start of the next lower one.
 
 With H the Hessian of half the posterior's chi2 and X its value at the mode, both over the
 same measurements and priors for every order, the log evidence in Laplace's approximation is
 
     log Z = log prior density at its centre - sum log(sigma sqrt(2 pi)) - (X + log |H / 2 pi|) / 2.
 
-A share of the sources is reserved, and judged by the calibration that the others leave. For
+A fraction of the sources is reserved and predicted with the calibration from the others. For
 their whitened measurements y, with J_s, J_t the Jacobians by the reserved sources and by the
-calibration, P the catalogue's covariance and C the calibration's, integrated over all that
-the others leave open, the prediction's covariance is M = I + J_s P J_s' + J_t C J_t'. With the
-subscripts of all measurements and of those of the others,
+calibration, P the covariance of the catalogue and C the marginal one of the calibration given
+the other sources, the covariance of the prediction is M = I + J_s P J_s' + J_t C J_t'. With the
+subscripts of all measurements and of those of the other sources,
 
     chi2 = (y - f)' M^-1 (y - f) = X_all - X_rest,
     log p(y | rest) = log Z_all - log Z_rest,
 
-the identities of a linear model, which need no M. So every reserved source's own position is
-free, within its catalogue's errors, and what the reserved ones have in common through the
-calibration is accounted for. If model and sigmas are right, chi2 has twice as many degrees
-of freedom as there are reserved measurements, whatever the order: too low an order raises
-it, a needless term does not, since M knows how far it leaves the prediction open. That is
-what the density pays for, by its log |M|: it is highest for the order that predicts best.
+which are identities of a linear model that do not need M. The position of every reserved source
+is free within its catalogue errors, and correlations of the reserved sources through the
+calibration are included. If model and sigmas are right, chi2 has twice as many degrees of
+freedom as there are reserved measurements, for every order: too low an order raises it, but a
+needless term does not, since M includes the uncertainty that it adds to the prediction. The
+density penalises this uncertainty by log |M|, so it is highest for the order that predicts best.
 """
 
 from collections.abc import Callable
@@ -45,20 +45,20 @@ from solver.problem.parameter_vector import PER_COEFFICIENT
 from solver.problem.problem import Problem, thinned
 from solver.results.diagnostics import effective_parameters, log_evidence
 
-# Of the sources that are no reference ones so many are reserved, the same for every order.
-_SHARE = 0.1
+# Fraction of the non-reference sources that is reserved, the same ones for every order.
+_RESERVED_FRACTION = 0.1
 _SEED = 0
-# Prior width of a coefficient that is held, um: its share in the evidence is then one.
-_HELD = 1e-12
-# With every step below so many sigmas, and the last one taken, the evidence is known to some
-# thousandths.
+# Prior width of a coefficient fixed at zero, um: its factor in the evidence is then one.
+_FIXED_WIDTH = 1e-12
+# Largest step at convergence, sigmas: since the last step is taken, the evidence is then accurate
+# to some thousandths.
 _TOLERANCE = 0.03
 
 
 class HeldOut(NamedTuple):
-    """How well the others predict the reserved measurements; see the module.
+    """How well the other sources predict the reserved measurements; see the module.
 
-    `chi2` is to be about `dof`; NaN where nothing can be said.
+    `chi2` should be about `dof`; it is NaN without a solution or without reserved sources.
     """
 
     chi2: float
@@ -75,46 +75,46 @@ def compare_orders(
 
     Parameters
     ----------
-    problem : of the highest order, as `solver.problem.problem.orders_held` says which can be
-    settings : of the engine; its order is not looked at
-    progress : called after every iteration; what it raises stops the comparison
+    problem : problem of the highest order; see `solver.problem.problem.orders_held`
+    settings : settings of the engine; their order is ignored
+    progress : called after every iteration; an exception it raises stops the comparison
 
     Returns
     -------
-    `schema.ORDERS`, from order 0 on
+    `schema.ORDERS`, from order 0 upwards
     """
     settings = settings.with_(tolerance=max(settings.tolerance, _TOLERANCE))
     reserved = reserved_sources(problem)
     rows: list[dict[str, object]] = []
-    here, mode = problem, _evaluated(problem, find_mode(problem, settings, progress))
+    current, mode = problem, _evaluated(problem, find_mode(problem, settings, progress))
     for order in range(problem.order, -1, -1):
         if rows and len(terms(order)) == len(terms(order + 1)):
             rows.append({**rows[-1], "order": order})
             continue
         if order < problem.order:
             lower = at_order(problem, order)
-            mode = _solve_from(mode, here, lower, settings, progress)
-            here = lower
-        held_out = judge_reserved(here, mode, reserved, settings, progress)
-        rows.append({"order": order, **_figures(here, mode, settings), **_columns(held_out)})
+            mode = _solve_from(mode, current, lower, settings, progress)
+            current = lower
+        held_out = judge_reserved(current, mode, reserved, settings, progress)
+        rows.append({"order": order, **_figures(current, mode, settings), **_columns(held_out)})
         rows[-1]["n_reserved"] = int(reserved.sum())
     table = pd.DataFrame(rows[::-1])
     return table[ORDERS.names].astype({column.name: column.dtype for column in ORDERS})
 
 
 def at_order(problem: Problem, order: int) -> Problem:
-    """Return a problem whose distortion has no terms above some order."""
+    """Return the problem with the distortion terms above an order fixed at zero."""
     width = problem.priors.width.copy()
-    width[_above(problem, order)] = _HELD
+    width[_above(problem, order)] = _FIXED_WIDTH
     return replace(problem, priors=problem.priors._replace(width=width))
 
 
 def reserved_sources(problem: Problem) -> Bool[np.ndarray, " src"]:
-    """Return which sources are reserved: a share of those that are no reference ones."""
+    """Return which sources are reserved: a random fraction of the non-reference sources."""
     others = np.flatnonzero(~problem.sources["is_reference"].to_numpy(bool))
     chosen = np.random.default_rng(_SEED).permutation(others)
     reserved = np.zeros(problem.n_src, dtype=bool)
-    reserved[chosen[: int(np.ceil(_SHARE * len(others)))]] = True
+    reserved[chosen[: int(np.ceil(_RESERVED_FRACTION * len(others)))]] = True
     return reserved
 
 
@@ -125,11 +125,11 @@ def judge_reserved(
     settings: FitSettings,
     progress: Callable[[Iteration], None] = lambda _: None,
 ) -> HeldOut:
-    """Judge the measurements of reserved sources by the solution of all others.
+    """Compare the measurements of reserved sources with the prediction from the other sources.
 
     Parameters
     ----------
-    mode : of the whole problem; the last row of its trace is that of its point
+    mode : mode of the full problem; the last row of its trace is evaluated at its point
     """
     dof = 2 * int(reserved[problem.measurements.index.source].sum())
     if dof == 0 or not mode.status.is_solution:
@@ -147,7 +147,7 @@ def judge_reserved(
 
 
 def _above(problem: Problem, order: int) -> Int[np.ndarray, " above"]:
-    """Return the columns of the coefficients above some order."""
+    """Return the columns of the coefficients above an order."""
     layout, kept = problem.layout, len(terms(order))
     return np.concatenate([layout.columns(group)[kept:] for group in PER_COEFFICIENT])
 
@@ -159,20 +159,20 @@ def _solve_from(
     settings: FitSettings,
     progress: Callable[[Iteration], None],
 ) -> Mode:
-    """Return the mode of a lower order, from that of the one above it.
+    """Return the mode of a lower order, from that of the order above it.
 
-    One step leads near it where the terms that are dropped were small, and is no help where
-    they were not. The Jacobians are made anew, for the evidence to be that of its own point.
+    A what-if gives a warm start if the dropped terms were small. The fit then recomputes the
+    Jacobians, so that the evidence is evaluated at its own point.
     """
-    near = solve_what_if(mode, solved, lower, settings) if mode.status.is_solution else None
-    return _evaluated(lower, find_mode(lower, settings, progress, start=near))
+    warm_start = solve_what_if(mode, solved, lower, settings) if mode.status.is_solution else None
+    return _evaluated(lower, find_mode(lower, settings, progress, start=warm_start))
 
 
 def _evaluated(problem: Problem, mode: Mode) -> Mode:
-    """Return a mode with the objective of its very point, not that before the last step."""
-    at = gradient(problem, mode.theta, mode.sources)
-    total = objective(problem, mode.theta, mode.sources, at)
-    return mode._replace(trace=[mode.trace[-1]._replace(objective=total, chi2=at.chi2)])
+    """Return a mode with the objective at its point instead of that before the last step."""
+    found = gradient(problem, mode.theta, mode.sources)
+    total = objective(problem, mode.theta, mode.sources, found)
+    return mode._replace(trace=[mode.trace[-1]._replace(objective=total, chi2=found.chi2)])
 
 
 def _log_evidence(problem: Problem, mode: Mode) -> float:
@@ -181,9 +181,9 @@ def _log_evidence(problem: Problem, mode: Mode) -> float:
 
 
 def _figures(problem: Problem, mode: Mode, settings: FitSettings) -> dict[str, object]:
-    """Return the columns of `schema.ORDERS` that all measurements together give."""
+    """Return the columns of `schema.ORDERS` that describe the fit of all measurements."""
     figures: dict[str, object] = {
-        "n_terms": int(2 * problem.layout.n_coef - _n_held(problem.priors.width)),
+        "n_terms": int(2 * problem.layout.n_coef - _n_fixed(problem.priors.width)),
         "converged": mode.status.is_solution,
         **dict.fromkeys(("chi2", "dof", "effective_parameters", "log_evidence"), np.nan),
     }
@@ -196,15 +196,14 @@ def _figures(problem: Problem, mode: Mode, settings: FitSettings) -> dict[str, o
         "dof": 2 * problem.n_obs - parameters,
         "effective_parameters": parameters,
     }
-    # A flat prior has no density: each of its terms would change the evidence by what unit
-    # it happens to be written in.
+    # A flat prior has no density: each of its terms would make the evidence depend on the unit.
     if all(np.isfinite(settings.width(group.name)) for group in PER_COEFFICIENT):
         figures["log_evidence"] = _log_evidence(problem, mode)
     return figures
 
 
-def _n_held(width: Float[np.ndarray, " calib"]) -> int:
-    return int((width == _HELD).sum())
+def _n_fixed(width: Float[np.ndarray, " calib"]) -> int:
+    return int((width == _FIXED_WIDTH).sum())
 
 
 def _columns(held_out: HeldOut) -> dict[str, object]:

@@ -1,9 +1,9 @@
-"""Shared errors: what the catalogue's errors do to an orbit, the same in every orbit.
+"""Shared errors: shifts of the sources due to catalogue errors, which all orbits share.
 
-The catalogue errs by the same in all orbits, so that what follows from its errors does not
-average out. How far the shifts of one source in two orbits agree depends on the fields of
-both. So errors of the catalogue are drawn, for a star the same ones in every orbit, and their
-shifts kept: any mean or fit over orbits, made of these shifts, shows what it inherits.
+The catalogue has the same errors in all orbits, so their effect does not average out. How
+closely the shifts of a source in two orbits agree depends on the fields of both. Catalogue
+errors are therefore drawn, the same for a source in every orbit, and the resulting shifts are
+stored: any mean or fit over orbits of these shifts gives its own catalogue error.
 """
 
 import numpy as np
@@ -23,17 +23,17 @@ from solver.problem.problem import Problem
 from solver.results.diagnostics import error_budget, induced_shift
 from solver.results.tables import uncertainties
 
-# Part of the seed of each star's draws; the rest is its id.
+# First element of the seed of each source's draws; the second is its ID.
 _SEED = 20290
 
 
 def error_budget_table(
     problem: Problem, reduced: ReducedSystem, covariance: Covariances
 ) -> pd.DataFrame:
-    """Return `survey_schema.ERROR_BUDGET`: each source's covariance by what repeats.
+    """Return `survey_schema.ERROR_BUDGET`: each source's covariance due to noise and catalogue.
 
-    What the centres of the calibration's priors cause is counted with the noise: it is small,
-    and most of those centres are another orbit's no more.
+    Errors due to the prior centres of the calibration count as noise: they are small, and most
+    of these centres differ from orbit to orbit.
     """
     budget = error_budget(reduced, problem.priors, covariance)
     columns = {"source_id": problem.sources["source_id"].to_numpy()}
@@ -45,7 +45,7 @@ def error_budget_table(
 def shared_error_table(
     problem: Problem, reduced: ReducedSystem, settings: FitSettings
 ) -> pd.DataFrame:
-    """Return `survey_schema.SHARED_ERRORS`: the shifts of all sources in each draw."""
+    """Return `survey_schema.SHARED_ERRORS`: the shifts of all sources for each draw."""
     error = np.zeros((N_DRAWS, problem.n_src, 2))
     is_reference = problem.sources["is_reference"].to_numpy(bool)
     drawn = _drawn_errors(problem.sources[is_reference], problem.epoch)
@@ -64,7 +64,7 @@ def draws_of(table: pd.DataFrame) -> Float[np.ndarray, "row draw 2"]:
 
 
 def _drawn_errors(references: pd.DataFrame, epoch: float) -> Float[np.ndarray, "draw src 2"]:
-    """Return errors of catalogue positions at an epoch, those of a star from its id alone."""
+    """Return drawn errors of catalogue positions at an epoch, which depend on the ID only."""
     root = square_roots(catalogue_covariance(references))
     normal = np.stack([_normal(int(number)) for number in references["source_id"]])
     frame = tangent_frame(references["ra"].to_numpy(), references["dec"].to_numpy())

@@ -1,4 +1,4 @@
-"""History: what one orbit adds to the history of each of its sources."""
+"""History: the rows that one orbit adds to the history of its sources."""
 
 import numpy as np
 import pandas as pd
@@ -16,12 +16,12 @@ from solver.results.tables import separation
 def history_table(
     problem: Problem, reduced: ReducedSystem, covariance: Covariances, result: FitResult
 ) -> pd.DataFrame:
-    """Return `survey_schema.HISTORY` of one orbit, with `survey_schema.SHARED_ERRORS` beside it.
+    """Return `survey_schema.HISTORY` of one orbit, joined with `survey_schema.SHARED_ERRORS`.
 
     Parameters
     ----------
     reduced : the problem linearised at the solution
-    covariance : what follows from it
+    covariance : covariances of `reduced`
     result : the solution
     """
     sources = result.sources.merge(
@@ -35,7 +35,7 @@ def history_table(
 
 
 def _true_offsets(result: FitResult) -> dict[str, np.ndarray]:
-    """Return truth minus catalogue of every source, mas; NaN where there is no truth."""
+    """Return truth minus catalogue of every source, mas; NaN for sources without a truth."""
     sources, offset = result.sources, np.full((len(result.sources), 2), np.nan)
     if result.true_places is not None:
         known = np.isin(sources["source_id"], result.true_places["source_id"])

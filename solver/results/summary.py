@@ -1,4 +1,4 @@
-"""The summary of a fit: plain numbers and words, the same in files, `--json` and dashboard."""
+"""The summary of a fit: plain numbers and text, the same in files, `--json` and dashboard."""
 
 import numpy as np
 import pandas as pd
@@ -16,11 +16,11 @@ from solver.results.tables import SolvedProblem
 def summarise(
     solution: SolvedProblem, settings: FitSettings, seconds: dict[str, float]
 ) -> dict[str, object]:
-    """Return the summary of one fit; lengths in mas or pixels as the names say.
+    """Return the summary of one fit; residuals in pixels, other lengths in mas.
 
     Parameters
     ----------
-    seconds : time taken by each part of the work
+    seconds : wall time of each stage of the fit
     """
     problem, mode, residuals = solution.problem, solution.mode, solution.residuals
     is_reference = problem.sources["is_reference"].to_numpy(bool)
@@ -59,7 +59,7 @@ def summarise(
 
 
 def truth_summary(sources: pd.DataFrame, places: pd.DataFrame) -> dict[str, dict[str, float | int]]:
-    """Return deviations from the truth per class of sources with 10 or more measurements.
+    """Return deviations from the truth by class, of sources with at least `MIN_OBS` measurements.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ def truth_summary(sources: pd.DataFrame, places: pd.DataFrame) -> dict[str, dict
     Returns
     -------
     class -> figures; means and rms in mas, pulls with the marginal sigmas. `induced_*` is
-    the mean shift that the errors of the reference stars explain.
+    the mean shift due to errors of the reference sources.
     """
     joined = sources.merge(places, on="source_id", suffixes=("", "_true"))
     joined = joined[joined["n_obs"] >= MIN_OBS]
     cos_dec = np.cos(np.radians(joined["dec"]))
-    # Wrapped, so that a field across 0h does not deviate by a turn.
+    # Wrapped, because a field may extend across 0h.
     joined["deviation_ra"] = (
         ((joined["ra"] - joined["ra_true"] + 180.0) % 360.0 - 180.0) * cos_dec * 3.6e6
     )
@@ -90,7 +90,7 @@ MIN_OBS = 10
 
 
 def class_members(sources: pd.DataFrame) -> dict[str, pd.Series]:
-    """Return which sources are reference, non-reference and artificial ones."""
+    """Return the members of each class: reference, non-reference and artificial sources."""
     reference = sources["is_reference"].astype(bool)
     artificial = sources["is_artificial"].astype(bool) & ~reference
     return {

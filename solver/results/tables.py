@@ -1,4 +1,4 @@
-"""The result tables of `solver.data.schema`, made from where an engine ended."""
+"""The result tables of `solver.data.schema`, computed from the estimate of an engine."""
 
 from typing import NamedTuple
 
@@ -32,11 +32,11 @@ from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
 
 
 class SolvedProblem(NamedTuple):
-    """A mode with what follows from it, from which all tables are made.
+    """An estimate with its covariances and residuals, from which all tables are computed.
 
-    `covariance` holds those of the linearised problem; what the tables say of the sources is
-    `conditional`, with the calibration held fixed, and `marginal` (both mas^2), and of the
-    calibration `theta_variance`: the engine's own where it has them.
+    `covariance` has the covariances of the linearised problem. The tables use `conditional` and
+    `marginal` of the sources (mas^2) and `theta_variance` of the calibration, which are the
+    engine's own if it computes them.
     """
 
     problem: Problem
@@ -50,7 +50,7 @@ class SolvedProblem(NamedTuple):
 
 
 def solved_problem(problem: Problem, found: Estimate, reduced: ReducedSystem) -> SolvedProblem:
-    """Return an estimate with all covariances and the residuals.
+    """Return an estimate with its covariances and residuals.
 
     Parameters
     ----------
@@ -133,11 +133,11 @@ def exposure_table(solution: SolvedProblem) -> pd.DataFrame:
 
 
 def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.DataFrame:
-    """Return `schema.CALIBRATION`: every group of the parameter table but the sources."""
+    """Return `schema.CALIBRATION`: all parameter groups except the sources."""
     problem, theta = solution.problem, solution.mode.theta
     priors = problem.priors
     marginal = solution.theta_variance
-    of_columns = {
+    by_column = {
         "offset": theta,
         "prior_sigma": priors.width,
         "sigma_conditional": 1.0 / np.sqrt(np.diag(solution.reduced.theta)),
@@ -145,12 +145,12 @@ def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.Dat
         "prior_share": priors.hessian_diagonal(theta) * marginal,
     }
     pointing = _pointing(problem, theta)
-    parts = []
+    frames = []
     for group in CALIBRATION_GROUPS:
         columns = problem.layout.columns(group)
         centre = priors.centre[columns] / group.per_value_unit
         value = pointing.get(group.name, centre + theta[columns] / group.per_value_unit)
-        part = {
+        values_by_name = {
             "group": np.full(len(columns), group.name),
             "element": np.arange(len(columns)),
             "label": np.array(_labels(group, problem, instrument), dtype=object),
@@ -158,10 +158,10 @@ def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.Dat
             "prior_centre": centre,
             "value_unit": np.full(len(columns), group.value_unit),
             "unit": np.full(len(columns), group.unit),
-            **{name: values[columns] for name, values in of_columns.items()},
+            **{name: values[columns] for name, values in by_column.items()},
         }
-        parts.append(_frame(part, CALIBRATION))
-    return pd.concat(parts, ignore_index=True)
+        frames.append(_frame(values_by_name, CALIBRATION))
+    return pd.concat(frames, ignore_index=True)
 
 
 def trace_table(mode: Mode) -> pd.DataFrame:
@@ -170,14 +170,14 @@ def trace_table(mode: Mode) -> pd.DataFrame:
 
 
 def loss_table(losses: Float[np.ndarray, " step"] | None) -> pd.DataFrame | None:
-    """Return `schema.LOSSES`, of an engine that has a loss."""
+    """Return `schema.LOSSES`, or None if the engine has no loss."""
     if losses is None:
         return None
     return _frame({"step": np.arange(1, len(losses) + 1), "loss": losses}, LOSSES)
 
 
 def true_places(solution: SolvedProblem, truth: pd.DataFrame | None) -> pd.DataFrame | None:
-    """Return `schema.TRUE_PLACES` of the measured sources that `truth` holds."""
+    """Return `schema.TRUE_PLACES` of the measured sources in `truth`."""
     if truth is None:
         return None
     problem = solution.problem
@@ -213,8 +213,8 @@ def separation(
 
     Parameters
     ----------
-    frame : of the prior position
-    direction : of the true one
+    frame : tangent frame at the prior position
+    direction : unit vector to the true position
     """
     return -np.einsum("sij,sj->si", frame[:, 1:], direction) / RAD_PER_MAS
 
@@ -228,7 +228,7 @@ def _displaced(
 def _pointing(
     problem: Problem, theta: Float[np.ndarray, " calib"]
 ) -> dict[str, Float[np.ndarray, " exp"]]:
-    """Return the pointings in degrees; their offsets lie in the tangent plane."""
+    """Return the pointings in degrees, from their offsets in the tangent plane."""
     values = problem.layout.scatter(theta)
     offset = np.stack([values["pointing_ra"], values["pointing_dec"]], axis=-1)
     frame = np.asarray(problem.geometry.pointing_frame)[: len(offset)]
@@ -253,10 +253,10 @@ def _sigmas(covariance: Float[np.ndarray, "src 2 2"]) -> Float[np.ndarray, "src 
 def uncertainties(
     kind: str, covariance: Float[np.ndarray, "src 2 2"]
 ) -> dict[str, Float[np.ndarray, " src"]]:
-    """Return sigmas and correlation of each source as columns named by the kind."""
+    """Return sigmas and correlation of each source as columns with `kind` in their names."""
     sigma = _sigmas(covariance)
     product = sigma[:, 0] * sigma[:, 1]
-    # What has no variance is correlated with nothing.
+    # The correlation is zero where a variance is zero.
     correlation = np.divide(
         covariance[:, 0, 1], product, out=np.zeros(len(product)), where=product > 0.0
     )

@@ -1,4 +1,4 @@
-"""Time series: what the orbits of a survey say together of each source, and of all.
+"""Time series: statistics over the orbits of a survey, for each source and for all.
 
 Paper, section "Time-series" and Fig. "discussion:test:rms".
 """
@@ -15,25 +15,25 @@ from solver.results.motion import MotionFit, fit_motions
 from solver.results.shared_errors import draws_of
 
 _AXES = ("ra", "dec")
-# A mean square over fewer samples says little.
-_FEWEST_SAMPLES = 10
+# Minimum number of samples of a mean square.
+_MIN_SAMPLES = 10
 
 
 def motion_table(history: pd.DataFrame, epoch: float) -> pd.DataFrame:
-    """Return `survey_schema.MOTIONS`; arguments as those of `solver.results.motion.fit_motions`."""
+    """Return `survey_schema.MOTIONS`; arguments as for `solver.results.motion.fit_motions`."""
     fit = fit_motions(history, epoch)
     count = np.diff(fit.first, append=len(history))
-    start = history.iloc[fit.first]
+    first_rows = history.iloc[fit.first]
     years = julian_year(history["epoch"].to_numpy())
     columns: dict[str, object] = {
         "source_id": fit.source_id,
-        "is_reference": start["is_reference"].to_numpy(bool),
-        "is_artificial": start["is_artificial"].to_numpy(bool),
+        "is_reference": first_rows["is_reference"].to_numpy(bool),
+        "is_artificial": first_rows["is_artificial"].to_numpy(bool),
         "n_orbits": count,
         "n_obs": np.add.reduceat(history["n_obs"].to_numpy(), fit.first),
         "span": years[fit.first + count - 1] - years[fit.first],
         "epoch": np.full(len(count), epoch),
-        **_of_parameters(fit),
+        **_parameter_columns(fit),
         "chi2": np.where(np.isnan(fit.motion[:, 0]), np.nan, fit.chi2),
         "dof": 2 * count - N_PARAMETERS,
         **_scatter(fit, count),
@@ -44,7 +44,7 @@ def motion_table(history: pd.DataFrame, epoch: float) -> pd.DataFrame:
 
 
 class _Sums(NamedTuple):
-    """Running sums over the orbits of a source, from its first one."""
+    """Cumulative sums over all rows of the history."""
 
     error: Float[np.ndarray, "n 2"]
     noise: Float[np.ndarray, "n 2"]
@@ -52,15 +52,15 @@ class _Sums(NamedTuple):
 
 
 def errors_by_count(history: pd.DataFrame, counts: list[int]) -> pd.DataFrame:
-    """Return `survey_schema.ERRORS_BY_COUNT`: how errors fall with the orbits averaged.
+    """Return `survey_schema.ERRORS_BY_COUNT`: the error as a function of the orbits averaged.
 
-    Each source's orbits, in order of time, are cut into groups of N; the error is that of the
-    mean position of a group, less the truth.
+    The orbits of each source, in order of time, are divided into groups of N; the error is the
+    mean position of a group minus the truth.
 
     Parameters
     ----------
-    history : of the sources to average, as for `solver.results.motion.fit_motions`, with truth
-    counts : the N
+    history : history of the sources, as for `solver.results.motion.fit_motions`, with truth
+    counts : values of N
     """
     first = np.unique(history["source_id"].to_numpy(), return_index=True)[1]
     error = _deviations(history)
@@ -71,7 +71,7 @@ def errors_by_count(history: pd.DataFrame, counts: list[int]) -> pd.DataFrame:
 
 
 def _running(values: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
-    """Return the sums of all rows before each row, and of all."""
+    """Return the sum of all rows before each row, and of all rows."""
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
 
 
@@ -83,23 +83,23 @@ def _errors_of(
     begin = np.repeat(first, groups) + count * (
         np.arange(groups.sum()) - np.repeat(np.cumsum(groups) - groups, groups)
     )
-    if len(begin) < _FEWEST_SAMPLES:
+    if len(begin) < _MIN_SAMPLES:
         return None
     error, noise, drawn = (total[begin + count] - total[begin] for total in sums)
     measured = float(np.mean((error / count) ** 2))
-    of_noise = float(np.mean(noise) / count**2)
-    # One value for each draw of the catalogue's errors, of which nature made one.
+    noise_square = float(np.mean(noise) / count**2)
+    # One value for each draw of the catalogue errors; the real errors are a single draw.
     floors = np.mean((drawn / count) ** 2, axis=(0, 2))
-    expected = of_noise + float(floors.mean())
-    spread = np.sqrt(2.0 * of_noise**2 / error.size + float(floors.var()))
+    expected = noise_square + float(floors.mean())
+    spread = np.sqrt(2.0 * noise_square**2 / error.size + float(floors.var()))
     sigma = 0.5 * spread / np.sqrt(expected)
     root = np.sqrt(measured)
     floor = float(np.sqrt(floors.mean()))
-    figures = (root, max(root - sigma, 0.0), root + sigma, np.sqrt(expected), np.sqrt(of_noise))
+    figures = (root, max(root - sigma, 0.0), root + sigma, np.sqrt(expected), np.sqrt(noise_square))
     return (count, int((groups > 0).sum()), *map(float, figures), floor)
 
 
-def _of_parameters(fit: MotionFit) -> dict[str, Float[np.ndarray, " src"]]:
+def _parameter_columns(fit: MotionFit) -> dict[str, Float[np.ndarray, " src"]]:
     noise, shared = (np.diagonal(c, axis1=1, axis2=2) for c in (fit.noise, fit.catalogue))
     sigma = np.sqrt(noise + shared)
     by_prefix = {
@@ -118,7 +118,7 @@ def _of_parameters(fit: MotionFit) -> dict[str, Float[np.ndarray, " src"]]:
 
 
 def _scatter(fit: MotionFit, count: Int[np.ndarray, " src"]) -> dict[str, np.ndarray]:
-    """Return the scatter about the motion; half the parameters belong to each coordinate."""
+    """Return the scatter about the motion, counting half of the parameters per coordinate."""
     freedom = np.where(count > N_PARAMETERS / 2, count - N_PARAMETERS / 2, np.nan)[:, None]
     measured, expected = (
         np.sqrt(np.add.reduceat(values, fit.first) / freedom)
@@ -132,9 +132,9 @@ def _deviation(
 ) -> dict[str, np.ndarray]:
     n = count[:, None]
     variance = history[["sigma_ra_noise", "sigma_dec_noise"]].to_numpy() ** 2
-    of_noise = np.add.reduceat(variance, fit.first) / n**2
-    of_draws = np.add.reduceat(fit.drawn, fit.first) / n[:, None]
-    expected = np.sqrt(of_noise + np.mean(of_draws**2, axis=1))
+    noise_square = np.add.reduceat(variance, fit.first) / n**2
+    mean_draws = np.add.reduceat(fit.drawn, fit.first) / n[:, None]
+    expected = np.sqrt(noise_square + np.mean(mean_draws**2, axis=1))
     mean = np.add.reduceat(_deviations(history), fit.first) / n
     return _by_axis("mean_deviation", mean) | _by_axis("expected_deviation", expected)
 

@@ -1,10 +1,10 @@
-"""Time `plateviz fit` from a cold process on a full-size orbit, compilations kept and not.
+"""Time `plateviz fit` in a new process on a full-size orbit, with and without a compilation cache.
 
     python tests/benchmarks/bench_cold.py [--sources 6480] [--repeat 3]
 
 The wall time is that of the whole command: start of Python, imports, reading FITS, the fit
-with all tables, writing FITS. The limit is 12 s and the goal 8 s, with compilations kept.
-The unit is that of `bench_fit.py`. What the operating system keeps of files is warm.
+with all tables, writing FITS. With cached compilations the limit is 12 s and the goal 8 s. The
+unit is that of `bench_fit.py`. The file cache of the operating system is warm.
 """
 
 import argparse
@@ -18,10 +18,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-# The checkout is measured, wherever it is run from.
+# Import this checkout, whatever the working directory.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-# Before NumPy, as in the program: it sets how long idle BLAS threads spin.
+# Imported before NumPy, as in the program, because it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
 import pandas as pd
@@ -41,9 +41,11 @@ IMPORTS = "import plateviz.cli.fit, solver.fit, solver.io.result"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Time one fit from a cold process.")
+    parser = argparse.ArgumentParser(description="Time one fit in a new process.")
     parser.add_argument("--sources", type=int, default=SOURCES_OF_THE_PAPER)
-    parser.add_argument("--repeat", type=int, default=3, help="runs of each; medians count")
+    parser.add_argument(
+        "--repeat", type=int, default=3, help="runs of each command; medians are reported"
+    )
     arguments = parser.parse_args()
     data = simulated_orbit(survey_of(arguments.sources))
     unit = time_of(unit_product(build_problem(data, MINI_MOCK, FitSettings())), UNIT_REPEATS)
@@ -71,18 +73,18 @@ def _hdu(name: str, frame: pd.DataFrame) -> fits.BinTableHDU:
 
 
 def timings(folder: Path, repeat: int) -> Iterator[tuple[str, tuple[float, float | None]]]:
-    """Yield what was run, and the medians of its wall time and of its time on all cores, s."""
+    """Yield the name of each command, and the medians of its wall time and CPU time, s."""
     yield (
         "Python and its imports",
         medians([run(["-c", IMPORTS], folder)[1] for _ in range(repeat)]),
     )
     yield (
-        "plateviz fit, nothing compiled",
+        "plateviz fit, empty compilation cache",
         medians([fit(folder / f"{i}", folder)[1] for i in range(repeat)]),
     )
-    kept = [fit(folder / "0", folder) for _ in range(repeat)]
-    yield "plateviz fit, compilations kept", medians([seconds for _, seconds in kept])
-    summaries = [json.loads(output)["seconds"] for output, _ in kept]
+    cached = [fit(folder / "0", folder) for _ in range(repeat)]
+    yield "plateviz fit, cached compilations", medians([seconds for _, seconds in cached])
+    summaries = [json.loads(output)["seconds"] for output, _ in cached]
     for stage in summaries[0]:
         wall = statistics.median(summary[stage] for summary in summaries)
         yield f"  of which {stage}", (wall, None)
@@ -105,10 +107,10 @@ def fit(cache: Path, folder: Path) -> tuple[str, tuple[float, float]]:
 def run(
     command: list[str], folder: Path, variables: Mapping[str, str] | None = None
 ) -> tuple[str, tuple[float, float]]:
-    """Run Python in a process of its own; return its output, wall and CPU time, s."""
+    """Run Python in a new process and return its output, wall time and CPU time, s."""
     environment = {**os.environ, "PYTHONPATH": str(REPOSITORY), **(variables or {})}
     before, start = os.times(), time.perf_counter()
-    done = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, *command],
         cwd=folder,
         env=environment,
@@ -120,7 +122,7 @@ def run(
     cpu = (
         after.children_user + after.children_system - before.children_user - before.children_system
     )
-    return done.stdout, (wall, cpu)
+    return completed.stdout, (wall, cpu)
 
 
 def medians(pairs: list[tuple[float, float]]) -> tuple[float, float]:

@@ -1,10 +1,10 @@
-"""Time one full-size fit, warm, in units of one matrix product.
+"""Time the stages of one full-size fit in a warm process, in units of one matrix product.
 
     python tests/benchmarks/bench_fit.py [--sources 7000] [--repeat 5]
 
 One unit is NumPy's `Z.T @ Z` for a float64 Z of 2 x sources rows and as many columns as
 there are calibration parameters: the largest product that the elimination of the sources
-needs. It is timed in the same run, so that results of different machines compare.
+needs. It is timed in the same run, so that results of different machines can be compared.
 """
 
 import argparse
@@ -13,10 +13,10 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-# The checkout is measured, wherever it is run from.
+# Import this checkout, whatever the working directory.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-# Before NumPy, as in the program: it sets how long idle BLAS threads spin.
+# Imported before NumPy, as in the program, because it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
 from solver.data.exclusions import Exclusions
@@ -50,17 +50,17 @@ def main() -> None:
     data = simulated_orbit(survey_of(arguments.sources))
     settings = FitSettings()
     problem = build_problem(data, MINI_MOCK, settings)
-    # Warm: everything compiled, memory touched.
+    # Warm up: compile everything and touch the memory.
     warm = fit_orbit(data, MINI_MOCK, settings)
-    # Before the other stages, which keep several solutions at once.
+    # Measured before the other stages, which keep several solutions at once.
     peak = peak_memory_mib()
     product, units, timings = unit_product(problem), [], {}
     for name, work in stages(data, problem, settings).items():
-        # Before each stage: a machine that others use, too, is not as fast all the time.
+        # Timed before each stage, because the speed of a shared machine varies.
         units.append(time_of(product, UNIT_REPEATS))
         timings[name] = time_of(work, arguments.repeat)
     unit = statistics.median(units)
-    # A step is timed as its share of a block, linearisations included.
+    # The time of a step includes its share of the linearisations of a block.
     timings["svi, one step"] /= settings.svi.block
     write(machine())
     write(f"JAX on {device()}")
@@ -78,15 +78,17 @@ def main() -> None:
 
 def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Time one full-size fit.")
-    parser.add_argument("--sources", type=int, default=7000, help="about as many in the orbit")
-    parser.add_argument("--repeat", type=int, default=5, help="runs of each stage; medians count")
+    parser.add_argument("--sources", type=int, default=7000, help="approximate number in the orbit")
+    parser.add_argument(
+        "--repeat", type=int, default=5, help="runs of each stage; medians are reported"
+    )
     return parser.parse_args()
 
 
 def stages(
     data: OrbitData, problem: Problem, settings: FitSettings
 ) -> dict[str, Callable[[], object]]:
-    """Return what is timed, by name."""
+    """Return the timed stages by name."""
     mode = find_mode(problem, settings)
     theta, sources = mode.theta, mode.sources
     equations = accumulate(problem, theta, sources)
@@ -111,11 +113,11 @@ def stages(
 
 
 def changes(problem: Problem) -> dict[str, tuple[FitSettings, ...]]:
-    """Return the settings of a fit, those that it is re-solved for, and those made ready before."""
+    """Return by name the settings of a fit, of a what-if, and of a precomputed warm start."""
     middle = problem.exposures.iloc[len(problem.exposures) // 2]
     reference = problem.sources.loc[problem.sources["is_reference"], "source_id"]
-    left_out = {
-        "no reference star": Exclusions(sources=frozenset([int(reference.iloc[0])])),
+    exclusions = {
+        "no reference source": Exclusions(sources=frozenset([int(reference.iloc[0])])),
         "no exposure": Exclusions(
             exposures=frozenset([(int(middle["field_id"]), int(middle["plate_id"]))])
         ),
@@ -125,18 +127,18 @@ def changes(problem: Problem) -> dict[str, tuple[FitSettings, ...]]:
     return {
         "sources' priors": (default, FitSettings(prior_widths={"sources": 2.0})),
         "detectors' priors": (default, FitSettings(prior_widths={"detector_x": 10.0})),
-        **{name: (default, FitSettings(exclusions=gone)) for name, gone in left_out.items()},
-        # From one order more than the distortion has, so that the lower one fits as well.
+        **{name: (default, FitSettings(exclusions=e)) for name, e in exclusions.items()},
+        # From one order more than the true one, so that the lower order also fits.
         "order 6 to 5": (FitSettings(order=6), default),
-        "order 6 to 5, made ready": (FitSettings(order=6), default, default),
-        "order 6 to 2, made ready": (FitSettings(order=6), *2 * (FitSettings(order=2),)),
+        "order 6 to 5, precomputed": (FitSettings(order=6), default, default),
+        "order 6 to 2, precomputed": (FitSettings(order=6), *2 * (FitSettings(order=2),)),
     }
 
 
 def svi_block(problem: Problem, settings: FitSettings, mode: Mode) -> Callable[[], object]:
-    """Return one block of steps from the mode."""
+    """Return work that makes one block of steps from the mode."""
     start = start_state(problem, settings.svi)._replace(theta=mode.theta, sources=mode.sources)
-    work = lambda: next(blocks(problem, settings, start))  # noqa: E731 timed as the others are
+    work = lambda: next(blocks(problem, settings, start))  # noqa: E731 timed like the others
     work()
     return work
 

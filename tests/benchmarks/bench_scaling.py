@@ -3,10 +3,10 @@
     python tests/benchmarks/bench_scaling.py [--measurements 10000 100000] [--exposures 24 384]
                                              [--repeat 3] [--write assets/docs]
 
-Each size is simulated in one process and measured in another, fresh one, so that its peak
+Each size is simulated in one process and measured in another, new process, so that its peak
 memory is that of the fit alone. All times are medians of warm runs. The unit is that of
-`bench_fit.py`, timed for each size. With `--write`, the folder gets `scaling.csv` and
-`scaling.svg`, and its `scaling.md` the table.
+`bench_fit.py`, timed for each size. `--write` writes `scaling.csv` and `scaling.svg` to the
+folder, and the table into its `scaling.md`.
 """
 
 import argparse
@@ -17,10 +17,10 @@ from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-# The checkout is measured, wherever it is run from.
+# Import this checkout, whatever the working directory.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-# Before NumPy, as in the program: it sets how long idle BLAS threads spin.
+# Imported before NumPy, as in the program, because it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
 from solver.fit import fit_orbit
@@ -70,40 +70,46 @@ def parse_arguments() -> argparse.Namespace:
         type=int,
         nargs="*",
         default=MEASUREMENTS,
-        help=f"about so many, on {EXPOSURES_OF_THE_PAPER} exposures",
+        help=f"approximate numbers of measurements, on {EXPOSURES_OF_THE_PAPER} exposures",
     )
     parser.add_argument(
-        "--exposures", type=int, nargs="*", default=EXPOSURES, help="of the paper's stars"
+        "--exposures",
+        type=int,
+        nargs="*",
+        default=EXPOSURES,
+        help="numbers of exposures, of the paper's stars",
     )
-    parser.add_argument("--repeat", type=int, default=3, help="runs of each stage; medians count")
+    parser.add_argument(
+        "--repeat", type=int, default=3, help="runs of each stage; medians are reported"
+    )
     parser.add_argument("--write", type=Path, help="folder for the table and the plot")
     return parser.parse_args()
 
 
 def sizes(arguments: argparse.Namespace) -> Iterator[tuple[int, int]]:
-    """Yield measurements, as many as 96 exposures would have, and exposures."""
+    """Yield the number of measurements, for 96 exposures, and the number of exposures."""
     along_both = [(count, EXPOSURES_OF_THE_PAPER) for count in arguments.measurements]
     along_both += [(MEASUREMENTS_OF_THE_PAPER, count) for count in arguments.exposures]
     yield from dict.fromkeys(along_both)
 
 
 def measured(measurements: int, exposures: int, repeat: int) -> tuple[Row, str]:
-    """Simulate and measure one size, each in a process of its own."""
+    """Simulate and measure one size, each in its own process."""
     sources = measurements / MEASUREMENTS_OF_THE_PAPER * SOURCES_OF_THE_PAPER
     survey = survey_of(sources, exposures)
-    fresh = ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1)
-    with TemporaryDirectory() as folder, fresh:
+    pool = ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1)
+    with TemporaryDirectory() as folder, pool:
         directory = Path(folder) / "survey"
-        fresh.submit(simulate_survey, directory, survey).result()
-        return fresh.submit(measure, directory, survey.n_stars, repeat).result()
+        pool.submit(simulate_survey, directory, survey).result()
+        return pool.submit(measure, directory, survey.n_stars, repeat).result()
 
 
 def measure(directory: Path, stars: int, repeat: int) -> tuple[Row, str]:
     data, settings = read_survey_orbit(directory, ORBIT), FitSettings()
-    # Warm: everything compiled, memory touched.
+    # Warm up: compile everything and touch the memory.
     if not fit_orbit(data, MINI_MOCK, settings).summary["converged"]:
         sys.exit(f"the fit of {len(data.measurements)} measurements did not converge")
-    # Before the other stages, which keep several solutions at once.
+    # Measured before the other stages, which keep several solutions at once.
     peak = peak_memory_mib()
     problem = build_problem(data, MINI_MOCK, settings)
     mode = find_mode(problem, settings)

@@ -1,11 +1,11 @@
-"""Time the store's questions on made-up tables of any number of orbits.
+"""Time the queries of a run on generated tables of any number of orbits.
 
     python tests/benchmarks/bench_store.py [--orbits 6000] [--sources 20000]
 
-The history is generated as `plateviz survey` gathers it: in order of source, in groups of rows.
-Its values are drawn from 256 numbers, so that thousands of orbits fit on a disk; their number,
-their types and what is read of them are those of a real one. The unit is one pass of NumPy over
-as many numbers as the history has rows (`sum` of float64), timed in the same run.
+The history has the layout that `plateviz survey` writes: in order of source, in groups of rows.
+Its values are drawn from 256 numbers, so that thousands of orbits fit on a disk; the number of
+values, their types and the columns read are those of a real history. The unit is one pass of
+NumPy over as many numbers as the history has rows (`sum` of float64), timed in the same run.
 """
 
 import argparse
@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-# The checkout is measured, wherever it is run from.
+# Import this checkout, whatever the working directory.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import numpy as np
@@ -36,7 +36,7 @@ def main() -> None:
     with TemporaryDirectory(prefix="plateviz-") as scratch:
         run = SurveyRun(Run(Path(scratch), "made-up"))
         run.directory.mkdir(parents=True)
-        made_up(run.directory, arguments.orbits, arguments.sources)
+        write_tables(run.directory, arguments.orbits, arguments.sources)
         rows = arguments.orbits * arguments.sources
         size = (run.directory / HISTORY_FILE).stat().st_size / 2**30
         values = np.ones(rows)
@@ -44,24 +44,24 @@ def main() -> None:
         write(machine())
         write(f"{rows:,} rows of {arguments.orbits} orbits, {size:.1f} GiB; unit {unit:.4f} s\n")
         source = _FIRST_ID + arguments.sources // 2
-        for name, question in {
+        for name, query in {
             "history of one source": lambda: run.history(source),
             "counts of all sources": run.counts,
-            "what classes of sources scatter by": lambda: run.classes(80),
+            "scatter of classes of sources": lambda: run.classes(80),
         }.items():
-            seconds = time_of(question, _REPEAT)
+            seconds = time_of(query, _REPEAT)
             write(f"{name:<40}{seconds:9.3f} s{seconds / unit:9.1f} units")
 
 
 def parse_arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Time the store's questions.")
+    parser = argparse.ArgumentParser(description="Time the queries of a run.")
     parser.add_argument("--orbits", type=int, default=6000)
     parser.add_argument("--sources", type=int, default=20_000, help="in each orbit")
     return parser.parse_args()
 
 
-def made_up(directory: Path, orbits: int, sources: int) -> None:
-    """Write a history in which every source was measured in every orbit, and its motions."""
+def write_tables(directory: Path, orbits: int, sources: int) -> None:
+    """Write a history with every source in every orbit, and the motions."""
     rng = np.random.default_rng(0)
     values = rng.standard_normal(256)
     schema = pa.schema([(c.name, pa.type_for_alias(c.dtype)) for c in HISTORY])

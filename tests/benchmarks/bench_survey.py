@@ -1,10 +1,10 @@
-"""Time a survey: simulated, fitted by one worker and by two, killed and gone on with.
+"""Time a survey: its simulation, runs with one and two workers, and a killed and resumed run.
 
     python tests/benchmarks/bench_survey.py [--orbits 8] [--stars 132651] [--kills 0] [--keep DIR]
 
-The unit is that of `bench_fit.py`, for the survey's first orbit. With `--kills` a run of its own
-is killed (SIGKILL, all its processes) so many times at random moments and begun again, and then
-compared with the one that was not, byte for byte.
+The unit is that of `bench_fit.py`, for the survey's first orbit. With `--kills N` a further run
+is killed N times at random moments (SIGKILL to all its processes), resumed each time, and then
+compared byte for byte with the uninterrupted run.
 """
 
 import argparse
@@ -18,10 +18,10 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-# The checkout is measured, wherever it is run from.
+# Import this checkout, whatever the working directory.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-# Before NumPy, as in the program: it sets how long idle BLAS threads spin.
+# Imported before NumPy, as in the program, because it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
 from plateviz.runs.queries import SurveyRun
@@ -58,34 +58,35 @@ def main() -> None:
             )
         report(seconds, arguments.orbits, unit)
         one, two = (Run(survey, f"by-{workers}") for workers in (1, 2))
-        write(f"\nworkers 2 against 1: {ratio(seconds):.2f} times as fast")
-        write(f"the same bytes by both: {contents(one) == contents(two)}")
+        write(f"\ntwo workers compared with one: {ratio(seconds):.2f} times as fast")
+        write(f"identical files from both: {contents(one) == contents(two)}")
         peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * _MIB_PER_KIB
         write(f"peak memory of one process: {peak:.0f} MiB")
         disk = sum(path.stat().st_size for path in two.directory.rglob("*") if path.is_file())
         write(f"disk: {disk / arguments.orbits / 2**20:.1f} MiB for each orbit")
-        ask(SurveyRun(two))
+        time_queries(SurveyRun(two))
         if arguments.kills:
-            write(f"the same bytes after {arguments.kills} kills: {killed(survey, two, arguments)}")
+            is_same = survives_kills(survey, two, arguments)
+            write(f"identical files after {arguments.kills} kills: {is_same}")
 
 
 def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Time a survey.")
     parser.add_argument("--orbits", type=int, default=8)
     parser.add_argument("--stars", type=int, default=132_651)
-    parser.add_argument("--kills", type=int, default=0, help="times that a run is killed")
+    parser.add_argument("--kills", type=int, default=0, help="number of times that a run is killed")
     parser.add_argument("--keep", help="folder to keep the survey in")
     return parser.parse_args()
 
 
-def command(*words: object) -> list[str]:
-    return [sys.executable, "-m", "plateviz.cli.main", *map(str, words)]
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "plateviz.cli.main", *map(str, arguments)]
 
 
-def seconds_of(*words: object) -> float:
-    """Return the wall time of a command of plateviz, imports and compilations included."""
+def seconds_of(*arguments: object) -> float:
+    """Return the wall time of a plateviz command, including imports and compilations."""
     start = time.perf_counter()
-    subprocess.run(command(*words), check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(command(*arguments), check=True, stdout=subprocess.DEVNULL)
     return time.perf_counter() - start
 
 
@@ -102,7 +103,7 @@ def report(seconds: dict[str, float], orbits: int, unit: float) -> None:
 
 
 def contents(run: Run) -> dict[str, bytes]:
-    """Return the bytes of every file of a run, but of those that hold times."""
+    """Return the bytes of every file of a run, except the file of timings."""
     return {
         str(path.relative_to(run.directory)): path.read_bytes()
         for path in sorted(run.directory.rglob("*"))
@@ -110,35 +111,37 @@ def contents(run: Run) -> dict[str, bytes]:
     }
 
 
-def ask(run: SurveyRun) -> None:
-    """Time the store's questions, warm."""
+def time_queries(run: SurveyRun) -> None:
+    """Time the queries of a run with warm caches."""
     counts = run.counts()
-    often = int(counts.loc[counts["n_orbits"].idxmax(), "source_id"])
-    for name, question in {
-        "history of one source": lambda: run.history(often),
+    most_frequent = int(counts.loc[counts["n_orbits"].idxmax(), "source_id"])
+    for name, query in {
+        "history of one source": lambda: run.history(most_frequent),
         "counts of all sources": run.counts,
         "orbits with their health": run.orbits,
     }.items():
-        write(f"{name}: {1e3 * time_of(question, 5):.0f} ms")
+        write(f"{name}: {1e3 * time_of(query, 5):.0f} ms")
 
 
-def killed(survey: Path, whole: Run, arguments: argparse.Namespace) -> bool:
-    """Return whether a run that is killed over and over ends as one that is not."""
+def survives_kills(survey: Path, uninterrupted: Run, arguments: argparse.Namespace) -> bool:
+    """Return whether a run that is killed repeatedly writes the same files as another run."""
     rng, run = random.Random(0), Run(survey, "killed")
     finished: set[int] = set()
     for kill in range(arguments.kills):
-        words = command("survey", survey, "--run", run.name)
-        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True)
+        arguments_of_run = command("survey", survey, "--run", run.name)
+        process = subprocess.Popen(
+            arguments_of_run, stdout=subprocess.DEVNULL, start_new_session=True
+        )
         time.sleep(rng.uniform(1.0, 25.0))
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        there = set(run.complete_orbits())
-        write(f"kill {kill + 1}: {len(there)} orbits there")
-        if not finished <= there:
+        complete = set(run.complete_orbits())
+        write(f"kill {kill + 1}: {len(complete)} orbits complete")
+        if not finished <= complete:
             return False
-        finished = there
+        finished = complete
     seconds_of("survey", survey, "--run", run.name)
-    return contents(run) == contents(whole)
+    return contents(run) == contents(uninterrupted)
 
 
 if __name__ == "__main__":

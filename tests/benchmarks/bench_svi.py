@@ -1,9 +1,9 @@
-"""Tell after how many steps the svi engine agrees with gauss-newton, on full-size orbits.
+"""Count the steps after which the svi engine agrees with gauss-newton, on full-size orbits.
 
     python tests/benchmarks/bench_svi.py [--orbits 3] [--sources 7000]
 
-Each orbit starts from the catalogue; a seed of the simulation makes each another one. The shift is
-the largest of any coordinate of a source from the mode, in its marginal sigma.
+Each fit starts from the catalogue; each orbit is simulated with another seed. The shift is the
+largest distance of any coordinate of a source from the mode, in its marginal sigma.
 """
 
 import argparse
@@ -12,10 +12,10 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-# The checkout is measured, wherever it is run from.
+# Import this checkout, whatever the working directory.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-# Before NumPy, as in the program: it sets how long idle BLAS threads spin.
+# Imported before NumPy, as in the program, because it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
 import numpy as np
@@ -30,9 +30,10 @@ from solver.engines.svi import SviState, variational
 from tests.benchmarks.machine import machine, write
 from tests.benchmarks.orbits import simulated_orbit, survey_of
 
-# What counts as agreement: of a marginal sigma.
+# Largest shift that counts as agreement, in marginal sigmas.
 _AGREES = 0.05
-_EVERY = 500
+# Steps between two reported shifts.
+_REPORT_STEPS = 500
 
 
 def main() -> None:
@@ -42,17 +43,21 @@ def main() -> None:
     survey, settings = survey_of(arguments.sources), FitSettings(engine="svi")
     for seed in range(arguments.orbits):
         data = simulated_orbit(replace(survey, seed=seed))
-        tell(build_problem(data, MINI_MOCK, settings), settings, seed)
+        report_agreement(build_problem(data, MINI_MOCK, settings), settings, seed)
 
 
 def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Count the steps of the svi engine.")
-    parser.add_argument("--orbits", type=int, default=3, help="how many are simulated and fitted")
-    parser.add_argument("--sources", type=int, default=7000, help="about as many in each")
+    parser.add_argument(
+        "--orbits", type=int, default=3, help="number of orbits to simulate and fit"
+    )
+    parser.add_argument(
+        "--sources", type=int, default=7000, help="approximate number in each orbit"
+    )
     return parser.parse_args()
 
 
-def tell(problem: Problem, settings: FitSettings, seed: int) -> None:
+def report_agreement(problem: Problem, settings: FitSettings, seed: int) -> None:
     exact = find_mode(problem, settings)
     if exact.reduced is None:
         sys.exit(f"the simulated orbit {seed} has no solution")
@@ -65,10 +70,10 @@ def tell(problem: Problem, settings: FitSettings, seed: int) -> None:
     start = time.perf_counter()
     found = variational(problem, settings, keep=keep)
     seconds = time.perf_counter() - start
-    last_apart = max((step for step, shift in shifts.items() if shift > _AGREES), default=0)
+    last_disagreement = max((step for step, shift in shifts.items() if shift > _AGREES), default=0)
     write(f"\norbit of seed {seed}: {problem.n_obs} measurements of {problem.n_src} sources")
-    write("  " + ", ".join(f"{n}: {shifts[n]:.3g}" for n in shifts if n % _EVERY == 0))
-    write(f"  means within {_AGREES} after step {last_apart}")
+    write("  " + ", ".join(f"{n}: {shifts[n]:.3g}" for n in shifts if n % _REPORT_STEPS == 0))
+    write(f"  means within {_AGREES} after step {last_disagreement}")
     write(f"  {found.mode.status.value}: step {max(shifts)}, {seconds:.0f} s")
     if found.conditional is not None:
         change = sigmas(found.conditional) / sigmas(exact.reduced.conditional_covariance())

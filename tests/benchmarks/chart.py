@@ -1,7 +1,6 @@
-"""Double-logarithmic line charts as SVG, for pages in light and in dark.
+"""Double-logarithmic line charts as SVG, for light and dark pages.
 
-The chart brings its own background, which follows the reader's colour scheme together with
-the words on it.
+The chart has its own background, which follows the reader's colour scheme like its text.
 """
 
 import math
@@ -12,7 +11,7 @@ from xml.etree import ElementTree as ET
 WIDTH, HEIGHT = 960, 470
 LEFT, RIGHT, TOP, BOTTOM = 62, 22, 84, 58
 GAP = 40
-# Of like contrast with a white and with a black background.
+# Colours with similar contrast on white and on black.
 COLOURS = ("#768390", "#b08800", "#2f81f7", "#e5534b", "#2da44e", "#a371f7", "#d9730d")
 STYLE = """
 svg { font: 14px system-ui, sans-serif; }
@@ -31,7 +30,7 @@ Line = Sequence[tuple[float, float]]
 
 
 class Panel(NamedTuple):
-    """One pair of axes: a title, the name of the horizontal axis, and points by line."""
+    """One pair of axes: title, label of the horizontal axis, and points of each line."""
 
     title: str
     axis: str
@@ -39,7 +38,7 @@ class Panel(NamedTuple):
 
 
 class _Scale(NamedTuple):
-    """Where the values from `low` to `high` lie, from `start` to `end` pixels."""
+    """Logarithmic scale from values `low` to `high` to pixels `start` to `end`."""
 
     low: float
     high: float
@@ -47,8 +46,8 @@ class _Scale(NamedTuple):
     end: float
 
     def __call__(self, value: float) -> float:
-        share = math.log(value / self.low) / math.log(self.high / self.low)
-        return round(self.start + share * (self.end - self.start), 1)
+        fraction = math.log(value / self.low) / math.log(self.high / self.low)
+        return round(self.start + fraction * (self.end - self.start), 1)
 
 
 def draw(panels: Sequence[Panel], unit: str) -> str:
@@ -78,12 +77,12 @@ def _panel(
     vertical: _Scale,
     decades: Iterable[float],
 ) -> None:
-    places = sorted({x for line in panel.lines.values() for x, _ in line})
-    # A little room on both sides.
-    horizontal = _Scale(places[0] / 1.15, places[-1] * 1.15, *edges)
+    positions = sorted({x for line in panel.lines.values() for x, _ in line})
+    # Leave a margin on both sides.
+    horizontal = _Scale(positions[0] / 1.15, positions[-1] * 1.15, *edges)
     for value in decades:
         _add_line(root, [(edges[0], vertical(value)), (edges[1], vertical(value))], "grid")
-    for value in places:
+    for value in positions:
         x = horizontal(value)
         _add_line(root, [(x, vertical.start), (x, vertical.end)], "grid")
         _text(root, x, HEIGHT - BOTTOM + 20, _short(value), "middle")
@@ -109,7 +108,7 @@ def _decades(low: float, high: float) -> list[float]:
 
 
 def _short(value: float) -> str:
-    """Return a number in few letters: 3M, 9.4k, 248k, 96."""
+    """Return an abbreviated number: 3M, 9.4k, 248k, 96."""
     for size, letter in ((1e6, "M"), (1e3, "k")):
         if value >= size:
             digits = 1 if value < 9.95 * size else 0
@@ -118,13 +117,13 @@ def _short(value: float) -> str:
 
 
 def _add_line(root: ET.Element, points: Line, kind: str, **attributes: str) -> None:
-    places = " ".join(f"{x:g},{y:g}" for x, y in points)
-    _add(root, "polyline", points=places, **{"class": kind}, **attributes)
+    positions = " ".join(f"{x:g},{y:g}" for x, y in points)
+    _add(root, "polyline", points=positions, **{"class": kind}, **attributes)
 
 
-def _text(root: ET.Element, x: float, y: float, words: str, anchor: str) -> None:
+def _text(root: ET.Element, x: float, y: float, content: str, anchor: str) -> None:
     element = ET.SubElement(root, "text", {"x": f"{x:g}", "y": f"{y:g}", "text-anchor": anchor})
-    element.text = words
+    element.text = content
 
 
 def _add(root: ET.Element, tag: str, **attributes: object) -> None:

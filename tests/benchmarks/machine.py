@@ -1,4 +1,4 @@
-"""What a benchmark runs on, and how it times and prints: shared by all of them."""
+"""Description of the machine, timing and printing, shared by all benchmarks."""
 
 import os
 import platform
@@ -21,7 +21,7 @@ def machine() -> str:
 
 
 def device() -> str:
-    """Return what JAX computes on: "cpu", or the platform and the name of the device."""
+    """Return the device that JAX uses: "cpu", or the platform and the name of the device."""
     used = jax.devices()[0]
     return used.platform if used.platform == "cpu" else f"{used.platform} ({used.device_kind})"
 
@@ -38,8 +38,8 @@ def usable_cores() -> int:
 
 
 def peak_memory_mib() -> float:
-    """Return the most memory that this process has held so far."""
-    # In KiB on Linux, in bytes on macOS.
+    """Return the peak memory of this process so far."""
+    # `ru_maxrss` is in KiB on Linux and in bytes on macOS.
     per_mib = 1024.0**2 if sys.platform == "darwin" else 1024.0
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / per_mib
 

@@ -9,14 +9,14 @@ from solver.simulate.measure import measure_orbit
 from solver.simulate.settings import SurveySettings
 
 ORBIT = 0
-# What the paper's catalogue of 132,651 stars leaves on the detectors in that orbit.
+# Numbers measured in this orbit with the paper's catalogue of 132,651 stars.
 SOURCES_OF_THE_PAPER = 6480
 MEASUREMENTS_OF_THE_PAPER = 247_932
 EXPOSURES_OF_THE_PAPER = 96
 
 
 def survey_of(sources: float, exposures: int = EXPOSURES_OF_THE_PAPER) -> SurveySettings:
-    """Return the mini-mock survey with about so many sources and just so many exposures."""
+    """Return the mini-mock survey, scaled to about `sources` sources and `exposures` exposures."""
     paper = SurveySettings()
     scaled = paper.scaled(round(sources / SOURCES_OF_THE_PAPER * paper.n_stars))
     return replace(scaled, orbits=1, exposures_per_field=exposures // scaled.n_fields)

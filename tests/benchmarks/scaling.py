@@ -1,6 +1,6 @@
-"""The results of `bench_scaling.py` as files: the rows, a plot, and tables in a page.
+"""The results of `bench_scaling.py` as files: rows, a plot, and tables in a page.
 
-The page `scaling.md` keeps its words; what stands between two marks in it is replaced.
+Only the text between two marks in the page `scaling.md` is replaced.
 """
 
 import csv
@@ -16,11 +16,11 @@ BEGIN, END = "<!-- scaling:begin -->", "<!-- scaling:end -->"
 
 
 class Row(NamedTuple):
-    """One size: what it is, the median times in s, the peak memory in MiB.
+    """Results of one size: counts, median times in s, and peak memory in MiB.
 
     `linearise` is one pass over the measurements and `reduce` the elimination of the sources
-    after it; `fit` leads from the catalogue to marginal sigmas, `tables` from the tables that
-    were read to all tables of the result.
+    after it; `fit` is a fit with marginal sigmas, starting from the catalogue, and `tables` a fit
+    from the input tables to all result tables.
     """
 
     stars: int
@@ -40,7 +40,7 @@ class Row(NamedTuple):
 
 
 class Scaling(NamedTuple):
-    """All sizes, and the machine they were measured on."""
+    """Results of all sizes, and the machine that they were measured on."""
 
     rows: list[Row]
     machine: str
@@ -73,7 +73,7 @@ def write_all(scaling: Scaling, folder: Path) -> None:
     """Write `scaling.csv` and `scaling.svg`, and the tables into `scaling.md`."""
     folder.mkdir(parents=True, exist_ok=True)
     write_rows(scaling.rows, folder / "scaling.csv")
-    # As they were rounded, so that page and plot are those of the file.
+    # Read back, so that page and plot show the rounded values of the file.
     rows = read_rows(folder / "scaling.csv")
     (folder / "scaling.svg").write_text(plot(rows), encoding="utf-8")
     page = folder / "scaling.md"
@@ -98,7 +98,7 @@ def read_rows(path: Path) -> list[Row]:
 
 
 def with_block(text: str, content: str) -> str:
-    """Return the page with what stands between its marks replaced."""
+    """Return the page with the text between its marks replaced."""
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not (begin and end):
@@ -116,25 +116,25 @@ def block(scaling: Scaling) -> str:
             lambda row, seconds: f"{1e6 * seconds / row.measurements:.2f}"
         ),
     }
-    parts = [f"{title}:\n\n{table(scaling.rows, {**KEY, **of})}" for title, of in tables.items()]
-    return "\n".join([f"{scaling.machine}\n", *parts])
+    sections = [f"{title}:\n\n{table(scaling.rows, {**KEY, **c})}" for title, c in tables.items()]
+    return "\n".join([f"{scaling.machine}\n", *sections])
 
 
 def table(rows: Iterable[Row], columns: Columns) -> str:
     """Return a table in Markdown."""
     lines = [list(columns), ["---:"] * len(columns)]
-    lines += [[of(row) for of in columns.values()] for row in rows]
+    lines += [[text_of(row) for text_of in columns.values()] for row in rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def plot(rows: Iterable[Row]) -> str:
-    """Return the times along both series of sizes as SVG."""
-    paper, rows = SurveySettings().n_stars, list(rows)
-    along_exposures = [row for row in rows if row.stars == paper]
+    """Return an SVG chart of the times over measurements and over exposures."""
+    stars_of_the_paper, rows = SurveySettings().n_stars, list(rows)
+    along_exposures = [row for row in rows if row.stars == stars_of_the_paper]
     along_measurements = [row for row in rows if row.exposures == EXPOSURES_OF_THE_PAPER]
     panels = [
         _panel(f"{EXPOSURES_OF_THE_PAPER} exposures", "measurements", along_measurements),
-        _panel(f"{paper:,} stars in the field", "exposures", along_exposures),
+        _panel(f"{stars_of_the_paper:,} stars in the field", "exposures", along_exposures),
     ]
     return draw([panel for panel in panels if panel.lines["unit"]], "seconds")
 
@@ -148,11 +148,11 @@ def _panel(title: str, axis: str, rows: list[Row]) -> Panel:
     return Panel(title, axis, lines)
 
 
-def _by_stage(words: Callable[[Row, float], str]) -> Columns:
-    def of(stage: str) -> Callable[[Row], str]:
-        return lambda row: words(row, getattr(row, stage))
+def _by_stage(text_of: Callable[[Row, float], str]) -> Columns:
+    def column(stage: str) -> Callable[[Row], str]:
+        return lambda row: text_of(row, getattr(row, stage))
 
-    return {label: of(stage) for stage, label in STAGES.items()}
+    return {label: column(stage) for stage, label in STAGES.items()}
 
 
 def _three_digits(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""What the benchmarks time: the parts of a fit, each as work without arguments."""
+"""The stages of a fit that the benchmarks time, as functions without arguments."""
 
 import sys
 from collections.abc import Callable
@@ -19,7 +19,7 @@ UNIT_REPEATS = 5
 
 
 def unit_product(problem: Problem) -> Callable[[], object]:
-    """Return the product whose time is one unit."""
+    """Return the matrix product whose time is one unit."""
     shape = (2 * problem.n_src, problem.layout.size)
     matrix = np.random.default_rng(0).standard_normal(shape)
     return lambda: matrix.T @ matrix
@@ -31,42 +31,42 @@ def fit_with_sigmas(problem: Problem, settings: FitSettings) -> object:
 
 
 def what_if(
-    data: OrbitData, before: FitSettings, after: FitSettings, made_ready: FitSettings | None = None
+    data: OrbitData, before: FitSettings, after: FitSettings, precomputed: FitSettings | None = None
 ) -> Callable[[], object]:
-    """Return the re-solution of one change, from a fit made and a problem built beforehand.
+    """Return the what-if of one change; the fit and the changed problem are made beforehand.
 
     Parameters
     ----------
-    made_ready : from which the worker starts instead, as it prepares it while nobody waits
+    precomputed : settings of a warm start that the solver process precomputes while idle
     """
-    selection = ProblemCache(data, MINI_MOCK)
-    _, solved = selection.choose(before)
+    cache = ProblemCache(data, MINI_MOCK)
+    _, solved = cache.choose(before)
     mode = find_mode(solved, before)
-    if made_ready is not None:
-        _, near = selection.choose(made_ready)
-        found = solve_what_if(mode, solved, near, made_ready) or find_mode(near, made_ready)
-        mode, solved = linearised(near, found), near
-    _, changed = selection.choose(after)
+    if precomputed is not None:
+        _, lower = cache.choose(precomputed)
+        found = solve_what_if(mode, solved, lower, precomputed) or find_mode(lower, precomputed)
+        mode, solved = linearised(lower, found), lower
+    _, changed = cache.choose(after)
     is_same = changed.measurements is solved.measurements
 
     def work() -> object:
-        # The tiles of the same measurements are laid, and those of others are not.
-        asked = changed if is_same else _as_new(changed)
-        reduced = _what_if(mode, solved, asked, after).reduced
+        # Tiles exist for the same measurements and have to be arranged for others.
+        target = changed if is_same else _as_new(changed)
+        reduced = _what_if(mode, solved, target, after).reduced
         return None if reduced is None else marginal_sigmas(reduced)
 
     return work
 
 
 def _as_new(problem: Problem) -> Problem:
-    """Return a problem whose tiles are still to be laid."""
+    """Return a copy of a problem without arranged tiles."""
     return replace(problem, measurements=replace(problem.measurements))
 
 
 def _what_if(mode: Mode, solved: Problem, changed: Problem, settings: FitSettings) -> Mode:
     found = solve_what_if(mode, solved, changed, settings)
     if found is None:
-        sys.exit(f"no re-solution for {settings}")
+        sys.exit(f"no what-if for {settings}")
     return found
 
 

@@ -39,7 +39,7 @@ def _small_chunks():
 def _small_patches():
     """Keep the fields of a small orbit in separate blocks, although it is too small to benefit."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("solver.problem.source_blocks.OF_ONE_BLOCK", 0.0)
+        patch.setattr("solver.problem.source_blocks.BLOCK_OVERHEAD", 0.0)
         yield
 
 

@@ -25,7 +25,7 @@ def path(tmp_path):
     return tmp_path / "run.npz"
 
 
-def test_state_comes_back_as_it_was(small_orbit, path, state):
+def test_state_survives_the_checkpoint(small_orbit, path, state):
     first = resume_from(path, small_orbit.data, SETTINGS)
     assert first.state is None
     first.keep(state)
@@ -36,9 +36,9 @@ def test_state_comes_back_as_it_was(small_orbit, path, state):
     assert [file.name for file in path.parent.iterdir()] == [path.name]
 
 
-def test_other_settings_are_another_fit(small_orbit, path, state):
+def test_checkpoint_of_other_settings_is_refused(small_orbit, path, state):
     resume_from(path, small_orbit.data, SETTINGS).keep(state)
-    with pytest.raises(InputError, match="this very fit, found that of other files or settings"):
+    with pytest.raises(InputError, match="of this fit, found that of other files or settings"):
         resume_from(path, small_orbit.data, SETTINGS.with_(order=4))
 
 
@@ -57,13 +57,13 @@ def test_truncated_file_is_refused(small_orbit, path, state):
         resume_from(path, small_orbit.data, SETTINGS)
 
 
-def test_place_that_cannot_be_written_is_refused_before_the_fit(small_orbit, tmp_path):
+def test_unwritable_path_is_refused_before_the_fit(small_orbit, tmp_path):
     with pytest.raises(InputError, match="found no folder"):
         resume_from(tmp_path / "none" / "run.npz", small_orbit.data, SETTINGS)
 
 
-def test_fit_goes_on_in_another_process_from_the_file(small_orbit, path):
-    """As far as the file tells: by another fitter, which knows nothing of the first."""
+def test_fit_resumes_from_the_file_in_another_process(small_orbit, path):
+    """Another fitter, which shares nothing but the file, stands for the other process."""
     data, instrument = small_orbit.data, small_orbit.instrument
 
     def cancel(row):
@@ -72,9 +72,9 @@ def test_fit_goes_on_in_another_process_from_the_file(small_orbit, path):
 
     with pytest.raises(CancelledError):
         OrbitFitter(data, instrument).fit(SETTINGS, cancel, resume_from(path, data, SETTINGS))
-    seen = []
+    iterations = []
     result = OrbitFitter(data, instrument).fit(
-        SETTINGS, lambda row: seen.append(row.iteration), resume_from(path, data, SETTINGS)
+        SETTINGS, lambda row: iterations.append(row.iteration), resume_from(path, data, SETTINGS)
     )
-    assert seen == [125, 150]
+    assert iterations == [125, 150]
     assert len(result.losses) == 150

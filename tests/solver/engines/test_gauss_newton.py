@@ -19,13 +19,13 @@ def problem_of(orbit, settings):
 
 
 def test_gradient_vanishes_at_the_mode(solution, make_dense):
-    """In units of the uncertainties, with the gradient of the dense model."""
+    """The reference is the gradient of the dense model, in units of the uncertainties."""
     dense = make_dense(solution.problem, solution.mode.theta, solution.mode.sources)
     step = dense.covariance @ dense.gradient
     assert np.abs(step / np.sqrt(np.diag(dense.covariance))).max() < 1e-4
 
 
-def test_any_direction_away_from_the_mode_raises_the_penalised_chi2(solution):
+def test_displacements_from_the_mode_raise_the_penalised_chi2(solution):
     problem, mode = solution.problem, solution.mode
     rng = np.random.default_rng(3)
 
@@ -41,7 +41,7 @@ def test_any_direction_away_from_the_mode_raises_the_penalised_chi2(solution):
         assert objective(theta, sources) > lowest
 
 
-def test_trace_begins_at_the_start_and_ends_below_the_tolerance(solution):
+def test_trace_begins_without_a_step_and_ends_below_the_tolerance(solution):
     trace = solution.mode.trace
     assert [row.iteration for row in trace] == list(range(len(trace)))
     assert np.isnan(trace[0].largest_step)
@@ -64,15 +64,15 @@ def test_trace_names_the_parameter_that_moved_most(solution, problem):
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0], ids=["short", "long"])
 def test_far_start_converges(sign):
-    """200 arcsec of pointing and 1 % of focal length off."""
+    """The start is 200 arcsec off in pointing and 1 % in focal length."""
     orbit = make_orbit(pointing_error=200.0, focal_error=sign * 0.01)
     mode = find_mode(problem_of(orbit, FitSettings()), FitSettings())
     assert mode.status is FitStatus.CONVERGED
     assert mode.trace[-1].chi2 < 2.0 * len(orbit.pixels)
 
 
-def test_step_that_overshoots_is_damped_and_the_fit_converges():
-    """At 75 deg of roll the full step is too long."""
+def test_overshooting_step_is_damped_and_the_fit_converges():
+    """An error of 75 deg in roll makes the full step too long."""
     orbit = make_orbit()
     exposures = orbit.data.exposures.assign(pa_est=orbit.data.exposures["pa_est"] + 75.0)
     data = replace(orbit.data, exposures=exposures)
@@ -85,7 +85,7 @@ def test_step_that_overshoots_is_damped_and_the_fit_converges():
 
 
 @pytest.mark.parametrize("limit", [1, 2])
-def test_limit_of_iterations_is_kept(small_orbit, limit):
+def test_number_of_iterations_is_limited(small_orbit, limit):
     settings = FitSettings(max_iterations=limit)
     mode = find_mode(problem_of(small_orbit, settings), settings)
     assert mode.status is FitStatus.MAX_ITERATIONS
@@ -93,17 +93,17 @@ def test_limit_of_iterations_is_kept(small_orbit, limit):
     assert mode.reduced is not None
 
 
-def test_tolerance_decides_when_to_stop(small_orbit, solution):
+def test_tolerance_determines_when_to_stop(small_orbit, solution):
     settings = FitSettings(tolerance=50.0)
     loose = find_mode(problem_of(small_orbit, settings), settings)
     assert loose.status is FitStatus.CONVERGED
     assert len(loose.trace) < len(solution.mode.trace)
 
 
-def test_progress_sees_every_row_of_the_trace(problem):
-    seen = []
-    mode = find_mode(problem, FitSettings(), seen.append)
-    assert seen == mode.trace
+def test_progress_receives_every_row_of_the_trace(problem):
+    rows = []
+    mode = find_mode(problem, FitSettings(), rows.append)
+    assert rows == mode.trace
 
 
 @pytest.mark.parametrize("error", [CancelledError, KeyboardInterrupt], ids=lambda e: e.__name__)
@@ -120,7 +120,7 @@ def test_exception_of_progress_stops_the_fit(problem, error):
     assert len(calls) == 2
 
 
-def test_measurement_that_is_no_number_is_said_to_be_so(small_orbit):
+def test_nan_measurement_is_reported_as_not_finite(small_orbit):
     measurements = small_orbit.data.measurements.assign(nx=np.nan)
     data = replace(small_orbit.data, measurements=measurements)
     mode = find_mode(build_problem(data, MINI_MOCK, FitSettings()), FitSettings())
@@ -136,8 +136,8 @@ def test_measurement_that_is_no_number_is_said_to_be_so(small_orbit):
     ],
     ids=["detectors", "scale"],
 )
-def test_direction_that_nothing_holds_is_said_to_be_singular(small_orbit, names):
-    """Common to exposures and detectors, where rounding alone might seem to hold it."""
+def test_unconstrained_direction_is_reported_as_singular(small_orbit, names):
+    """The direction is common to exposures and detectors; rounding may seem to constrain it."""
     settings = FitSettings(prior_widths=dict.fromkeys(names, np.inf))
     mode = find_mode(problem_of(small_orbit, settings), settings)
     assert mode.status is FitStatus.SINGULAR

@@ -1,4 +1,4 @@
-"""The numpyro model against the priors and the chi2 that gauss-newton works with."""
+"""The numpyro model compared with the priors and the chi2 of the gauss-newton engine."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def density(problem, theta, sources):
 
 
 @pytest.mark.parametrize("widths", [{}, FLAT, {"sources": 2.0}], ids=["default", "flat", "loose"])
-def test_density_is_that_of_the_posterior(small_orbit, expansion_point, widths):
+def test_density_equals_that_of_the_posterior(small_orbit, expansion_point, widths):
     settings = FitSettings(prior_widths=widths)
     problem = build_problem(small_orbit.data, small_orbit.instrument, settings)
     theta, sources = expansion_point
@@ -39,7 +39,7 @@ def test_density_is_that_of_the_posterior(small_orbit, expansion_point, widths):
     ).sum() - 0.5 * problem.measurements.sigma.size * np.log(2.0 * np.pi)
     expected = likelihood + problem.priors.log_normalisation()
     expected -= 0.5 * objective(problem, theta, sources, at)
-    # A gamma prior's normalisation is that of a normal one to a part in a million.
+    # The normalisation of gamma priors equals that of normal ones to a part in a million.
     assert density(problem, theta, sources) == pytest.approx(expected, abs=1e-3)
 
 

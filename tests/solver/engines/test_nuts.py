@@ -1,4 +1,4 @@
-"""The nuts engine against the marginal sigmas of gauss-newton, on a small orbit."""
+"""The nuts engine compared with the marginal sigmas of gauss-newton, on a small orbit."""
 
 import sys
 from dataclasses import replace
@@ -25,7 +25,7 @@ ENGINES = {
 
 @pytest.fixture(scope="module")
 def results(optimised):
-    """A small orbit by every engine."""
+    """A small orbit fitted by every engine."""
     orbit = make_orbit()
     return {
         name: fit_orbit(orbit.data, orbit.instrument, settings)
@@ -42,8 +42,8 @@ def test_engines_agree(results):
 
 
 @pytest.mark.slow
-def test_a_wrong_answer_does_not_agree(results):
-    """Sigmas twice as large, positions a sigma off."""
+def test_wrong_results_do_not_agree(results):
+    """Sigmas are twice as large and positions are one sigma off."""
     exact = results["gauss-newton"]
     sources = exact.sources.assign(
         sigma_ra_conditional=2.0 * exact.sources["sigma_ra_conditional"],
@@ -55,7 +55,7 @@ def test_a_wrong_answer_does_not_agree(results):
 
 
 @pytest.mark.slow
-def test_it_says_how_well_the_chains_mixed(results):
+def test_summary_describes_the_mixing_of_the_chains(results):
     summary = results["nuts"].summary
     assert summary["converged"]
     assert summary["reason"] == FitStatus.SAMPLED.value
@@ -67,7 +67,7 @@ def test_it_says_how_well_the_chains_mixed(results):
 
 
 @pytest.mark.slow
-def test_calibration_is_sampled_as_well(results):
+def test_calibration_uncertainties_agree_with_gauss_newton(results):
     exact, found = (results[name].calibration for name in ("gauss-newton", "nuts"))
     ratio = found["sigma_marginal"] / exact["sigma_marginal"]
     effective = results["nuts"].summary["smallest_effective_samples_of_sigmas"]
@@ -75,7 +75,7 @@ def test_calibration_is_sampled_as_well(results):
 
 
 def test_run_can_be_cancelled(small_orbit, monkeypatch):
-    """Between two blocks of samples."""
+    """Cancellation takes effect between two blocks of samples."""
 
     def cancel(row):
         raise CancelledError("now")
@@ -92,7 +92,7 @@ def chains(*values):
     return Chains(samples, np.stack([samples, samples], axis=-2), 0, 1)
 
 
-def test_chains_apart_are_seen():
+def test_separated_chains_have_a_large_r_hat():
     rng = np.random.default_rng(0)
     together, apart = rng.standard_normal((2, 500)), rng.standard_normal((2, 500))
     apart[1] += 3.0
@@ -100,8 +100,8 @@ def test_chains_apart_are_seen():
     assert _mixing(chains(*apart)).r_hat > 1.5
 
 
-def test_arviz_is_asked_where_it_is_installed(monkeypatch):
-    """Its names and what they take, as of ArviZ 0.23 and 1.3."""
+def test_arviz_is_used_if_installed(monkeypatch):
+    """The stub has the functions and arguments of ArviZ 0.23 and 1.3."""
     dataset = SimpleNamespace(max=lambda: 1.01, min=lambda: 321.0)
     answer = {"free": dataset, "squares": dataset}
     module = SimpleNamespace(

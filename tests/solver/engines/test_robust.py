@@ -1,4 +1,4 @@
-"""Outliers: found, listed, left out, and without a trace in what is left."""
+"""Outliers are found, listed and left out, and do not bias the other sources."""
 
 from dataclasses import replace
 
@@ -17,14 +17,14 @@ SHARE, SIGMAS = 0.01, 50.0
 
 
 def disturbed(data, share, sigmas, seed=1):
-    """Return the orbit with a share of its measurements moved, and their rows."""
+    """Return the orbit with a fraction of its measurements displaced, and their rows."""
     rng = np.random.default_rng(seed)
     rows = data.measurements.copy()
     bad = rng.choice(len(rows), round(share * len(rows)), replace=False)
     angle = rng.uniform(0.0, 2.0 * np.pi, len(bad))
-    for column, way in (("nx", np.cos(angle)), ("ny", np.sin(angle))):
-        place = rows.columns.get_loc(column)
-        rows.iloc[bad, place] += sigmas * rows[f"s{column[1]}"].to_numpy()[bad] * way
+    for column, direction in (("nx", np.cos(angle)), ("ny", np.sin(angle))):
+        position = rows.columns.get_loc(column)
+        rows.iloc[bad, position] += sigmas * rows[f"s{column[1]}"].to_numpy()[bad] * direction
     return replace(data, measurements=rows), bad
 
 
@@ -41,7 +41,7 @@ def found(sample_orbit, fit_whole):
 
 @pytest.fixture(scope="module")
 def plain(found, fit_whole):
-    """The disturbed orbit as if there were no outliers."""
+    """The disturbed orbit fitted without a search for outliers."""
     return fit_whole(found[1])
 
 
@@ -49,8 +49,8 @@ def shifts(found, clean, axis):
     """Return the shifts of the sources without a disturbed measurement, in sigmas."""
     result, data, bad = found
     both = result.sources.merge(clean.sources, on="source_id", suffixes=("", "_clean"))
-    touched = data.measurements["source_id"].iloc[bad]
-    both = both[~both["source_id"].isin(touched)]
+    disturbed_ids = data.measurements["source_id"].iloc[bad]
+    both = both[~both["source_id"].isin(disturbed_ids)]
     assert len(both) > 400
     moved = both[f"offset_{axis}"] - both[f"offset_{axis}_clean"]
     return moved / both[f"sigma_{axis}_marginal_clean"]
@@ -58,7 +58,7 @@ def shifts(found, clean, axis):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("axis", ["ra", "dec"])
-def test_the_other_sources_are_not_biased(found, clean, axis):
+def test_undisturbed_sources_are_not_biased(found, clean, axis):
     moved = shifts(found, clean, axis)
     assert abs(moved.mean()) < 0.1
     assert np.sqrt((moved**2).mean()) < 0.1
@@ -66,13 +66,13 @@ def test_the_other_sources_are_not_biased(found, clean, axis):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("axis", ["ra", "dec"])
-def test_without_it_they_are_far_off(plain, found, clean, axis):
+def test_undisturbed_sources_are_biased_without_the_robust_fit(plain, found, clean, axis):
     moved = shifts((plain, *found[1:]), clean, axis)
     assert np.sqrt((moved**2).mean()) > 0.5
 
 
 @pytest.mark.slow
-def test_all_of_them_and_no_others_are_listed(found):
+def test_exactly_the_outliers_are_listed(found):
     result, data, bad = found
     expected = data.measurements.iloc[bad]
     listed = result.outliers
@@ -84,7 +84,7 @@ def test_all_of_them_and_no_others_are_listed(found):
 
 
 @pytest.mark.slow
-def test_what_is_left_is_a_good_fit(found):
+def test_remaining_measurements_fit_well(found):
     result, data, bad = found
     assert result.summary["n_outliers"] == len(bad)
     assert result.summary["n_measurements"] == len(data.measurements) - len(bad)
@@ -92,8 +92,8 @@ def test_what_is_left_is_a_good_fit(found):
 
 
 @pytest.mark.slow
-def test_it_says_how_far_each_would_move_its_source(found, fit_whole):
-    """As a fit of all the others and that one does."""
+def test_shift_is_how_far_an_outlier_would_move_its_source(found, fit_whole):
+    """The reference is a fit that includes this one outlier."""
     result, data, _ = found
     worst = next(result.outliers.itertuples())
     key = ["field_id", "plate_id", "detector_id", "source_id"]
@@ -111,19 +111,19 @@ def test_it_says_how_far_each_would_move_its_source(found, fit_whole):
 
 
 @pytest.mark.slow
-def test_good_measurements_are_left_alone(sample_orbit, clean, fit_whole):
+def test_orbit_without_outliers_is_unchanged(sample_orbit, clean, fit_whole):
     result = fit_whole(sample_orbit, ROBUST)
     assert result.summary["n_outliers"] == 0
     pd.testing.assert_frame_equal(result.sources, clean.sources)
 
 
 @pytest.mark.slow
-def test_nothing_is_looked_for_unless_asked(clean):
+def test_outliers_are_not_searched_for_by_default(clean):
     assert clean.outliers is None
     assert "n_outliers" not in clean.summary
 
 
-def test_what_if_leaves_the_same_outliers_out(small_orbit):
+def test_what_if_leaves_out_the_same_outliers(small_orbit):
     data, bad = disturbed(small_orbit.data, 0.01, 200.0)
     fitter = OrbitFitter(data, small_orbit.instrument)
     fitted = fitter.fit(ROBUST)

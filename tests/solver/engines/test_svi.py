@@ -1,4 +1,4 @@
-"""The svi engine against gauss-newton, and what happens between its blocks of steps."""
+"""The svi engine compared with gauss-newton, and its behaviour between blocks of steps."""
 
 from dataclasses import replace
 from functools import partial
@@ -24,7 +24,7 @@ from solver.problem.problem import build_problem
 SETTINGS = FitSettings(engine="svi")
 
 
-# Thousands of steps are worth an optimised program.
+# Thousands of steps run faster with compiler optimisation.
 pytestmark = pytest.mark.usefixtures("optimised")
 
 
@@ -49,7 +49,7 @@ def sigmas(covariance):
 
 
 @pytest.mark.slow
-def test_agrees_with_gauss_newton_from_a_cold_start(found, exact):
+def test_svi_agrees_with_gauss_newton_from_a_cold_start(found, exact):
     estimate, states = found
     shift = estimate.mode.sources - exact.sources
     assert np.abs(shift / sigmas(covariances(exact.reduced).source)).max() < 0.05
@@ -58,14 +58,14 @@ def test_agrees_with_gauss_newton_from_a_cold_start(found, exact):
 
 
 @pytest.mark.slow
-def test_its_sigmas_are_the_conditional_ones(found, exact):
+def test_sigmas_are_the_conditional_ones(found, exact):
     expected = sigmas(exact.reduced.conditional_covariance())
     np.testing.assert_allclose(sigmas(found[0].conditional), expected, rtol=0.02)
 
 
 @pytest.mark.slow
-def test_widths_are_found_and_not_only_kept(svi_problem, exact):
-    """From widths three times too large at the mode it comes back to the right ones."""
+def test_wrong_widths_converge_to_the_right_ones(svi_problem, exact):
+    """Widths three times too large at the mode converge to the right ones."""
     start = start_state(svi_problem, SETTINGS.svi)._replace(
         step=1000,
         theta=exact.theta,
@@ -78,17 +78,17 @@ def test_widths_are_found_and_not_only_kept(svi_problem, exact):
 
 
 @pytest.mark.slow
-def test_loss_falls_and_comes_to_rest(found):
-    """With the guide at its best, draws hardly matter: they would scatter the loss by eight."""
+def test_loss_falls_and_becomes_constant(found):
+    """At the optimum the loss hardly depends on the draws; unmirrored ones scatter it by eight."""
     losses = found[0].losses
     assert losses[:100].min() > losses[-1] + 1e3
     assert losses[-200:].std() < 0.5
 
 
-def test_same_seed_same_answer_and_another_one_another(svi_problem):
-    few = replace(SETTINGS, svi=SviSettings(steps=100, max_steps=100))
+def test_result_depends_only_on_the_seed(svi_problem):
+    short = replace(SETTINGS, svi=SviSettings(steps=100, max_steps=100))
     first, again, other = (
-        variational(svi_problem, replace(few, svi=replace(few.svi, seed=seed))).mode.sources
+        variational(svi_problem, replace(short, svi=replace(short.svi, seed=seed))).mode.sources
         for seed in (0, 0, 1)
     )
     np.testing.assert_array_equal(first, again)
@@ -96,17 +96,17 @@ def test_same_seed_same_answer_and_another_one_another(svi_problem):
 
 
 @pytest.mark.slow
-def test_stopped_run_goes_on_as_if_it_had_not_been(svi_problem, found):
-    """Block for block, in step, means, widths and losses."""
+def test_resumed_fit_equals_an_uninterrupted_one(svi_problem, found):
+    """Steps, means, widths and losses are compared block by block."""
     _, states = found
-    begun = states[9]
-    rest = list(blocks(svi_problem, SETTINGS, begun))
-    assert rest[0].step == begun.step + SETTINGS.svi.block
+    resumed_from = states[9]
+    rest = list(blocks(svi_problem, SETTINGS, resumed_from))
+    assert rest[0].step == resumed_from.step + SETTINGS.svi.block
     for name in ("theta", "sources", "scale", "losses"):
         np.testing.assert_array_equal(getattr(rest[-1], name), getattr(states[-1], name))
 
 
-def test_cancelled_fit_is_gone_on_with(small_orbit):
+def test_cancelled_fit_is_resumed(small_orbit):
     settings = replace(SETTINGS, svi=SviSettings(steps=200, patience=50))
     fitter = OrbitFitter(small_orbit.data, small_orbit.instrument)
 
@@ -116,13 +116,13 @@ def test_cancelled_fit_is_gone_on_with(small_orbit):
 
     with pytest.raises(CancelledError):
         fitter.fit(settings, cancel)
-    seen = []
-    result = fitter.fit(settings, lambda row: seen.append(row.iteration))
-    assert seen[0] == 100 + settings.svi.block
-    assert list(result.losses["step"]) == list(range(1, seen[-1] + 1))
+    iterations = []
+    result = fitter.fit(settings, lambda row: iterations.append(row.iteration))
+    assert iterations[0] == 100 + settings.svi.block
+    assert list(result.losses["step"]) == list(range(1, iterations[-1] + 1))
 
 
-def test_other_settings_start_anew(small_orbit):
+def test_other_settings_start_from_the_beginning(small_orbit):
     settings = replace(SETTINGS, svi=SviSettings(steps=100, max_steps=100))
     fitter = OrbitFitter(small_orbit.data, small_orbit.instrument)
 
@@ -131,22 +131,22 @@ def test_other_settings_start_anew(small_orbit):
 
     with pytest.raises(CancelledError):
         fitter.fit(settings, cancel)
-    seen = []
-    fitter.fit(settings.with_(order=4), lambda row: seen.append(row.iteration))
-    assert seen[0] == settings.svi.block
+    iterations = []
+    fitter.fit(settings.with_(order=4), lambda row: iterations.append(row.iteration))
+    assert iterations[0] == settings.svi.block
 
 
 @pytest.mark.slow
-def test_published_coordinates_get_nowhere(svi_problem, exact):
-    """Why the engine works in whitened ones."""
+def test_published_coordinates_do_not_converge(svi_problem, exact):
+    """This is why the engine works in whitened coordinates."""
     options = replace(WARPFIELD, steps=3000, max_steps=3000, patience=100)
     estimate = variational(svi_problem, replace(SETTINGS, svi=options))
     assert estimate.mode.trace[-1].largest_step > 100.0
     assert estimate.mode.status is not FitStatus.AT_REST
 
 
-def test_loss_at_rest_away_from_the_mode_is_no_solution(svi_problem, exact):
-    """A rate that is too low makes the loss rest anywhere; the linearised problem says so."""
+def test_constant_loss_away_from_the_mode_is_no_solution(svi_problem, exact):
+    """With too low a rate the loss is constant anywhere; the linearised problem shows it."""
     options = SviSettings(first_rate=2e-9, last_rate=1e-9, steps=100, patience=50, max_steps=100)
     far = start_state(svi_problem, options)._replace(theta=exact.theta, sources=exact.sources + 0.5)
     estimate = variational(svi_problem, replace(SETTINGS, svi=options), start=far)
@@ -154,20 +154,20 @@ def test_loss_at_rest_away_from_the_mode_is_no_solution(svi_problem, exact):
     assert not estimate.mode.status.is_solution
 
 
-def test_limit_of_steps_is_said(svi_problem):
+def test_limit_of_steps_is_reported(svi_problem):
     options = SviSettings(steps=50, max_steps=100, patience=200)
     estimate = variational(svi_problem, replace(SETTINGS, svi=options))
     assert estimate.mode.status is FitStatus.MAX_STEPS
 
 
-def test_rate_falls_over_seven_decades_and_stays():
+def test_rate_falls_over_seven_decades_and_stays_constant():
     rates = rate(SviSettings(steps=2000), (500, 1e4), np.array([500, 1500, 2500, 3500]))
     np.testing.assert_allclose(rates, [1e4, np.sqrt(1e4 * 1e-3), 1e-3, 1e-3], rtol=1e-12)
 
 
 @pytest.mark.slow
-def test_loss_at_rest_away_from_the_mode_starts_the_rate_again(svi_problem, exact):
-    """As the paper's runs were restarted by hand, until the mode is reached."""
+def test_constant_loss_away_from_the_mode_restarts_the_rate(svi_problem, exact):
+    """The rate is raised until the mode is reached, as the paper's authors did by hand."""
     options = SviSettings(first_rate=1.0, steps=300, patience=50)
     moved = exact.sources + 10.0 * np.random.default_rng(1).normal(size=exact.sources.shape)
     far = start_state(svi_problem, options)._replace(theta=exact.theta, sources=moved)
@@ -176,8 +176,8 @@ def test_loss_at_rest_away_from_the_mode_starts_the_rate_again(svi_problem, exac
     assert states[-1].trace[-1].largest_step < options.tolerance
 
 
-def test_loss_that_creeps_away_from_the_mode_starts_the_rate_again(svi_problem, exact):
-    """It would never come to rest: with the lowest rate the mode is out of reach."""
+def test_slowly_falling_loss_away_from_the_mode_restarts_the_rate(svi_problem, exact):
+    """The loss would never be constant: with the lowest rate the mode is out of reach."""
     options = SviSettings(steps=100, patience=50, max_steps=200)
     far = start_state(svi_problem, options)._replace(
         step=100,
@@ -186,21 +186,21 @@ def test_loss_that_creeps_away_from_the_mode_starts_the_rate_again(svi_problem, 
         losses=np.linspace(1e6, 0.0, 100),
     )
     after = next(blocks(svi_problem, replace(SETTINGS, svi=options), far))
-    begun, highest = after.cycle
-    assert begun == 100
+    restarted_at, highest = after.cycle
+    assert restarted_at == 100
     assert highest == pytest.approx(min(options.first_rate, after.trace[-1].largest_step))
 
 
-def test_draws_are_of_either_sign_as_often():
+def test_draws_have_either_sign_equally_often():
     values = np.asarray(draws(jax.random.key(3), 40, (2, 5000)))
     np.testing.assert_array_equal(np.abs(values), 1.0)
-    # Five deviations of a mean of 400,000.
+    # Five standard deviations of a mean of 400,000 values.
     assert abs(values.mean()) < 0.008
     assert np.abs(values.mean(axis=0)).max() < 0.95
 
 
-def test_with_its_mirror_image_one_draw_is_as_good_as_another(svi_problem, exact):
-    """A sigma from the mode, where single draws scatter by more than the way is long."""
+def test_mirrored_gradient_does_not_depend_on_the_draw(svi_problem, exact):
+    """One sigma from the mode, gradients of single draws scatter by more than their mean."""
     evidence = jax.device_put(evidence_of(svi_problem))
     coordinates = whitened(replace(exact.reduced, at=(exact.theta, exact.sources)))
     shape = (2, svi_problem.n_src)

@@ -15,7 +15,7 @@ from solver.linear.update import update_equations
 from solver.problem.problem import build_problem
 from tests.solver.small_orbit import make_orbit
 
-# What a refit has to confirm, in sigmas.
+# Required agreement with a refit, in sigmas.
 AGREEMENT = 1e-3
 
 
@@ -74,7 +74,7 @@ CHANGES = {
 
 @pytest.fixture(scope="module", params=CHANGES)
 def pair(request, sample_orbit, sample_fitter):
-    """The sample orbit re-solved and fitted again, under changed settings."""
+    """The what-if and the refit of the sample orbit under changed settings."""
     settings = FitSettings(**{"order": 6, **CHANGES[request.param](sample_orbit)})
     return sample_fitter.what_if(settings), fit_orbit(sample_orbit, settings=settings)
 
@@ -111,7 +111,7 @@ def test_refit_confirms_the_diagnostics(pair):
     [FitSettings(order=7), FitSettings(order=6, aberration=False)],
     ids=["higher-order", "other-model"],
 )
-def test_what_the_fit_did_not_hold_needs_a_refit(fitter, settings):
+def test_change_beyond_the_fit_needs_a_refit(fitter, settings):
     assert fitter.what_if(settings) is None
 
 
@@ -122,34 +122,34 @@ PREPARED = {
 
 
 @pytest.mark.parametrize("change", PREPARED)
-def test_what_was_made_ready_is_not_linearised_again(
+def test_precomputed_order_is_not_linearised_again(
     change, sample_orbit, sample_fitter, monkeypatch
 ):
     settings = FitSettings(**{"order": 6, **PREPARED[change](sample_orbit)})
     expected = sample_fitter.what_if(settings)
-    ready = fitted(OrbitFitter(sample_orbit))
-    assert len(list(ready.get_ready(6))) > 4
+    prepared = fitted(OrbitFitter(sample_orbit))
+    assert len(list(prepared.get_ready(6))) > 4
 
     def refuse(*_):
         raise AssertionError("linearised again")
 
     monkeypatch.setattr("solver.linear.update.accumulate", refuse)
-    found = ready.what_if(settings)
+    found = prepared.what_if(settings)
     step = found.sources["offset_ra"] - expected.sources["offset_ra"]
     assert np.abs(step / expected.sources["sigma_ra_marginal"]).max() < 1e-3
     for name in ("sigma_dec_marginal", "chi2"):
         np.testing.assert_allclose(found.sources[name], expected.sources[name], rtol=1e-3)
 
 
-def test_what_was_interrupted_is_made_ready_later_and_once(orbit):
-    ready = fitted(OrbitFitter(orbit.data, orbit.instrument))
-    next(ready.get_ready(6))
-    rest = len(list(ready.get_ready(6)))
+def test_interrupted_precomputation_resumes_and_runs_once(orbit):
+    prepared = fitted(OrbitFitter(orbit.data, orbit.instrument))
+    next(prepared.get_ready(6))
+    rest = len(list(prepared.get_ready(6)))
     assert rest > 0
-    assert list(ready.get_ready(6)) == []
+    assert list(prepared.get_ready(6)) == []
 
 
-def test_lower_order_without_a_term_whose_prior_is_shifted_is_not_made_ready(orbit):
+def test_lower_order_without_a_shifted_term_is_not_precomputed(orbit):
     fitter = OrbitFitter(orbit.data, orbit.instrument)
     settings = FitSettings(order=2, prior_shifts={"distortion_x[2/0]": 1.0})
     fitter.fit(settings)
@@ -157,14 +157,14 @@ def test_lower_order_without_a_term_whose_prior_is_shifted_is_not_made_ready(orb
     assert fitter.what_if(settings) is not None
 
 
-def test_every_lower_order_is_made_ready(sample_orbit):
-    """That of which only a fit can tell, too."""
-    asked = [FitSettings(order=order) for order in (4, 1)]
-    ready = fitted(OrbitFitter(sample_orbit))
-    assert ready.what_if(asked[-1]) is None
-    list(ready.get_ready(6))
-    for settings in asked:
-        found, expected = ready.what_if(settings), fit_orbit(sample_orbit, settings=settings)
+def test_every_lower_order_is_precomputed(sample_orbit):
+    """This includes an order that otherwise needs a refit."""
+    variants = [FitSettings(order=order) for order in (4, 1)]
+    prepared = fitted(OrbitFitter(sample_orbit))
+    assert prepared.what_if(variants[-1]) is None
+    list(prepared.get_ready(6))
+    for settings in variants:
+        found, expected = prepared.what_if(settings), fit_orbit(sample_orbit, settings=settings)
         moved = found.sources["offset_ra"] - expected.sources["offset_ra"]
         assert np.abs(moved / expected.sources["sigma_ra_marginal"]).max() < AGREEMENT
         assert found.summary["chi2"] == pytest.approx(expected.summary["chi2"], rel=1e-6)
@@ -183,12 +183,12 @@ def test_lower_order_compiles_nothing(orbit, caplog):
     assert compiled(3) == compiled(0) == []
 
 
-def test_orbit_that_was_not_fitted_needs_a_fit(orbit):
+def test_unfitted_orbit_needs_a_fit(orbit):
     assert OrbitFitter(orbit.data, orbit.instrument).what_if(FitSettings()) is None
 
 
 def test_change_too_large_for_a_linear_model_needs_a_refit(orbit, fitter):
-    """A distortion of the fifth order that is to be of the fourth: the stars would have to move."""
+    """Dropping the fifth order of the distortion moves the sources too far."""
     assert fitter.what_if(FitSettings(order=4)) is None
 
 
@@ -196,7 +196,7 @@ def test_change_too_large_for_a_linear_model_needs_a_refit(orbit, fitter):
     ("steps", "is_solved"),
     [
         ((0.7, 1e-4), True),
-        # What is held in the second step follows in the third.
+        # Directions kept fixed in the second step follow in the third.
         ((0.7, 1.5e-3, 8e-3, 1e-5), True),
         ((0.7, 0.1, 0.05, 1e-4), True),
         ((0.7, 0.8), False),
@@ -206,21 +206,21 @@ def test_change_too_large_for_a_linear_model_needs_a_refit(orbit, fitter):
     ],
 )
 def test_steps_of_a_nearly_linear_model_become_shorter(orbit, monkeypatch, steps, is_solved):
-    """Of the solution that is given, the last step is below the tolerance."""
-    fitter, taken = fitted(OrbitFitter(orbit.data, orbit.instrument)), iter(steps)
-    monkeypatch.setattr(what_if, "largest_step", lambda *_: (next(taken), "detector x [0]"))
+    """A solution is returned once a step is below the tolerance."""
+    fitter, remaining = fitted(OrbitFitter(orbit.data, orbit.instrument)), iter(steps)
+    monkeypatch.setattr(what_if, "largest_step", lambda *_: (next(remaining), "detector x [0]"))
     found = fitter.what_if(FitSettings(order=6, prior_widths={"sources": 3.0}))
     assert (found is not None) == is_solved
 
 
-def test_what_if_starts_from_the_fit_and_not_from_another(fitter):
+def test_what_if_starts_from_the_fit_not_from_another_what_if(fitter):
     before = fitter.what_if(FitSettings(order=6))
     fitter.what_if(FitSettings(order=6, prior_widths={"sources": 3.0}))
     after = fitter.what_if(FitSettings(order=6))
     np.testing.assert_array_equal(before.sources["ra"], after.sources["ra"])
 
 
-LEFT_OUT = {
+EXCLUSIONS = {
     "a-detector": lambda data: Exclusions(detectors=frozenset(first(data, "detector_id"))),
     "detectors": lambda data: Exclusions(
         detectors=frozenset(data.measurements["detector_id"].unique().tolist()[:2])
@@ -235,26 +235,28 @@ LEFT_OUT = {
 }
 
 
-@pytest.mark.parametrize("left_out", LEFT_OUT)
-def test_blocks_without_some_measurements_are_those_of_the_others(
-    left_out, orbit, problem, expansion_point
+@pytest.mark.parametrize("name", EXCLUSIONS)
+def test_blocks_without_some_measurements_equal_those_of_the_others(
+    name, orbit, problem, expansion_point
 ):
-    """The blocks are sums, so that what is taken out is what would not be added."""
+    """Blocks are sums over the measurements, so removing some subtracts their contribution."""
     equations = accumulate(problem, *expansion_point)
-    fewer = without(LEFT_OUT[left_out](orbit.data), orbit)
+    fewer = without(EXCLUSIONS[name](orbit.data), orbit)
     compare_blocks(update_equations(equations, problem, fewer), fewer)
 
 
-def test_blocks_without_a_detector_are_at_hand(orbit, problem, expansion_point, monkeypatch):
+def test_blocks_without_a_detector_need_no_linearisation(
+    orbit, problem, expansion_point, monkeypatch
+):
     equations = accumulate(problem, *expansion_point)
     monkeypatch.setattr("solver.linear.contribution.accumulate", None)
-    for left_out in ("a-detector", "detectors"):
-        fewer = without(LEFT_OUT[left_out](orbit.data), orbit)
+    for name in ("a-detector", "detectors"):
+        fewer = without(EXCLUSIONS[name](orbit.data), orbit)
         assert update_equations(equations, problem, fewer) is not None
 
 
-def test_blocks_without_a_detector_that_saw_what_another_did(orbit):
-    """Where they overlap, both measure a star in one exposure."""
+def test_blocks_without_a_detector_that_overlaps_another_are_correct(orbit):
+    """Where detectors overlap, both measure a source in one exposure."""
     table = orbit.data.measurements
     others = table[table["detector_id"] != first(orbit.data, "detector_id")[0]].head(50)
     twice = others.assign(detector_id=first(orbit.data, "detector_id")[0])
@@ -263,20 +265,22 @@ def test_blocks_without_a_detector_that_saw_what_another_did(orbit):
     problem = build_problem(both.data, orbit.instrument, FitSettings())
     origin = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
     equations = accumulate(problem, *origin)
-    fewer = without(LEFT_OUT["a-detector"](orbit.data), both)
+    fewer = without(EXCLUSIONS["a-detector"](orbit.data), both)
     compare_blocks(update_equations(equations, problem, fewer), fewer)
 
 
-@pytest.mark.parametrize("left_out", [None, "a-detector"])
-def test_blocks_of_a_lower_order_are_those_made_anew(left_out, orbit, problem, expansion_point):
-    """Those between its own terms too, which are taken from the higher order."""
+@pytest.mark.parametrize("name", [None, "a-detector"])
+def test_blocks_of_a_lower_order_equal_those_accumulated_for_it(
+    name, orbit, problem, expansion_point
+):
+    """This includes blocks between the distortion terms, taken from the higher order."""
     settings = FitSettings(order=problem.order - 1, prior_shifts={"detector_x": 1.0})
-    exclusions = LEFT_OUT[left_out](orbit.data) if left_out else Exclusions()
+    exclusions = EXCLUSIONS[name](orbit.data) if name else Exclusions()
     lower = without(exclusions, orbit, settings)
     compare_blocks(update_equations(accumulate(problem, *expansion_point), problem, lower), lower)
 
 
-def test_blocks_between_the_terms_of_a_lower_order_are_at_hand(
+def test_blocks_between_the_terms_of_a_lower_order_are_reused(
     orbit, problem, expansion_point, monkeypatch
 ):
     equations = accumulate(problem, *expansion_point)
@@ -296,11 +300,11 @@ def compare_blocks(found, problem):
     for name in ("theta", "source", "cross"):
         values = getattr(expected, name)
         np.testing.assert_allclose(getattr(found, name), values, atol=1e-9 * np.abs(values).max())
-    for part, values in zip(found.gradient, expected.gradient, strict=True):
-        np.testing.assert_allclose(part, values, rtol=1e-6, atol=1e-6 * np.abs(values).max())
+    for block, values in zip(found.gradient, expected.gradient, strict=True):
+        np.testing.assert_allclose(block, values, rtol=1e-6, atol=1e-6 * np.abs(values).max())
 
 
-def test_more_measurements_cannot_be_carried_over(problem, expansion_point):
+def test_update_refuses_other_measurements(problem, expansion_point):
     measurements = replace(problem.measurements, label=problem.measurements.label + 1)
     fewer = replace(problem, measurements=measurements)
     assert update_equations(accumulate(problem, *expansion_point), problem, fewer) is None

@@ -22,7 +22,7 @@ def hat(dense):
     return jacobian @ dense.covariance @ np.swapaxes(jacobian, 1, 2)
 
 
-def test_covariances_are_the_dense_ones(reduced, dense, problem):
+def test_covariances_equal_the_dense_ones(reduced, dense, problem):
     found, n = covariances(reduced), dense.n_calib
     sigma = np.sqrt(np.diag(dense.covariance))
     theta = dense.covariance[:n, :n] / np.outer(sigma[:n], sigma[:n])
@@ -33,26 +33,26 @@ def test_covariances_are_the_dense_ones(reduced, dense, problem):
     np.testing.assert_allclose(in_order / scale, cross, atol=1e-8 * sigma[n:].max())
 
 
-def test_leverage_is_the_dense_one(at_point, hat):
+def test_leverage_equals_the_dense_one(at_point, hat):
     np.testing.assert_allclose(at_point.trace, np.trace(hat, axis1=1, axis2=2), atol=1e-8)
 
 
-def test_leverage_lies_between_nothing_and_two(at_point):
+def test_leverage_lies_between_zero_and_two(at_point):
     assert (at_point.trace > 0.0).all()
     assert (at_point.trace < 2.0).all()
 
 
-def test_leverages_add_up_to_the_effective_parameters(at_point, problem, reduced, expansion_point):
+def test_leverages_sum_to_the_effective_parameters(at_point, problem, reduced, expansion_point):
     prior_hessian = problem.priors.hessian_diagonal(expansion_point[0])
     expected = effective_parameters(problem.priors, prior_hessian, covariances(reduced))
     assert at_point.trace.sum() == pytest.approx(expected, rel=1e-8)
 
 
-def test_whitened_residuals_are_the_dense_ones(at_point, dense):
+def test_whitened_residuals_equal_the_dense_ones(at_point, dense):
     np.testing.assert_allclose(at_point.whitened.ravel(), dense.residual, atol=1e-6)
 
 
-def test_standardised_residuals_are_freed_of_the_dense_leverage(at_point, dense, hat):
+def test_standardised_residuals_are_corrected_for_the_dense_leverage(at_point, dense, hat):
     whitened = dense.residual.reshape(-1, 2)
     values, vectors = np.linalg.eigh(np.eye(2) - hat)
     root = vectors @ (values[:, :, None] ** -0.5 * np.swapaxes(vectors, 1, 2))
@@ -62,29 +62,29 @@ def test_standardised_residuals_are_freed_of_the_dense_leverage(at_point, dense,
     np.testing.assert_allclose(at_point.standardised[usable], expected[usable], atol=1e-5)
 
 
-def test_standardised_residuals_scatter_by_one(mocks):
+def test_standardised_residuals_have_unit_scatter(mocks):
     values = np.concatenate([s.residuals.standardised.ravel() for _, s in mocks])
-    # They are correlated within an orbit, by which only the spread's own error grows.
+    # Correlations within an orbit only increase the error of the standard deviation.
     limit = 4.0 / np.sqrt(2.0 * len(values) / 2.0)
     assert np.std(values) == pytest.approx(1.0, abs=limit)
 
 
-def test_whitened_residuals_scatter_by_less(mocks):
+def test_whitened_residuals_scatter_by_less_than_one(mocks):
     values = np.concatenate([s.residuals.whitened.ravel() for _, s in mocks])
     expected = np.mean([(2.0 - s.residuals.trace).mean() for _, s in mocks]) / 2.0
     assert np.mean(values**2) == pytest.approx(expected, rel=4.0 * np.sqrt(2.0 / len(values)))
     assert np.std(values) < 0.95
 
 
-def test_expected_chi2_is_that_of_the_mocks(mocks):
-    """Sum over the mocks of chi2 and of 2 n_obs less the leverage."""
+def test_sum_of_chi2_over_mocks_matches_its_expectation(mocks):
+    """Degrees of freedom are 2 n_obs minus the leverage."""
     chi2 = sum((s.residuals.whitened**2).sum() for _, s in mocks)
     dof = sum((2.0 - s.residuals.trace).sum() for _, s in mocks)
     assert stats.chi2(dof).cdf(chi2) == pytest.approx(0.5, abs=0.499)
 
 
-def test_measurement_that_decides_its_own_prediction_has_no_standardised_residual(small_orbit):
-    """A source measured once and all but free otherwise: its residual is nothing but rounding."""
+def test_measurement_that_determines_its_own_prediction_has_no_standardised_residual(small_orbit):
+    """A source measured once, with a very wide prior: its residual is only rounding noise."""
     settings = FitSettings(prior_widths={"sources": 1e5})
     problem = build_problem(small_orbit.data, small_orbit.instrument, settings)
     rows = np.bincount(problem.measurements.index.source, minlength=problem.n_src)
@@ -94,19 +94,17 @@ def test_measurement_that_decides_its_own_prediction_has_no_standardised_residua
     theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
     reduced = at_origin(problem, theta, sources)
     found = residuals(problem, theta, sources, covariances(reduced))
-    here = np.isin(problem.measurements.index.source, alone)
-    assert np.isnan(found.standardised[here]).all()
-    assert np.isfinite(found.standardised[~here]).all()
-    np.testing.assert_allclose(found.trace[here], 2.0, atol=1e-5)
+    is_alone = np.isin(problem.measurements.index.source, alone)
+    assert np.isnan(found.standardised[is_alone]).all()
+    assert np.isfinite(found.standardised[~is_alone]).all()
+    np.testing.assert_allclose(found.trace[is_alone], 2.0, atol=1e-5)
 
 
-def test_leverage_rounded_above_one_leaves_no_standardised_residual(
-    problem, reduced, expansion_point, hat
-):
-    """As if all covariances were too large; both axes above one have a positive determinant."""
+def test_leverage_above_one_gives_no_standardised_residual(problem, reduced, expansion_point, hat):
+    """With both eigenvalues of H above one, the determinant of I - H is positive."""
     found = covariances(reduced)
-    parts = ("source", "theta", "cross")
-    tripled = found._replace(**{name: 3.0 * getattr(found, name) for name in parts})
+    fields = ("source", "theta", "cross")
+    tripled = found._replace(**{name: 3.0 * getattr(found, name) for name in fields})
     found = residuals(problem, *expansion_point, tripled)
     above = np.linalg.eigvalsh(3.0 * hat).min(axis=1) > 1.0
     assert above.any()

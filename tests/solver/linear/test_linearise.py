@@ -11,13 +11,13 @@ _predict = jax.jit(predict)
 
 
 def in_working_order(problem, weight, at):
-    """Linearise all chunks; return what belongs to each measurement, in working order."""
+    """Linearise all chunks and return the values of each measurement, in working order."""
     tiles, offsets = problem.measurements.tiles, problem.offsets(*at)
     turn, chunks = turning(offsets, problem.geometry), []
     for i in range(len(tiles.measured)):
         index, measured, _ = tiles.chunk(i)
         chunks.append(linearise(turn, offsets, problem.geometry, index, measured, weight[i]))
-    joined = jax.tree.map(lambda *parts: np.concatenate([np.ravel(p) for p in parts]), *chunks)
+    joined = jax.tree.map(lambda *leaves: np.concatenate([np.ravel(p) for p in leaves]), *chunks)
     return jax.tree.map(lambda values: values[tiles.place], joined)
 
 
@@ -30,13 +30,13 @@ def linearised(problem, expansion_point):
     return in_working_order(problem, problem.measurements.tiles.weight, expansion_point)
 
 
-def of_pixels(problem, pair):
-    """Return a pair of whitened derivatives as those of the pixels, one column each."""
+def in_pixels(problem, pair):
+    """Return a pair of whitened derivatives in pixels, one column each."""
     return np.stack(pair, axis=-1) * problem.measurements.sigma
 
 
 def finite_difference(problem, point, group, element, step):
-    """Return the derivative of the pixels by one parameter group moved as a whole."""
+    """Return the derivative of the pixels when a whole parameter group moves."""
     moved = []
     for sign in (-1.0, 1.0):
         offsets = problem.offsets(*point)
@@ -48,20 +48,22 @@ def finite_difference(problem, point, group, element, step):
 
 
 @pytest.mark.parametrize("axis", [0, 1], ids=["east", "north"])
-def test_derivatives_by_sources_are_finite_differences(problem, expansion_point, linearised, axis):
+def test_derivatives_by_sources_equal_finite_differences(
+    problem, expansion_point, linearised, axis
+):
     expected = finite_difference(problem, expansion_point, "sources", axis, 100.0)
-    found = of_pixels(problem, linearised.source[axis])
+    found = in_pixels(problem, linearised.source[axis])
     np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", [g.name for g in LOCAL_GROUPS])
-def test_derivatives_by_local_groups_are_finite_differences(
+def test_derivatives_by_local_groups_equal_finite_differences(
     problem, expansion_point, linearised, name
 ):
     column = [g.name for g in LOCAL_GROUPS].index(name)
     step = 1e-3 if name.startswith("pitch") else 1.0
     expected = finite_difference(problem, expansion_point, name, 0, step)
-    found = of_pixels(problem, linearised.local[column])
+    found = in_pixels(problem, linearised.local[column])
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
@@ -70,7 +72,7 @@ def test_displacement_times_basis_is_the_derivative_by_the_coefficients(
     problem, expansion_point, linearised, axis
 ):
     group = f"distortion_{'xy'[axis]}"
-    found = of_pixels(problem, linearised.displacement[axis])
+    found = in_pixels(problem, linearised.displacement[axis])
     for term in range(problem.layout.n_coef):
         moved = []
         for step in (-1.0, 1.0):
@@ -82,8 +84,8 @@ def test_displacement_times_basis_is_the_derivative_by_the_coefficients(
         np.testing.assert_allclose(found * basis, expected, atol=1e-9)
 
 
-def test_all_derivatives_are_those_of_the_whole_model(problem, linearised, dense):
-    """Against the Jacobian of `predict` by all parameters at once."""
+def test_all_derivatives_equal_those_of_the_whole_model(problem, linearised, dense):
+    """The reference is the Jacobian of `predict` by all parameters."""
     layout, jacobian = problem.layout, dense.jacobian.reshape(problem.n_obs, 2, -1)
     source, exposure, detector = problem.measurements.index
     columns = layout.touched(exposure, detector).T

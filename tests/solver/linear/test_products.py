@@ -11,7 +11,7 @@ def chunk(problem, expansion_point):
     return next(chunks(problem, *expansion_point))
 
 
-def test_rows_are_the_parts_of_a_chunk(chunk):
+def test_rows_equal_the_fields_of_a_chunk(chunk):
     rows = rows_of(chunk)
     assert rows.local.shape[1] == len(LOCAL_GROUPS) + 1
     for found, pairs in (

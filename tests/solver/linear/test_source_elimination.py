@@ -5,10 +5,10 @@ import pytest
 
 from solver.data.settings import FitSettings
 from solver.linear.normal_equations import accumulate
-from solver.linear.source_elimination import POORLY_HELD, eliminate_sources
+from solver.linear.source_elimination import POORLY_CONSTRAINED, eliminate_sources
 from solver.problem.problem import build_problem
 
-# The agreement that the elimination is held to, relative to the uncertainties.
+# Required agreement of the elimination with the dense solution, relative to the uncertainties.
 AGREEMENT = 1e-8
 
 
@@ -18,7 +18,7 @@ def sigma(dense):
 
 
 def blocks_of(covariance, n_calib):
-    """Return the covariances of the calibration, between, and of each source."""
+    """Return the covariances of the calibration, between it and the sources, and of each source."""
     n_src = (len(covariance) - n_calib) // 2
     of_sources = covariance[n_calib:, n_calib:].reshape(n_src, 2, n_src, 2)
     return (
@@ -32,7 +32,7 @@ def flat(theta, sources):
     return np.concatenate([theta, sources.ravel()])
 
 
-def test_step_is_the_dense_newton_step(reduced, dense, sigma):
+def test_step_equals_the_dense_newton_step(reduced, dense, sigma):
     n = dense.n_calib
     step = reduced.solve(dense.gradient[:n], dense.gradient[n:].reshape(-1, 2))
     expected = dense.covariance @ dense.gradient
@@ -41,20 +41,20 @@ def test_step_is_the_dense_newton_step(reduced, dense, sigma):
     )
 
 
-def test_calibration_covariance_is_the_dense_one(reduced, dense, sigma):
+def test_calibration_covariance_equals_the_dense_one(reduced, dense, sigma):
     expected = blocks_of(dense.covariance, dense.n_calib)[0]
     scale = np.outer(sigma[: dense.n_calib], sigma[: dense.n_calib])
     found = reduced.theta_covariance()
     np.testing.assert_allclose(found / scale, expected / scale, atol=AGREEMENT)
 
 
-def test_marginal_covariance_is_the_dense_one(reduced, dense):
+def test_marginal_covariance_equals_the_dense_one(reduced, dense):
     expected = blocks_of(dense.covariance, dense.n_calib)[2]
     for found in (reduced.marginal_covariance(), reduced.marginal_covariance(reduced.spread())):
         np.testing.assert_allclose(found, expected, rtol=AGREEMENT)
 
 
-def test_conditional_covariance_is_the_inverse_of_the_sources_block(reduced, dense):
+def test_conditional_covariance_equals_the_inverse_of_the_source_block(reduced, dense):
     expected = np.linalg.inv(blocks_of(dense.hessian, dense.n_calib)[2])
     np.testing.assert_allclose(reduced.conditional_covariance(), expected, rtol=AGREEMENT)
 
@@ -64,10 +64,10 @@ def test_conditional_covariance_is_below_the_marginal_one(reduced):
     assert np.linalg.eigvalsh(difference).min() > 0.0
 
 
-def test_cross_covariance_is_the_dense_one(reduced, dense, sigma):
+def test_cross_covariance_equals_the_dense_one(reduced, dense, sigma):
     expected = blocks_of(dense.covariance, dense.n_calib)[1]
-    of_sources = sigma[dense.n_calib :].reshape(-1, 2).T
-    scale = sigma[: dense.n_calib, None, None] * of_sources
+    source_sigma = sigma[dense.n_calib :].reshape(-1, 2).T
+    scale = sigma[: dense.n_calib, None, None] * source_sigma
     found = reduced.cross_covariance(reduced.spread())[:, :, reduced.source_blocks.position]
     np.testing.assert_allclose(found / scale, expected / scale, atol=AGREEMENT)
 
@@ -80,14 +80,14 @@ def test_response_is_minus_the_shift_of_sources_per_unit_of_the_calibration(redu
     np.testing.assert_allclose(found, expected, atol=AGREEMENT * np.abs(expected).max())
 
 
-def test_log_determinant_is_the_dense_one(reduced, dense):
+def test_log_determinant_equals_the_dense_one(reduced, dense):
     scale = np.sqrt(np.diag(dense.hessian))
     scaled = np.linalg.slogdet(dense.hessian / np.outer(scale, scale))[1]
     expected = scaled + 2.0 * np.log(scale).sum()
     assert reduced.log_determinant() == pytest.approx(expected, abs=1e-7)
 
 
-def test_solve_takes_any_right_hand_side(reduced, dense, sigma):
+def test_solve_accepts_any_right_hand_side(reduced, dense, sigma):
     rng = np.random.default_rng(0)
     right = rng.normal(size=len(sigma)) / sigma
     expected = dense.covariance @ right
@@ -97,14 +97,14 @@ def test_solve_takes_any_right_hand_side(reduced, dense, sigma):
 
 
 def test_blocks_of_the_data_are_not_changed(equations, problem, expansion_point):
-    """They outlive a change of the priors."""
+    """The blocks are reused when the priors change."""
     before = {k: np.copy(getattr(equations, k)) for k in ("theta", "source", "cross")}
     eliminate_sources(equations, problem.priors)
     for name, values in before.items():
         np.testing.assert_array_equal(getattr(equations, name), values)
 
 
-def test_open_direction_makes_no_solution(equations, problem, expansion_point):
+def test_unconstrained_parameter_has_no_solution(equations, problem, expansion_point):
     """A parameter with neither data nor prior."""
     theta = equations.theta.copy()
     theta[0], theta[:, 0] = 0.0, 0.0
@@ -113,14 +113,14 @@ def test_open_direction_makes_no_solution(equations, problem, expansion_point):
     width = problem.priors.width.copy()
     width[0] = np.inf
     priors = problem.priors._replace(width=width)
-    open_ = replace(equations, theta=theta, cross=cross)
-    assert eliminate_sources(open_, priors) is None
+    unconstrained = replace(equations, theta=theta, cross=cross)
+    assert eliminate_sources(unconstrained, priors) is None
 
 
-def test_combination_that_only_priors_hold_makes_no_solution_without_them(
+def test_combination_that_only_priors_constrain_has_no_solution_with_flat_priors(
     equations, problem, expansion_point
 ):
-    """A common shift of the detectors is one of the pointings: with both flat, it is open."""
+    """A common shift of the detectors equals one of the pointings: flat priors leave it free."""
     flat_prior = problem.priors._replace(
         width=np.full(problem.layout.size, np.inf),
         is_gamma=np.zeros(problem.layout.size, dtype=bool),
@@ -128,38 +128,41 @@ def test_combination_that_only_priors_hold_makes_no_solution_without_them(
     assert eliminate_sources(equations, flat_prior) is None
 
 
-def test_values_that_are_not_finite_make_no_solution(equations, problem, expansion_point):
+def test_non_finite_values_have_no_solution(equations, problem, expansion_point):
     theta = equations.theta.copy()
     theta[2, 2] = np.nan
     assert eliminate_sources(replace(equations, theta=theta), problem.priors) is None
 
 
-def test_weak_directions_are_those_that_pointings_and_detectors_share(small_orbit, problem):
-    """Two shifts, a rotation and a scale, where the priors are as wide as the paper's."""
+def test_weak_directions_are_common_changes_of_pointings_and_detectors(small_orbit, problem):
+    """There are two shifts, a rotation and a scale, with the paper's priors."""
     wide = build_problem(small_orbit.data, small_orbit.instrument, FitSettings())
     origin = np.zeros(wide.layout.size), np.zeros((wide.n_src, 2))
     reduced = eliminate_sources(accumulate(wide, *origin), wide.priors)
     weak = reduced.weak_directions()
     assert weak.shape[1] == 4
-    # A conditional sigma along them costs next to nothing, unlike one of any parameter alone.
+    # One conditional sigma along them hardly raises chi2, unlike along any single parameter.
     cost = np.sum((reduced.factor @ weak) ** 2, axis=0)
     assert cost.max() < 1e-6
 
 
-def test_poorly_held_directions_hold_the_weak_ones_among_them(small_orbit):
+def test_poorly_constrained_directions_include_the_weak_ones(small_orbit):
     wide = build_problem(small_orbit.data, small_orbit.instrument, FitSettings())
     origin = np.zeros(wide.layout.size), np.zeros((wide.n_src, 2))
     reduced = eliminate_sources(accumulate(wide, *origin), wide.priors)
-    weak, poorly = reduced.weak_directions(), reduced.weak_directions(POORLY_HELD)
-    assert poorly.shape[1] > weak.shape[1]
-    cost = np.sum((reduced.factor @ poorly) ** 2, axis=0)
-    assert cost.max() < POORLY_HELD
-    # Both are orthonormal where each parameter is in units of its conditional sigma.
-    overlap = (poorly.T * np.diag(reduced.theta)) @ weak
+    weak, poorly_constrained = (
+        reduced.weak_directions(),
+        reduced.weak_directions(POORLY_CONSTRAINED),
+    )
+    assert poorly_constrained.shape[1] > weak.shape[1]
+    cost = np.sum((reduced.factor @ poorly_constrained) ** 2, axis=0)
+    assert cost.max() < POORLY_CONSTRAINED
+    # Both sets are orthonormal in units of the parameters' conditional sigmas.
+    overlap = (poorly_constrained.T * np.diag(reduced.theta)) @ weak
     np.testing.assert_allclose(overlap.T @ overlap, np.eye(weak.shape[1]), atol=1e-6)
 
 
-def test_held_directions_do_not_move(small_orbit):
+def test_solve_does_not_move_along_fixed_directions(small_orbit):
     wide = build_problem(small_orbit.data, small_orbit.instrument, FitSettings())
     origin = np.zeros(wide.layout.size), np.zeros((wide.n_src, 2))
     reduced = eliminate_sources(accumulate(wide, *origin), wide.priors)

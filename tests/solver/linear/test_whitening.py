@@ -17,7 +17,7 @@ def reduced(problem, expansion_point):
 
 
 def placed(coordinates, flat, n_theta):
-    """Return the parameters of flat free coordinates as one vector, less the origin."""
+    """Return the parameters of flat free coordinates as one vector relative to the origin."""
     theta, sources = coordinates.place(flat[:n_theta], flat[n_theta:].reshape(2, -1))
     return np.concatenate(
         [theta - coordinates.origin[0], np.ravel(sources - coordinates.origin[1])]
@@ -33,7 +33,7 @@ def test_whitened_posterior_has_unit_covariance(reduced, problem, dense):
     assert float(coordinates.log_volume) == pytest.approx(logarithm, abs=1e-6)
 
 
-def test_covariance_of_unit_scatter_is_the_conditional_one(reduced, problem):
+def test_covariance_of_unit_scatter_equals_the_conditional_one(reduced, problem):
     found = whitened(reduced).covariance(np.ones((2, problem.n_src)))
     np.testing.assert_allclose(found, reduced.conditional_covariance(), rtol=1e-12)
 
@@ -50,24 +50,26 @@ def test_bare_units_are_degrees_and_micrometres(problem):
     np.testing.assert_allclose(values["detector_x"], 1.0)
 
 
-def test_posterior_is_followed_where_it_bends(small_orbit):
-    """Along the weak directions the straight way leaves the posterior, the bent one does not."""
+def test_curvature_follows_the_posterior_along_weak_directions(small_orbit):
+    """Along weak directions the objective rises as expected only with the second-order term."""
     settings = FitSettings()
     problem = build_problem(small_orbit.data, small_orbit.instrument, settings)
     mode = find_mode(problem, settings)
     reduced = eliminate_sources(accumulate(problem, mode.theta, mode.sources), problem.priors)
-    bend = curvature_at(problem, mode, reduced)
+    curvature = curvature_at(problem, mode, reduced)
 
-    def above_the_mode(theta, sources):
+    def objective_at(theta, sources):
         at = gradient(problem, np.asarray(theta), np.asarray(sources))
         return objective(problem, np.asarray(theta), np.asarray(sources), at)
 
-    lowest = above_the_mode(mode.theta, mode.sources)
-    way = reduced.theta_covariance() @ bend.weak.T
-    follow = -np.einsum("kas,kw->wsa", reduced.response(), way)[:, reduced.source_blocks.position]
-    for i in range(len(bend.weak)):
-        straight = mode.theta + way[:, i], mode.sources + follow[i]
-        added = bend.at(way[:, i])
-        bent = [a + np.asarray(b) for a, b in zip(straight, added, strict=True)]
-        expected = float(bend.weak[i] @ way[:, i])
-        assert above_the_mode(*bent) - lowest == pytest.approx(expected, abs=0.2)
+    lowest = objective_at(mode.theta, mode.sources)
+    displacement = reduced.theta_covariance() @ curvature.weak.T
+    follow = -np.einsum("kas,kw->wsa", reduced.response(), displacement)[
+        :, reduced.source_blocks.position
+    ]
+    for i in range(len(curvature.weak)):
+        straight = mode.theta + displacement[:, i], mode.sources + follow[i]
+        correction = curvature.at(displacement[:, i])
+        corrected = [a + np.asarray(b) for a, b in zip(straight, correction, strict=True)]
+        expected = float(curvature.weak[i] @ displacement[:, i])
+        assert objective_at(*corrected) - lowest == pytest.approx(expected, abs=0.2)

@@ -20,7 +20,7 @@ def centres(problem, group):
 
 
 @pytest.mark.parametrize("group", ["position_angle", "focal_length", "detector_x", "pitch_y"])
-def test_shift_of_a_group_moves_all_of_its_centres(small_orbit, group):
+def test_shift_of_a_group_moves_all_its_centres(small_orbit, group):
     moved = centres(built(small_orbit, **{group: 0.25}), group) - centres(built(small_orbit), group)
     np.testing.assert_allclose(moved, 0.25, rtol=1e-6)
 
@@ -33,7 +33,7 @@ def test_shift_of_a_group_moves_all_of_its_centres(small_orbit, group):
         ("distortion_x", "3/0", terms(5).index((3, 0))),
     ],
 )
-def test_shift_of_an_element_moves_no_other(small_orbit, group, element, place):
+def test_shift_of_an_element_moves_only_its_centre(small_orbit, group, element, place):
     shifts = {f"{group}[{element}]": 2.0}
     problem = build_problem(
         small_orbit.data, small_orbit.instrument, FitSettings(prior_shifts=shifts)
@@ -42,7 +42,7 @@ def test_shift_of_an_element_moves_no_other(small_orbit, group, element, place):
     np.testing.assert_allclose(moved, 2.0 * (np.arange(len(moved)) == place), atol=1e-9)
 
 
-def test_shift_of_the_pointing_is_one_on_the_sky(small_orbit):
+def test_shift_of_the_pointing_is_a_distance_on_the_sky(small_orbit):
     before, after = (
         build_problem(small_orbit.data, small_orbit.instrument, FitSettings(prior_shifts=shifts))
         for shifts in ({}, {"pointing_ra": 30.0, "pointing_dec": -40.0})
@@ -66,7 +66,7 @@ def test_shift_of_the_catalogue_moves_the_priors_of_all_sources(small_orbit):
 
 
 def test_solution_follows_the_catalogue(small_orbit, result):
-    """The whole sky shifted: every star with it, and nothing is left of it in the residuals."""
+    """Shifting the whole catalogue shifts every source and leaves the residuals unchanged."""
     settings = FitSettings(prior_shifts={"sources[dec]": 5.0})
     shifted = fit_orbit(small_orbit.data, small_orbit.instrument, settings)
     moved = (shifted.sources["dec"] - result.sources["dec"]) * 3.6e6
@@ -75,13 +75,13 @@ def test_solution_follows_the_catalogue(small_orbit, result):
 
 
 @pytest.mark.parametrize(
-    ("name", "complaint"),
+    ("name", "message"),
     [
         ("detector_x[9]", "found '9'"),
         ("focal_length[5/0]", "0/0, 0/1, .*1/3"),
         ("distortion_x[9/9]", "found '9/9'"),
     ],
 )
-def test_element_that_there_is_not_is_refused(small_orbit, name, complaint):
-    with pytest.raises(InputError, match=complaint):
+def test_unknown_element_is_refused(small_orbit, name, message):
+    with pytest.raises(InputError, match=message):
         built(small_orbit, **{name.replace("[", "__").rstrip("]"): 1.0})

@@ -33,22 +33,22 @@ def mixed():
 
 
 @pytest.mark.parametrize("offset", [-3e4, -700.0, 0.0, 1.0, 5e3, 5e4])
-def test_gamma_penalty_is_that_of_scipy(offset):
+def test_gamma_penalty_equals_that_of_scipy(offset):
     density = scipy_gamma()
     expected = -2.0 * (density.logpdf(CENTRE + offset) - density.logpdf(CENTRE))
     found = gamma_prior().penalty(np.array([offset]), NO_SOURCES)
     assert found == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
-def test_gamma_prior_has_the_mean_and_the_width_it_is_given():
+def test_gamma_prior_has_the_given_mean_and_width():
     density = scipy_gamma()
     assert density.mean() == pytest.approx(CENTRE)
     assert density.std() == pytest.approx(WIDTH)
 
 
 @pytest.mark.parametrize("offset", [-1.5, -0.3, 0.0, 0.4, 2.5])
-def test_derivatives_of_the_gamma_penalty_are_its_finite_differences(offset):
-    # A wide gamma prior, that its skewness may count.
+def test_derivatives_of_the_gamma_penalty_equal_finite_differences(offset):
+    # A wide gamma prior, whose skewness matters.
     prior, step = gamma_prior(5.0, 2.0), 1e-4
 
     def half_penalty(at):
@@ -69,7 +69,7 @@ def test_gamma_penalty_forbids_values_below_zero():
     assert outside > inside + 100.0
 
 
-def test_derivatives_of_a_mixed_prior_are_its_finite_differences(mixed):
+def test_derivatives_of_a_mixed_prior_equal_finite_differences(mixed):
     theta, steps = np.array([0.03, 12.0, 900.0]), (1e-3, 1.0, 10.0)
     for i, (unit, step) in enumerate(zip(np.eye(3), steps, strict=True)):
         low, high = (mixed.penalty(theta + d * unit, np.zeros((2, 2))) for d in (-step, step))
@@ -77,7 +77,7 @@ def test_derivatives_of_a_mixed_prior_are_its_finite_differences(mixed):
         assert mixed.gradient(theta)[i] == pytest.approx(expected, rel=1e-5, abs=1e-8)
 
 
-def test_flat_prior_neither_pulls_nor_holds(mixed):
+def test_flat_prior_has_no_penalty_gradient_or_hessian(mixed):
     theta = np.array([0.0, 1e9, 0.0])
     assert mixed.penalty(theta, np.zeros((2, 2))) == 0.0
     assert mixed.gradient(theta)[1] == 0.0
@@ -94,7 +94,7 @@ def test_sources_are_penalised_with_their_correlation(mixed):
     assert mixed.penalty(np.zeros(3), sources) == pytest.approx(expected)
 
 
-def test_normalisation_is_the_density_at_the_centres(mixed):
+def test_log_normalisation_equals_the_log_density_at_the_centres(mixed):
     expected = stats.norm(0.0, 0.1).logpdf(0.0) + scipy_gamma().logpdf(CENTRE)
     for covariance in np.linalg.inv(mixed.precision):
         expected += stats.multivariate_normal(np.zeros(2), covariance).logpdf(np.zeros(2))
@@ -107,7 +107,7 @@ def test_relative_width_is_a_fraction_of_the_centre():
     np.testing.assert_allclose(widths["pitch_x"], [0.16, 0.08])
 
 
-def test_absolute_width_is_that_of_the_settings_or_the_table():
+def test_absolute_width_comes_from_the_settings_or_the_table():
     centres = {g.name: np.array([-8.0, 4.0]) for g in CALIBRATION_GROUPS}
     widths = group_widths(FitSettings(prior_widths={"detector_x": 7.0}), centres)
     np.testing.assert_array_equal(widths["detector_x"], 7.0)

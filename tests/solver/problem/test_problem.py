@@ -17,7 +17,7 @@ def test_measurements_are_in_order_of_exposure_detector_and_source(problem):
     np.testing.assert_array_equal(order, np.arange(problem.n_obs))
 
 
-def test_rows_lead_back_to_the_input(small_orbit, problem):
+def test_rows_refer_to_the_input_table(small_orbit, problem):
     rows = small_orbit.data.measurements.iloc[problem.measurements.row]
     np.testing.assert_array_equal(rows[["nx", "ny"]].to_numpy(), problem.measurements.measured)
     ids = problem.sources["source_id"].to_numpy()[problem.measurements.index.source]
@@ -37,7 +37,7 @@ def test_geometry_is_padded_without_changing_its_rows(problem):
     np.testing.assert_array_equal(frame[problem.n_src :], last)
 
 
-def test_prior_positions_are_those_of_the_catalogue_at_the_mean_epoch(small_orbit, problem):
+def test_prior_positions_are_catalogue_positions_at_the_mean_epoch(small_orbit, problem):
     assert problem.epoch == pytest.approx(small_orbit.data.exposures["obstime"].mean())
     ra, dec = np.radians(epoch_places(problem.sources, problem.epoch))
     direction = np.asarray(problem.geometry.source_frame)[: problem.n_src, 0]
@@ -45,7 +45,7 @@ def test_prior_positions_are_those_of_the_catalogue_at_the_mean_epoch(small_orbi
     np.testing.assert_allclose(direction, expected, atol=5e-15)
 
 
-def test_factor_on_the_sources_widens_their_priors(small_orbit, problem):
+def test_sources_factor_widens_their_priors(small_orbit, problem):
     wider = build_problem(
         small_orbit.data, small_orbit.instrument, FitSettings(prior_widths={"sources": 3.0})
     )
@@ -56,13 +56,13 @@ def test_prior_of_a_source_includes_its_proper_motion(problem):
     reference = problem.sources["is_reference"].to_numpy(bool)
     variance = np.linalg.inv(problem.priors.precision)[reference, 1, 1]
     years = 2000.0 + (problem.epoch - 51544.5) / 365.25 - 2016.0
-    # Of the parallax only the error of 0.02 mas times less than 1 au is left out.
+    # Omits only the parallax error of 0.02 mas times less than 1 au.
     expected = 0.05**2 + (0.02 * years) ** 2
     assert (variance >= expected).all()
     np.testing.assert_allclose(variance, expected, atol=0.02**2)
 
 
-def test_width_given_in_settings_reaches_the_priors(small_orbit):
+def test_width_in_the_settings_sets_the_priors(small_orbit):
     settings = FitSettings(prior_widths={"position_angle": 60.0})
     problem = build_problem(small_orbit.data, small_orbit.instrument, settings)
     widths = problem.layout.scatter(problem.priors.width)
@@ -76,18 +76,18 @@ def test_only_focal_lengths_have_gamma_priors(problem):
 
 
 @pytest.mark.parametrize("velocity", [0.0, 7.6], ids=["earth", "satellite"])
-def test_switch_takes_the_velocity_out(velocity):
+def test_aberration_switch_sets_the_velocity_to_zero(velocity):
     orbit = make_orbit(velocity=velocity)
     off = build_problem(orbit.data, orbit.instrument, FitSettings(aberration=False))
     np.testing.assert_array_equal(off.geometry.velocity, 0.0)
 
 
-def test_satellite_columns_are_added_to_the_earths_velocity():
-    still, moving = (
+def test_satellite_velocity_is_added_to_that_of_the_earth():
+    at_rest, moving = (
         build_problem(orbit.data, orbit.instrument, FitSettings())
         for orbit in (make_orbit(), make_orbit(velocity=7.6))
     )
-    added = (moving.geometry.velocity - still.geometry.velocity)[:8] * 299_792.458
+    added = (moving.geometry.velocity - at_rest.geometry.velocity)[:8] * 299_792.458
     expected = make_orbit(velocity=7.6).data.exposures[[f"satellite_v{a}" for a in "xyz"]]
     np.testing.assert_allclose(added, expected.to_numpy(), atol=1e-9)
 
@@ -102,7 +102,7 @@ def test_unknown_detector_is_refused(small_orbit, with_tables):
 
 
 def cut_down(n_rows):
-    """An orbit with too few measurements for its sources."""
+    """Return the tables of an orbit with few measurements for its sources."""
     orbit = make_orbit()
     rows = orbit.data.measurements.sort_values("source_id", ignore_index=True).head(n_rows)
     return replace(orbit.data, measurements=rows)
@@ -113,43 +113,43 @@ def parameters_at(data, order):
     return others + (order + 1) * (order + 2) - 6 if order > 1 else others
 
 
-def test_order_that_the_data_cannot_hold_is_refused_with_the_highest_that_they_can():
+def test_too_high_order_is_refused_with_the_highest_possible_one():
     data = cut_down(90)
     orders = range(MAX_ORDER + 1)
     highest = max(n for n in orders if parameters_at(data, n) < 180)
     assert 1 < highest < MAX_ORDER
-    with pytest.raises(InputError, match=f"highest order they can hold is {highest}$"):
+    with pytest.raises(InputError, match=f"highest order they allow is {highest}$"):
         build_problem(data, Design().instrument, FitSettings(order=highest + 1))
     build_problem(data, Design().instrument, FitSettings(order=highest))
 
 
-def test_data_that_hold_no_order_are_refused():
+def test_data_too_few_for_any_order_are_refused():
     with pytest.raises(InputError, match="no order fits"):
         build_problem(cut_down(12), Design().instrument, FitSettings(order=0))
 
 
-def test_thinned_problem_holds_the_measurements_of_the_kept_sources(problem, expansion_point):
+def test_thinned_problem_has_the_measurements_of_the_kept_sources(problem, expansion_point):
     theta, sources = expansion_point
     keep = np.arange(problem.n_src) % 3 == 1
-    part = thinned(problem, keep)
+    subset = thinned(problem, keep)
     rows = keep[problem.measurements.index.source]
-    np.testing.assert_array_equal(part.measurements.label, problem.measurements.label[rows])
+    np.testing.assert_array_equal(subset.measurements.label, problem.measurements.label[rows])
     ids = problem.sources["source_id"].to_numpy()
-    np.testing.assert_array_equal(part.sources["source_id"], ids[keep])
+    np.testing.assert_array_equal(subset.sources["source_id"], ids[keep])
     np.testing.assert_array_equal(
-        part.sources["source_id"].to_numpy()[part.measurements.index.source],
+        subset.sources["source_id"].to_numpy()[subset.measurements.index.source],
         ids[problem.measurements.index.source[rows]],
     )
-    # Its model is that of the whole: the same measurements have the same residuals.
+    # The model is that of the full problem: the same measurements have the same residuals.
     whole, found = (
         np.concatenate([np.ravel(c.residual[0]) for c in chunks(p, theta, s)])[
             p.measurements.tiles.place
         ]
-        for p, s in ((problem, sources), (part, sources[keep]))
+        for p, s in ((problem, sources), (subset, sources[keep]))
     )
     np.testing.assert_allclose(found, whole[rows], atol=1e-6)
 
 
-def test_thinned_problem_has_the_shapes_of_the_whole(problem):
-    part = thinned(problem, np.arange(problem.n_src) % 2 == 0)
-    assert part.geometry.source_frame.shape == problem.geometry.source_frame.shape
+def test_thinned_problem_keeps_the_shapes_of_the_full_problem(problem):
+    subset = thinned(problem, np.arange(problem.n_src) % 2 == 0)
+    assert subset.geometry.source_frame.shape == problem.geometry.source_frame.shape

@@ -11,7 +11,7 @@ DEFAULT = FitSettings(order=3)
 
 
 @pytest.fixture
-def selection(small_orbit):
+def cache(small_orbit):
     return ProblemCache(small_orbit.data, small_orbit.instrument)
 
 
@@ -31,11 +31,9 @@ def without(orbit, rank):
     ],
     ids=["lower", "higher", "widths", "centres", "aberration"],
 )
-def test_problem_of_the_same_measurements_is_as_if_built_from_the_tables(
-    selection, small_orbit, settings
-):
-    _, first = selection.choose(DEFAULT)
-    data, found = selection.choose(settings)
+def test_cached_problem_equals_one_built_from_the_tables(cache, small_orbit, settings):
+    _, first = cache.choose(DEFAULT)
+    data, found = cache.choose(settings)
     assert data is small_orbit.data
     assert found.measurements is first.measurements
     expected = build_problem(data, small_orbit.instrument, settings)
@@ -49,20 +47,20 @@ def test_problem_of_the_same_measurements_is_as_if_built_from_the_tables(
     for name, values in expected.geometry.origin.items():
         np.testing.assert_array_equal(found.geometry.origin[name], values, err_msg=name)
     assert len(found.source_blocks.blocks) == len(expected.source_blocks.blocks)
-    for part, other in zip(found.source_blocks.blocks, expected.source_blocks.blocks, strict=True):
-        assert part.places == other.places
-        np.testing.assert_array_equal(part.columns, other.columns)
+    for block, other in zip(found.source_blocks.blocks, expected.source_blocks.blocks, strict=True):
+        assert block.places == other.places
+        np.testing.assert_array_equal(block.columns, other.columns)
 
 
-def test_what_leaves_out_something_else_is_chosen_anew(selection, small_orbit):
-    settings = [DEFAULT, *(without(small_orbit, rank) for rank in range(3))]
-    settings.append(FitSettings(order=3, thin=2))
-    for chosen in settings:
-        data, problem = selection.choose(chosen)
+def test_other_exclusions_give_another_problem(cache, small_orbit):
+    variants = [DEFAULT, *(without(small_orbit, rank) for rank in range(3))]
+    variants.append(FitSettings(order=3, thin=2))
+    for settings in variants:
+        data, problem = cache.choose(settings)
         expected = build_problem(
-            chosen.exclusions.without(small_orbit.data), small_orbit.instrument, chosen
+            settings.exclusions.without(small_orbit.data), small_orbit.instrument, settings
         )
-        if chosen.thin == 1:
+        if settings.thin == 1:
             np.testing.assert_array_equal(problem.measurements.label, expected.measurements.label)
         else:
             assert problem.n_obs < expected.n_obs
@@ -71,22 +69,22 @@ def test_what_leaves_out_something_else_is_chosen_anew(selection, small_orbit):
         )
 
 
-def test_outliers_of_one_fit_are_not_taken_for_those_of_another(selection, small_orbit):
+def test_cache_distinguishes_outliers_of_different_fits(cache, small_orbit):
     rows = small_orbit.data.measurements
-    _, none = selection.choose(DEFAULT)
+    _, none = cache.choose(DEFAULT)
     for outliers in (rows.iloc[:3], rows.iloc[3:4]):
-        _, problem = selection.choose(DEFAULT, outliers)
-        left = rows.index.difference(outliers.index)
-        np.testing.assert_array_equal(np.sort(problem.measurements.label), left)
-    _, again = selection.choose(DEFAULT)
+        _, problem = cache.choose(DEFAULT, outliers)
+        remaining = rows.index.difference(outliers.index)
+        np.testing.assert_array_equal(np.sort(problem.measurements.label), remaining)
+    _, again = cache.choose(DEFAULT)
     assert again.n_obs == none.n_obs == len(rows)
 
 
-def test_only_the_last_choices_are_kept(selection, small_orbit):
-    _, first = selection.choose(DEFAULT)
-    _, second = selection.choose(without(small_orbit, 0))
-    assert selection.choose(DEFAULT)[1].measurements is first.measurements
-    _, third = selection.choose(without(small_orbit, 1))
-    assert selection.choose(without(small_orbit, 1))[1].measurements is third.measurements
-    assert selection.choose(without(small_orbit, 0))[1].measurements is second.measurements
-    assert selection.choose(DEFAULT)[1].measurements is not first.measurements
+def test_cache_keeps_only_the_latest_problems(cache, small_orbit):
+    _, first = cache.choose(DEFAULT)
+    _, second = cache.choose(without(small_orbit, 0))
+    assert cache.choose(DEFAULT)[1].measurements is first.measurements
+    _, third = cache.choose(without(small_orbit, 1))
+    assert cache.choose(without(small_orbit, 1))[1].measurements is third.measurements
+    assert cache.choose(without(small_orbit, 0))[1].measurements is second.measurements
+    assert cache.choose(DEFAULT)[1].measurements is not first.measurements

@@ -23,14 +23,14 @@ def members_of(problem):
     return ~problem.sources["is_reference"].to_numpy(bool)
 
 
-def test_effective_parameters_are_the_dense_ones(problem, reduced, dense, expansion_point):
+def test_effective_parameters_equal_the_dense_ones(problem, reduced, dense, expansion_point):
     expected = len(dense.hessian) - np.trace(dense.prior @ dense.covariance)
     prior_hessian = problem.priors.hessian_diagonal(expansion_point[0])
     found = effective_parameters(problem.priors, prior_hessian, covariances(reduced))
     assert found == pytest.approx(expected, rel=1e-8)
 
 
-def test_mean_covariance_is_the_dense_one(problem, reduced, dense):
+def test_mean_covariance_equals_the_dense_one(problem, reduced, dense):
     members = np.flatnonzero(members_of(problem))
     average = np.zeros((2, len(dense.hessian)))
     for axis in range(2):
@@ -40,7 +40,7 @@ def test_mean_covariance_is_the_dense_one(problem, reduced, dense):
     np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-8 * expected.max())
 
 
-def test_induced_shift_is_the_dense_one(problem, reduced, dense):
+def test_induced_shift_equals_the_dense_one(problem, reduced, dense):
     rng, n = np.random.default_rng(0), dense.n_calib
     error = rng.normal(size=(problem.n_src, 2)) * ~members_of(problem)[:, None]
     pull = dense.prior[n:, n:] @ error.ravel()
@@ -49,29 +49,29 @@ def test_induced_shift_is_the_dense_one(problem, reduced, dense):
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("part", ["noise", "catalogue", "calibration"])
-def test_error_budget_is_the_dense_one(problem, reduced, dense, part):
-    """H^-1 M H^-1, with M the data's Hessian, or the precision of one kind of prior."""
-    n, of_calibration = dense.n_calib, np.zeros_like(dense.prior)
-    of_calibration[:n, :n] = dense.prior[:n, :n]
+@pytest.mark.parametrize("cause", ["noise", "catalogue", "calibration"])
+def test_error_budget_equals_the_dense_one(problem, reduced, dense, cause):
+    """The reference is H^-1 M H^-1, with M the data's Hessian or the precision of the priors."""
+    n, calibration_prior = dense.n_calib, np.zeros_like(dense.prior)
+    calibration_prior[:n, :n] = dense.prior[:n, :n]
     middle = {
         "noise": dense.jacobian.T @ dense.jacobian,
-        "catalogue": dense.prior - of_calibration,
-        "calibration": of_calibration,
-    }[part]
-    whole = (dense.covariance @ middle @ dense.covariance)[n:, n:]
-    whole = whole.reshape(problem.n_src, 2, problem.n_src, 2)
-    expected = whole[np.arange(problem.n_src), :, np.arange(problem.n_src), :]
+        "catalogue": dense.prior - calibration_prior,
+        "calibration": calibration_prior,
+    }[cause]
+    full = (dense.covariance @ middle @ dense.covariance)[n:, n:]
+    full = full.reshape(problem.n_src, 2, problem.n_src, 2)
+    expected = full[np.arange(problem.n_src), :, np.arange(problem.n_src), :]
     covariance = covariances(reduced)
-    found = getattr(error_budget(reduced, problem.priors, covariance), part)
-    # In units of the uncertainties, as all that the elimination is held to.
+    found = getattr(error_budget(reduced, problem.priors, covariance), cause)
+    # In units of the uncertainties, like other tests of the elimination.
     scale = np.sqrt(np.diagonal(covariance.source, axis1=1, axis2=2))
     scale = scale[:, :, None] * scale[:, None, :]
     np.testing.assert_allclose(found / scale, expected / scale, atol=1e-8)
 
 
-def test_reference_stars_scatter_by_less_than_their_uncertainty(problem, reduced):
-    """What they owe to the catalogue is the same in every orbit."""
+def test_reference_sources_scatter_by_less_than_their_uncertainty(problem, reduced):
+    """Their errors due to the catalogue are the same in every orbit."""
     covariance = covariances(reduced)
     noise = error_budget(reduced, problem.priors, covariance).noise
     share = np.trace(noise, axis1=1, axis2=2) / np.trace(covariance.source, axis1=1, axis2=2)
@@ -81,10 +81,10 @@ def test_reference_stars_scatter_by_less_than_their_uncertainty(problem, reduced
     assert np.median(share[~references]) > 0.8
 
 
-def test_moving_the_catalogue_of_the_references_moves_the_solution_by_the_induced_shift(
+def test_shifting_the_reference_catalogue_moves_the_solution_by_the_induced_shift(
     small_orbit, solution, with_tables
 ):
-    """A refit with the reference stars 0.4 mas further east."""
+    """The reference is a refit with the reference sources 0.4 mas further east."""
     catalogue = small_orbit.data.catalogue
     shift = 0.4 * catalogue["is_reference"] / 3.6e6 / np.cos(np.radians(catalogue["dec"]))
     moved_catalogue = catalogue.assign(ra=catalogue["ra"] + shift)
@@ -92,14 +92,14 @@ def test_moving_the_catalogue_of_the_references_moves_the_solution_by_the_induce
     error = np.zeros((solution.problem.n_src, 2))
     error[~members_of(solution.problem), 0] = 0.4
     expected = induced_shift(solution.reduced, solution.problem.priors, error)
-    # Offsets are from the prior positions, which have moved themselves.
+    # Offsets are relative to the prior positions, which have moved too.
     found = moved.mode.sources + error - solution.mode.sources
     np.testing.assert_allclose(found, expected, atol=2e-3)
     assert np.abs(expected).max() > 0.3
 
 
-def test_normalised_deviation_is_the_papers():
-    """Eq. (result:deviation), of reference sources alone."""
+def test_normalised_deviation_equals_that_of_the_paper():
+    """Eq. (result:deviation) uses only the reference sources."""
     sources = np.array([[0.3, -0.2], [0.1, 0.5], [900.0, 900.0]])
     prior, marginal = np.full((3, 2), 0.25), np.full((3, 2), 0.09)
     found = normalised_deviation(sources, prior, marginal, np.array([True, True, False]))
@@ -125,8 +125,8 @@ def test_normalised_deviation_has_its_expected_value_over_mocks(mocks):
     assert (expected < 0.5).all()
 
 
-def test_evidence_is_the_density_of_the_data_in_the_linearised_model(make_dense):
-    """log N(data; mean, noise + J P J'), which needs a proper prior on everything."""
+def test_evidence_equals_the_density_of_the_data_in_the_linearised_model(make_dense):
+    """The reference is log N(data; mean, noise + J P J'), which needs proper priors."""
     settings = FitSettings(prior_widths={"position_angle": 300.0}, tolerance=1e-6)
     solution = solve(make_orbit(), settings)
     problem, mode = solution.problem, solution.mode
@@ -135,11 +135,11 @@ def test_evidence_is_the_density_of_the_data_in_the_linearised_model(make_dense)
     point = np.concatenate([mode.theta, mode.sources.ravel()])
     precision = dense.prior.copy()
     precision[:n, :n] = np.diag(problem.priors.width**-2.0)
-    # Of the linear model, whose prediction at the mode is the one found.
+    # Data of the linear model, whose prediction at the mode is the exact one.
     mean = dense.residual + dense.jacobian @ point
     covariance = np.eye(len(mean)) + dense.jacobian @ np.linalg.inv(precision) @ dense.jacobian.T
-    # Priors that are all but flat leave it a condition of 4e13: of a general solution the rounding
-    # would be as large as the tolerance, of the triangle it is a fifth.
+    # Nearly flat priors give it a condition number of 4e13: the rounding error of a general solver
+    # would be as large as the tolerance, that of the triangular one is a fifth of it.
     factor = np.linalg.cholesky(covariance)
     whitened = sl.solve_triangular(factor, mean, lower=True)
     log_det = 2.0 * np.log(np.diag(factor)).sum()
@@ -147,7 +147,7 @@ def test_evidence_is_the_density_of_the_data_in_the_linearised_model(make_dense)
     expected = -0.5 * (len(mean) * np.log(2 * np.pi) + log_det)
     expected -= 0.5 * whitened @ whitened + log_sigma
     found = log_evidence(mode, problem.priors, log_sigma, len(mean))
-    # The gamma priors are skew, which is worth some hundredths.
+    # The skewness of the gamma priors contributes some hundredths.
     assert found == pytest.approx(expected, abs=0.1)
 
 
@@ -155,15 +155,15 @@ def penalised_chi2(problem, theta, sources):
     return gradient(problem, theta, sources).chi2 + problem.priors.penalty(theta, sources)
 
 
-def test_penalised_chi2_at_the_mode_is_that_of_the_coordinates_over_mocks(mocks):
-    """One for each coordinate, less the pointings and rolls, whose priors are all but flat."""
+def test_penalised_chi2_at_the_mode_matches_the_number_of_coordinates_over_mocks(mocks):
+    """Expected is one per coordinate, minus pointings and rolls, whose priors are nearly flat."""
     total = sum(solution.mode.trace[-1].objective for _, solution in mocks)
     count = sum(2 * solution.problem.n_obs - 3 * 8 for _, solution in mocks)
     assert 0.001 < stats.chi2(count).cdf(total) < 0.999
 
 
 def test_truth_lies_above_the_mode_by_the_number_of_parameters_over_mocks(mocks):
-    """Of all parameters at once, in the very likelihood."""
+    """This uses all parameters and the exact likelihood."""
     total, count = 0.0, 0
     for orbit, solution in mocks:
         problem = solution.problem
@@ -174,22 +174,22 @@ def test_truth_lies_above_the_mode_by_the_number_of_parameters_over_mocks(mocks)
 
 
 @pytest.mark.parametrize("kind", ["reference", "others"])
-def test_pulls_of_the_sources_scatter_by_one_over_mocks(mocks, kind):
+def test_pulls_of_the_sources_have_unit_scatter_over_mocks(mocks, kind):
     pulls = []
     for orbit, solution in mocks:
         _, sources = true_offsets(orbit, solution.problem)
         sigma = np.sqrt(np.diagonal(solution.covariance.source, axis1=1, axis2=2))
         members = members_of(solution.problem) == (kind == "others")
         pulls.append(((solution.mode.sources - sources) / sigma)[members])
-    # Sources share the calibration: the number of orbits limits how well this is known.
+    # Sources share the calibration, so the number of orbits limits the accuracy.
     squares = np.array([np.mean(p**2) for p in pulls])
     error = squares.std(ddof=1) / np.sqrt(len(squares))
     assert squares.mean() == pytest.approx(1.0, abs=4.0 * error)
     assert error < 0.12
 
 
-def test_mean_error_of_the_sources_is_the_one_foretold(mocks):
-    """Its square in the metric of `mean_covariance`, over the mocks."""
+def test_mean_error_of_the_sources_matches_its_covariance(mocks):
+    """Its square in the metric of `mean_covariance` follows a chi2 distribution over the mocks."""
     total = 0.0
     for orbit, solution in mocks:
         _, sources = true_offsets(orbit, solution.problem)
@@ -200,7 +200,7 @@ def test_mean_error_of_the_sources_is_the_one_foretold(mocks):
 
 
 def test_pulls_with_conditional_sigmas_scatter_by_more(mocks):
-    """Why the marginal sigmas are needed: the calibration's error is not in the others."""
+    """Marginal sigmas are needed: conditional ones omit the errors of the calibration."""
     ratios = [
         np.sqrt(
             np.diagonal(s.covariance.source, axis1=1, axis2=2)

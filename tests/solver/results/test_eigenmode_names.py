@@ -1,4 +1,4 @@
-"""Names of modes, on vectors made by hand."""
+"""Names of eigenmodes, for hand-made vectors."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def labels_of(group):
     return [f"{word} {i}" for i in range(SIZES[group.axis])]
 
 
-def part(name, moves, share=1.0):
+def group_share(name, moves, share=1.0):
     group = BY_NAME[name]
     places = PLACES.get(group.axis)
     places = places.astype(float) if places is not None else None
@@ -34,16 +34,16 @@ def part(name, moves, share=1.0):
 
 
 def name_of(**moves):
-    """Return the name of a mode; a group moves by its vector, with a share."""
-    parts = []
+    """Return the name of an eigenmode, from the vector and share of each group."""
+    shares = []
     for group in CALIBRATION_GROUPS:
         vector, share = moves.get(group.name, (np.zeros(SIZES[group.axis]), 0.0))
-        parts.append(part(group.name, vector, share))
-    return eigenmode_name(parts)
+        shares.append(group_share(group.name, vector, share))
+    return eigenmode_name(shares)
 
 
 @pytest.mark.parametrize(
-    ("group", "moves", "words"),
+    ("group", "moves", "expected"),
     [
         ("detector_x", [1.0, 1.1, 0.9, 1.0], "common"),
         ("detector_x", [-1.0, -1.1, -0.9, -1.0], "common"),
@@ -69,16 +69,16 @@ def name_of(**moves):
         "terms",
     ],
 )
-def test_pattern(group, moves, words):
-    assert pattern(part(group, moves)) == words
+def test_pattern(group, moves, expected):
+    assert pattern(group_share(group, moves)) == expected
 
 
-def test_one_group_alone_is_named_alone():
+def test_single_group_is_named_alone():
     name = name_of(pointing_ra=(COMMON["exp"], 0.95), focal_length=(COMMON["exp"], 0.05))
     assert name == "common pointing RA"
 
 
-def test_a_detector_against_the_pointing():
+def test_families_are_joined_by_with():
     name = name_of(
         detector_y=(COMMON["det"], 0.55),
         pointing_ra=(COMMON["exp"], 0.3),
@@ -87,12 +87,12 @@ def test_a_detector_against_the_pointing():
     assert name == "common detector y with common pointing RA, Dec"
 
 
-def test_opposite_signs_in_a_family_are_against_each_other():
+def test_opposite_signs_in_a_family_are_joined_by_against():
     name = name_of(pitch_x=(COMMON["det"], 0.6), pitch_y=(-COMMON["det"], 0.4))
     assert name == "common pixel pitch x against y"
 
 
-def test_the_largest_family_comes_first_and_its_groups_in_the_order_of_the_table():
+def test_largest_family_comes_first_with_groups_in_table_order():
     name = name_of(
         position_angle=(COMMON["exp"], 0.4),
         detector_x=(OPPOSED, 0.2),
@@ -102,7 +102,7 @@ def test_the_largest_family_comes_first_and_its_groups_in_the_order_of_the_table
     assert name == ("opposed detector x, y with common position angle and detector rotation")
 
 
-def test_a_roll_of_the_sky_has_gradients_of_the_pointings():
+def test_gradients_of_a_family_are_named_together():
     name = name_of(
         position_angle=(COMMON["exp"], 0.7),
         pointing_ra=(GRADIENT, 0.15),
@@ -111,7 +111,7 @@ def test_a_roll_of_the_sky_has_gradients_of_the_pointings():
     assert name == "common position angle with gradients of pointing RA, Dec"
 
 
-def test_terms_of_the_distortion_are_named():
+def test_distortion_terms_are_named():
     name = name_of(
         distortion_x=([1.0, 0.0, -1.0, 0.1, 0.0, 0.0, 0.0], 0.5),
         distortion_y=([0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.3),
@@ -120,29 +120,29 @@ def test_terms_of_the_distortion_are_named():
     assert name == "distortion A(0,2), A(2,0), B(1,1) with gradient of focal length"
 
 
-def test_one_exposure_that_outdoes_all_others_is_named():
+def test_dominant_exposure_is_named():
     moves = np.full(12, 0.01)
     moves[5] = 1.0
     assert name_of(focal_length=(moves, 1.0)) == "focal length of field 0 plate 5"
 
 
-def test_a_small_part_of_a_family_is_left_out():
+def test_small_share_of_a_family_is_omitted():
     name = name_of(pointing_ra=(COMMON["exp"], 0.96), pointing_dec=(GRADIENT, 0.04))
     assert name == "common pointing RA"
 
 
-def test_groups_that_move_in_their_own_ways_are_told_apart():
+def test_groups_of_a_family_with_different_patterns_are_named_separately():
     name = name_of(pointing_ra=(COMMON["exp"], 0.6), pointing_dec=(GRADIENT, 0.4))
     assert name == "common pointing RA with gradient of pointing Dec"
 
 
-def test_a_mode_of_many_small_shares_has_the_name_of_the_largest_family():
+def test_eigenmode_of_many_small_shares_is_named_after_the_largest_family():
     shares = {group.name: (COMMON[group.axis], 0.04) for group in CALIBRATION_GROUPS}
     shares["detector_x"] = (COMMON["det"], 0.045)
     assert "detector x" in name_of(**shares)
 
 
-def test_the_sign_of_a_mode_does_not_change_its_name():
+def test_sign_of_an_eigenmode_does_not_change_its_name():
     moves = {"detector_x": (OPPOSED, 0.5), "pointing_ra": (GRADIENT + 0.1, 0.5)}
-    turned = {name: (-np.asarray(values), share) for name, (values, share) in moves.items()}
-    assert name_of(**moves) == name_of(**turned)
+    negated = {name: (-np.asarray(values), share) for name, (values, share) in moves.items()}
+    assert name_of(**moves) == name_of(**negated)

@@ -16,7 +16,7 @@ def motions():
     return scale * np.random.default_rng(1).standard_normal((N_SOURCES, 5))
 
 
-def test_julian_years_are_those_of_the_standard_epoch():
+def test_julian_year_of_the_standard_epoch_is_2000():
     assert julian_year(np.array([51_544.5]))[0] == 2000.0
 
 
@@ -35,7 +35,7 @@ def test_pulls_are_unit_normal(motions):
     assert pulls.std() == pytest.approx(1.0, abs=4.0 / np.sqrt(2 * pulls.size))
 
 
-def test_chi2_is_that_of_its_degrees_of_freedom(motions):
+def test_mean_chi2_equals_its_degrees_of_freedom(motions):
     fit = fit_motions(make_history(motions, N_ORBITS), EPOCH)
     dof = 2 * N_ORBITS - 5
     assert fit.chi2.mean() == pytest.approx(dof, abs=4.0 * np.sqrt(2.0 * dof / N_SOURCES))
@@ -47,15 +47,15 @@ def test_residuals_scatter_as_expected(motions):
     assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(1.0 / fit.residual.size))
 
 
-def test_errors_of_the_catalogue_go_through_whole(motions):
-    """An error that is alike in all orbits is not averaged: the fit inherits it as it is."""
+def test_catalogue_errors_are_inherited_in_full(motions):
+    """An error that is the same in all orbits does not average out: the fit inherits it."""
     draws = np.random.default_rng(2).standard_normal((3, N_DRAWS, 5))
     fit = fit_motions(make_history(motions[:3], N_ORBITS, draws=draws), EPOCH)
     expected = np.einsum("sdp,sdq->spq", draws, draws) / N_DRAWS
     np.testing.assert_allclose(fit.catalogue, expected, atol=1e-5)
 
 
-def test_noise_weighs_the_orbits(motions):
+def test_orbits_are_weighted_by_their_noise(motions):
     history = make_history(motions, N_ORBITS)
     bad = history["orbit_id"] == 3
     history.loc[bad, ["sigma_ra_noise", "sigma_dec_noise"]] = 1e3
@@ -76,9 +76,9 @@ def test_one_orbit_at_the_epoch_has_no_motion(motions):
     assert np.isnan(fit_motions(history, epoch).motion).all()
 
 
-def test_sources_with_different_numbers_of_orbits_stay_apart(motions):
-    whole = make_history(motions[:2], N_ORBITS, noise=1e-9)
-    mixed = whole[(whole["source_id"] == whole["source_id"].min()) | (whole["orbit_id"] < 6)]
+def test_sources_with_different_numbers_of_orbits_are_separate(motions):
+    full = make_history(motions[:2], N_ORBITS, noise=1e-9)
+    mixed = full[(full["source_id"] == full["source_id"].min()) | (full["orbit_id"] < 6)]
     fit = fit_motions(mixed.reset_index(drop=True), EPOCH)
     np.testing.assert_allclose(fit.motion, motions[:2], atol=1e-5)
     assert fit.first.tolist() == [0, N_ORBITS]

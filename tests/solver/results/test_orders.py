@@ -1,4 +1,4 @@
-"""Choosing the order of the distortion, against a dense posterior and a known truth."""
+"""The comparison of distortion orders, tested with a dense posterior and a known truth."""
 
 from dataclasses import replace
 
@@ -18,10 +18,10 @@ from solver.results.orders import at_order, compare_orders, judge_reserved, rese
 from tests.solver.small_orbit import make_orbit
 
 TRUE_ORDER = 5
-# One needless order; those above cost compilations and say the same.
+# One order too many; higher ones cost compilations and add nothing.
 HIGHEST = 6
-# An orbit near its nominal calibration, and priors so narrow that a covariance of its data has
-# all digits.
+# An orbit near its nominal calibration, with priors narrow enough for an accurate covariance of
+# its data.
 NEAR = {"scatter": 0.01, "pointing_error": 0.1}
 EXACT = FitSettings(
     prior_widths={
@@ -35,27 +35,27 @@ EXACT = FitSettings(
 
 @pytest.fixture(scope="module")
 def orders():
-    """An orbit whose distortion is of the fifth order, compared up to the sixth."""
+    """The comparison up to order six of an orbit with distortion of order five."""
     orbit = make_orbit()
     settings = FitSettings(order=HIGHEST)
     return compare_orders(build_problem(orbit.data, orbit.instrument, settings), settings)
 
 
 @pytest.mark.slow
-def test_every_order_is_there_and_has_converged(orders):
+def test_every_order_is_present_and_converged(orders):
     assert orders["order"].tolist() == list(range(HIGHEST + 1))
     assert orders["n_terms"].tolist() == [2 * len(terms(n)) for n in range(HIGHEST + 1)]
     assert orders["converged"].all()
 
 
 @pytest.mark.slow
-def test_evidence_and_reserved_sources_choose_the_true_order(orders):
+def test_evidence_and_reserved_sources_prefer_the_true_order(orders):
     assert int(orders["log_evidence"].argmax()) == TRUE_ORDER
     assert int(orders["held_out_log_density"].argmax()) == TRUE_ORDER
 
 
 @pytest.mark.slow
-def test_chi2_of_the_reserved_sources_falls_to_the_true_order_and_stays(orders):
+def test_chi2_of_the_reserved_sources_falls_up_to_the_true_order(orders):
     ratio = (orders["held_out_chi2"] / orders["held_out_dof"]).to_numpy()
     scatter = np.sqrt(2.0 / orders["held_out_dof"].iloc[0])
     assert ratio[TRUE_ORDER] == pytest.approx(1.0, abs=3.0 * scatter)
@@ -64,16 +64,16 @@ def test_chi2_of_the_reserved_sources_falls_to_the_true_order_and_stays(orders):
 
 
 @pytest.mark.slow
-def test_chi2_of_all_can_only_fall_with_the_order(orders):
-    """Nearly: what the priors of new terms add is no part of it."""
+def test_chi2_falls_with_the_order(orders):
+    """Except for a small rise, because chi2 excludes the priors of the new terms."""
     assert (np.diff(orders["chi2"].to_numpy()) < 1.0).all()
 
 
 @pytest.mark.slow
-def test_effective_parameters_grow_with_the_terms_and_by_no_more(orders):
-    grown = np.diff(orders["effective_parameters"].to_numpy())
-    assert (grown[TRUE_ORDER:] > 0.0).all()
-    assert (grown <= np.diff(orders["n_terms"]) + 1e-3).all()
+def test_effective_parameters_grow_at_most_by_the_number_of_terms(orders):
+    growth = np.diff(orders["effective_parameters"].to_numpy())
+    assert (growth[TRUE_ORDER:] > 0.0).all()
+    assert (growth <= np.diff(orders["n_terms"]) + 1e-3).all()
 
 
 @pytest.mark.slow
@@ -83,8 +83,8 @@ def test_orders_without_terms_are_the_same(orders):
 
 
 @pytest.mark.slow
-def test_figures_are_those_of_a_fit_of_that_order(orders, result):
-    """In which the terms above are not there, rather than held at zero."""
+def test_figures_equal_those_of_a_fit_of_that_order(orders, result):
+    """The fit has no higher terms, instead of terms fixed at zero."""
     row = orders.iloc[TRUE_ORDER]
     for name in ("chi2", "dof", "effective_parameters"):
         assert row[name] == pytest.approx(result.summary[name], rel=1e-5)
@@ -92,10 +92,10 @@ def test_figures_are_those_of_a_fit_of_that_order(orders, result):
 
 
 class LinearModel:
-    """The linear model of a problem at its mode, with the sources and all else integrated out.
+    """The linear model of a problem at its mode, with all parameters integrated out.
 
-    `mean` and `covariance` are those of the whitened data, in working order; a model without
-    the calibration's and the sources' posterior, and without any elimination.
+    `data` is whitened, in working order, and `covariance` is its covariance, computed from the
+    dense Jacobian and the priors without any elimination.
     """
 
     def __init__(self, problem, make_dense, settings):
@@ -116,49 +116,49 @@ class LinearModel:
         chi2 = self.data @ np.linalg.solve(self.covariance, self.data)
         return -0.5 * (chi2 + log_det + sigma.size * np.log(2 * np.pi)) - np.log(sigma).sum()
 
-    def prediction(self, held, sigma):
+    def prediction(self, is_reserved, sigma):
         """Return chi2 and log density of some data given the others."""
-        rest = ~held
-        cross = self.covariance[np.ix_(held, rest)]
+        rest = ~is_reserved
+        cross = self.covariance[np.ix_(is_reserved, rest)]
         gain = np.linalg.solve(self.covariance[np.ix_(rest, rest)], cross.T).T
-        left = self.data[held] - gain @ self.data[rest]
-        spread = self.covariance[np.ix_(held, held)] - gain @ cross.T
+        remainder = self.data[is_reserved] - gain @ self.data[rest]
+        spread = self.covariance[np.ix_(is_reserved, is_reserved)] - gain @ cross.T
         _, log_det = np.linalg.slogdet(spread)
-        chi2 = left @ np.linalg.solve(spread, left)
-        count = held.sum() * np.log(2 * np.pi)
-        return chi2, -0.5 * (chi2 + log_det + count) - np.log(sigma.ravel()[held]).sum()
+        chi2 = remainder @ np.linalg.solve(spread, remainder)
+        count = is_reserved.sum() * np.log(2 * np.pi)
+        return chi2, -0.5 * (chi2 + log_det + count) - np.log(sigma.ravel()[is_reserved]).sum()
 
 
 @pytest.fixture(scope="module", params=[3, TRUE_ORDER], ids=["too-low", "true"])
 def linear(request, make_dense):
-    """A problem of some order out of one of the fifth, all its priors normal, and its model."""
+    """A problem of a given order, with normal priors, and its linear model."""
     orbit = make_orbit(max_degree=TRUE_ORDER, **NEAR)
-    whole = build_problem(orbit.data, orbit.instrument, EXACT)
-    normal = whole.priors._replace(is_gamma=np.zeros_like(whole.priors.is_gamma))
-    problem = at_order(replace(whole, priors=normal), request.param)
+    full = build_problem(orbit.data, orbit.instrument, EXACT)
+    normal = full.priors._replace(is_gamma=np.zeros_like(full.priors.is_gamma))
+    problem = at_order(replace(full, priors=normal), request.param)
     return problem, LinearModel(problem, make_dense, EXACT)
 
 
-def test_evidence_is_the_density_of_the_data(linear):
-    """With every normalisation of every prior, to the last digits of a number of thousands."""
+def test_evidence_equals_the_density_of_the_data(linear):
+    """This includes the normalisation of every prior; the value is of the order of thousands."""
     problem, model = linear
     log_sigma = float(np.log(problem.measurements.sigma).sum())
     found = log_evidence(model.mode, problem.priors, log_sigma, problem.measurements.sigma.size)
     assert found == pytest.approx(model.log_density(problem.measurements.sigma), abs=1e-6)
 
 
-def test_reserved_sources_are_judged_by_their_predictive_density(linear):
+def test_figures_of_reserved_sources_equal_the_predictive_ones(linear):
     problem, model = linear
     reserved = reserved_sources(problem)
     found = judge_reserved(problem, model.mode, reserved, EXACT)
-    held = np.repeat(reserved[problem.measurements.index.source], 2)
-    chi2, log_density = model.prediction(held, problem.measurements.sigma)
-    assert found.dof == held.sum()
+    is_reserved = np.repeat(reserved[problem.measurements.index.source], 2)
+    chi2, log_density = model.prediction(is_reserved, problem.measurements.sigma)
+    assert found.dof == is_reserved.sum()
     assert found.chi2 == pytest.approx(chi2, rel=1e-4)
     assert found.log_density == pytest.approx(log_density, abs=1e-2)
 
 
-def test_a_tenth_of_the_sources_that_are_no_reference_is_reserved(problem):
+def test_a_tenth_of_the_non_reference_sources_is_reserved(problem):
     reserved = reserved_sources(problem)
     is_reference = problem.sources["is_reference"].to_numpy(bool)
     assert reserved.sum() == np.ceil(0.1 * (~is_reference).sum())
@@ -166,10 +166,12 @@ def test_a_tenth_of_the_sources_that_are_no_reference_is_reserved(problem):
     np.testing.assert_array_equal(reserved, reserved_sources(problem))
 
 
-def test_without_sources_to_reserve_the_evidence_alone_is_left(problem):
-    everyone = replace(problem, sources=problem.sources.assign(is_reference=True))
-    reserved = reserved_sources(everyone)
-    found = judge_reserved(everyone, find_mode(problem, FitSettings()), reserved, FitSettings())
+def test_without_reserved_sources_there_is_no_predictive_density(problem):
+    references_only = replace(problem, sources=problem.sources.assign(is_reference=True))
+    reserved = reserved_sources(references_only)
+    found = judge_reserved(
+        references_only, find_mode(problem, FitSettings()), reserved, FitSettings()
+    )
     assert found.dof == 0
     assert np.isnan([found.chi2, found.log_density]).all()
 
@@ -177,7 +179,7 @@ def test_without_sources_to_reserve_the_evidence_alone_is_left(problem):
 @pytest.mark.parametrize(
     ("spare", "highest"), [(1, 0), (7, 2), (37, 5), (1000, MAX_ORDER)], ids=str
 )
-def test_orders_that_the_data_hold_leave_a_coordinate_to_spare(spare, highest):
+def test_orders_held_leave_at_least_one_spare_coordinate(spare, highest):
     layout, n_src = VectorLayout(8, len(terms(4)), 4), 51
     bare = 2 * n_src + layout.size - 2 * layout.n_coef
     n_obs = (bare + spare + 1) // 2
@@ -186,11 +188,11 @@ def test_orders_that_the_data_hold_leave_a_coordinate_to_spare(spare, highest):
 
 @pytest.fixture(scope="module")
 def short_orbit():
-    """Two exposures without distortion, which hold as many orders as are compiled here anyway."""
+    """Two exposures without distortion, with few enough data to limit the number of orders."""
     orbit = make_orbit(max_degree=1)
     rows = orbit.data.measurements
-    kept = rows["field_id"].eq(0) & rows["plate_id"].le(1)
-    return orbit._replace(data=of_rows(orbit.data, kept.to_numpy()))
+    is_kept = rows["field_id"].eq(0) & rows["plate_id"].le(1)
+    return orbit._replace(data=of_rows(orbit.data, is_kept.to_numpy()))
 
 
 COMPARED = FitSettings(order=HIGHEST, compare_orders=True)
@@ -207,35 +209,39 @@ def compared(fitter):
 
 
 @pytest.mark.slow
-def test_orders_that_the_data_cannot_hold_are_left_out(compared):
+def test_orders_with_too_many_parameters_are_omitted(compared):
     assert compared.orders["order"].tolist() == list(range(HIGHEST + 1))
 
 
 @pytest.mark.slow
-def test_the_fit_itself_is_that_without_a_comparison(short_orbit, compared):
-    alone = fit_orbit(short_orbit.data, short_orbit.instrument, FitSettings(order=HIGHEST))
-    assert alone.orders is None
-    assert compared.sources.equals(alone.sources)
+def test_comparison_does_not_change_the_fit(short_orbit, compared):
+    without_comparison = fit_orbit(
+        short_orbit.data, short_orbit.instrument, FitSettings(order=HIGHEST)
+    )
+    assert without_comparison.orders is None
+    assert compared.sources.equals(without_comparison.sources)
     without_times = {**compared.summary, "seconds": {}}
-    assert without_times == {**alone.summary, "seconds": {}}
-    assert set(compared.summary["seconds"]) - set(alone.summary["seconds"]) == {"orders"}
+    assert without_times == {**without_comparison.summary, "seconds": {}}
+    assert set(compared.summary["seconds"]) - set(without_comparison.summary["seconds"]) == {
+        "orders"
+    }
 
 
 @pytest.mark.slow
-def test_a_change_of_the_order_alone_keeps_the_comparison(fitter, compared):
+def test_what_if_of_another_order_keeps_the_comparison(fitter, compared):
     changed = fitter.what_if(COMPARED.with_(order=5))
     assert changed.orders.equals(compared.orders)
 
 
 @pytest.mark.slow
-def test_any_other_change_has_no_comparison(fitter, compared):
+def test_other_what_ifs_have_no_comparison(fitter, compared):
     assert compared.orders is not None
     changed = fitter.what_if(COMPARED.with_(prior_widths={"distortion_x": 0.5}))
     assert changed is not None
     assert changed.orders is None
 
 
-def test_a_flat_prior_of_the_distortion_leaves_the_predictions_alone(short_orbit):
+def test_flat_distortion_prior_gives_predictions_without_evidence(short_orbit):
     flat = FitSettings(order=HIGHEST, prior_widths={"distortion_y": np.inf})
     problem = build_problem(short_orbit.data, short_orbit.instrument, flat)
     orders = compare_orders(problem, flat)

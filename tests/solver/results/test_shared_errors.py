@@ -28,7 +28,7 @@ def budget(problem, reduced):
     return error_budget_table(problem, reduced, covariances(reduced))
 
 
-def test_budget_adds_up_to_the_marginal_variance(problem, reduced, budget):
+def test_budget_sums_to_the_marginal_variance(problem, reduced, budget):
     assert list(budget.columns) == ERROR_BUDGET.names
     marginal = covariances(reduced).source
     for i, axis in enumerate(("ra", "dec")):
@@ -36,11 +36,11 @@ def test_budget_adds_up_to_the_marginal_variance(problem, reduced, budget):
         np.testing.assert_allclose(total, marginal[:, i, i], rtol=1e-9)
 
 
-def test_draws_scatter_as_the_budget_says(problem, reduced, budget):
+def test_draws_scatter_as_in_the_budget(problem, reduced, budget):
     table = shared_error_table(problem, reduced, FitSettings())
     assert list(table.columns) == SHARED_ERRORS.names
     found = draws_of(table).std(axis=1)
-    # All sources share the errors of the same stars, so that they are few draws of a whole.
+    # All sources share the errors of the same reference sources, so they are not independent.
     ratio = np.median(found[:, 0] / budget["sigma_ra_catalogue"])
     assert ratio == pytest.approx(1.0, abs=4.0 / np.sqrt(2 * N_DRAWS))
 
@@ -55,18 +55,18 @@ def test_many_draws_have_the_covariance_of_the_catalogue(problem, reduced, budge
 
     monkeypatch.setattr("solver.results.shared_errors.SHARED_ERRORS", Wide())
     drawn = draws_of(shared_error_table(problem, reduced, FitSettings()))
-    # Only the reference sources err by draws; the vague priors of the others hardly add.
+    # Only reference sources have drawn errors; the wide priors of the others hardly contribute.
     for i, axis in enumerate(("ra", "dec")):
         ratio = (drawn[:, :, i].std(axis=1) / budget[f"sigma_{axis}_catalogue"]) ** 2
         assert ratio.mean() == pytest.approx(1.0, abs=0.2)
 
 
-def test_star_that_nothing_moves_errs_as_its_catalogue_does(problem):
+def test_source_with_a_tight_prior_has_the_errors_of_the_catalogue(problem):
     tight = replace(
         problem, priors=problem.priors._replace(precision=1e12 * problem.priors.precision)
     )
-    held = eliminate_sources(equations_of(problem), tight.priors)
-    drawn = draws_of(shared_error_table(tight, held, FitSettings()))
+    reduced = eliminate_sources(equations_of(problem), tight.priors)
+    drawn = draws_of(shared_error_table(tight, reduced, FitSettings()))
     is_reference = problem.sources["is_reference"].to_numpy(bool)
     sigma = np.sqrt(np.linalg.inv(problem.priors.precision)[is_reference][:, 0, 0])
     spread = drawn[is_reference, :, 0].std(axis=1) / sigma
@@ -74,20 +74,22 @@ def test_star_that_nothing_moves_errs_as_its_catalogue_does(problem):
     assert np.abs(drawn[~is_reference]).max() < 1e-3
 
 
-def test_star_errs_alike_whatever_else_is_measured(problem):
-    """A star's errors hang on its id alone, so that they are the same in every orbit."""
-    few = replace(problem, sources=problem.sources.iloc[::2])
-    whole, part = (_drawn_errors(p.sources, p.epoch) for p in (problem, few))
-    np.testing.assert_array_equal(whole[:, ::2], part)
+def test_drawn_errors_do_not_depend_on_the_other_sources(problem):
+    """The errors depend only on the ID of the source, so they are the same in every orbit."""
+    subset = replace(problem, sources=problem.sources.iloc[::2])
+    full, of_subset = (_drawn_errors(p.sources, p.epoch) for p in (problem, subset))
+    np.testing.assert_array_equal(full[:, ::2], of_subset)
 
 
-def test_looser_priors_err_by_more(problem, reduced):
-    one = draws_of(shared_error_table(problem, reduced, FitSettings()))
-    two = draws_of(shared_error_table(problem, reduced, FitSettings(prior_widths={"sources": 2.0})))
-    np.testing.assert_allclose(two, 2.0 * one, rtol=1e-6)
+def test_wider_priors_scale_the_errors(problem, reduced):
+    default = draws_of(shared_error_table(problem, reduced, FitSettings()))
+    doubled = draws_of(
+        shared_error_table(problem, reduced, FitSettings(prior_widths={"sources": 2.0}))
+    )
+    np.testing.assert_allclose(doubled, 2.0 * default, rtol=1e-6)
 
 
-def test_history_is_that_of_the_schema(small_orbit):
+def test_history_has_the_columns_of_the_schema(small_orbit):
     fitter = OrbitFitter(small_orbit.data, small_orbit.instrument)
     result = fitter.fit(FitSettings())
     history = fitter.history(result)

@@ -13,7 +13,7 @@ def off_diagonal(matrices):
 
 
 @pytest.mark.parametrize("n", [1, 2, 7], ids=["one", "two", "seven"])
-def test_axes_that_exist_are_found(n):
+def test_common_axes_are_found(n):
     rng = np.random.default_rng(n)
     axes = random_axes(rng, n)
     matrices = np.array([axes * rng.uniform(size=n) @ axes.T for _ in range(3)])
@@ -22,7 +22,7 @@ def test_axes_that_exist_are_found(n):
     np.testing.assert_allclose(np.abs(found.T @ axes).max(axis=0), 1.0, rtol=1e-9)
 
 
-def test_axes_that_one_matrix_leaves_open_are_told_apart_by_another():
+def test_axes_degenerate_in_one_matrix_are_separated_by_another():
     rng = np.random.default_rng(0)
     axes = random_axes(rng, 3)
     values = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]])
@@ -31,7 +31,7 @@ def test_axes_that_one_matrix_leaves_open_are_told_apart_by_another():
     np.testing.assert_allclose(np.abs(found.T @ axes).max(axis=0), 1.0, rtol=1e-9)
 
 
-def test_axes_are_orthonormal_and_no_worse_where_there_are_none_in_common():
+def test_axes_are_orthonormal_and_improve_without_common_axes():
     rng = np.random.default_rng(1)
     matrices = rng.standard_normal((4, 5, 5))
     matrices += matrices.swapaxes(1, 2)
@@ -41,7 +41,7 @@ def test_axes_are_orthonormal_and_no_worse_where_there_are_none_in_common():
     assert after < np.sum(off_diagonal(matrices) ** 2)
 
 
-def test_matrices_are_left_as_they_were():
+def test_input_matrices_are_not_changed():
     matrices = np.array([[[2.0, 1.0], [1.0, 0.0]]])
     joint_axes(matrices)
     assert matrices.tolist() == [[[2.0, 1.0], [1.0, 0.0]]]

@@ -5,7 +5,7 @@ import pytest
 from solver.results.summary import MIN_OBS, class_members, truth_summary
 
 
-def test_counts_are_those_of_the_tables(small_orbit, result):
+def test_counts_equal_those_of_the_tables(small_orbit, result):
     summary, sources = result.summary, result.sources
     assert summary["n_measurements"] == len(small_orbit.data.measurements)
     assert summary["n_sources"] == len(sources)
@@ -16,23 +16,23 @@ def test_counts_are_those_of_the_tables(small_orbit, result):
     assert summary["epoch_mjd"] == pytest.approx(small_orbit.data.exposures["obstime"].mean())
 
 
-def test_keys_promised_for_json_are_there(result):
-    promised = {"converged", "reason", "engine", "iterations", "n_measurements", "n_sources"}
-    promised |= {"n_reference", "chi2_per_dof", "seconds"}
-    assert promised <= set(result.summary)
+def test_documented_keys_are_present(result):
+    expected = {"converged", "reason", "engine", "iterations", "n_measurements", "n_sources"}
+    expected |= {"n_reference", "chi2_per_dof", "seconds"}
+    assert expected <= set(result.summary)
     assert set(result.summary["seconds"]) >= {"prepare", "fit"}
 
 
-def test_values_are_plain(result):
-    def plain(value):
+def test_values_are_plain_types(result):
+    def is_plain(value):
         if isinstance(value, dict):
-            return all(plain(v) for v in value.values())
+            return all(is_plain(v) for v in value.values())
         return type(value) in (bool, int, float, str)
 
-    assert {k: v for k, v in result.summary.items() if not plain(v)} == {}
+    assert {k: v for k, v in result.summary.items() if not is_plain(v)} == {}
 
 
-def test_chi2_is_that_of_the_residuals(result):
+def test_chi2_equals_that_of_the_residuals(result):
     rows = result.residuals
     chi2 = ((rows["residual_x"] / rows["sx"]) ** 2 + (rows["residual_y"] / rows["sy"]) ** 2).sum()
     assert result.summary["chi2"] == pytest.approx(chi2)
@@ -52,13 +52,13 @@ def test_residual_rms_is_in_pixels(result):
     assert result.summary["residual_rms_x"] == pytest.approx(expected)
 
 
-def test_iterations_are_the_steps_of_the_trace(result):
+def test_iterations_equal_the_steps_of_the_trace(result):
     assert result.summary["iterations"] == result.trace["iteration"].max()
 
 
 @pytest.mark.parametrize("axis", ["ra", "dec"])
-def test_normalised_deviation_is_of_the_reference_sources(result, axis):
-    """Eq. (result:deviation)."""
+def test_normalised_deviation_uses_the_reference_sources(result, axis):
+    """Reproduce Eq. (result:deviation)."""
     reference = result.sources[result.sources["is_reference"]]
     ratio = reference[f"offset_{axis}"] / reference[f"prior_sigma_{axis}"]
     expected = np.sqrt((ratio**2).mean())
@@ -66,7 +66,7 @@ def test_normalised_deviation_is_of_the_reference_sources(result, axis):
 
 
 @pytest.mark.parametrize("axis", ["ra", "dec"])
-def test_expected_normalised_deviation_is_that_of_the_shrinkage(result, axis):
+def test_expected_normalised_deviation_accounts_for_shrinkage(result, axis):
     reference = result.sources[result.sources["is_reference"]]
     ratio = reference[f"sigma_{axis}_marginal"] / reference[f"prior_sigma_{axis}"]
     expected = np.sqrt((1.0 - ratio**2).mean())
@@ -91,7 +91,7 @@ def tables(ra, ra_true, n_obs=MIN_OBS, dec=60.0):
     return sources, places.assign(induced_ra=0.1, induced_dec=-0.2)
 
 
-def test_deviation_is_along_the_great_circle_and_pulls_are_of_marginal_sigmas():
+def test_deviation_is_on_the_sky_and_pulls_use_marginal_sigmas():
     mas = 1.0 / 3.6e6
     figures = truth_summary(*tables([10.0 + 8 * mas, 10.0, 10.0], [10.0, 10.0, 10.0]))
     found = figures["non-reference"]
@@ -110,12 +110,12 @@ def test_deviation_across_zero_hours_is_small():
     assert figures["artificial"]["mean_ra"] == pytest.approx(-1.0, abs=1e-4)
 
 
-def test_sources_seen_too_seldom_do_not_count():
+def test_sources_with_few_measurements_are_omitted():
     figures = truth_summary(*tables([10.0, 10.0], [10.0, 10.0], n_obs=[MIN_OBS - 1, MIN_OBS]))
     assert set(figures) == {"artificial"}
 
 
-def test_every_source_is_of_one_class(result):
+def test_every_source_is_in_one_class(result):
     members = class_members(result.sources)
     total = sum(m.astype(int) for m in members.values())
     assert (total == 1).all()

@@ -28,10 +28,10 @@ def test_table_has_the_columns_and_types_of_the_schema(result, name):
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_only_columns_that_may_hold_it_hold_nan(result, name):
+def test_only_columns_that_may_be_nan_contain_nan(result, name):
     table, frame = TABLES[name], getattr(result, name)
-    holding = [c for c in frame if frame[c].isna().any()]
-    assert all(table[c].may_be_nan for c in holding)
+    with_nan = [c for c in frame if frame[c].isna().any()]
+    assert all(table[c].may_be_nan for c in with_nan)
 
 
 def test_sources_are_in_ascending_order(result):
@@ -56,11 +56,11 @@ def separation_mas(sources, column, prior):
 def test_offset_of_a_source_is_estimate_minus_prior(result, column):
     sources = result.sources
     expected = separation_mas(sources, column, sources["prior_dec"])
-    # The tangent plane leaves it by 1 arcsec squared, some 5 uas.
+    # The tangent plane deviates by the square of 1 arcsec, about 5 uas.
     np.testing.assert_allclose(sources[f"offset_{column}"], expected, atol=0.02)
 
 
-def test_prior_of_a_source_is_the_catalogue_at_the_mean_epoch(small_orbit, result):
+def test_prior_of_a_source_is_its_catalogue_position_at_the_mean_epoch(small_orbit, result):
     rows = small_orbit.data.catalogue.set_index("source_id").loc[result.sources["source_id"]]
     epoch = small_orbit.data.exposures["obstime"].mean()
     ra, dec = epoch_places(rows, epoch)
@@ -85,7 +85,7 @@ def test_marginal_sigmas_lie_between_the_conditional_and_the_prior_ones(result):
         assert (sources[f"sigma_{axis}_marginal"] < sources[f"prior_sigma_{axis}"]).all()
 
 
-def test_correlations_are_those_of_the_covariances(solution, result):
+def test_correlations_equal_those_of_the_covariances(solution, result):
     covariance = solution.covariance.source
     expected = covariance[:, 0, 1] / np.sqrt(covariance[:, 0, 0] * covariance[:, 1, 1])
     np.testing.assert_allclose(result.sources["corr_marginal"], expected, atol=1e-6)
@@ -93,7 +93,7 @@ def test_correlations_are_those_of_the_covariances(solution, result):
 
 
 @pytest.mark.parametrize("table", ["sources", "exposures"])
-def test_chi2_and_dof_add_up_to_those_of_the_fit(result, table):
+def test_chi2_and_dof_sum_to_those_of_the_fit(result, table):
     frame = getattr(result, table)
     assert frame["chi2"].sum() == pytest.approx(result.summary["chi2"])
     assert frame["dof"].sum() == pytest.approx(result.summary["dof"])
@@ -166,7 +166,7 @@ def test_value_is_centre_plus_offset(result):
     np.testing.assert_allclose(simple["offset"], expected, atol=1e-6)
 
 
-def test_prior_share_is_a_share(result):
+def test_prior_share_is_between_zero_and_one(result):
     rows = result.calibration.set_index("group")
     assert rows["prior_share"].between(0.0, 1.0).all()
     assert (rows.loc["position_angle", "prior_share"] == 0.0).all()
@@ -178,7 +178,7 @@ def test_conditional_sigmas_of_the_calibration_are_below_the_marginal_ones(resul
     assert (rows["sigma_conditional"] < rows["sigma_marginal"]).all()
 
 
-def test_true_places_are_those_of_the_truth_at_the_mean_epoch(small_orbit, result):
+def test_true_places_are_the_truth_at_the_mean_epoch(small_orbit, result):
     truth = small_orbit.data.truth.set_index("source_id").loc[result.true_places["source_id"]]
     ra, dec = epoch_places(truth, small_orbit.data.exposures["obstime"].mean())
     # 3e-13 deg is 0.001 uas.
@@ -186,7 +186,7 @@ def test_true_places_are_those_of_the_truth_at_the_mean_epoch(small_orbit, resul
     np.testing.assert_allclose(result.true_places["dec"], dec, atol=3e-13)
 
 
-def test_true_places_are_those_of_measured_sources_with_a_truth(small_orbit, fit, with_tables):
+def test_true_places_include_measured_sources_with_a_truth(small_orbit, fit, with_tables):
     truth = small_orbit.data.truth.iloc[::2]
     places = fit(with_tables(small_orbit, truth=truth)).true_places
     measured = set(small_orbit.data.measurements["source_id"])
@@ -199,7 +199,7 @@ def test_without_truth_there_are_no_true_places(small_orbit, fit, with_tables):
     assert "truth" not in result.summary
 
 
-def test_induced_shift_is_undone_by_a_reference_catalogue_without_errors(
+def test_error_free_reference_catalogue_removes_the_induced_shift(
     small_orbit, result, fit, with_tables
 ):
     catalogue, truth = small_orbit.data.catalogue.copy(), small_orbit.data.truth
@@ -212,7 +212,7 @@ def test_induced_shift_is_undone_by_a_reference_catalogue_without_errors(
     np.testing.assert_allclose(found, induced, atol=1e-3)
 
 
-def test_values_on_an_axis_are_one_column_per_group(result):
+def test_values_on_an_axis_have_one_column_per_group(result):
     wide = result.values_on("det", "sigma_marginal")
     assert wide.shape == (4, 5)
     rows = result.calibration.set_index(["group", "element"])["sigma_marginal"]

@@ -31,7 +31,7 @@ def recording(compute):
     return wrapper
 
 normal.linearise = recording(normal.linearise)
-objective._of_chunk = recording(objective._of_chunk)
+objective._value_and_gradient = recording(objective._value_and_gradient)
 jax.config.update("jax_default_device", jax.devices()[1])
 orbit = make_orbit()
 summary = fit_orbit(orbit.data, orbit.instrument).summary

@@ -23,7 +23,7 @@ extensions = [
     "equations",
     "schema_reference",
 ]
-exclude_patterns = ["extensions", "pictures", "static"]
+exclude_patterns = ["extensions", "figures", "static"]
 
 # The pages are Markdown that a forge shows as well.
 myst_enable_extensions = ["dollarmath"]

@@ -16,7 +16,7 @@ COMMANDS = get_command(app).commands
 SHELL = [block for page in (README, *PAGES) for block in blocks_of(page, "sh")]
 PYTHON = [block for page in (README, *PAGES) for block in blocks_of(page, "python")]
 # Its blocks are files and changes of the code, which have tests of their own.
-EXTENDING = DOCS / "extending.md"
+CONTRIBUTING = DOCS / "contributing.md"
 # What takes too long for a page's test, and the test that runs it.
 ELSEWHERE = {"demo": "tests/ui/test_dashboard.py"}
 # Smaller than the page's, and where nothing is in the way.
@@ -24,6 +24,7 @@ SMALLER = {
     "simulate": ["--orbits", "2", "--stars", "2000"],
     "serve": ["--port", "0"],
 }
+_OTHER_PROGRAMS = {"pytest", "ruff", "pyright", "dask", "ssh", ".", "jupyter", "panel"}
 EXTRAS = tomllib.loads((REPOSITORY / "pyproject.toml").read_text("utf-8"))["project"][
     "optional-dependencies"
 ]
@@ -62,7 +63,7 @@ def test_command_is_known(block):
         if program in known:
             known[program]()
         else:
-            assert program in {"pytest", "dask", "ssh", ".", "jupyter", "panel"}, program
+            assert program in _OTHER_PROGRAMS, program
 
 
 def _known_extra(words):
@@ -97,7 +98,7 @@ def test_page_says_why_a_block_is_not_run(page):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
-    [page for page in PAGES if page != EXTENDING and run_of(page, "sh")],
+    [page for page in PAGES if page != CONTRIBUTING and run_of(page, "sh")],
     ids=lambda page: page.stem,
 )
 def test_commands_of_a_page_run(page, command, workplace):
@@ -115,7 +116,7 @@ def test_commands_of_a_page_run(page, command, workplace):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
-    [page for page in PAGES if page != EXTENDING and run_of(page, "python")],
+    [page for page in PAGES if page != CONTRIBUTING and run_of(page, "python")],
     ids=lambda page: page.stem,
 )
 def test_code_of_a_page_runs(page, command, workplace):

@@ -27,11 +27,11 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from solver.data.columns import Column, Table
+from solver.data.parameters import PARAMETERS, Group
+from solver.data.prior_text import format_width
 from solver.io import header
 from solver.io import published as layout
 from solver.io.published import Derived, PublishedTable
-from solver.data.parameters import PARAMETERS, Group
-from solver.data.prior_text import format_width
 
 _AXES = {"src": "source", "exp": "exposure", "coef": "distortion term", "det": "detector"}
 _DERIVED: dict[str, Callable] = {
@@ -84,7 +84,9 @@ def columns_of(where: str) -> nodes.table:
 
 def hdu(name: str) -> nodes.table:
     """Return the columns of an HDU in the order in which they are written."""
-    kept = next((k for k in vars(layout).values() if isinstance(k, PublishedTable) and k.hdu == name), None)
+    kept = next(
+        (k for k in vars(layout).values() if isinstance(k, PublishedTable) and k.hdu == name), None
+    )
     rows = [] if kept is None else [_kept(kept, column) for column in kept.table]
     rows += [_derived(column) for column in _DERIVED.get(name, lambda _: [])(example_result())]
     if not rows:

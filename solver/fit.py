@@ -139,9 +139,7 @@ class OrbitFitter:
         `solver.engines.what_if.solve_what_if`.
         """
         kept = self._kept
-        if kept is None or kept.settings.aberration != settings.aberration:
-            return None
-        if kept.settings.robust != settings.robust:
+        if kept is None or not kept.settings.what_if_holds(settings):
             return None
         start = time.perf_counter()
         data, problem = self._selection.choose(settings, kept.outliers)

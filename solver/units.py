@@ -14,6 +14,11 @@ value is exact enough to store, but not to subtract, scale and exponentiate.
 """
 
 import math
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from astropy.units import UnitBase
 
 RAD_PER_DEG = math.pi / 180.0
 RAD_PER_ARCSEC = RAD_PER_DEG / 3600.0
@@ -24,3 +29,36 @@ UAS_PER_MAS = 1000.0
 DAYS_PER_JULIAN_YEAR = 365.25
 MJD_J2000 = 51544.5
 KM_PER_S_IN_C = 1.0 / 299_792.458
+
+# Names that astropy does not know, with their value.
+_MORE_UNITS = {"ppm": 1e-6}
+
+
+@cache
+def unit_named(text: str) -> "UnitBase":
+    """Return the astropy unit of a name; "" is dimensionless, and "ppm" a millionth.
+
+    Raises
+    ------
+    ValueError
+        If there is no such unit.
+    """
+    # Readers of results need no units, and astropy takes tenths of a second to import.
+    from astropy import units as u
+
+    if text in _MORE_UNITS:
+        return u.Unit(_MORE_UNITS[text] * u.dimensionless_unscaled)
+    return u.Unit(text.replace("µ", "u"))
+
+
+@cache
+def factor_between(unit: str, other: str) -> float:
+    """Return how many of `other` make one of `unit`.
+
+    Raises
+    ------
+    ValueError
+        If either is no unit, or they are of different kinds.
+    """
+    # Rounded, since astropy's factors between degrees and their parts end in rounding errors.
+    return float(f"{unit_named(unit).to(unit_named(other)):.12g}")

@@ -14,11 +14,12 @@ import numpy as np
 import pandas as pd
 
 from plateviz.plots.diagnostic import Chosen
+from solver.data.engine_settings import SviSettings
 from solver.data.exclusions import Exclusions
 from solver.data.instrument import MINI_MOCK
 from solver.data.orbit import OrbitData
 from solver.data.result import FitResult
-from solver.data.settings import FitSettings, SviSettings
+from solver.data.settings import FitSettings
 from solver.fit import fit_orbit
 from solver.io.survey import read_survey_orbit
 from solver.simulate.settings import SurveySettings

@@ -9,7 +9,7 @@ import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -20,7 +20,7 @@ from plateviz.cli.report import report
 from plateviz.cli.reproduce import reproduce
 from plateviz.cli.serve import run_server, serve
 from plateviz.runs.run import DEFAULT_RUN
-from solver.data.settings import ENGINES, NutsSettings, svi_settings
+from solver.data.settings import ENGINES
 from solver.errors import FitError, InputError
 
 app = typer.Typer(
@@ -124,6 +124,7 @@ def inspect(
 
 
 @app.command()
+@options.takes_settings("fit", {"engine": "Or all, to check whether they agree."})
 def fit(
     observations: Annotated[Path, _OBS],
     reference: Annotated[Path, options.REFERENCE],
@@ -132,55 +133,26 @@ def fit(
     ],
     truth: options.Truth = None,
     orbit: options.Orbit = None,
-    order: options.Order = 5,
-    engine: Annotated[
-        str, typer.Option(help=f"One of: {', '.join(ENGINES)}; or all, to see whether they agree.")
-    ] = ENGINES[0],
-    prior: options.Prior = None,
-    centre: options.Centre = None,
-    exclude: options.Exclude = None,
-    aberration: options.Aberration = True,
-    robust: options.Robust = False,
-    compare_orders: Annotated[
-        bool,
-        typer.Option(
-            "--compare-orders", help="Also solve every order, to see which one the data ask for."
-        ),
-    ] = False,
-    thin: options.Thin = 1,
-    seed: options.Seed = 0,
-    steps: options.Steps = None,
-    compat: options.Compat = None,
     checkpoint: Annotated[
         Path | None,
         typer.Option(help="File to keep an svi run in; a run that was stopped goes on from it."),
     ] = None,
     instrument: options.Instrument = None,
     as_json: Annotated[bool, _JSON] = False,
+    **settings: Any,  # noqa: ANN401 the options of the settings
 ) -> None:
     """Solve one orbit and write the solution."""
     from plateviz.cli.fit import FitRequest, run_fit
     from plateviz.solving.origin import OrbitFiles
 
-    settings = options.fit_settings(
-        order=order,
-        engine=ENGINES[0] if engine == "all" else engine,
-        prior=prior,
-        centre=centre,
-        exclude=exclude,
-        aberration=aberration,
-        robust=robust,
-        compare_orders=compare_orders,
-        thin=thin,
-        svi=svi_settings(compat, steps, seed),
-        nuts=NutsSettings(seed=seed),
-    )
+    engines = ENGINES if settings["engine"] == "all" else (settings["engine"],)
+    chosen = options.fit_settings({**settings, "engine": engines[0]})
     files = OrbitFiles(str(observations), str(reference), _text(truth), orbit, _text(instrument))
-    engines = ENGINES if engine == "all" else (engine,)
-    run_fit(FitRequest(files, orbit, settings, engines, output, checkpoint), as_json)
+    run_fit(FitRequest(files, orbit, chosen, engines, output, checkpoint), as_json)
 
 
 @app.command()
+@options.takes_settings("survey")
 def survey(
     directory: Annotated[Path, typer.Argument(help="Survey directory.", metavar="DIR")],
     run: Annotated[
@@ -197,33 +169,14 @@ def survey(
         str | None,
         typer.Option(help="Address of a Dask scheduler whose workers are to do it instead."),
     ] = None,
-    order: options.Order = 5,
-    engine: Annotated[str, typer.Option(help=f"One of: {', '.join(ENGINES)}.")] = ENGINES[0],
-    prior: options.Prior = None,
-    centre: options.Centre = None,
-    exclude: options.Exclude = None,
-    aberration: options.Aberration = True,
-    robust: options.Robust = False,
-    thin: options.Thin = 1,
-    seed: options.Seed = 0,
     as_json: Annotated[bool, _JSON] = False,
+    **settings: Any,  # noqa: ANN401 the options of the settings
 ) -> None:
     """Fit every orbit of a survey; one that was interrupted is gone on with."""
     from plateviz.cli.survey import parse_orbits, run_survey
 
-    settings = options.fit_settings(
-        order=order,
-        engine=engine,
-        prior=prior,
-        centre=centre,
-        exclude=exclude,
-        aberration=aberration,
-        robust=robust,
-        thin=thin,
-        svi=svi_settings(None, None, seed),
-        nuts=NutsSettings(seed=seed),
-    )
-    run_survey(directory, run, settings, parse_orbits(orbits), workers, scheduler, as_json)
+    chosen = options.fit_settings(settings)
+    run_survey(directory, run, chosen, parse_orbits(orbits), workers, scheduler, as_json)
 
 
 app.command()(serve)

@@ -1,59 +1,19 @@
-"""Options of the command line that say how orbits are fitted, and the settings they make."""
+"""Options of the command line: those of the settings, and others that commands share."""
 
+import inspect
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated
+from types import MappingProxyType
+from typing import Annotated, Any, TypeVar
 
 import typer
 
-from solver.data.exclusions import parse_exclusions
-from solver.data.parameters import PARAMETERS
-from solver.data.prior_text import parse_shift, parse_width
-from solver.data.settings import FitSettings
-from solver.errors import InputError
+from solver.data.engine_settings import ENGINE_OPTIONS, engine_settings
+from solver.data.setting import Setting, Switch, Whole
+from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
+from solver.data.text_setting import Texts
 
-_GROUPS = ", ".join(group.name for group in PARAMETERS)
-
-Order = Annotated[int, typer.Option(help="Order of the distortion, 0 to 9.")]
-Prior = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Prior width of a parameter group, such as distortion_x=0.5um or "
-        f"position_angle=flat; may be repeated. Groups: {_GROUPS}.",
-        metavar="GROUP=VALUE",
-    ),
-]
-Centre = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Shift the centre of a prior from the value in the files, such as "
-        "focal_length=100um or detector_x[2]=-5um; may be repeated. An element is "
-        "FIELD/PLATE, a detector, K/L of a distortion term, or ra or dec of sources.",
-        metavar="GROUP[ELEMENT]=SHIFT",
-    ),
-]
-Exclude = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Leave out measurements: source=ID, exposure=FIELD/PLATE or detector=ID; "
-        "may be repeated.",
-        metavar="WHAT",
-    ),
-]
-Aberration = Annotated[bool, typer.Option(help="Model the aberration by the observer's velocity.")]
-Robust = Annotated[
-    bool, typer.Option("--robust", help="Look for outliers, list them and leave them out.")
-]
-Thin = Annotated[
-    int, typer.Option(help="Use one in so many sources, for a quick look or nuts.", min=1)
-]
-Seed = Annotated[int, typer.Option(help="Seed of svi and nuts.", min=0)]
-Steps = Annotated[
-    int | None, typer.Option(help="Steps over which svi's learning rate falls.", min=1)
-]
-Compat = Annotated[
-    str | None,
-    typer.Option(help="warpfield: svi in the units and with the rates of the published code."),
-]
+_Function = TypeVar("_Function", bound=Callable)
 
 REFERENCE = typer.Argument(
     help="Reference catalogue: FITS, VOTable, ECSV, CSV or Parquet.", metavar="REF"
@@ -76,37 +36,84 @@ OpenBrowser = Annotated[
 ]
 
 
-def fit_settings(
-    prior: list[str] | None,
-    centre: list[str] | None,
-    exclude: list[str] | None,
-    **choices: object,
-) -> FitSettings:
-    """Return the settings that options make.
+def takes_settings(
+    command: str, notes: Mapping[str, str] = MappingProxyType({})
+) -> Callable[[_Function], _Function]:
+    """Give a command with `**settings` the options of all settings that it offers.
 
     Parameters
     ----------
-    prior, centre, exclude : texts as people write them
-    choices : of `FitSettings`, by name
+    command : name of the command
+    notes : option -> sentence to add to its help
+    """
+
+    def with_options(function: _Function) -> _Function:
+        signature = inspect.signature(function)
+        own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+        named: Any = function
+        options = [_parameter(name, one, notes) for name, one in _offered(command).items()]
+        named.__signature__ = signature.replace(parameters=[*own, *options])
+        named.__annotations__ = {
+            **{p.name: p.annotation for p in (*own, *options)},
+            "return": None,
+        }
+        return function
+
+    return with_options
+
+
+def fit_settings(values: Mapping[str, Any]) -> FitSettings:
+    """Return the settings that the options of `takes_settings` state.
 
     Raises
     ------
     InputError
         If one of them cannot be used.
     """
-    return FitSettings(
-        prior_widths=_prior_widths(prior or []),
-        prior_shifts=dict(map(parse_shift, centre or [])),
-        exclusions=parse_exclusions(exclude or []),
-        **choices,  # type: ignore[arg-type]
+    fields = {}
+    for name, one in SETTINGS.items():
+        key = _python_name(one)
+        if key in values:
+            value = values[key]
+            fields[name] = one.parse(value or []) if isinstance(one, Texts) else value
+    engines = {name: values[name] for name in ENGINE_OPTIONS if name in values}
+    return FitSettings(**fields, **engine_settings(**engines))
+
+
+def _offered(command: str) -> dict[str, Setting]:
+    """Return the settings and engine options of a command, by their Python names."""
+    every = [*SETTINGS.values(), *ENGINE_OPTIONS.values()]
+    return {_python_name(one): one for one in every if one.option and command in one.commands}
+
+
+def _python_name(one: Setting) -> str:
+    return one.option.replace("-", "_")
+
+
+def _parameter(name: str, one: Setting, notes: Mapping[str, str]) -> inspect.Parameter:
+    """Return the parameter of a command from which typer makes the option."""
+    defaults = {_python_name(SETTINGS[field]): value for field, value in DEFAULTS.items()}
+    default = defaults.get(name, 0 if name == "seed" else None)
+    words = f"{one.help} {notes[name]}" if name in notes else one.help
+    annotation: Any = str
+    option = typer.Option(f"--{one.option}", help=words)
+    if isinstance(one, Switch):
+        annotation = bool
+        if default:
+            option = typer.Option(f"--{one.option}/--no-{one.option}", help=words)
+    elif isinstance(one, Whole):
+        annotation = int if default is not None else int | None
+        # The order's bounds are checked with the message that every interface gives.
+        low = one.low if one.high is None else None
+        option = typer.Option(f"--{one.option}", help=words, min=low)
+    elif isinstance(one, Texts):
+        annotation, default = list[str] | None, None
+        option = typer.Option(f"--{one.option}", help=words, metavar=one.metavar)
+    elif default is None:
+        annotation = str | None
+    return inspect.Parameter(
+        name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=default,
+        annotation=Annotated[annotation, option],
     )
-
-
-def _prior_widths(texts: list[str]) -> dict[str, float]:
-    widths = {}
-    for text in texts:
-        name, found, value = text.partition("=")
-        if not found:
-            raise InputError(f"--prior: expected GROUP=VALUE, found {text!r}")
-        widths[name.strip()] = parse_width(name.strip(), value)
-    return widths

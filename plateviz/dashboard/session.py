@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import param
 
-from plateviz.dashboard.state import FitChoices, Selection, describe
+from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices, Selection
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.solution_store import SolutionStore
 from solver.data.result import FitResult
@@ -39,7 +39,9 @@ class Solution(NamedTuple):
     @property
     def label(self) -> str:
         """The solution in a few words."""
-        return f"what if: {describe(self.settings)}" if self.is_what_if else describe(self.settings)
+        return (
+            f"what if: {self.settings.describe()}" if self.is_what_if else self.settings.describe()
+        )
 
 
 class Session(param.Parameterized):
@@ -70,7 +72,7 @@ class Session(param.Parameterized):
         self._next_what_if: FitSettings | None = None
         self.choices.param.watch(
             lambda *_: self.ask_what_if(),
-            ["order", "aberration", "robust", "widths", "exclusions", "what_if_at_once"],
+            [*ANSWERED_AT_ONCE, "what_if_at_once"],
         )
 
     @property
@@ -117,12 +119,14 @@ class Session(param.Parameterized):
         of the choices made since waits for it.
         """
         fitted = self.fitted
-        if not self.choices.what_if_at_once or fitted is None or self.choices.engine != ENGINES[0]:
+        if not self.choices.what_if_at_once or fitted is None:
             return
         try:
             settings = _what_if_settings(self.choices.settings(), fitted.settings)
         except InputError as error:
             self.refuse(str(error))
+            return
+        if settings.engine != ENGINES[0]:
             return
         known = next((s for s in self.solutions if s.settings == settings), None)
         if self._job is not None:

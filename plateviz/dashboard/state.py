@@ -2,16 +2,16 @@
 
 import re
 from collections.abc import Mapping
-from itertools import starmap
 from typing import Any
 
 import param
 
-from solver.data.exclusions import parse_exclusions
 from solver.data.parameters import PARAMETERS
-from solver.data.prior_text import format_shift, format_width, parse_shift, parse_width
+from solver.data.prior_text import format_width
 from solver.data.result import FitResult
-from solver.data.settings import ENGINES, MAX_ORDER, FitSettings
+from solver.data.setting import Change, Choice, Setting, Switch, Whole
+from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
+from solver.data.text_setting import PriorWidths, Texts
 
 ALL = "all"
 _PLATES = re.compile(r"(-?\d+)-(-?\d+)")
@@ -89,84 +89,74 @@ class Selection(param.Parameterized):
 
 
 class FitChoices(param.Parameterized):
-    """What a refit is to use; prior widths are kept as the words that people write."""
+    """The settings of the next fit, a parameter for each that has a control.
 
-    what_if_at_once = param.Boolean(default=True, doc="whether a change is tried out at once")
-    engine = param.Selector(default=ENGINES[0], objects=list(ENGINES), doc="engine of a refit")
-    order = param.Integer(default=5, bounds=(0, MAX_ORDER), doc="order of the distortion")
-    aberration = param.Boolean(default=True, doc="stellar aberration in the model")
-    robust = param.Boolean(default=False, doc="whether outliers are looked for and left out")
-    compare_orders = param.Boolean(default=False, doc="whether a fit compares all orders")
-    widths = param.Dict(default={}, doc="group name -> prior width as text")
-    shifts = param.String(default="", doc="where priors are centred, as on the command line")
-    exclusions = param.String(default="", doc="what is left out, as on the command line")
+    Prior widths are a dict of group name -> text; shifts and exclusions are one text each, as on
+    the command line. The parameters are added below, from `solver.data.settings`.
+    """
+
+    what_if_at_once = param.Boolean(default=True, doc="whether a change is answered at once")
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
         """Start from the paper's priors."""
         super().__init__(**values)
-        self.widths = default_widths()
+        self.prior_widths = default_widths()
 
     def settings(self) -> FitSettings:
-        """Return the choices as settings; InputError says which of them cannot be used."""
-        defaults = default_widths()
-        changed = {
-            name: parse_width(name, text)
-            for name, text in self.widths.items()
-            if text.strip() != defaults[name]
-        }
+        """Return the settings; InputError says which of them cannot be used."""
         return FitSettings(
-            order=self.order,
-            engine=self.engine,
-            aberration=self.aberration,
-            robust=self.robust,
-            compare_orders=self.compare_orders,
-            prior_widths=changed,
-            prior_shifts=dict(map(parse_shift, _words(self.shifts))),
-            exclusions=parse_exclusions(_words(self.exclusions)),
+            **{name: _value(one, getattr(self, name)) for name, one in CONTROLS.items()}
         )
 
     def take(self, settings: FitSettings) -> None:
-        """Show the choices that `settings` were made from."""
-        widths = {g.name: format_width(g.name, settings.width(g.name)) for g in PARAMETERS}
-        self.param.update(
-            order=settings.order,
-            engine=settings.engine,
-            aberration=settings.aberration,
-            robust=settings.robust,
-            compare_orders=settings.compare_orders,
-            widths=widths,
-            shifts=", ".join(starmap(format_shift, settings.prior_shifts.items())),
-            exclusions=", ".join(n.replace(" ", "=") for n in settings.exclusions.names()),
-        )
+        """Show the values of `settings`."""
+        values = {name: _shown(one, settings, name) for name, one in CONTROLS.items()}
+        self.param.update(**values)
 
 
-def _words(text: str) -> list[str]:
-    return text.replace(",", " ").split()
+CONTROLS = {name: one for name, one in SETTINGS.items() if one.control}
+# Controls whose change is answered at once.
+ANSWERED_AT_ONCE = tuple(n for n, one in CONTROLS.items() if one.change is not Change.ON_REQUEST)
+
+
+def _parameter(one: Setting, default: Any) -> param.Parameter:  # noqa: ANN401
+    """Return the param parameter of a setting; param enforces its bounds on the server."""
+    if isinstance(one, Switch):
+        return param.Boolean(default=default, doc=one.help)
+    if isinstance(one, Whole):
+        return param.Integer(default=default, bounds=(one.low, one.high), doc=one.help)
+    if isinstance(one, Choice):
+        return param.Selector(default=default, objects=list(one.names), doc=one.help)
+    if isinstance(one, PriorWidths):
+        return param.Dict(default={}, doc=one.help)
+    if isinstance(one, Texts):
+        return param.String(default="", doc=one.help)
+    raise TypeError(f"{one.label}: there is no control for a {type(one).__name__}")
+
+
+def _value(one: Setting, shown: Any) -> Any:  # noqa: ANN401
+    """Return the value of a setting from what its control shows."""
+    if isinstance(one, PriorWidths):
+        defaults = default_widths()
+        changed = {name: text for name, text in shown.items() if text.strip() != defaults[name]}
+        return one.parse(f"{name}={text}" for name, text in changed.items())
+    if isinstance(one, Texts):
+        return one.parse(shown.replace(",", " ").split())
+    return shown
+
+
+def _shown(one: Setting, settings: FitSettings, name: str) -> Any:  # noqa: ANN401
+    """Return what the control of a setting shows."""
+    if isinstance(one, PriorWidths):
+        return {g.name: format_width(g.name, settings.width(g.name)) for g in PARAMETERS}
+    value = getattr(settings, name)
+    return ", ".join(one.texts(value)) if isinstance(one, Texts) else value
+
+
+for _name, _one in CONTROLS.items():
+    FitChoices.param.add_parameter(_name, _parameter(_one, DEFAULTS[_name]))
 
 
 def default_widths() -> dict[str, str]:
     """Return the paper's prior widths as people write them."""
-    defaults = FitSettings()
-    return {g.name: format_width(g.name, defaults.width(g.name)) for g in PARAMETERS}
-
-
-def describe(settings: FitSettings) -> str:
-    """Return the choices of a fit in a few words, the paper's priors going without saying."""
-    words = [f"order {settings.order}"]
-    if settings.engine != ENGINES[0]:
-        words.append(settings.engine)
-    words += [f"{name} {format_width(name, w)}" for name, w in _changed(settings).items()]
-    words += starmap(format_shift, settings.prior_shifts.items())
-    if not settings.aberration:
-        words.append("no aberration")
-    if settings.robust:
-        words.append("without outliers")
-    if settings.compare_orders:
-        words.append("orders compared")
-    words += [f"without {name}" for name in settings.exclusions.names()]
-    return ", ".join(words)
-
-
-def _changed(settings: FitSettings) -> Mapping[str, float]:
-    defaults = FitSettings()
-    return {n: w for n, w in settings.prior_widths.items() if w != defaults.width(n)}
+    return _shown(SETTINGS["prior_widths"], FitSettings(), "prior_widths")

@@ -6,7 +6,6 @@ from functools import partial
 import pandas as pd
 from astropy.table import QTable
 
-from plateviz.dashboard.state import describe
 from plateviz.notebook.card import card, in_words
 from plateviz.notebook.choices import settings_with, takes_choices
 from plateviz.notebook.dashboard import Dashboard
@@ -99,9 +98,8 @@ class OpenOrbit(HasSolver):
 
         Parameters
         ----------
-        choices : `order`, `engine`, `priors`, `centres`, `exclude`, `aberration`, `robust`,
-            `compare_orders`, `thin`, `steps` and `seed`, as `plateviz.notebook.choices.Choices`
-            has them: `fit(order=3, priors={"distortion_x": "10um", "pitch_x": "flat"})`
+        choices : settings by the keywords of `plateviz.notebook.choices.KEYWORDS`, such as
+            `fit(order=3, priors={"distortion_x": "10um", "pitch_x": "flat"})`
 
         Raises
         ------
@@ -150,7 +148,7 @@ class OpenOrbit(HasSolver):
         return card(f"Orbit {self.number}", f"{self.origin}, {solved}", None, items)
 
     def _label(self) -> str:
-        return describe(self.solution.settings)
+        return self.solution.settings.describe()
 
     def _of_run(self, run: SurveyRun) -> OpenSolution | None:
         orbits = run.orbits().set_index("orbit_id")["status"]
@@ -164,7 +162,7 @@ class OpenOrbit(HasSolver):
 
     def _solve(self, settings: FitSettings, base: OpenSolution | None) -> OpenSolution:
         """Return a solution; by a step from the last fit where it is to be compared with one."""
-        title = f"{'what if' if base else 'fit'}: {describe(settings)}"
+        title = f"{'what if' if base else 'fit'}: {settings.describe()}"
         result = self._solver.solve(
             self._orbit, settings, what_if=base is not None, title=f"orbit {self.number}, {title}"
         )

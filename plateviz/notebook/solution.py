@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import pandas as pd
 from astropy.table import QTable
 
-from plateviz.dashboard.state import describe
 from plateviz.notebook.card import card, in_words
 from plateviz.notebook.choices import takes_choices
 from plateviz.notebook.drawing import Drawing, FigureRecipe, Illustrated, drawings
@@ -215,8 +214,8 @@ class OpenSolution(Illustrated):
         return card(*self._titles(), self.verdict, summary_strip(self.result))
 
     def _titles(self) -> tuple[str, str]:
-        compared = f", compared with {describe(self.other.settings)}" if self.other else ""
-        return f"Orbit {self.result.orbit_id}, {describe(self.settings)}{compared}", self.origin
+        compared = f", compared with {self.other.settings.describe()}" if self.other else ""
+        return f"Orbit {self.result.orbit_id}, {self.settings.describe()}{compared}", self.origin
 
     def _tables(self) -> dict[str, OpenTable]:
         return result_tables(self.result)

@@ -18,10 +18,27 @@ Axes, the words used in array shapes throughout the solver:
 from dataclasses import dataclass
 from typing import Literal
 
-from solver.units import ARCSEC_PER_DEG, MAS_PER_DEG
+from solver.units import factor_between
 
 Axis = Literal["src", "exp", "coef", "det"]
 Family = Literal["normal", "gamma", "uniform"]
+
+
+@dataclass(frozen=True)
+class Published:
+    """A column of the published result layout that the value of a group enters.
+
+    Attributes
+    ----------
+    column : name in the file
+    words : meaning, for people
+    factor : None if the column is the value; else the column, which another group makes, is
+        multiplied by 1 + `factor` times the value
+    """
+
+    column: str
+    words: str = ""
+    factor: float | None = None
 
 
 @dataclass(frozen=True)
@@ -42,6 +59,7 @@ class Group:
     origin : where the centre of the prior comes from: the catalogue, a column of the
         environment table, an attribute of the instrument's detectors, or zero
     column : that column or attribute
+    published : columns of the published layout; one of its own by default
     """
 
     name: str
@@ -55,13 +73,12 @@ class Group:
     relative: bool = False
     origin: Literal["catalogue", "environment", "instrument", "zero"] = "zero"
     column: str = ""
+    published: tuple[Published, ...] = ()
 
     @property
     def per_value_unit(self) -> float:
         """How many of `unit` make one `value_unit`."""
-        return {"deg": {"mas": MAS_PER_DEG, "arcsec": ARCSEC_PER_DEG}, "um": {"um": 1.0}}[
-            self.value_unit
-        ][self.unit]
+        return factor_between(self.value_unit, self.unit)
 
     @property
     def width_unit(self) -> str:
@@ -98,6 +115,7 @@ PARAMETERS: tuple[Group, ...] = (
         3600.0,
         origin="environment",
         column="ra_est",
+        published=(Published("tel_a_loc", "RA of the optical axis"),),
     ),
     Group(
         "pointing_dec",
@@ -110,6 +128,7 @@ PARAMETERS: tuple[Group, ...] = (
         3600.0,
         origin="environment",
         column="dec_est",
+        published=(Published("tel_d_loc", "Dec of the optical axis"),),
     ),
     Group(
         "position_angle",
@@ -122,6 +141,7 @@ PARAMETERS: tuple[Group, ...] = (
         float("inf"),
         origin="environment",
         column="pa_est",
+        published=(Published("tel_t_loc", "position angle"),),
     ),
     Group(
         "focal_length",
@@ -134,9 +154,33 @@ PARAMETERS: tuple[Group, ...] = (
         _FOCAL_WIDTH_UM,
         origin="environment",
         column="focal_length",
+        published=(
+            Published("tel_f_loc_x", "focal length"),
+            Published("tel_f_loc_y", "focal length, the same"),
+        ),
     ),
-    Group("distortion_x", "distortion A", "A_kl", "coef", "um", "um", "normal", 1.0),
-    Group("distortion_y", "distortion B", "B_kl", "coef", "um", "um", "normal", 1.0),
+    Group(
+        "distortion_x",
+        "distortion A",
+        "A_kl",
+        "coef",
+        "um",
+        "um",
+        "normal",
+        1.0,
+        published=(Published("opt_A_loc", "A_kl"),),
+    ),
+    Group(
+        "distortion_y",
+        "distortion B",
+        "B_kl",
+        "coef",
+        "um",
+        "um",
+        "normal",
+        1.0,
+        published=(Published("opt_B_loc", "B_kl"),),
+    ),
     Group(
         "detector_x",
         "detector x",
@@ -148,6 +192,7 @@ PARAMETERS: tuple[Group, ...] = (
         100.0,
         origin="instrument",
         column="x_um",
+        published=(Published("det_o_loc_x", "x of the centre"),),
     ),
     Group(
         "detector_y",
@@ -160,6 +205,7 @@ PARAMETERS: tuple[Group, ...] = (
         100.0,
         origin="instrument",
         column="y_um",
+        published=(Published("det_o_loc_y", "y of the centre"),),
     ),
     Group(
         "detector_rotation",
@@ -172,6 +218,7 @@ PARAMETERS: tuple[Group, ...] = (
         360.0,
         origin="instrument",
         column="rotation_deg",
+        published=(Published("det_r_loc", "rotation"),),
     ),
     Group(
         "pitch_x",
@@ -185,6 +232,7 @@ PARAMETERS: tuple[Group, ...] = (
         relative=True,
         origin="instrument",
         column="pitch_x_um",
+        published=(Published("det_p_loc_x", "pixel pitch in x"),),
     ),
     Group(
         "pitch_y",
@@ -198,6 +246,7 @@ PARAMETERS: tuple[Group, ...] = (
         relative=True,
         origin="instrument",
         column="pitch_y_um",
+        published=(Published("det_p_loc_y", "pixel pitch in y"),),
     ),
 )
 

@@ -5,13 +5,12 @@ import re
 
 from solver.data.parameters import BY_NAME, Group
 from solver.errors import InputError
+from solver.units import factor_between
 
-_NUMBER = r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\W\d]\w*)?"
+_NUMBER = r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>%|[^\W\d]\w*)?"
 _WIDTH = re.compile(rf"(?P<flat>flat|inf)|{_NUMBER}")
 _SHIFT = re.compile(_NUMBER)
 _SHIFTED = re.compile(r"(?P<group>\w+)\s*(?:\[\s*(?P<element>[^\[\]\s]+)\s*\])?")
-_IN_ARCSEC = {"deg": 3600.0, "arcmin": 60.0, "arcsec": 1.0, "mas": 1e-3, "uas": 1e-6}
-_IN_UM = {"mm": 1e3, "um": 1.0, "µm": 1.0, "micron": 1.0, "nm": 1e-3}
 
 
 def group_named(name: str) -> Group:
@@ -133,10 +132,12 @@ def format_shift(name: str, shift: float) -> str:
 
 
 def _factor(what: str, given: str | None, unit: str) -> float:
-    scale = next((s for s in (_IN_ARCSEC, _IN_UM) if unit in s), {})
     if given is None:
         return 1.0
-    if given not in scale:
-        expected = f"a unit out of {', '.join(scale)}" if scale else "a number without unit"
-        raise InputError(f"{what}: expected {expected}, found {given!r}")
-    return scale[given] / scale[unit]
+    try:
+        if unit:
+            return factor_between(given, unit)
+    except ValueError:
+        pass
+    expected = f"a unit such as {unit}" if unit else "a number without unit"
+    raise InputError(f"{what}: expected {expected}, found {given!r}")

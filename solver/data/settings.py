@@ -1,191 +1,193 @@
 """FitSettings: everything a person chooses about a fit, checked once, plain enough for JSON."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Any
 
+from solver.data.engine_settings import NutsSettings, SviSettings
 from solver.data.exclusions import Exclusions
-from solver.data.parameters import BY_NAME
-from solver.data.prior_text import check_shift, check_width
-from solver.errors import InputError
+from solver.data.parameters import BY_NAME, PARAMETERS
+from solver.data.setting import (
+    Change,
+    Choice,
+    EngineSettings,
+    Positive,
+    Switch,
+    Whole,
+    check_fields,
+    defaults_of,
+    setting,
+    settings_of,
+)
+from solver.data.text_setting import LeftOut, PriorShifts, PriorWidths
 
 MAX_ORDER = 9
-# Engine -> what its progress is counted in.
+# Engine -> unit of its progress.
 COUNTED = {"gauss-newton": "iteration", "svi": "step", "nuts": "sample"}
 ENGINES = tuple(COUNTED)
-
-
-def _is_whole(number: object) -> bool:
-    return isinstance(number, int) and not isinstance(number, bool)
-
-
-@dataclass(frozen=True)
-class SviSettings:
-    """The choices of the svi engine.
-
-    Attributes
-    ----------
-    steps : over which the learning rate falls
-    first_rate, last_rate : the learning rate, in free coordinates: whitened ones, where
-        one is a sigma, or the published code's degrees and micrometres
-    block : steps between two linearisations, after which Adam starts afresh
-    patience : the fit has converged when the loss has not changed for so many steps
-    tolerance : with the loss at rest, the mode is to be nearer than this, sigma
-    max_steps : limit of the engine
-    seed : of the random draws
-    conditioned : whether to move in whitened coordinates
-    """
-
-    steps: int = 1500
-    first_rate: float = 1e4
-    last_rate: float = 1e-3
-    block: int = 25
-    patience: int = 200
-    tolerance: float = 0.1
-    max_steps: int = 10_000
-    seed: int = 0
-    conditioned: bool = True
-
-    def __post_init__(self) -> None:
-        """Refuse what no fit can use; `InputError` names the setting."""
-        for name in ("steps", "block", "patience", "max_steps"):
-            number = getattr(self, name)
-            if not _is_whole(number) or number < 1:
-                raise InputError(f"expected svi {name} to be 1 or more, found {number!r}")
-        if self.max_steps < self.steps:
-            raise InputError(
-                f"expected svi max_steps not to be below steps ({self.steps}), "
-                f"found {self.max_steps}"
-            )
-        if not self.first_rate > self.last_rate > 0.0:
-            raise InputError(
-                "expected svi learning rates that fall and are positive, "
-                f"found {self.first_rate!r} to {self.last_rate!r}"
-            )
-        if not self.tolerance > 0.0:
-            raise InputError(f"expected a positive svi tolerance, found {self.tolerance!r}")
-        _check_seed("svi", self.seed)
-
-
-@dataclass(frozen=True)
-class NutsSettings:
-    """The choices of the nuts engine.
-
-    Attributes
-    ----------
-    warmup : samples of each chain with which its step size is found, thrown away
-    samples : kept of each chain
-    chains : how many, one after the other
-    seed : of the random draws
-    """
-
-    warmup: int = 300
-    samples: int = 500
-    chains: int = 2
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        """Refuse what no run can use; `InputError` names the setting."""
-        for name, least in (("warmup", 1), ("samples", 4), ("chains", 1)):
-            number = getattr(self, name)
-            if not _is_whole(number) or number < least:
-                raise InputError(f"expected nuts {name} to be {least} or more, found {number!r}")
-        _check_seed("nuts", self.seed)
-
-
-def _check_seed(engine: str, seed: int) -> None:
-    if not _is_whole(seed) or seed < 0:
-        raise InputError(f"expected {engine} seed to be 0 or more, found {seed!r}")
-
-
-# The published code's coordinates, rates and rule of convergence (paper, section
-# "Optimization"), for comparison; it took up to a million steps.
-WARPFIELD = SviSettings(
-    steps=1_000_000,
-    first_rate=1e-3,
-    last_rate=1e-10,
-    block=1000,
-    patience=10_000,
-    max_steps=1_000_000,
-    conditioned=False,
-)
-
-
-def svi_settings(compat: str | None, steps: int | None, seed: int) -> SviSettings:
-    """Return the svi engine's choices as a person states them.
-
-    Parameters
-    ----------
-    compat : "warpfield" for the published code's coordinates and rates, or None
-    steps : over which the learning rate falls; None for the default
-    """
-    if compat not in (None, "warpfield"):
-        raise InputError(f"expected warpfield to be compatible with, found {compat!r}")
-    chosen = replace(WARPFIELD if compat else SviSettings(), seed=seed)
-    if steps is None:
-        return chosen
-    return replace(chosen, steps=steps, max_steps=2 * steps, block=min(chosen.block, steps))
+_GROUPS = ", ".join(group.name for group in PARAMETERS)
 
 
 @dataclass(frozen=True)
 class FitSettings:
-    """The choices of one fit.
+    """The settings of one fit; `SETTINGS` describes each."""
 
-    Attributes
-    ----------
-    order : highest total degree of the Legendre distortion, 0 to 9
-    engine : one of `ENGINES`
-    prior_widths : group name -> standard deviation of its prior, in the group's
-        `width_unit`; for "sources" a factor on the catalogue's uncertainties;
-        `inf` for a flat prior. Groups not named keep the default of `parameters`.
-    prior_shifts : "GROUP" or "GROUP[ELEMENT]" -> shift of the prior's centre from the value in
-        the files, in the group's unit; an element is written FIELD/PLATE, a detector's number,
-        K/L of a distortion term, or ra or dec of the sources, which shift the whole catalogue
-    aberration : whether stellar aberration is part of the forward model
-    exclusions : measurements that are not to be used
-    max_iterations : limit of the engine
-    tolerance : the fit has converged when every step is below this times its uncertainty
-    robust : whether outliers are looked for and left out
-    compare_orders : whether every order of the distortion is solved beside this one
-    thin : of the sources of each class one in so many is used, for a quick look or nuts
-    svi, nuts : the choices of those engines
-    """
-
-    order: int = 5
-    engine: str = "gauss-newton"
-    prior_widths: Mapping[str, float] = field(default_factory=dict)
-    aberration: bool = True
-    exclusions: Exclusions = Exclusions()
-    max_iterations: int = 20
-    tolerance: float = 1e-3
-    robust: bool = False
-    thin: int = 1
-    svi: SviSettings = SviSettings()
-    nuts: NutsSettings = NutsSettings()
-    prior_shifts: Mapping[str, float] = field(default_factory=dict)
-    compare_orders: bool = False
+    order: int = setting(
+        5,
+        Whole(
+            label="Distortion order",
+            help=f"Order of the distortion, 0 to {MAX_ORDER}: highest total degree of its terms.",
+            low=0,
+            high=MAX_ORDER,
+            keyword="order",
+            option="order",
+            control=True,
+            change=Change.WHAT_IF,
+            card="ORDER",
+            phrase="order {}",
+            is_always_described=True,
+        ),
+    )
+    engine: str = setting(
+        ENGINES[0],
+        Choice(
+            label="Engine",
+            help=f"Engine that solves the orbit, one of: {', '.join(ENGINES)}.",
+            names=ENGINES,
+            keyword="engine",
+            option="engine",
+            control=True,
+            card="ENGINE",
+        ),
+    )
+    aberration: bool = setting(
+        True,
+        Switch(
+            label="Stellar aberration",
+            help="Model the aberration by the observer's velocity.",
+            keyword="aberration",
+            option="aberration",
+            control=True,
+            change=Change.REFIT,
+            card="ABERR",
+            phrase="no aberration",
+        ),
+    )
+    max_iterations: int = setting(
+        20,
+        Whole(
+            label="limit of iterations",
+            help="Limit of the gauss-newton engine.",
+            card="MAXITER",
+            phrase="at most {} iterations",
+        ),
+    )
+    tolerance: float = setting(
+        1e-3,
+        Positive(
+            label="steps over sigma at convergence",
+            help="The fit has converged when every step is below this times its uncertainty.",
+            unit="sigma",
+            card="TOLER",
+            phrase="tolerance {}",
+        ),
+    )
+    prior_widths: Mapping[str, float] = setting(
+        {},
+        PriorWidths(
+            label="Prior widths",
+            help="Prior width of a parameter group, such as distortion_x=0.5um or "
+            f"position_angle=flat; may be repeated. Groups: {_GROUPS}.",
+            keyword="priors",
+            option="prior",
+            metavar="GROUP=VALUE",
+            control=True,
+            change=Change.WHAT_IF,
+            card="PRIORS",
+        ),
+    )
+    prior_shifts: Mapping[str, float] = setting(
+        {},
+        PriorShifts(
+            label="Shift of the prior centres",
+            help="Shift the centre of a prior from the value in the files, such as "
+            "focal_length=100um or detector_x[2]=-5um; may be repeated. An element is "
+            "FIELD/PLATE, a detector, K/L of a distortion term, or ra or dec of sources.",
+            keyword="centres",
+            option="centre",
+            metavar="GROUP[ELEMENT]=SHIFT",
+            example="detector_x[2]=-5um",
+            control=True,
+            change=Change.WHAT_IF,
+            card="CENTRES",
+        ),
+    )
+    exclusions: Exclusions = setting(
+        Exclusions(),
+        LeftOut(
+            label="Leave out",
+            help="Leave out measurements: source=ID, exposure=FIELD/PLATE or detector=ID; "
+            "may be repeated.",
+            keyword="exclude",
+            option="exclude",
+            metavar="WHAT",
+            example="detector=1, exposure=0/3",
+            control=True,
+            change=Change.WHAT_IF,
+            card="EXCLUDED",
+            phrase="without {}",
+        ),
+    )
+    robust: bool = setting(
+        False,
+        Switch(
+            label="Leave out outliers",
+            help="Look for outliers, list them and leave them out.",
+            keyword="robust",
+            option="robust",
+            control=True,
+            change=Change.REFIT,
+            card="ROBUST",
+            phrase="without outliers",
+        ),
+    )
+    thin: int = setting(
+        1,
+        Whole(
+            label="Share of the sources",
+            help="Use one in this many sources of each class, for a quick look or nuts.",
+            keyword="thin",
+            option="thin",
+            card="THIN",
+            phrase="one in {} sources",
+        ),
+    )
+    compare_orders: bool = setting(
+        False,
+        Switch(
+            label="Compare all orders",
+            help="Also solve every order, to see which one the data ask for.",
+            keyword="compare_orders",
+            option="compare-orders",
+            commands=("fit",),
+            control=True,
+            is_identity=False,
+            card="COMPARED",
+            phrase="orders compared",
+        ),
+    )
+    svi: SviSettings = setting(
+        SviSettings(),
+        EngineSettings(label="svi", help="The settings of that engine.", kind=SviSettings),
+    )
+    nuts: NutsSettings = setting(
+        NutsSettings(),
+        EngineSettings(label="nuts", help="The settings of that engine.", kind=NutsSettings),
+    )
 
     def __post_init__(self) -> None:
         """Refuse what no fit can use; `InputError` names the setting."""
-        if not _is_whole(self.order) or not 0 <= self.order <= MAX_ORDER:
-            raise InputError(
-                f"expected a distortion order from 0 to {MAX_ORDER}, found {self.order!r}"
-            )
-        if self.engine not in ENGINES:
-            raise InputError(
-                f"expected an engine out of {', '.join(ENGINES)}, found {self.engine!r}"
-            )
-        if not _is_whole(self.max_iterations) or self.max_iterations < 1:
-            raise InputError(
-                f"expected max_iterations to be 1 or more, found {self.max_iterations!r}"
-            )
-        if not self.tolerance > 0.0:
-            raise InputError(f"expected a positive tolerance, found {self.tolerance!r}")
-        if not _is_whole(self.thin) or self.thin < 1:
-            raise InputError(f"expected thin to be 1 or more, found {self.thin!r}")
-        for name, width in self.prior_widths.items():
-            check_width(name, width)
-        for name, shift in self.prior_shifts.items():
-            check_shift(name, shift)
+        check_fields(self)
         for name in ("prior_widths", "prior_shifts"):
             object.__setattr__(self, name, dict(getattr(self, name)))
 
@@ -195,7 +197,7 @@ class FitSettings:
 
     @property
     def step_tolerance(self) -> float:
-        """How near to the mode the engine is to come, sigma."""
+        """Largest distance from the mode at which the engine stops, sigma."""
         return self.svi.tolerance if self.engine == "svi" else self.tolerance
 
     def with_(self, **changes: object) -> "FitSettings":
@@ -204,28 +206,34 @@ class FitSettings:
 
     def to_dict(self) -> dict[str, object]:
         """Return the settings as plain values; `from_dict` reads them back."""
-        return {
-            "order": self.order,
-            "engine": self.engine,
-            "aberration": self.aberration,
-            "max_iterations": self.max_iterations,
-            "tolerance": self.tolerance,
-            "prior_widths": dict(self.prior_widths),
-            "prior_shifts": dict(self.prior_shifts),
-            "exclusions": self.exclusions.to_dict(),
-            "robust": self.robust,
-            "thin": self.thin,
-            "compare_orders": self.compare_orders,
-            "svi": asdict(self.svi),
-            "nuts": asdict(self.nuts),
-        }
+        return {name: one.to_plain(getattr(self, name)) for name, one in SETTINGS.items()}
 
     @staticmethod
-    def from_dict(values: Mapping[str, object]) -> "FitSettings":
-        """Return the settings that `to_dict` wrote."""
-        exclusions = Exclusions.from_dict(values.get("exclusions", Exclusions().to_dict()))  # type: ignore[arg-type]
-        engines = {
-            "svi": SviSettings(**values.get("svi", {})),  # type: ignore[arg-type]
-            "nuts": NutsSettings(**values.get("nuts", {})),  # type: ignore[arg-type]
-        }
-        return FitSettings(**{**values, "exclusions": exclusions, **engines})  # type: ignore[arg-type]
+    def from_dict(values: Mapping[str, Any]) -> "FitSettings":
+        """Return the settings that `to_dict` wrote; what it does not name has its default."""
+        unknown = sorted(set(values) - set(SETTINGS))
+        if unknown:
+            raise TypeError(f"settings of an unknown name: {', '.join(unknown)}")
+        found = {name: SETTINGS[name].from_plain(value) for name, value in values.items()}
+        return FitSettings(**found)
+
+    def identity(self) -> dict[str, object]:
+        """Return `to_dict` with the settings that do not change the solution at their defaults."""
+        same = {name: DEFAULTS[name] for name, one in SETTINGS.items() if not one.is_identity}
+        return self.with_(**same).to_dict()
+
+    def what_if_holds(self, other: "FitSettings") -> bool:
+        """Return whether a what-if from a fit with these settings may answer the others."""
+        refit = [name for name, one in SETTINGS.items() if one.change is Change.REFIT]
+        return all(getattr(self, name) == getattr(other, name) for name in refit)
+
+    def describe(self) -> str:
+        """Return in a few words what departs from the defaults, and the order in any case."""
+        phrases = (
+            one.described(getattr(self, name), DEFAULTS[name]) for name, one in SETTINGS.items()
+        )
+        return ", ".join(phrase for some in phrases for phrase in some)
+
+
+SETTINGS = settings_of(FitSettings)
+DEFAULTS = defaults_of(FitSettings)

@@ -39,7 +39,7 @@ def resume_from(path: Path, data: OrbitData, settings: FitSettings) -> Resumptio
 
 
 def _fingerprint(data: OrbitData, settings: FitSettings) -> str:
-    said = [settings.to_dict(), sorted(data.provenance.values()), data.orbit_id]
+    said = [settings.identity(), sorted(data.provenance.values()), data.orbit_id]
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
 

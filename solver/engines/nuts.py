@@ -17,8 +17,9 @@ from jaxtyping import Float
 from numpyro.diagnostics import effective_sample_size, split_gelman_rubin
 from numpyro.infer import MCMC, NUTS
 
+from solver.data.engine_settings import NutsSettings
 from solver.data.result import FitStatus
-from solver.data.settings import FitSettings, NutsSettings
+from solver.data.settings import FitSettings
 from solver.engines.curvature import curvature_at
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, find_mode

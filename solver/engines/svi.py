@@ -19,9 +19,10 @@ import optax
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 from numpyro.infer import SVI
 
+from solver.data.engine_settings import SviSettings
 from solver.data.parameters import SOURCES
 from solver.data.result import FitStatus
-from solver.data.settings import FitSettings, SviSettings
+from solver.data.settings import FitSettings
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, downhill, largest_step
 from solver.engines.guide import SITES, Means, MirroredElbo, draws, guide

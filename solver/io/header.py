@@ -1,12 +1,13 @@
 """FITS headers of a result: what made it, and the figures that its readers look for."""
 
-import json
 import math
 
 import numpy as np
 from astropy.io import fits
 
 from solver.data.result import FitResult
+from solver.data.settings import SETTINGS, FitSettings
+from solver.data.text_setting import Texts
 from solver.runtime.versions import versions_of
 
 ORIGIN = "plateviz"
@@ -21,7 +22,7 @@ Card = tuple[str, object, str]
 def primary_header(result: FitResult) -> fits.Header:
     """Return the primary header: format, versions, settings, inputs and figures."""
     inputs = list(result.provenance.items())
-    settings, versions = result.settings, versions_of(_VERSIONS.values())
+    versions = versions_of(_VERSIONS.values())
     cards: list[Card] = [
         ("ORIGIN", ORIGIN, "program that wrote this file"),
         ("FORMAT", FORMAT, "version of this layout"),
@@ -38,20 +39,20 @@ def primary_header(result: FitResult) -> fits.Header:
             (f"INHASH{number}", digest, ""),
         ]
     cards += [
-        ("ENGINE", settings.engine, "engine of the fit"),
-        ("ORDER", settings.order, "order of the distortion"),
-        ("ABERR", settings.aberration, "aberration in the model"),
-        ("MAXITER", settings.max_iterations, "limit of iterations"),
-        ("TOLER", settings.tolerance, "steps over sigma at convergence"),
-        ("PRIORS", json.dumps(dict(settings.prior_widths)), ""),
-        ("CENTRES", json.dumps(dict(settings.prior_shifts)), ""),
-        ("ROBUST", settings.robust, "outliers looked for and left out"),
-        ("THIN", settings.thin, "one in so many sources used"),
-        ("EXCLUDED", json.dumps(settings.exclusions.to_dict()), ""),
+        *_settings(result.settings),
         ("NITER", int(result.trace["iteration"].max()) if len(result.trace) else 0, "iterations"),
         *_figures(result),
     ]
     return _header(cards)
+
+
+def _settings(settings: FitSettings) -> list[Card]:
+    cards = []
+    for name, one in SETTINGS.items():
+        if one.card:
+            value = one.card_value(getattr(settings, name))
+            cards.append((one.card, value, "" if isinstance(one, Texts) else one.label.lower()))
+    return cards
 
 
 def versions_in(primary: fits.Header) -> dict[str, str]:

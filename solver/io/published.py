@@ -6,15 +6,16 @@ DISTORTION repeat what CALIBRATION says in full, for readers of the published la
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
 
 from solver.data import eigenmode_schema as eigenmode_schema
 from solver.data import schema
+from solver.data.parameters import Axis, Published, groups_on
 from solver.data.result import FitResult
-from solver.units import MAS_PER_DEG
+from solver.units import MAS_PER_DEG, factor_between
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,7 @@ PUBLISHED_ORDER = {
         *("ij_x", "ij_y", "xy_x", "xy_y", "pq_x", "pq_y", "sig_x_loc", "sig_y_loc"),
     ),
     "TRACE": ("loss",),
+    "DETECTOR": ("det_r_loc",),
 }
 
 
@@ -123,46 +125,53 @@ def source_sigmas(sources: pd.DataFrame) -> list[Derived]:
     return columns
 
 
-def telescope(result: FitResult) -> list[Derived]:
+def exposure_columns(result: FitResult) -> list[Derived]:
     """Return the columns of TELESCOPE: one row per exposure, in order."""
-    values = result.values_on("exp")
-    exposures = result.exposures.iloc[values.index.to_numpy()]
+    rows = result.values_on("exp").index.to_numpy()
+    exposures = result.exposures.iloc[rows]
     ids = [
         Derived(name, "", schema.EXPOSURES[name].meaning, exposures[name].to_numpy())
         for name in schema.EXPOSURES.key
     ]
-    # One focal length per exposure here; the published files have one per axis.
-    return ids + [
-        Derived(name, unit, f"[{unit}] {words}", values[group].to_numpy())
-        for name, unit, group, words in (
-            ("tel_a_loc", "deg", "pointing_ra", "RA of the optical axis"),
-            ("tel_d_loc", "deg", "pointing_dec", "Dec of the optical axis"),
-            ("tel_t_loc", "deg", "position_angle", "position angle"),
-            ("tel_f_loc_x", "um", "focal_length", "focal length"),
-            ("tel_f_loc_y", "um", "focal_length", "focal length, the same"),
-        )
-    ]
+    return ids + _calibration_columns(result, "exp")
 
 
-def detector(result: FitResult) -> list[Derived]:
+def detector_columns(result: FitResult) -> list[Derived]:
     """Return the columns of DETECTOR: one row per detector, in order."""
-    values = result.values_on("det")
-    return [
-        Derived(name, "", f"[{unit}] {words}", values[group].to_numpy())
-        for name, unit, group, words in (
-            ("det_r_loc", "deg", "detector_rotation", "rotation"),
-            ("det_o_loc_x", "um", "detector_x", "x of the centre"),
-            ("det_o_loc_y", "um", "detector_y", "y of the centre"),
-            ("det_p_loc_x", "um", "pitch_x", "pixel pitch in x"),
-            ("det_p_loc_y", "um", "pitch_y", "pixel pitch in y"),
-        )
-    ]
+    return _calibration_columns(result, "det")
 
 
-def distortion(result: FitResult) -> list[Derived]:
+def distortion_columns(result: FitResult) -> list[Derived]:
     """Return the columns of DISTORTION: one row per term, (2,0), (1,1), (0,2), (3,0)..."""
-    values = result.values_on("coef")
-    return [
-        Derived(f"opt_{axis}_loc", "", f"[um] {axis}_kl", values[group].to_numpy())
-        for axis, group in (("A", "distortion_x"), ("B", "distortion_y"))
-    ]
+    return _calibration_columns(result, "coef")
+
+
+# Axis -> HDU and prefix of the columns. Only TELESCOPE has TUNITs in the published files.
+_HDUS: dict[Axis, tuple[str, str]] = {
+    "exp": ("TELESCOPE", "tel"),
+    "det": ("DETECTOR", "det"),
+    "coef": ("DISTORTION", "opt"),
+}
+
+
+def _calibration_columns(result: FitResult, axis: Axis) -> list[Derived]:
+    """Return the columns that the groups on an axis make, in the order of the published files."""
+    hdu, prefix = _HDUS[axis]
+    values = result.values_on(axis)
+    columns: dict[str, Derived] = {}
+    for group in groups_on(axis):
+        value, unit = values[group.name].to_numpy(), group.value_unit
+        named = [one for one in group.published if one.factor is None]
+        for one in named or [Published(f"{prefix}_{group.name}_loc", group.label)]:
+            shown = unit if hdu == "TELESCOPE" else ""
+            columns[one.column] = Derived(one.column, shown, f"[{unit}] {one.words}", value)
+    for group in groups_on(axis):
+        for one in group.published:
+            if one.factor is not None:
+                relative = one.factor * factor_between(group.value_unit, "") * values[group.name]
+                changed = columns[one.column]
+                columns[one.column] = replace(
+                    changed, values=changed.values * (1.0 + relative.to_numpy())
+                )
+    rank = {name: number for number, name in enumerate(PUBLISHED_ORDER.get(hdu, ()))}
+    return sorted(columns.values(), key=lambda one: rank.get(one.name, len(rank)))

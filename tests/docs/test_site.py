@@ -10,9 +10,10 @@ import plateviz.plots
 import plateviz.tables
 import solver
 from plateviz.cli.main import app
+from solver.data.engine_settings import NutsSettings, SviSettings
 from solver.data.parameters import PARAMETERS
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, RESULT_TABLES, TRUTH
-from solver.data.settings import FitSettings, NutsSettings, SviSettings
+from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from solver.io import published as layout
 from solver.simulate.settings import SurveySettings

@@ -273,19 +273,14 @@ def _with_chi2(exposures: pd.DataFrame, residuals: pd.DataFrame, chi2: pd.Series
 
 
 def _values(group: Group, pointings: pd.DataFrame, random: np.random.Generator) -> np.ndarray:
-    if group.axis == "exp":
+    if group.name in pointings:
         return pointings[group.name].to_numpy()
     if group.axis == "coef":
         degrees = [d for d in range(2, ORDER + 1) for _ in range(d + 1)]
         return random.normal(0.0, 1.0, len(degrees)) * 2.0 ** (3 - np.array(degrees))
-    nominal = {
-        "detector_x": [d.x_um for d in MINI_MOCK.detectors],
-        "detector_y": [d.y_um for d in MINI_MOCK.detectors],
-        "detector_rotation": [d.rotation_deg for d in MINI_MOCK.detectors],
-        "pitch_x": [d.pitch_x_um for d in MINI_MOCK.detectors],
-        "pitch_y": [d.pitch_y_um for d in MINI_MOCK.detectors],
-    }
-    return np.array(nominal[group.name])
+    if group.origin == "instrument":
+        return np.array([getattr(d, group.column) for d in MINI_MOCK.detectors])
+    return np.zeros(len(pointings if group.axis == "exp" else MINI_MOCK.detectors))
 
 
 def _calibration(
@@ -300,7 +295,9 @@ def _calibration(
     frames = []
     for group in CALIBRATION_GROUPS:
         value = _values(group, pointings, random)
-        names = labels.get(group.axis) or [f"{letters[group.name]}({k},{n})" for k, n in pairs]
+        names = labels.get(group.axis) or [
+            f"{letters.get(group.name, group.name)}({k},{n})" for k, n in pairs
+        ]
         frames.append(
             pd.DataFrame(
                 {

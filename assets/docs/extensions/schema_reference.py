@@ -7,6 +7,7 @@
 | `keywords NAME`      | the header keywords of an HDU                                      |
 | `parameters`         | the parameter groups with their priors                             |
 | `settings MODULE:NAME`| fields and defaults of a class of settings                        |
+| `choices`            | the settings that a fit takes as keywords in a notebook            |
 | `fields MODULE:NAME` | plain fields of any class                                          |
 | `layout MODULE`      | the tree of files in a module's docstring                          |
 """
@@ -26,6 +27,7 @@ from markup import code, table
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+from plateviz.notebook.choices import KEYWORDS
 from solver.data.columns import Column, Table
 from solver.data.parameters import PARAMETERS, Group
 from solver.data.prior_text import format_width
@@ -36,9 +38,9 @@ from solver.io.published import Derived, PublishedTable
 _AXES = {"src": "source", "exp": "exposure", "coef": "distortion term", "det": "detector"}
 _DERIVED: dict[str, Callable] = {
     "RESULT": lambda result: layout.source_sigmas(result.sources),
-    "TELESCOPE": layout.telescope,
-    "DETECTOR": layout.detector,
-    "DISTORTION": layout.distortion,
+    "TELESCOPE": layout.exposure_columns,
+    "DETECTOR": layout.detector_columns,
+    "DISTORTION": layout.distortion_columns,
 }
 _HEADERS = {"PRIMARY": header.primary_header, "RESULT": header.result_header}
 
@@ -51,6 +53,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         ("keywords", keywords),
         ("parameters", parameters),
         ("settings", settings),
+        ("choices", choices),
         ("fields", fields),
         ("layout", files),
     ):
@@ -116,15 +119,32 @@ def parameters() -> nodes.table:
 
 
 def settings(where: str) -> nodes.table:
-    """Return the fields of a class of settings, with the meanings in its docstring."""
+    """Return the fields of a class of settings, with the meanings in their help or its docstring."""
     kind = _named(where)
-    meanings = attributes(kind)
+    meanings = {**attributes(kind), **_helps(kind)}
     shown = kind()
     rows = (
         (f"`{f.name}`", _default(getattr(shown, f.name)), meanings.get(f.name, ""))
         for f in dataclasses.fields(kind)
     )
     return table(("setting", "default", "meaning"), rows)
+
+
+def choices() -> nodes.table:
+    """Return the keywords of a fit in a notebook."""
+    return table(
+        ("keyword", "meaning"), ((f"`{name}`", one.help) for name, one in KEYWORDS.items())
+    )
+
+
+def _helps(kind: type) -> dict[str, str]:
+    """Return the help of the fields that have a setting, with the unit."""
+    found = {f.name: f.metadata.get("setting") for f in dataclasses.fields(kind)}
+    return {
+        name: f"{one.help} Unit: {one.unit}." if one.unit else one.help
+        for name, one in found.items()
+        if one is not None
+    }
 
 
 def fields(where: str) -> nodes.table:

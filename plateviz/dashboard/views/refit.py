@@ -6,8 +6,11 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.session import Session, Solution, Stage
-from plateviz.dashboard.state import FitChoices, default_widths
+from plateviz.dashboard.state import CONTROLS, FitChoices, default_widths
 from solver.data.parameters import PARAMETERS, Group
+from solver.data.setting import Choice, Setting, Switch, Whole
+from solver.data.settings import SETTINGS
+from solver.data.text_setting import LeftOut, PriorShifts, Texts
 
 # Of a control that stands close to the next one.
 _TIGHT = (0, 10)
@@ -33,10 +36,14 @@ class RefitView(pn.viewable.Viewer):
         self._news = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
         self._column = pmui.Column(
-            *_model_inputs(session.choices),
+            pmui.Switch.from_param(
+                session.choices.param.what_if_at_once,
+                label="Try every change at once",
+                margin=_TIGHT,
+            ),
+            *_controls(session.choices, Whole, Switch),
             self._priors_card(),
-            _exclusions_input(session.choices),
-            _engine_input(session.choices),
+            *_controls(session.choices, LeftOut, Choice),
             pmui.Row(self._fit, self._stop, sizing_mode="stretch_width", margin=0),
             self._bar,
             self._news,
@@ -58,7 +65,7 @@ class RefitView(pn.viewable.Viewer):
         self._keep.on_click(lambda _: session.keep())
         self._reset.on_click(self._take_defaults)
         self._solutions.param.watch(self._bring_up, "value")
-        session.choices.param.watch(self._show_widths, "widths")
+        session.choices.param.watch(self._show_widths, "prior_widths")
         session.param.watch(self._show_stage, ["stage", "message"])
         session.param.watch(self._show_solutions, ["solutions", "shown"])
         self._show_stage()
@@ -67,7 +74,7 @@ class RefitView(pn.viewable.Viewer):
     def _priors_card(self) -> pmui.Card:
         entries: list[Any] = [
             *self._widths.values(),
-            _shifts_input(self._session.choices),
+            *_controls(self._session.choices, PriorShifts),
             self._reset,
         ]
         return pmui.Card(
@@ -83,24 +90,24 @@ class RefitView(pn.viewable.Viewer):
     def _width_input(self, group: Group) -> pmui.TextInput:
         entry = pmui.TextInput(
             label=f"{group.label} ({group.symbol})",
-            value=self._session.choices.widths[group.name],
+            value=self._session.choices.prior_widths[group.name],
             description=_explanation(group),
             size="small",
             sizing_mode="stretch_width",
         )
 
         def take(event: object) -> None:
-            widths = self._session.choices.widths
-            self._session.choices.widths = {**widths, group.name: event.new}  # type: ignore[attr-defined]
+            widths = self._session.choices.prior_widths
+            self._session.choices.prior_widths = {**widths, group.name: event.new}  # type: ignore[attr-defined]
 
         entry.param.watch(take, "value")
         return entry
 
     def _take_defaults(self, _: object) -> None:
-        self._session.choices.param.update(widths=default_widths(), shifts="")
+        self._session.choices.param.update(prior_widths=default_widths(), prior_shifts="")
 
     def _show_widths(self, *_: object) -> None:
-        for name, text in self._session.choices.widths.items():
+        for name, text in self._session.choices.prior_widths.items():
             self._widths[name].value = text
 
     def _show_stage(self, *_: object) -> None:
@@ -131,49 +138,39 @@ class RefitView(pn.viewable.Viewer):
             self._session.bring_up(chosen)
 
 
-def _model_inputs(choices: FitChoices) -> list[pn.viewable.Viewable]:
-    """Return what the model is made of: the order of its distortion, and switches."""
-    of = choices.param
+def _control(choices: FitChoices, name: str) -> pn.viewable.Viewable:
+    """Return the control of a setting."""
+    one, of = SETTINGS[name], choices.param[name]
+    if isinstance(one, Switch):
+        return pmui.Switch.from_param(of, label=one.label, margin=_TIGHT)
+    if isinstance(one, Whole):
+        return pmui.IntSlider.from_param(of, label=one.label, sizing_mode="stretch_width")
+    if isinstance(one, Choice):
+        return pmui.Select.from_param(
+            of, label=one.label, size="small", sizing_mode="stretch_width"
+        )
+    return pmui.TextInput.from_param(
+        of,
+        label=one.label,
+        placeholder=one.example if isinstance(one, Texts) else "",
+        description=one.help,
+        size="small",
+        sizing_mode="stretch_width",
+    )
+
+
+def _controls(choices: FitChoices, *kinds: type[Setting]) -> list[pn.viewable.Viewable]:
+    """Return the controls of the settings of some kinds, in the order of the kinds."""
     return [
-        pmui.Switch.from_param(of.what_if_at_once, label="Try every change at once", margin=_TIGHT),
-        pmui.IntSlider.from_param(of.order, label="Distortion order", sizing_mode="stretch_width"),
-        pmui.Switch.from_param(of.aberration, label="Stellar aberration"),
-        pmui.Switch.from_param(of.robust, label="Leave out outliers", margin=_TIGHT),
-        pmui.Switch.from_param(of.compare_orders, label="Compare all orders", margin=_TIGHT),
+        _control(choices, name)
+        for kind in kinds
+        for name, one in CONTROLS.items()
+        if isinstance(one, kind)
     ]
 
 
-def _engine_input(choices: FitChoices) -> pmui.Select:
-    return pmui.Select.from_param(
-        choices.param.engine, label="Engine", size="small", sizing_mode="stretch_width"
-    )
-
-
-def _exclusions_input(choices: FitChoices) -> pmui.TextInput:
-    return pmui.TextInput.from_param(
-        choices.param.exclusions,
-        label="Leave out",
-        placeholder="detector=1, exposure=0/3",
-        description="source=ID, exposure=FIELD/PLATE or detector=ID, as many as you like.",
-        size="small",
-        sizing_mode="stretch_width",
-    )
-
-
-def _shifts_input(choices: FitChoices) -> pmui.TextInput:
-    return pmui.TextInput.from_param(
-        choices.param.shifts,
-        label="Shift of the centres",
-        placeholder="detector_x[2]=-5um",
-        description="GROUP=SHIFT or GROUP[ELEMENT]=SHIFT, as many as you like. An element is "
-        "FIELD/PLATE, a detector, K/L of a distortion term, or ra or dec of sources.",
-        size="small",
-        sizing_mode="stretch_width",
-    )
-
-
 def _explanation(group: Group) -> str:
-    """Say what the number in a prior's box means."""
+    """Return what the number in the control of a prior width means."""
     if group.axis == "src":
         return "Factor on the catalogue's own uncertainties."
     if group.relative:

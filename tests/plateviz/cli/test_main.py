@@ -61,7 +61,7 @@ def test_svi_that_was_stopped_goes_on_from_its_file(run, sample, tmp_path):
         (["--prior", "nothing=1"], "found 'nothing'"),
         (["--centre", "detector_x[2]"], "expected GROUP=SHIFT"),
         (["--centre", "detector_x[7]=1um"], "expected an element out of 0, 1, 2, 3, found '7'"),
-        (["--prior", "distortion_x=1deg"], "prior of distortion_x: expected a unit out of"),
+        (["--prior", "distortion_x=1deg"], "prior of distortion_x: expected a unit such as um"),
         (["--orbit", "99"], "99"),
         (["--instrument", "none.toml"], "none.toml: expected an instrument in TOML"),
     ],

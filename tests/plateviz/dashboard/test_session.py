@@ -3,10 +3,17 @@
 import pytest
 
 from plateviz.dashboard.session import Session, Stage
-from plateviz.dashboard.state import ALL, FitChoices, Selection, default_widths, describe
+from plateviz.dashboard.state import (
+    ALL,
+    ANSWERED_AT_ONCE,
+    CONTROLS,
+    FitChoices,
+    Selection,
+    default_widths,
+)
 from plateviz.solving.job import Job
 from solver.data.instrument import MINI_MOCK
-from solver.data.settings import FitSettings
+from solver.data.settings import SETTINGS, FitSettings
 from solver.errors import InputError
 
 
@@ -103,7 +110,7 @@ def test_a_failed_refit_says_why_and_leaves_the_old_solution(session):
 
 def test_a_prior_that_cannot_be_used_asks_for_nothing(session):
     finish(session)
-    session.choices.widths = {**session.choices.widths, "distortion_x": "wide"}
+    session.choices.prior_widths = {**session.choices.prior_widths, "distortion_x": "wide"}
     session.refit()
     assert session.stage is Stage.FAILED
     assert "distortion_x" in session.message
@@ -298,9 +305,9 @@ def test_the_order_is_bounded_on_the_server(order):
 def test_choices_become_settings_that_name_only_what_was_changed():
     choices = FitChoices()
     assert choices.settings() == FitSettings()
-    choices.widths = {**default_widths(), "pointing_ra": "1 arcmin", "pitch_x": "flat"}
+    choices.prior_widths = {**default_widths(), "pointing_ra": "1 arcmin", "pitch_x": "flat"}
     assert choices.settings().prior_widths == {"pointing_ra": 60.0, "pitch_x": float("inf")}
-    choices.shifts = "detector_x[2]=-5um, focal_length=0.1mm"
+    choices.prior_shifts = "detector_x[2]=-5um, focal_length=0.1mm"
     assert choices.settings().prior_shifts == {"detector_x[2]": -5.0, "focal_length": 100.0}
     choices.compare_orders = True
     assert choices.settings().compare_orders
@@ -311,16 +318,16 @@ def test_choices_become_settings_that_name_only_what_was_changed():
 
 def test_choices_that_cannot_be_used_say_which():
     choices = FitChoices()
-    choices.widths = {**default_widths(), "detector_x": "-3"}
+    choices.prior_widths = {**default_widths(), "detector_x": "-3"}
     with pytest.raises(InputError, match="detector_x"):
         choices.settings()
 
 
 def test_solutions_are_described_by_what_departs_from_the_paper():
-    assert describe(FitSettings()) == "order 5"
+    assert FitSettings().describe() == "order 5"
     changed = FitSettings(order=3, aberration=False, prior_widths={"distortion_x": 0.5})
-    assert describe(changed) == "order 3, distortion_x 0.5 um, no aberration"
-    assert describe(FitSettings(compare_orders=True)) == "order 5, orders compared"
+    assert changed.describe() == "order 3, no aberration, distortion_x 0.5 um"
+    assert FitSettings(compare_orders=True).describe() == "order 5, orders compared"
 
 
 def test_address_brings_back_the_selection(fit_result):
@@ -356,3 +363,27 @@ def test_address_asks_for_an_orbit_of_the_workbench(fit_result):
     session.selection.want({"orbit": "1"})
     assert session.selection.orbit == 1
     assert session.selection.address()["orbit"] == "1"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("order", 4),
+        ("aberration", False),
+        ("robust", True),
+        ("prior_shifts", "detector_x[2]=-5um"),
+        ("prior_widths", {**default_widths(), "pitch_x": "flat"}),
+        ("exclusions", "detector=1"),
+    ],
+)
+def test_change_of_any_control_that_is_answered_at_once_asks_a_what_if(live, name, value):
+    assert name in ANSWERED_AT_ONCE
+    setattr(live.choices, name, value)
+    assert live.job.request["what_if"]
+    assert live.store.asked[-1][1] == live.choices.settings()
+
+
+def test_every_setting_with_a_control_is_a_parameter_of_the_choices():
+    controls = {name for name, one in SETTINGS.items() if one.control}
+    assert controls == set(CONTROLS) == set(FitChoices.param) - {"name", "what_if_at_once"}
+    assert set(ANSWERED_AT_ONCE) == controls - {"engine", "compare_orders"}

@@ -6,7 +6,7 @@ import math
 import astropy.units as u
 import pytest
 
-from plateviz.notebook.choices import Choices, settings_with, takes_choices
+from plateviz.notebook.choices import KEYWORDS, settings_with, takes_choices
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 
@@ -68,12 +68,12 @@ def test_steps_and_seed_are_of_the_engines():
         ({"thin": 0}, "thin to be 1 or more"),
         ({"priors": ["distortion_x"]}, r"priors: expected names and values .* \['distortion_x'\]"),
         ({"priors": {"distortion": "1um"}}, "parameter group out of .* found 'distortion'"),
-        ({"priors": {"distortion_x": "1 parsec"}}, "prior of distortion_x: .* found 'parsec'"),
+        ({"priors": {"distortion_x": "1 kg"}}, "prior of distortion_x: .* found 'kg'"),
         ({"priors": {"distortion_x": -1}}, "positive prior width"),
         ({"centres": {"detector_x[2]": "far"}}, "centre of a prior: expected .*found"),
         ({"exclude": "detector 2"}, "exclusion: expected source=ID"),
         ({"exclude": 2}, "exclude: expected texts such as 'detector=2', found 2"),
-        ({"steps": 2.5}, "steps: expected a number of 1 or more, found 2.5"),
+        ({"steps": 2.5}, "svi steps to be 1 or more, found 2.5"),
         ({"seed": -1}, "svi seed to be 0 or more"),
     ],
     ids=lambda value: str(value)[:40],
@@ -89,5 +89,5 @@ def test_signature_names_the_choices():
         return choices
 
     names = list(inspect.signature(fit).parameters)
-    assert names == ["orbit", *Choices.__annotations__]
+    assert names == ["orbit", *KEYWORDS]
     assert fit(1, order=3) == {"order": 3}

@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS, PARAMETERS, groups_on
+from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS, PARAMETERS, Group, groups_on
+from solver.data.prior_text import format_shift, format_width, parse_shift, parse_width
+from solver.units import factor_between
 
 
 def test_names_are_unique():
@@ -54,3 +56,20 @@ def test_units_convert(group):
 @pytest.mark.parametrize("group", PARAMETERS, ids=lambda g: g.name)
 def test_widths_that_are_fractions_or_factors_have_no_unit(group):
     assert (group.width_unit == "") == (group.relative or group.name == "sources")
+
+
+def test_group_in_any_unit_of_astropy_is_converted_and_read_back():
+    group = Group("squeeze", "squeeze", "ε", "exp", "ppm", "%", "normal", 50.0)
+    assert group.per_value_unit == 1e4
+    assert factor_between("mas", "rad") == pytest.approx(4.84813681109536e-09)
+    with pytest.raises(ValueError, match="convertible"):
+        factor_between("um", "arcsec")
+
+
+def test_width_in_ppm_is_written_and_read_back(monkeypatch):
+    group = Group("squeeze", "squeeze", "ε", "exp", "ppm", "ppm", "normal", 50.0)
+    monkeypatch.setitem(BY_NAME, "squeeze", group)
+    assert format_width("squeeze", 50.0) == "50 ppm"
+    assert parse_width("squeeze", "50 ppm") == 50.0
+    assert parse_width("squeeze", "0.01 %") == 100.0
+    assert parse_shift(format_shift("squeeze[0/3]", -3.0)) == ("squeeze[0/3]", -3.0)

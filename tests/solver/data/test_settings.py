@@ -3,14 +3,10 @@ import json
 import numpy as np
 import pytest
 
+from solver.data.engine_settings import WARPFIELD, NutsSettings, SviSettings, svi_settings
+from solver.data.exclusions import Exclusions
 from solver.data.parameters import PARAMETERS
-from solver.data.settings import (
-    WARPFIELD,
-    FitSettings,
-    NutsSettings,
-    SviSettings,
-    svi_settings,
-)
+from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.errors import InputError
 
 
@@ -131,3 +127,53 @@ def test_orders_are_compared_when_asked_for_and_old_results_never_asked():
     assert FitSettings.from_dict(plain) == settings
     del plain["compare_orders"]
     assert FitSettings.from_dict(plain) == FitSettings()
+
+
+def test_every_setting_states_all_that_its_interfaces_need():
+    for name, one in SETTINGS.items():
+        assert one.label, name
+        assert one.help.endswith("."), name
+        one.check(name, DEFAULTS[name])
+        assert one.from_plain(one.to_plain(DEFAULTS[name])) == DEFAULTS[name]
+    cards = [one.card for one in SETTINGS.values() if one.card]
+    assert len(set(cards)) == len(cards)
+    assert all(len(card) <= 8 for card in cards)
+
+
+def test_settings_of_an_unknown_name_are_refused():
+    with pytest.raises(TypeError, match="flavour"):
+        FitSettings.from_dict({"order": 3, "flavour": 1})
+
+
+def test_identity_leaves_out_what_does_not_change_the_solution():
+    asked = FitSettings(order=3, compare_orders=True)
+    assert asked.identity() == FitSettings(order=3).identity()
+    assert asked.identity() != FitSettings(order=4).identity()
+
+
+@pytest.mark.parametrize(
+    ("changes", "holds"),
+    [
+        ({"order": 3, "prior_shifts": {"detector_x": 1.0}}, True),
+        ({"prior_widths": {"pitch_x": 0.1}}, True),
+        ({"aberration": False}, False),
+        ({"robust": True}, False),
+    ],
+)
+def test_what_if_holds_unless_the_model_or_the_outliers_change(changes, holds):
+    assert FitSettings().what_if_holds(FitSettings(**changes)) == holds
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({}, "order 5"),
+        ({"thin": 3, "engine": "svi"}, "order 5, svi, one in 3 sources"),
+        ({"svi": SviSettings(seed=3)}, "order 5, svi seed 3"),
+        ({"exclusions": Exclusions(detectors=frozenset({1}))}, "order 5, without detector 1"),
+        ({"prior_shifts": {"detector_x[2]": -5.0}}, "order 5, detector_x[2]=-5um"),
+        ({"max_iterations": 9, "robust": True}, "order 5, at most 9 iterations, without outliers"),
+    ],
+)
+def test_description_names_everything_that_departs_from_the_defaults(changes, text):
+    assert FitSettings(**changes).describe() == text

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from solver.data.settings import FitSettings, SviSettings
+from solver.data.engine_settings import SviSettings
+from solver.data.settings import FitSettings
 from solver.engines.checkpoint import resume_from
 from solver.engines.gauss_newton import Iteration
 from solver.engines.svi import SviState

@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from solver.data.engine_settings import NutsSettings, SviSettings
 from solver.data.result import FitStatus
-from solver.data.settings import FitSettings, NutsSettings, SviSettings
+from solver.data.settings import FitSettings
 from solver.engines.nuts import Chains, _mixing
 from solver.errors import CancelledError
 from solver.fit import fit_orbit

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from numpyro.infer import Trace_ELBO
 
+from solver.data.engine_settings import WARPFIELD, SviSettings
 from solver.data.result import FitStatus
-from solver.data.settings import WARPFIELD, FitSettings, SviSettings
+from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import find_mode
 from solver.engines.guide import Means, MirroredElbo, draws, guide
 from solver.engines.numpyro_model import evidence_of, in_coordinates

@@ -1,0 +1,159 @@
+"""Settings of the engines svi and nuts, and the options that set them."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from solver.data.setting import Positive, Setting, Switch, Whole, check_fields, setting, settings_of
+from solver.errors import InputError
+
+
+@dataclass(frozen=True)
+class SviSettings:
+    """The settings of the svi engine; `settings_of` describes each."""
+
+    steps: int = setting(
+        1500,
+        Whole(label="steps", help="Steps over which the learning rate falls."),
+    )
+    first_rate: float = setting(
+        1e4,
+        Positive(
+            label="first rate",
+            help="Learning rate at the start, in free coordinates: whitened ones, where one is a "
+            "sigma, or the published code's degrees and micrometres.",
+        ),
+    )
+    last_rate: float = setting(
+        1e-3, Setting(label="last rate", help="Learning rate at the end, in the same coordinates.")
+    )
+    block: int = setting(
+        25,
+        Whole(
+            label="block",
+            help="Steps between two linearisations, after which Adam starts afresh.",
+        ),
+    )
+    patience: int = setting(
+        200,
+        Whole(
+            label="patience",
+            help="The fit has converged when the loss has not changed for this many steps.",
+        ),
+    )
+    tolerance: float = setting(
+        0.1,
+        Setting(
+            label="tolerance",
+            help="Largest distance from the mode at which a loss at rest counts as converged.",
+            unit="sigma",
+        ),
+    )
+    max_steps: int = setting(
+        10_000, Whole(label="limit of steps", help="Limit of the engine, not below `steps`.")
+    )
+    seed: int = setting(0, Whole(label="seed", help="Seed of the random draws.", low=0))
+    conditioned: bool = setting(
+        True, Switch(label="conditioned", help="Whether to move in whitened coordinates.")
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse what no fit can use; `InputError` names the setting."""
+        wholes = {n: s for n, s in settings_of(type(self)).items() if isinstance(s, Whole)}
+        for name, whole in wholes.items():
+            whole.check(f"svi {name}", getattr(self, name))
+        if self.max_steps < self.steps:
+            raise InputError(
+                f"expected svi max_steps not to be below steps ({self.steps}), "
+                f"found {self.max_steps}"
+            )
+        if not self.first_rate > self.last_rate > 0.0:
+            raise InputError(
+                "expected svi learning rates that fall and are positive, "
+                f"found {self.first_rate!r} to {self.last_rate!r}"
+            )
+        if not self.tolerance > 0.0:
+            raise InputError(f"expected a positive svi tolerance, found {self.tolerance!r}")
+
+
+@dataclass(frozen=True)
+class NutsSettings:
+    """The settings of the nuts engine; `settings_of` describes each."""
+
+    warmup: int = setting(
+        300,
+        Whole(
+            label="warm-up",
+            help="Samples of each chain that adapt its step size and are thrown away.",
+        ),
+    )
+    samples: int = setting(500, Whole(label="samples", help="Samples kept of each chain.", low=4))
+    chains: int = setting(
+        2, Whole(label="chains", help="Number of chains, run one after the other.")
+    )
+    seed: int = setting(0, Whole(label="seed", help="Seed of the random draws.", low=0))
+
+    def __post_init__(self) -> None:
+        """Refuse what no run can use; `InputError` names the setting."""
+        check_fields(self, "nuts ")
+
+
+# The published code's coordinates, rates and rule of convergence (paper, section
+# "Optimization"), for comparison; it took up to a million steps.
+WARPFIELD = SviSettings(
+    steps=1_000_000,
+    first_rate=1e-3,
+    last_rate=1e-10,
+    block=1000,
+    patience=10_000,
+    max_steps=1_000_000,
+    conditioned=False,
+)
+
+# Options that set fields of `SviSettings` and `NutsSettings`: `engine_settings` takes them.
+ENGINE_OPTIONS: dict[str, Setting] = {
+    "seed": Whole(label="seed", help="Seed of svi and nuts.", low=0, keyword="seed", option="seed"),
+    "steps": Whole(
+        label="steps",
+        help="Steps over which the learning rate of svi falls.",
+        keyword="steps",
+        option="steps",
+        commands=("fit",),
+    ),
+    "compat": Setting(
+        label="compat",
+        help="warpfield: svi in the units and with the rates of the published code.",
+        keyword="compat",
+        option="compat",
+        commands=("fit",),
+    ),
+}
+
+
+def engine_settings(
+    seed: int = 0, steps: int | None = None, compat: str | None = None
+) -> dict[str, Any]:
+    """Return the fields `svi` and `nuts` that `ENGINE_OPTIONS` state.
+
+    Raises
+    ------
+    InputError
+        If an option cannot be used.
+    """
+    return {"svi": svi_settings(compat, steps, seed), "nuts": NutsSettings(seed=seed)}
+
+
+def svi_settings(compat: str | None, steps: int | None, seed: int) -> SviSettings:
+    """Return the settings of the svi engine from its options.
+
+    Parameters
+    ----------
+    compat : "warpfield" for the published code's coordinates and rates, or None
+    steps : over which the learning rate falls; None for the default
+    """
+    if compat not in (None, "warpfield"):
+        raise InputError(f"expected warpfield to be compatible with, found {compat!r}")
+    chosen = replace(WARPFIELD if compat else SviSettings(), seed=seed)
+    if steps is None:
+        return chosen
+    ENGINE_OPTIONS["steps"].check("svi steps", steps)
+    return replace(chosen, steps=steps, max_steps=2 * steps, block=min(chosen.block, steps))

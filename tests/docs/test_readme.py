@@ -5,7 +5,7 @@ import re
 import pytest
 
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT
-from tests.docs.pages import PAGES, README, REPOSITORY, section_of
+from tests.docs.pages import PAGES, README, REPOSITORY, headings_of, section_of
 from tests.test_architecture import FOLDERS, LOOSE
 
 TEXT = README.read_text("utf-8")
@@ -22,9 +22,17 @@ def test_readme_is_short():
     assert 6_000 <= len(TEXT.encode()) <= 8_000
 
 
-def test_links_of_the_readme_lead_to_files():
-    linked = {path.partition("#")[0] for path in re.findall(r"\]\((?!http|#)(.+?)\)", TEXT)}
-    assert not {path for path in linked if not (REPOSITORY / path).is_file()}
+def test_links_of_the_readme_lead_to_files_and_headings():
+    for link in re.findall(r"\]\((?!http)(.+?)\)", TEXT):
+        path, _, anchor = link.partition("#")
+        target = REPOSITORY / path if path else README
+        assert target.is_file(), link
+        anchors = (
+            {heading.lower().replace(" ", "-") for heading in headings_of(target)}
+            if anchor
+            else {""}
+        )
+        assert anchor in anchors, link
 
 
 def test_readme_links_to_every_page():

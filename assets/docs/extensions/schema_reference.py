@@ -119,7 +119,7 @@ def parameters() -> nodes.table:
 
 
 def settings(where: str) -> nodes.table:
-    """Return the fields of a class of settings, with the meanings in their help or its docstring."""
+    """Return the fields of a class of settings, with their help or the docstring's meanings."""
     kind = _named(where)
     meanings = {**attributes(kind), **_helps(kind)}
     shown = kind()

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import astropy.units as u
 import numpy as np
 import pandas as pd
 from astropy.table import QTable
@@ -12,6 +11,7 @@ from solver.data.columns import Column
 from solver.data.parameters import Axis, groups_on
 from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES
+from solver.units import unit_named
 
 # Of the calibration: name of the table -> what it has a row for.
 FITTED: dict[str, Axis] = {"pointings": "exp", "detectors": "det", "distortion": "coef"}
@@ -29,7 +29,7 @@ class OpenTable(NamedTuple):
         table = QTable()
         for column in self.columns:
             values = _values(self.frame[column.name], column)
-            table[column.name] = values << u.Unit(column.unit) if column.unit else values
+            table[column.name] = values << unit_named(column.unit) if column.unit else values
             table[column.name].info.description = column.meaning
         return table
 

@@ -128,8 +128,8 @@ def changes(problem: Problem) -> dict[str, tuple[FitSettings, ...]]:
         **{name: (default, FitSettings(exclusions=gone)) for name, gone in left_out.items()},
         # From one order more than the distortion has, so that the lower one fits as well.
         "order 6 to 5": (FitSettings(order=6), default),
-        "order 6 to 5, precomputed": (FitSettings(order=6), default, default),
-        "order 6 to 2, precomputed": (FitSettings(order=6), *2 * (FitSettings(order=2),)),
+        "order 6 to 5, made ready": (FitSettings(order=6), default, default),
+        "order 6 to 2, made ready": (FitSettings(order=6), *2 * (FitSettings(order=2),)),
     }
 
 

@@ -1,4 +1,4 @@
-"""The numbers of the documentation: the script runs, foretells right, and is what is quoted."""
+"""The page on uncertainties: its script predicts correctly, and the page quotes its output."""
 
 import contextlib
 import importlib.util
@@ -17,22 +17,22 @@ PROSE = " ".join(PAGE[: PAGE.index("## Output")].split())
 KINDS = ("reference", "non-reference", "artificial")
 LABEL = 62
 
-# What the prose says, with the number from the output in its place.
+# Quotations of the prose, with {} for the number from the output.
 QUOTED = [
     ("reported sigma: conditional, median", "reference", "{} µas, from 143 to 291"),
-    ("scatter over orbits, foretold", "reference", "{} µas foretold"),
+    ("scatter over orbits, predicted", "reference", "{} µas predicted"),
     ("scatter over orbits, measured", "reference", "{} µas measured"),
     ("  of one star alone, sigma_conditional^2 / sigma_d", "reference", "one star alone, {} µas"),
     ("scatter over orbits, changes of the offset", "reference", "by {} µas rms"),
-    ("scatter over orbits, foretold", "non-reference", "scatter, {} µas"),
+    ("scatter over orbits, predicted", "non-reference", "scatter, {} µas"),
     ("marginal sigma, rms", "non-reference", "marginal sigma, {} µas"),
     ("  of which the catalogue's errors", "non-reference", "$H^{{-1}} P H^{{-1}}$, {} µas"),
     ("offset from the catalogue's errors, rms", "non-reference", "{} µas with the true errors"),
     ("  of which the same in every orbit", "non-reference", "{} µas are the same"),
     ("normalised deviation, measured", "reference", "measured {}"),
     ("normalised deviation, expected", "reference", "in the survey {},"),
-    ("scatter, measured over foretold", "reference", "{} ± "),
-    ("scatter, measured over foretold", "non-reference", "{} ± "),
+    ("scatter, measured over predicted", "reference", "{} ± "),
+    ("scatter, measured over predicted", "non-reference", "{} ± "),
     ("pull by the marginal sigma, rms", "reference", "rms of {}."),
     ("  its marginal error, rms", "non-reference", "marginal error is {} µas"),
     ("  its deviation from the truth, rms over orbits", "non-reference", "was {} µas"),
@@ -56,7 +56,7 @@ def script():
 
 @pytest.fixture(scope="module")
 def printed(script):
-    """What it prints of the small survey that the page names as well."""
+    """The output for the small survey that the page also names."""
     with contextlib.redirect_stdout(io.StringIO()) as output:
         script.main(["--orbits", "4", "--stars", "4000"])
     return rows_of(output.getvalue())
@@ -73,8 +73,8 @@ def number(rows, label, kind):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_scatter_over_orbits_is_the_one_foretold(printed, kind):
-    found = number(printed, "scatter, measured over foretold", kind)
+def test_scatter_over_orbits_is_as_predicted(printed, kind):
+    found = number(printed, "scatter, measured over predicted", kind)
     error = number(printed, "  its sampling error", kind)
     assert found == pytest.approx(1.0, abs=4.0 * error)
     assert error < 0.25
@@ -82,13 +82,13 @@ def test_scatter_over_orbits_is_the_one_foretold(printed, kind):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_the_catalogue_leaves_scatters_by_noise(printed, kind):
+def test_deviation_without_catalogue_part_scatters_by_noise(printed, kind):
     label = "pull of what the catalogue leaves, by noise, rms"
     assert number(printed, label, kind) == pytest.approx(1.0, abs=0.2)
 
 
 @pytest.mark.slow
-def test_few_references_cost_the_others_a_fifth(printed):
+def test_few_references_raise_the_other_sigmas_by_a_fifth(printed):
     found = number(printed, "marginal over conditional sigma, median", "non-reference")
     assert found == pytest.approx(1.20, abs=0.03)
     assert "by 20 % where some 50 reference stars" in PROSE
@@ -111,18 +111,18 @@ def test_output_in_the_page_has_the_rows_that_the_script_prints(printed, quoted)
 
 
 @pytest.mark.parametrize(("label", "kind", "words"), QUOTED)
-def test_prose_says_what_the_output_says(quoted, label, kind, words):
+def test_prose_quotes_the_output(quoted, label, kind, words):
     assert words.format(quoted[label][KINDS.index(kind)]) in PROSE
 
 
-def test_measured_and_foretold_scatter_in_the_page_agree(quoted):
+def test_measured_and_predicted_scatter_in_the_page_agree(quoted):
     for kind in KINDS:
-        found = number(quoted, "scatter, measured over foretold", kind)
+        found = number(quoted, "scatter, measured over predicted", kind)
         error = number(quoted, "  its sampling error", kind)
         assert found == pytest.approx(1.0, abs=4.0 * error)
 
 
-def test_files_that_the_page_names_exist():
+def test_files_named_in_the_page_exist():
     named = set(re.findall(r"`((?:solver|tests)/[\w/]+\.py)`", PAGE))
     assert len(named) >= 6
     assert not {name for name in named if not (REPOSITORY / name).is_file()}

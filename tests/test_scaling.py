@@ -1,4 +1,4 @@
-"""The page on scaling says what its file of figures says, and its plot shows them."""
+"""The page on scaling and its plot agree with the file of measured times."""
 
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -32,24 +32,24 @@ def _circles(svg):
     ]
 
 
-def test_page_shows_the_figures_of_the_file():
+def test_page_shows_the_numbers_of_the_file():
     rows = read_rows(DOCUMENTS / "scaling.csv")
     text = (DOCUMENTS / "scaling.md").read_text("utf-8")
     machine = text.partition(BEGIN)[2].strip().partition("\n")[0]
     assert with_block(text, block(Scaling(rows, machine))) == text
 
 
-def test_plot_is_of_the_file():
+def test_plot_is_drawn_from_the_file():
     rows = read_rows(DOCUMENTS / "scaling.csv")
     assert plot(rows) == (DOCUMENTS / "scaling.svg").read_text("utf-8")
 
 
-def test_rows_come_back_from_the_file(tmp_path):
+def test_rows_are_read_back_from_the_file(tmp_path):
     write_all(Scaling(ROWS, "a machine"), tmp_path)
     assert read_rows(tmp_path / "scaling.csv") == ROWS
 
 
-def test_page_keeps_its_words(tmp_path):
+def test_page_keeps_its_text(tmp_path):
     page = tmp_path / "scaling.md"
     page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n", "utf-8")
     write_all(Scaling(ROWS, "a machine"), tmp_path)
@@ -71,9 +71,9 @@ def test_block_gives_seconds_units_and_microseconds():
     assert "| 250,000 | 96 | 0.40 | 0.80 | 0.24 | 3.60 | 1.20 | 10.00 |" in text
 
 
-def test_plot_has_a_point_for_every_time_and_a_mark_in_the_legend():
+def test_plot_has_a_point_for_every_time_and_a_legend():
     lines = len(STAGES) + 1
-    # Both rows have 96 exposures, and one the paper's stars.
+    # Both rows have 96 exposures; one has the paper's number of stars.
     assert len(_circles(plot(ROWS))) == lines * (1 + 3)
 
 

@@ -1,11 +1,11 @@
-"""How the site is built: `sphinx-build -W assets/docs SITE`. It fetches nothing, then or later."""
+"""Configuration of Sphinx: `sphinx-build -W assets/docs SITE`; needs no network."""
 
 import sys
 from importlib import metadata
 from pathlib import Path
 
 _DOCS = Path(__file__).resolve().parent
-# The repository is described, not the copy that was installed before the last edit.
+# Describe the checkout, not an installed copy.
 sys.path[:0] = [str(_DOCS / "extensions"), str(_DOCS.parents[1])]
 
 project = "plateviz"
@@ -23,14 +23,14 @@ extensions = [
     "equations",
     "schema_reference",
 ]
-exclude_patterns = ["extensions", "pictures", "static"]
+exclude_patterns = ["extensions", "figures", "static"]
 
-# The pages are Markdown that a forge shows as well.
+# The pages are Markdown that can be read as it is.
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
 html_math_renderer = "svg"
 
-# Dashes and quotes of help texts stay what people type.
+# Keep dashes and quotes of help texts as typed.
 smartquotes = False
 
 autodoc_member_order = "bysource"
@@ -38,7 +38,7 @@ autodoc_preserve_defaults = True
 autodoc_typehints_format = "short"
 python_maximum_signature_line_length = 80
 python_use_unqualified_type_names = True
-# Words in single backticks are code, and a link where there is something of that name.
+# Text in single backticks is code, and a link if an object has that name.
 default_role = "py:obj"
 add_module_names = False
 toc_object_entries_show_parents = "hide"

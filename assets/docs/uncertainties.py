@@ -1,9 +1,9 @@
-"""Make the numbers of uncertainties.md: sigmas, scatter and offsets over simulated orbits.
+"""Compute the numbers of uncertainties.md: sigmas, scatter and offsets over simulated orbits.
 
     python assets/docs/uncertainties.py [--orbits 8] [--stars N] [--seed 0]
 
-Orbits of the mini-mock survey are simulated and solved; what the linearised problem foretells
-of every source stands beside what its deviations from the truth do from orbit to orbit.
+Orbits of the mini-mock survey are simulated and solved; what the linearised problem predicts
+for every source is compared with its deviations from the truth from orbit to orbit.
 """
 
 import argparse
@@ -11,10 +11,10 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-# The checkout is measured, wherever it is run from.
+# Use the checkout, not an installed copy.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-# Before NumPy, as in the program: it sets how long idle BLAS threads spin.
+# Before NumPy: it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
 import numpy as np
@@ -36,18 +36,18 @@ from solver.units import MAS_PER_DEG
 
 KINDS = ("reference", "non-reference", "artificial")
 AXES = ("ra", "dec")
-# Of the orbits, the share in which a source is to be measured to be counted.
+# Minimum share of the orbits in which a counted source was measured.
 LEAST_SHARE = 0.5
 UAS_PER_MAS = 1000.0
 SIGMA_OBS_UAS = 4000.0
-# What the paper says of reference stars, section "Discussion", uas.
+# Numbers of the paper for reference stars, section "Discussion", uas.
 PAPER_REPORTED, PAPER_SCATTER = 100.0, 30.0
 COUNTS = (24, 36, 48, 72, 96)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print all tables."""
-    parser = argparse.ArgumentParser(description="Make the numbers of uncertainties.md.")
+    parser = argparse.ArgumentParser(description="Compute the numbers of uncertainties.md.")
     parser.add_argument("--orbits", type=int, default=8, help="at least 2")
     parser.add_argument("--stars", type=int, help="in the catalogue; default: the paper's")
     parser.add_argument("--seed", type=int, default=0)
@@ -150,19 +150,19 @@ def within(rows: pd.DataFrame, name: str) -> float:
     return float(np.sqrt(((rows[name] - groups.transform("mean")) ** 2).sum() / freedom))
 
 
-def foretold(rows: pd.DataFrame, offset: bool = True) -> float:
-    """Return the scatter that noise and the changes of the offset should give, or noise alone."""
-    # As the deviations about a source's own mean weigh.
+def predicted(rows: pd.DataFrame, offset: bool = True) -> float:
+    """Return the expected scatter from noise and changes of the offset, or from noise alone."""
+    # The weights of deviations about a source's own mean.
     weight = 1.0 - 1.0 / rows.groupby(["source_id", "axis"])["orbit"].transform("count")
     noise = np.sqrt(np.average(rows["sigma_noise"] ** 2, weights=weight))
     return float(np.hypot(noise, within(rows, "induced") if offset else 0.0))
 
 
 def ratio(rows: pd.DataFrame) -> tuple[float, float]:
-    """Return measured over foretold scatter, and its error by leaving out an orbit at a time."""
+    """Return measured over predicted scatter, and its jackknife error over the orbits."""
 
     def of(part: pd.DataFrame) -> float:
-        return within(part, "deviation") / foretold(part)
+        return within(part, "deviation") / predicted(part)
 
     orbits = rows["orbit"].unique()
     others = np.array([of(rows[rows["orbit"] != orbit]) for orbit in orbits])
@@ -170,7 +170,7 @@ def ratio(rows: pd.DataFrame) -> tuple[float, float]:
 
 
 def mean_deviation(rows: pd.DataFrame) -> tuple[float, float]:
-    """Return the rms of the sources' mean deviations over the orbits, and what it should be."""
+    """Return the rms of the sources' mean deviations over the orbits, and its expectation."""
     groups = rows.groupby(["source_id", "axis"])
     variance = (rows["sigma_noise"] ** 2).groupby([rows["source_id"], rows["axis"]]).mean()
     expected = groups["induced"].mean() ** 2 + variance / groups.size()
@@ -178,7 +178,7 @@ def mean_deviation(rows: pd.DataFrame) -> tuple[float, float]:
 
 
 def constant(rows: pd.DataFrame) -> float:
-    """Return the rms of what the offsets would come to over any number of such orbits."""
+    """Return the rms of the part of the offsets that is the same in every orbit."""
     groups = rows.groupby(["source_id", "axis"])["induced"]
     return np.sqrt(max(float((groups.mean() ** 2 - groups.var() / groups.size()).mean()), 0.0))
 
@@ -197,7 +197,7 @@ def separations(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def extent(values: pd.Series) -> str:
-    """Return between what 5 and 95 per cent of the values lie."""
+    """Return the 5 and 95 per cent quantiles of the values."""
     low, high = values.quantile([0.05, 0.95])
     return f"{low:.0f}-{high:.0f}"
 
@@ -214,17 +214,17 @@ def single_star() -> dict[str, np.ndarray]:
 
 
 def figure(of: Callable[[pd.DataFrame], float], digits: int = 0) -> Callable[[pd.DataFrame], str]:
-    """Return the function that writes a number of some rows."""
+    """Return the function that formats a number computed from rows."""
     return lambda rows: f"{of(rows):.{digits}f}"
 
 
 def quadratic(name: str) -> Callable[[pd.DataFrame], str]:
-    """Return the function that writes the rms of a column."""
+    """Return the function that formats the rms of a column."""
     return figure(lambda rows: rms(rows[name]))
 
 
 def middle(name: str) -> Callable[[pd.DataFrame], str]:
-    """Return the function that writes the median of a column."""
+    """Return the function that formats the median of a column."""
     return figure(lambda rows: float(rows[name].median()))
 
 
@@ -248,19 +248,19 @@ FIGURES: dict[str, Callable[[pd.DataFrame], str]] = {
     "  of which the catalogue's errors": quadratic("sigma_catalogue"),
     "  of which the calibration's priors": quadratic("sigma_calibration"),
     "deviation from the truth, rms": quadratic("deviation"),
-    "scatter over orbits, noise": figure(lambda rows: foretold(rows, offset=False)),
+    "scatter over orbits, noise": figure(lambda rows: predicted(rows, offset=False)),
     "scatter over orbits, noise, 5 to 95 %": lambda rows: extent(rows["sigma_noise"]),
     "  of one star alone, sigma_conditional^2 / sigma_d": figure(
         lambda rows: rms(rows["sigma_conditional"] ** 2 / rows["sigma_data"])
     ),
     "scatter over orbits, changes of the offset": figure(lambda rows: within(rows, "induced")),
-    "scatter over orbits, foretold": figure(foretold),
+    "scatter over orbits, predicted": figure(predicted),
     "scatter over orbits, measured": figure(lambda rows: within(rows, "deviation")),
-    "scatter, measured over foretold": figure(lambda rows: ratio(rows)[0], 3),
+    "scatter, measured over predicted": figure(lambda rows: ratio(rows)[0], 3),
     "  its sampling error": figure(lambda rows: ratio(rows)[1], 3),
     "offset from the catalogue's errors, rms": quadratic("induced"),
     "  of which the same in every orbit": figure(constant),
-    "mean deviation over the orbits, rms, foretold": figure(lambda rows: mean_deviation(rows)[1]),
+    "mean deviation over the orbits, rms, predicted": figure(lambda rows: mean_deviation(rows)[1]),
     "mean deviation over the orbits, rms, measured": figure(lambda rows: mean_deviation(rows)[0]),
     "rms separation from the truth (2-D), median": figure(
         lambda rows: float(separations(rows)["rms"].median())

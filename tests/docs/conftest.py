@@ -1,4 +1,4 @@
-"""A folder with all that the pages' commands name: OBS.fits, REF.fits, RESULT.fits and a survey."""
+"""A folder with the files named in the pages: OBS.fits, REF.fits, RESULT.fits and a survey."""
 
 import shutil
 import sys
@@ -19,7 +19,7 @@ from tests.docs.pages import REPOSITORY, build_site
 
 @pytest.fixture(scope="session")
 def stock(small_survey, tmp_path_factory):
-    """The files, made once."""
+    """The files, written once."""
     folder = tmp_path_factory.mktemp("stock")
     shutil.copytree(small_survey, folder / "DIR")
     data = read_survey_orbit(small_survey, 0)
@@ -35,20 +35,20 @@ def stock(small_survey, tmp_path_factory):
 
 @pytest.fixture
 def workplace(stock, tmp_path, monkeypatch):
-    """A copy of them in the folder from which commands are run."""
+    """A copy of them in the current folder."""
     folder = tmp_path / "work"
     shutil.copytree(stock, folder)
     monkeypatch.chdir(folder)
-    # The solver's process takes the checkout, too, and not the copy that was installed.
+    # The solver process must use the checkout too, not an installed copy.
     monkeypatch.setenv("PYTHONPATH", str(REPOSITORY))
     return folder
 
 
 @pytest.fixture
 def command(workplace, monkeypatch):
-    """Return the function that runs a command line of plateviz in this process: its exit code.
+    """Return the function that runs a command line in this process and returns its exit code.
 
-    A survey is fitted by a worker in this process, too, and nothing is served or opened.
+    A worker in this process fits surveys; nothing is served or opened.
     """
     monkeypatch.setattr("plateviz.runs.fit_survey._client", _worker_here)
     monkeypatch.setattr("plateviz.cli.serve.run_server", lambda store, *_: store.close())

@@ -1,4 +1,4 @@
-"""The pages of the documentation as their source has them: headings, blocks and their marks."""
+"""The source of the pages: headings, fenced blocks and the marks above them."""
 
 import re
 import subprocess
@@ -17,7 +17,7 @@ _MARK = re.compile(r"<!-- not run: (.+) -->")
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block: of which page, in which line, and what the line above it says."""
+    """A fenced block with its page, its line number and the line above it."""
 
     page: Path
     line: int
@@ -27,7 +27,7 @@ class Block:
 
     @property
     def reason(self):
-        """Why it is not run, as the page says; "" if it is to be run."""
+        """The page's reason for not running it; "" if it is to be run."""
         found = _MARK.fullmatch(self.above)
         return found[1] if found else ""
 
@@ -36,14 +36,14 @@ class Block:
         return f"{self.page.stem}-{self.line}"
 
     def commands(self):
-        """Return its lines without comments, those continued with a backslash as one."""
+        """Return its lines without comments; lines continued with a backslash are joined."""
         joined = self.text.replace("\\\n", " ")
         lines = (re.split(r"(?:^|\s)#", line)[0].strip() for line in joined.splitlines())
         return [line for line in lines if line]
 
 
 def blocks_of(page, *languages):
-    """Return the blocks of a page in some languages, in order."""
+    """Return the blocks of a page in the given languages, in order."""
     text = page.read_text("utf-8")
     found = []
     for match in _FENCE.finditer(text):
@@ -69,7 +69,7 @@ def section_of(page, heading):
 
 
 def build_site(folder):
-    """Build the site as the README says: its folder; a warning is an error."""
+    """Build the site as in the README and return its folder; a warning is an error."""
     build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going"]
     places = ["-d", str(folder / "doctrees"), str(DOCS), str(folder / "html")]
     run = subprocess.run(

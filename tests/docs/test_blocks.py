@@ -1,4 +1,4 @@
-"""Commands and code of the pages: run in a folder that has what they name, or known to parse."""
+"""Commands and code of the pages: run in a folder with the files they name, or parsed."""
 
 import ast
 import re
@@ -15,15 +15,16 @@ from tests.docs.pages import DOCS, PAGES, README, REPOSITORY, blocks_of
 COMMANDS = get_command(app).commands
 SHELL = [block for page in (README, *PAGES) for block in blocks_of(page, "sh")]
 PYTHON = [block for page in (README, *PAGES) for block in blocks_of(page, "python")]
-# Its blocks are files and changes of the code, which have tests of their own.
-EXTENDING = DOCS / "extending.md"
-# What takes too long for a page's test, and the test that runs it.
+# Its blocks are files and changes of the code; test_contributing.py runs them.
+CONTRIBUTING = DOCS / "contributing.md"
+# Commands too slow for a page's test, and the test that runs them.
 ELSEWHERE = {"demo": "tests/ui/test_dashboard.py"}
-# Smaller than the page's, and where nothing is in the way.
+# Options that make a command small, or avoid a port in use.
 SMALLER = {
     "simulate": ["--orbits", "2", "--stars", "2000"],
     "serve": ["--port", "0"],
 }
+_OTHER_PROGRAMS = {"pytest", "ruff", "pyright", "dask", "ssh", ".", "jupyter", "panel"}
 EXTRAS = tomllib.loads((REPOSITORY / "pyproject.toml").read_text("utf-8"))["project"][
     "optional-dependencies"
 ]
@@ -33,12 +34,12 @@ of_python = pytest.mark.parametrize("block", PYTHON, ids=lambda block: block.nam
 
 
 def run_of(page, *languages):
-    """Return the blocks of a page that are to be run."""
+    """Return the blocks of a page without a reason not to run them."""
     return [block for block in blocks_of(page, *languages) if not block.reason]
 
 
 def parsed(words):
-    """Parse a command line of plateviz; a wrong option or value ends the test."""
+    """Parse a command line of plateviz; a wrong option or value fails the test."""
     _, name, *rest = words
     if name == "--help" or "--help" in rest:
         return
@@ -46,7 +47,7 @@ def parsed(words):
 
 
 def programs(block):
-    """Return the command lines of a block, apart where one line has several."""
+    """Return the command lines of a block; a line with several is split."""
     return [shlex.split(part) for line in block.commands() for part in re.split(r"&&|\s&\s", line)]
 
 
@@ -62,7 +63,7 @@ def test_command_is_known(block):
         if program in known:
             known[program]()
         else:
-            assert program in {"pytest", "dask", "ssh", ".", "jupyter", "panel"}, program
+            assert program in _OTHER_PROGRAMS, program
 
 
 def _known_extra(words):
@@ -90,14 +91,14 @@ def test_code_parses(block):
 def test_page_says_why_a_block_is_not_run(page):
     reasons = [block.reason for block in blocks_of(page, "sh", "python") if block.reason]
     assert all(re.match(r"needs|takes", reason) for reason in reasons)
-    # No mark that is misspelt, or belongs to no block.
+    # No mark is misspelt or without a block.
     assert page.read_text("utf-8").count("not run:") == len(reasons)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
-    [page for page in PAGES if page != EXTENDING and run_of(page, "sh")],
+    [page for page in PAGES if page != CONTRIBUTING and run_of(page, "sh")],
     ids=lambda page: page.stem,
 )
 def test_commands_of_a_page_run(page, command, workplace):
@@ -115,7 +116,7 @@ def test_commands_of_a_page_run(page, command, workplace):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
-    [page for page in PAGES if page != EXTENDING and run_of(page, "python")],
+    [page for page in PAGES if page != CONTRIBUTING and run_of(page, "python")],
     ids=lambda page: page.stem,
 )
 def test_code_of_a_page_runs(page, command, workplace):
@@ -125,7 +126,7 @@ def test_code_of_a_page_runs(page, command, workplace):
         exec(compile(block.text, block.name, "exec"), namespace)
 
 
-def test_a_wrong_option_would_be_found():
+def test_wrong_option_is_found():
     for wrong in (["fit", "OBS", "REF", "--oder", "5", "-o", "R"], ["serve", "DIR", "--port", "x"]):
         with pytest.raises(Exception, match=r"No such option|valid integer"):
             parsed(["plateviz", *wrong])

@@ -1,4 +1,4 @@
-"""Every figure of the gallery has its section, and in it a picture of good and of bad."""
+"""Every figure of the gallery has its section, with an example of good and one of bad."""
 
 import re
 import sys
@@ -10,7 +10,7 @@ from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from tests.docs.pages import DOCS, headings_of, section_of
 
 ORBIT, SURVEY = DOCS / "diagnostics.md", DOCS / "survey-diagnostics.md"
-PICTURES = DOCS / "pictures"
+EXAMPLES = DOCS / "figures"
 PLACES = [
     *((figure, ORBIT) for figure in diagnostics()),
     *((figure, SURVEY) for figure in (*survey_figures(), *source_figures())),
@@ -23,9 +23,9 @@ of_every_figure = pytest.mark.parametrize(
 
 
 @of_every_figure
-def test_figure_has_a_section_with_both_pictures_in_it(figure, page):
+def test_figure_has_a_section_with_both_examples(figure, page):
     assert figure.title in headings_of(page)
-    shown = re.findall(r"!\[[^\]]+\]\(pictures/(.+?)\)", section_of(page, figure.title))
+    shown = re.findall(r"!\[[^\]]+\]\(figures/(.+?)\)", section_of(page, figure.title))
     assert shown == [f"{figure.name}-good.png", f"{figure.name}-bad.png"]
 
 
@@ -44,42 +44,42 @@ def test_section_says_what_is_good_and_what_is_bad(figure, page):
     [(ORBIT, diagnostics()), (SURVEY, (*survey_figures(), *source_figures()))],
     ids=["orbit", "survey"],
 )
-def test_sections_stand_in_the_order_of_the_page(page, figures):
+def test_sections_are_in_the_order_of_the_page(page, figures):
     titles = [figure.title for figure in figures]
     assert [heading for heading in headings_of(page) if heading in titles] == titles
 
 
 @pytest.mark.parametrize("kind", ["good", "bad"])
 @of_every_figure
-def test_picture_is_small_and_not_blank(figure, page, kind):
-    path = PICTURES / f"{figure.name}-{kind}.png"
-    # A frame with nothing but words in it has three thousand.
+def test_example_is_small_and_not_blank(figure, page, kind):
+    path = EXAMPLES / f"{figure.name}-{kind}.png"
+    # An empty frame with a message has three thousand bytes.
     assert 5_000 < path.stat().st_size <= MOST_BYTES
-    picture = Image.open(path).convert("L")
-    assert min(picture.size) > 200
-    assert max(picture.size) <= 1400
-    drawn = sum(picture.histogram()[:200])
-    assert 0.01 < drawn / (picture.width * picture.height) < 0.5
+    image = Image.open(path).convert("L")
+    assert min(image.size) > 200
+    assert max(image.size) <= 1400
+    drawn = sum(image.histogram()[:200])
+    assert 0.01 < drawn / (image.width * image.height) < 0.5
 
 
 @of_every_figure
 def test_good_and_bad_differ(figure, page):
-    good, bad = (PICTURES / f"{figure.name}-{kind}.png" for kind in ("good", "bad"))
+    good, bad = (EXAMPLES / f"{figure.name}-{kind}.png" for kind in ("good", "bad"))
     assert good.read_bytes() != bad.read_bytes()
 
 
-def test_folder_holds_these_pictures_alone():
+def test_folder_holds_only_these_examples():
     wanted = {f"{figure.name}-{kind}.png" for figure, _ in PLACES for kind in ("good", "bad")}
-    found = list(PICTURES.iterdir())
+    found = list(EXAMPLES.iterdir())
     assert {path.name for path in found} == wanted
     assert sum(path.stat().st_size for path in found) < MOST_BYTES_IN_ALL
 
 
 def test_script_has_a_case_for_every_figure(monkeypatch):
     monkeypatch.setattr(sys, "path", [str(DOCS), *sys.path])
-    import picture_orbits
-    import picture_surveys
+    import figure_orbits
+    import figure_surveys
 
-    assert set(picture_orbits.ORBITS) == {figure.name for figure in diagnostics()}
-    assert set(picture_surveys.SURVEYS) == {figure.name for figure in survey_figures()}
-    assert set(picture_surveys.SOURCES) == {figure.name for figure in source_figures()}
+    assert set(figure_orbits.ORBITS) == {figure.name for figure in diagnostics()}
+    assert set(figure_surveys.SURVEYS) == {figure.name for figure in survey_figures()}
+    assert set(figure_surveys.SOURCES) == {figure.name for figure in source_figures()}

@@ -1,4 +1,4 @@
-"""The site as it is built: every link leads somewhere, and it is read without a network."""
+"""The built site: its links work, and it needs no network."""
 
 from html.parser import HTMLParser
 from urllib.parse import unquote, urldefrag, urlsplit
@@ -22,12 +22,12 @@ from tests.docs.pages import DOCS, PAGES
 pytestmark = pytest.mark.slow
 
 COMMANDS = get_command(app).commands
-# What a browser fetches with a page, by the attribute that says where.
+# Elements that a browser loads with a page, and the attribute with their address.
 _LOADED = {"script": "src", "img": "src", "link": "href", "iframe": "src", "source": "src"}
 
 
 class _Page(HTMLParser):
-    """The ids of a page, its links, what it loads, and its words."""
+    """Ids, links, loaded files and text of a page."""
 
     def __init__(self, text):
         super().__init__()
@@ -62,7 +62,7 @@ def page(pages, site):
 
 
 def plain(words):
-    """Return words as they stand in a page, where what was in backticks is code."""
+    """Return a text as it appears in a page, without backticks."""
     return " ".join(words.replace("`", "").split())
 
 
@@ -98,7 +98,7 @@ def test_no_style_sheet_asks_for_a_font_from_elsewhere(site):
 @pytest.mark.parametrize("name", ["concepts", "uncertainties", "survey"])
 def test_equations_are_drawn(page, name):
     dollars = (DOCS / f"{name}.md").read_text("utf-8").count("$")
-    # A block has four of them, what stands in a line two.
+    # A displayed equation has four dollar signs, an inline one two.
     assert dollars / 4 <= page(name).equations <= dollars / 2
 
 
@@ -154,6 +154,6 @@ def test_every_public_name_is_described(page):
     ids = page("api").ids
     described = {one.rpartition(".")[2] for one in ids}
     public = {*solver.__all__, *plateviz.plots.__all__, *plateviz.tables.__all__}
-    # A table of the paper's, which has its place among the concepts; and constants.
+    # Constants, and the parameter table, which the page on concepts shows.
     constants = {name for name in public if name.isupper()}
     assert not public - constants - described

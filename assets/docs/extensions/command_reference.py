@@ -1,4 +1,4 @@
-"""The directive `command`: what a command of the command line takes, from the command itself."""
+"""The directive `command`: a reference of one command, generated from the command itself."""
 
 import inspect
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ def setup(site: Sphinx) -> dict[str, bool]:
 
 
 class Parameter(NamedTuple):
-    """An argument or an option of a command, in the words of its help."""
+    """An argument or an option of a command, with its help text."""
 
     names: list[str]
     value: str
@@ -41,8 +41,8 @@ class CommandReference(SphinxDirective):
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
-        """Return what it does, how it is called, its arguments and options."""
-        # The page changes with the code, which Sphinx does not watch.
+        """Return its summary, usage, arguments and options."""
+        # The page depends on the code, which Sphinx does not watch.
         self.env.note_reread()
         name = self.arguments[0]
         if name not in COMMANDS:
@@ -59,7 +59,7 @@ class CommandReference(SphinxDirective):
 
 
 def parameters(name: str) -> Iterator[Parameter]:
-    """Yield what a command takes, in order; KeyError if there is no such command."""
+    """Yield the parameters of a command in order; KeyError if there is no such command."""
     called: Any = COMMANDS[name]
     hints = get_type_hints(called.callback, include_extras=True)
     for one in called.params:

@@ -1,4 +1,4 @@
-"""Docstrings of the house as reStructuredText: `name : meaning` is no type, and no markup else."""
+"""Convert the docstrings to reStructuredText: `name : meaning` gives a meaning, not a type."""
 
 import inspect
 import re
@@ -22,7 +22,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def attributes(kind: type) -> dict[str, str]:
-    """Return what a class's docstring says of each of its attributes."""
+    """Return the meaning of each attribute in a class's docstring."""
     found = {}
     for title, lines in _sections(inspect.getdoc(kind) or ""):
         if title == "Attributes":
@@ -51,7 +51,7 @@ def _process(_: Sphinx, __: str, ___: str, ____: object, _____: object, lines: l
 
 
 def _sections(text: str) -> Iterator[tuple[str, list[str]]]:
-    """Yield the title and the lines of each section, the first without a title."""
+    """Yield title and lines of each section; the first has no title."""
     title, body = "", []
     for line in text.splitlines():
         if body and re.fullmatch(r"-{3,}", line) and len(line) == len(body[-1]):
@@ -78,7 +78,7 @@ def _entries(lines: list[str]) -> Iterator[tuple[str, str]]:
 
 
 def _plain(line: str) -> str:
-    """Escape what would be markup, outside backticks."""
+    """Escape markup outside backticks."""
     parts = line.split("`")
     parts[::2] = [re.sub(r"([*_|\\])", r"\\\1", part) for part in parts[::2]]
     return "`".join(parts)

@@ -1,4 +1,4 @@
-"""Equations as drawings in the page: no script, no font and no network is needed to read them."""
+"""Render equations as SVG in the page, so that no script, font or network is needed."""
 
 from html import escape
 
@@ -10,14 +10,14 @@ from ziamath.config import config
 from ziamath.zmath import Latex
 
 _LOGGER = logging.getLogger(__name__)
-# In the pixels of the theme's text.
+# Font sizes in pixels, to match the theme's text.
 _SIZE = 17.0
 _INLINE_SIZE = 16.0
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the renderer that conf.py names."""
-    # Glyphs shared by name would be lost where two drawings of a page differ in them.
+    """Register the math renderer named in conf.py."""
+    # Without shared glyphs: two equations of a page would overwrite each other's by name.
     config.svg2 = False
     config.math.color = "currentColor"
     app.add_html_math_renderer("svg", (_visit_inline, None), (_visit_block, None))
@@ -25,7 +25,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def svg(text: str, *, inline: bool) -> str:
-    """Return an equation in LaTeX as SVG, with its source for those who cannot see it."""
+    """Return a LaTeX equation as SVG, with its source as the label for screen readers."""
     drawn = Latex(text, size=_INLINE_SIZE if inline else _SIZE, inline=inline)
     below = f"vertical-align: {drawn.getyofst():.2f}px" if inline else ""
     label = escape(" ".join(text.split()), quote=True)

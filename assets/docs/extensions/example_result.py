@@ -1,4 +1,4 @@
-"""A result of one source on one exposure: what is written of it shows how any is written."""
+"""A result of one source on one exposure, from which the pages on file formats are generated."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""Nodes of a page that the extensions make: tables, and words with code in backticks."""
+"""Nodes of a page for the extensions: tables, and text with code in backticks."""
 
 from collections.abc import Iterable, Sequence
 
@@ -6,19 +6,19 @@ from docutils import nodes
 
 
 def words(text: str) -> list[nodes.Node]:
-    """Return a text, of which what stands in backticks is code."""
+    """Return a text as nodes; parts in backticks become code."""
     parts = text.split("`")
     kinds = (nodes.Text, lambda part: nodes.literal("", part))
     return [kinds[number % 2](part) for number, part in enumerate(parts) if part]
 
 
 def code(names: Iterable[str]) -> str:
-    """Return names in backticks, between commas."""
+    """Return names in backticks, separated by commas."""
     return ", ".join(f"`{name}`" for name in names)
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> nodes.table:
-    """Return a table of texts as `words` takes them; a column without any is left out."""
+    """Return a table of texts in the form of `words`; empty columns are omitted."""
     kept = list(rows)
     used = [i for i in range(len(headings)) if any(row[i] for row in kept)]
     group = nodes.tgroup(cols=len(used))

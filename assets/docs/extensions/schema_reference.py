@@ -1,15 +1,15 @@
-"""Directives that write the file formats down from the code that reads and writes them.
+"""Directives that generate the description of the file formats from the code.
 
 | directive            | shows                                                              |
 |----------------------|--------------------------------------------------------------------|
-| `columns MODULE:NAME`| the columns of a table, `solver.data.schema:MEASUREMENT`                |
+| `columns MODULE:NAME`| the columns of a table, `solver.data.schema:MEASUREMENT`           |
 | `hdu NAME`           | the columns of an HDU of a result file                             |
 | `keywords NAME`      | the header keywords of an HDU                                      |
 | `parameters`         | the parameter groups with their priors                             |
 | `settings MODULE:NAME`| fields and defaults of a class of settings                        |
 | `choices`            | the settings that a fit takes as keywords in a notebook            |
 | `fields MODULE:NAME` | plain fields of any class                                          |
-| `layout MODULE`      | the tree of files that a module's docstring draws                  |
+| `layout MODULE`      | the tree of files in a module's docstring                          |
 """
 
 import dataclasses
@@ -63,13 +63,13 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 def _directive(make: Callable[..., nodes.Node]) -> type[SphinxDirective]:
     class Reference(SphinxDirective):
-        """Write down what the argument names."""
+        """Insert the description of what the argument names."""
 
         optional_arguments = 1
 
         def run(self) -> list[nodes.Node]:
             """Return it as one node."""
-            # The page changes with the code, which Sphinx does not watch.
+            # The page depends on the code, which Sphinx does not watch.
             self.env.note_reread()
             return [make(*self.arguments)]
 
@@ -77,7 +77,7 @@ def _directive(make: Callable[..., nodes.Node]) -> type[SphinxDirective]:
 
 
 def columns_of(where: str) -> nodes.table:
-    """Return the columns of a table with the names by which they are read as well."""
+    """Return the columns of a table, with their aliases."""
     found: Table = _named(where)
     rows = (
         (f"`{c.name}`", c.dtype, _unit(c), _meaning(c), code(c.aliases), _absent(c)) for c in found
@@ -87,7 +87,9 @@ def columns_of(where: str) -> nodes.table:
 
 def hdu(name: str) -> nodes.table:
     """Return the columns of an HDU in the order in which they are written."""
-    kept = next((k for k in vars(layout).values() if isinstance(k, PublishedTable) and k.hdu == name), None)
+    kept = next(
+        (k for k in vars(layout).values() if isinstance(k, PublishedTable) and k.hdu == name), None
+    )
     rows = [] if kept is None else [_kept(kept, column) for column in kept.table]
     rows += [_derived(column) for column in _DERIVED.get(name, lambda _: [])(example_result())]
     if not rows:
@@ -98,7 +100,7 @@ def hdu(name: str) -> nodes.table:
 
 
 def keywords(name: str) -> nodes.table:
-    """Return the keywords of a header, as they stand in a result of one source."""
+    """Return the keywords of a header, with the values of the example result."""
     cards = _HEADERS[name](example_result()).cards
     rows = ((f"`{card.keyword}`", str(card.value)[:40], card.comment) for card in cards)
     return table(("keyword", "such as", "meaning"), rows)
@@ -117,7 +119,7 @@ def parameters() -> nodes.table:
 
 
 def settings(where: str) -> nodes.table:
-    """Return the fields of a class of settings, with their help or what its docstring says."""
+    """Return the fields of a class of settings, with their help or the docstring's meanings."""
     kind = _named(where)
     meanings = {**attributes(kind), **_helps(kind)}
     shown = kind()
@@ -146,7 +148,7 @@ def _helps(kind: type) -> dict[str, str]:
 
 
 def fields(where: str) -> nodes.table:
-    """Return the fields of a class that are plain values, with what its docstring says of them."""
+    """Return the fields of a class with plain values, with the meanings in its docstring."""
     kind = _named(where)
     meanings = attributes(kind)
     plain = [f.name for f in dataclasses.fields(kind) if get_origin(f.type) is not tuple]
@@ -161,7 +163,7 @@ def files(module: str) -> nodes.literal_block:
 
 
 def _default(value: object) -> str:
-    # What has fields of its own is described by itself.
+    # A setting with fields of its own has a table of its own.
     return "" if dataclasses.is_dataclass(value) else f"`{value!r}`"
 
 

@@ -1,7 +1,7 @@
-"""Orbits for the pictures of the documentation: one as it should be, others with one defect each.
+"""Orbits for the example figures of the documents: one good, the others with one defect each.
 
-Every defect is put into the measurements, the catalogue or the settings of the same simulated
-orbit, which is then fitted and drawn as any other.
+Each defect is introduced into the measurements, the catalogue or the settings of the same simulated
+orbit, which is then fitted and drawn like any other.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,7 +28,7 @@ from solver.simulate.survey import simulate_survey
 _SKY = SurveySettings(orbits=1, seed=1).scaled(18_000)
 _VAGUE = {"ra_error": 1000.0, "dec_error": 1000.0, "pmra_error": 1.0, "pmdec_error": 1.0}
 _CALIBRATION = ("detector_x", "detector_y", "distortion_x", "distortion_y")
-# The exposures of which residuals are drawn.
+# The exposures whose residuals are drawn.
 _FIELD = tuple((0, plate) for plate in range(24))
 _FIELDS = tuple((field, plate) for field in range(4) for plate in range(24))
 
@@ -63,7 +63,7 @@ def _measured(change: Callable[[pd.DataFrame, np.random.Generator], None]) -> Or
 
 
 def _understated(rows: pd.DataFrame, random: np.random.Generator) -> None:
-    """Make the errors half as large again as stated, and one in a hundred an outlier."""
+    """Make the errors 1.5 times as large as stated, and one measurement in a hundred an outlier."""
     for axis in "xy":
         scale = np.sqrt(1.5**2 - 1.0) * rows[f"s{axis}"]
         rows[f"n{axis}"] += scale * random.standard_normal(len(rows))
@@ -86,7 +86,7 @@ def _trailed(rows: pd.DataFrame, random: np.random.Generator) -> None:
 
 @cache
 def _few_references() -> FitResult:
-    """Fit with five reference sources, all of them in the east of the orbit's fields."""
+    """Fit with five reference sources, all in the east of the orbit's fields."""
     catalogue = _orbit().catalogue.copy()
     known = catalogue[catalogue["is_reference"]].sort_values("ra", ascending=False)
     dropped = known.index[5:]
@@ -101,8 +101,8 @@ def _few_references() -> FitResult:
 
 
 @cache
-def _proud_catalogue() -> FitResult:
-    """Fit by a catalogue whose reference sources err five times as much as it says."""
+def _overconfident_catalogue() -> FitResult:
+    """Fit with a catalogue that states the errors of its reference sources five times too small."""
     catalogue = _orbit().catalogue.copy()
     references = catalogue["is_reference"]
     for name in ("ra_error", "dec_error", "pmra_error", "pmdec_error"):
@@ -112,7 +112,7 @@ def _proud_catalogue() -> FitResult:
 
 @cache
 def _one_field() -> FitResult:
-    """Fit five exposures of one field alone, which do not overlap any other."""
+    """Fit only five exposures of a single field, without overlap with another."""
     kept = {(0, plate) for plate in range(5)}
     exposures = _orbit().exposures[["field_id", "plate_id"]].itertuples(index=False, name=None)
     return _fitted(exclusions=Exclusions(exposures=frozenset(set(exposures) - kept)))
@@ -158,7 +158,7 @@ ORBITS: Mapping[str, Pair] = {
         lambda: _chosen(_fitted(_measured(_moved_detector)), detector=1),
     ),
     "pulls": (_good_chosen, lambda: _chosen(_fitted(_measured(_understated)))),
-    "deviation": (_good_chosen, lambda: _chosen(_proud_catalogue())),
+    "deviation": (_good_chosen, lambda: _chosen(_overconfident_catalogue())),
     "uncertainty": (_good_chosen, lambda: _chosen(_few_references())),
     "exposure-chi2": (_good_chosen, lambda: _chosen(_fitted(_measured(_trailed)))),
     "distortion": (_good_chosen, lambda: _chosen(_sparse_distortion())),

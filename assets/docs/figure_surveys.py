@@ -1,4 +1,4 @@
-"""Surveys for the pictures of the documentation: one as it should be, others with one defect."""
+"""Surveys for the example figures of the documents: one good, the others with one defect each."""
 
 import shutil
 from collections.abc import Callable, Iterator, Mapping
@@ -22,7 +22,7 @@ from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 
-# The fields wander less than the paper's, so that many sources are seen in nearly every orbit.
+# The fields move less than the paper's, so that many sources are measured in nearly every orbit.
 _SKY = replace(
     SurveySettings(orbits=48, seed=5).scaled(5_000), n_artificial=60, pair_spread_deg=0.15
 )
@@ -33,23 +33,23 @@ _POSITION_ERRORS = ("ra_error", "dec_error", "pmra_error", "pmdec_error")
 
 @dataclass(frozen=True)
 class Surveys:
-    """The surveys in a folder, each simulated and fitted when it is first asked for."""
+    """The surveys in a folder, each simulated and fitted on first use."""
 
     folder: Path
 
     @cached_property
     def good(self) -> SurveyRun:
-        """A survey fitted with the order that its distortion has."""
+        """A survey fitted with the true order of its distortion."""
         return _fitted(self._simulated("good", _SKY), "default", FitSettings())
 
     @cached_property
     def low_order(self) -> SurveyRun:
-        """The same survey fitted with too low an order."""
+        """The same survey fitted with an order that is too low."""
         return _fitted(self.good.survey, "low", FitSettings(order=3))
 
     @cached_property
     def ageing(self) -> SurveyRun:
-        """The same survey, whose measurements get worse and do not say so."""
+        """The same survey with measurement errors that grow with time, but not as stated."""
         directory = self.folder / "ageing"
         shutil.copytree(self.good.survey, directory, ignore=shutil.ignore_patterns("runs"))
         random = np.random.default_rng(4)
@@ -58,7 +58,7 @@ class Surveys:
         return _fitted(directory, "default", FitSettings())
 
     def counted(self, settings: SurveySettings) -> SurveyTables:
-        """Return a survey in which sources were counted and nothing was fitted."""
+        """Return a survey with the numbers of orbits of its sources, without a fit."""
         directory = self._simulated("counted", settings)
         catalogue = reference_catalogue(truth_catalogue(settings), settings)
         frames = [
@@ -75,7 +75,7 @@ class Surveys:
 
 @contextmanager
 def surveys() -> Iterator[Surveys]:
-    """Give the surveys, and remove their files at the end."""
+    """Yield the surveys, and remove their files at the end."""
     with TemporaryDirectory() as folder:
         yield Surveys(Path(folder))
 
@@ -103,11 +103,11 @@ def _sky(spoil: Callable[[pd.DataFrame], None] = lambda _: None) -> SurveyTables
 
 
 def _half_the_references(catalogue: pd.DataFrame) -> None:
-    """Leave the reference sources out where a second catalogue was to have brought them."""
+    """Drop the reference sources in one half of the sky."""
     catalogue["is_reference"] &= catalogue["ra"] > catalogue["ra"].median()
 
 
-def _proud(catalogue: pd.DataFrame) -> None:
+def _overconfident(catalogue: pd.DataFrame) -> None:
     """State the errors of the reference sources three times too small."""
     references = catalogue["is_reference"]
     for name in _POSITION_ERRORS:
@@ -129,7 +129,7 @@ _SOURCES: SourcePair = (lambda s: _source(s.good), lambda s: _source(s.low_order
 SURVEYS: Mapping[str, SurveyPair] = {
     "orbit-health": (_RUNS[0], lambda s: survey_tables(s.ageing)),
     "sky-distribution": (lambda _: _sky(), lambda _: _sky(_half_the_references)),
-    "prior-separation": (lambda _: _sky(), lambda _: _sky(_proud)),
+    "prior-separation": (lambda _: _sky(), lambda _: _sky(_overconfident)),
     "orbit-counts": (_RUNS[0], lambda s: s.counted(_WANDERING)),
     "error-by-count": _RUNS,
     "reference-scatter": _RUNS,

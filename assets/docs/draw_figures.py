@@ -1,9 +1,10 @@
-"""Draw the pictures of the documentation: each diagnostic of a good solution and of a bad one.
+"""Draw the example figures of the documents: each diagnostic of a good and of a bad solution.
 
-    python assets/docs/pictures.py [NAME]...
+    python assets/docs/draw_figures.py [NAME]...
 
-simulates a small survey, puts one defect at a time into it, fits, and draws with the plots of the
-application in Chromium. The pictures are kept beside the pages, in `pictures`; some minutes.
+The script simulates small orbits and surveys, introduces one defect at a time, fits them, and draws
+with the application's own plots in Chromium. It writes PNG files into `figures` beside the pages,
+and takes some minutes.
 """
 
 import argparse
@@ -18,20 +19,20 @@ from tempfile import TemporaryDirectory
 import holoviews as hv
 from bokeh.embed import file_html
 from bokeh.resources import INLINE
-from picture_orbits import ORBITS
-from picture_surveys import SOURCES, SURVEYS, Surveys, surveys
+from figure_orbits import ORBITS
+from figure_surveys import SOURCES, SURVEYS, Surveys, surveys
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 
-FOLDER = Path(__file__).resolve().parent / "pictures"
+FOLDER = Path(__file__).resolve().parent / "figures"
 _FLAGS = ["--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
 _IS_DRAWN = "() => window.Bokeh && Bokeh.documents.length && Bokeh.documents[0].is_idle"
 _STYLE = "<style>body { margin: 0 } </style>"
 KINDS = ("good", "bad")
 MOST_BYTES = 60_000
-# Tried in turn: a figure of several panels may need all the points, and one of one panel has 550.
+# Widths in pixels, tried in turn until the file is small enough; a single panel has 550.
 _WIDTHS = (1000, 800, 600)
 _COLOURS = (128, 64, 32)
 
@@ -40,7 +41,7 @@ Figure = Callable[[], hv.core.Dimensioned]
 
 
 def figures_drawn(made: Surveys) -> Iterator[tuple[str, str, Figure]]:
-    """Yield the name of every figure, whether it is the good or the bad one, and how to draw it."""
+    """Yield name, kind ("good" or "bad") and drawing function of every figure."""
     for found, cases in ((survey_figures(), SURVEYS), (source_figures(), SOURCES)):
         for figure in found:
             for kind, case in zip(KINDS, cases[figure.name], strict=True):
@@ -51,9 +52,9 @@ def figures_drawn(made: Surveys) -> Iterator[tuple[str, str, Figure]]:
 
 
 def main() -> None:
-    """Draw the pictures asked for, or all of them."""
+    """Draw the figures that are named, or all of them."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help="of figures; all by default")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="names of figures; all by default")
     names = parser.parse_args().names
     with _chromium() as page, surveys() as made, TemporaryDirectory() as folder:
         for name, kind, draw in figures_drawn(made):
@@ -71,7 +72,7 @@ def _chromium() -> Iterator[Page]:
 
 
 def _shot(page: Page, figure: hv.core.Dimensioned, folder: Path) -> bytes:
-    """Return a figure as a small PNG."""
+    """Return a figure as a PNG of at most `MOST_BYTES`."""
     html = file_html(hv.render(figure, backend="bokeh"), INLINE, "figure")
     path = folder / "figure.html"
     path.write_text(html.replace("</head>", f"{_STYLE}</head>"), encoding="utf-8")
@@ -84,12 +85,12 @@ def _shot(page: Page, figure: hv.core.Dimensioned, folder: Path) -> bytes:
     return _small(taken)
 
 
-def _small(picture: Image.Image) -> bytes:
-    """Return a picture with as many points and colours as its bytes allow."""
+def _small(image: Image.Image) -> bytes:
+    """Return an image as PNG, with the most pixels and colours that `MOST_BYTES` allow."""
     for width, colours in itertools.product(_WIDTHS, _COLOURS):
-        scale = min(1.0, width / picture.width)
-        size = round(picture.width * scale), round(picture.height * scale)
-        scaled = picture.resize(size, Image.Resampling.LANCZOS)
+        scale = min(1.0, width / image.width)
+        size = round(image.width * scale), round(image.height * scale)
+        scaled = image.resize(size, Image.Resampling.LANCZOS)
         content = io.BytesIO()
         few = scaled.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
         few.save(content, "PNG", optimize=True)

@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from solver.data.engine_settings import ENGINE_OPTIONS, engine_settings
-from solver.data.setting import Setting, Switch, Whole
+from solver.data.setting import Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import Texts
 
@@ -106,6 +106,8 @@ def _parameter(name: str, one: Setting, notes: Mapping[str, str]) -> inspect.Par
         # The order's bounds are checked with the message that every interface gives.
         low = one.low if one.high is None else None
         option = typer.Option(f"--{one.option}", help=words, min=low)
+    elif isinstance(one, Positive):
+        annotation = float
     elif isinstance(one, Texts):
         annotation, default = list[str] | None, None
         option = typer.Option(f"--{one.option}", help=words, metavar=one.metavar)

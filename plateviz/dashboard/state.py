@@ -9,7 +9,7 @@ import param
 from solver.data.parameters import PARAMETERS
 from solver.data.prior_text import format_width
 from solver.data.result import FitResult
-from solver.data.setting import Change, Choice, Setting, Switch, Whole
+from solver.data.setting import Change, Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import PriorWidths, Texts
 
@@ -125,6 +125,10 @@ def _parameter(one: Setting, default: Any) -> param.Parameter:  # noqa: ANN401
         return param.Boolean(default=default, doc=one.help)
     if isinstance(one, Whole):
         return param.Integer(default=default, bounds=(one.low, one.high), doc=one.help)
+    if isinstance(one, Positive):
+        return param.Number(
+            default=default, bounds=(0.0, None), inclusive_bounds=(False, True), doc=one.help
+        )
     if isinstance(one, Choice):
         return param.Selector(default=default, objects=list(one.names), doc=one.help)
     if isinstance(one, PriorWidths):

@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from solver.data.engine_settings import ENGINE_OPTIONS, engine_settings
-from solver.data.setting import Choice, Setting, Switch, Whole
+from solver.data.setting import Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import SETTINGS, FitSettings
 from solver.data.text_setting import LeftOut, Texts
 from solver.errors import InputError
@@ -104,5 +104,5 @@ def _exclusions(exclude: object) -> list[str]:
 def _annotation(one: Setting) -> object:
     if isinstance(one, LeftOut):
         return str | Iterable[str]
-    kinds = {Switch: bool, Whole: int, Choice: str}
+    kinds = {Switch: bool, Whole: int, Positive: float, Choice: str}
     return Mapping[str, object] if isinstance(one, Texts) else kinds.get(type(one), str)

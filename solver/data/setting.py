@@ -37,6 +37,7 @@ class Setting:
     control : whether the dashboard has a control for it
     change : how the dashboard answers a change
     is_identity : whether another value makes another solution
+    selects : whether it decides which measurements are used
     card : FITS keyword; "" for none
     phrase : text of a value in the description of a solution, with {} for the value
     is_always_described : whether the default is described as well
@@ -51,6 +52,7 @@ class Setting:
     control: bool = False
     change: Change = Change.ON_REQUEST
     is_identity: bool = True
+    selects: bool = False
     card: str = ""
     phrase: str = "{}"
     is_always_described: bool = False

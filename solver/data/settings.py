@@ -134,6 +134,7 @@ class FitSettings:
             example="detector=1, exposure=0/3",
             control=True,
             change=Change.WHAT_IF,
+            selects=True,
             card="EXCLUDED",
             phrase="without {}",
         ),
@@ -158,6 +159,7 @@ class FitSettings:
             help="Use one in this many sources of each class, for a quick look or nuts.",
             keyword="thin",
             option="thin",
+            selects=True,
             card="THIN",
             phrase="one in {} sources",
         ),
@@ -221,6 +223,10 @@ class FitSettings:
         """Return `to_dict` with the settings that do not change the solution at their defaults."""
         same = {name: DEFAULTS[name] for name, one in SETTINGS.items() if not one.is_identity}
         return self.with_(**same).to_dict()
+
+    def selection(self) -> tuple[object, ...]:
+        """Return the values of the settings that decide which measurements are used."""
+        return tuple(getattr(self, name) for name, one in SETTINGS.items() if one.selects)
 
     def what_if_holds(self, other: "FitSettings") -> bool:
         """Return whether a what-if from a fit with these settings may answer the others."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from solver.data.exclusions import Exclusions, of_rows, thinned_orbit
+from solver.data.exclusions import of_rows, thinned_orbit
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
@@ -19,15 +19,13 @@ _CAPACITY = 2
 
 
 class _Entry(NamedTuple):
-    exclusions: Exclusions
-    thin: int
+    selection: tuple[object, ...]
     outliers: pd.DataFrame | None
     data: OrbitData
     problem: Problem
 
     def matches(self, settings: FitSettings, outliers: pd.DataFrame | None) -> bool:
-        same = (self.exclusions, self.thin) == (settings.exclusions, settings.thin)
-        return same and self.outliers is outliers
+        return self.selection == settings.selection() and self.outliers is outliers
 
 
 class ProblemCache:
@@ -62,6 +60,6 @@ class ProblemCache:
         if outliers is not None:
             data = of_rows(data, ~data.measurements.index.isin(outliers.index))
         problem = build_problem(data, self._instrument, settings)
-        entry = _Entry(settings.exclusions, settings.thin, outliers, data, problem)
+        entry = _Entry(settings.selection(), outliers, data, problem)
         self._entries = [entry, *self._entries][:_CAPACITY]
         return data, problem

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from astropy.io import fits
 from astropy.table import Table
 
 from solver.io.result import read_result
@@ -28,6 +29,22 @@ drawn = hv.render(figure, backend="bokeh").select(type=GlyphRenderer)
 print(max(len(one.data_source.data.get("rms", ())) for one in drawn), "points")
 """
 _PATH = re.compile(r"`((?:plateviz|solver)/[\w/]+\.py|[\w.]+\.toml)`")
+
+
+# The files that the recipe of a parameter group touches.
+GROUP_FILES = {"solver/data/parameters.py", "solver/model/forward.py"}
+# What the dashboard and the notebook make of the setting of the example.
+CONTROLS = """
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices
+from plateviz.dashboard.views.refit import RefitView
+from plateviz.notebook.choices import settings_with
+from solver.data.settings import FitSettings
+
+choices = FitChoices(min_obs=3)
+assert choices.settings() == settings_with(FitSettings(), {"min_obs": 3})
+print("min_obs", "at once" if "min_obs" in ANSWERED_AT_ONCE else "on request")
+"""
 
 
 def blocks_in(heading, language):
@@ -129,7 +146,10 @@ def test_diagnostics_are_found_and_drawn(tree, run_in):
 
 
 def test_recipes_are_clean_code(tree, run_in):
-    headings = ("Add a diagnostic", "Add a parameter group", "Add an engine", "Add a file format")
+    headings = (
+        *("Add a diagnostic", "Add a parameter group", "Add a setting"),
+        *("Add an engine", "Add a file format"),
+    )
     paths = sorted({str(tree / path) for heading in headings for path in add(heading, tree)})
     run_in(tree, "-m", "ruff", "check", *paths)
     run_in(tree, "-m", "ruff", "format", "--diff", *paths)
@@ -137,13 +157,47 @@ def test_recipes_are_clean_code(tree, run_in):
 
 @pytest.mark.slow
 def test_parameter_group_is_fitted(tree, run_in):
-    assert len(add("Add a parameter group", tree)) == 2
+    assert set(add("Add a parameter group", tree)) == GROUP_FILES
     (use,) = uses_in("Add a parameter group")
     printed = run_in(tree, "-c", use.text)
     found, sigma = map(float, re.fullmatch(r"(\S+) ± (\S+) arcsec\n", printed).groups())
     assert found == pytest.approx(5.0, abs=4.0 * sigma)
     assert sigma < 4.0
     assert "detector_skew" in run_in(tree, "-m", "plateviz.cli.main", "fit", "--help")
+
+
+@pytest.mark.slow
+def test_group_on_exposures_is_fitted_and_published(tree, plateviz_in, workplace):
+    add("Add a parameter group", tree)
+    (block,) = blocks_in("Add a parameter group", "sh")
+    (line,) = block.commands()
+    assert json.loads(plateviz_in(tree, line, "--json"))["converged"]
+    calibration = Table.read(workplace / "ANISOTROPY.fits", "CALIBRATION")
+    rows = calibration[calibration["group"] == "focal_anisotropy"]
+    assert (rows["prior_sigma"] == 20.0).all()
+    assert rows["prior_centre"][0] == 5.0
+    assert (rows["sigma_marginal"] < 20.0).all()
+    telescope = Table.read(workplace / "ANISOTROPY.fits", "TELESCOPE")
+    ratio = np.asarray(telescope["tel_f_loc_y"] / telescope["tel_f_loc_x"])
+    np.testing.assert_allclose(1e6 * (ratio - 1.0), rows["value"], atol=1e-6)
+
+
+@pytest.mark.slow
+def test_setting_reaches_every_interface(tree, run_in, plateviz_in, workplace):
+    assert set(add("Add a setting", tree)) == {
+        "solver/data/settings.py",
+        "solver/problem/problem_cache.py",
+    }
+    (use,) = uses_in("Add a setting")
+    printed = run_in(tree, "-c", use.text)
+    assert printed == "order 5, 20 measurements or more per source True\n"
+    (block,) = blocks_in("Add a setting", "sh")
+    (line,) = block.commands()
+    summary = json.loads(plateviz_in(tree, line, "--json"))
+    assert summary["n_sources"] < len(Table.read(workplace / "RESULT.fits", "RESULT"))
+    assert fits.getheader(workplace / "FREQUENT.fits")["MINOBS"] == 20
+    assert "--min-obs" in run_in(tree, "-m", "plateviz.cli.main", "survey", "--help")
+    assert run_in(tree, "-c", CONTROLS) == "min_obs at once\n"
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import panel_material_ui as pmui
 from plateviz.dashboard.session import Session, Solution, Stage
 from plateviz.dashboard.state import CONTROLS, FitChoices, default_widths
 from solver.data.parameters import PARAMETERS, Group
-from solver.data.setting import Choice, Setting, Switch, Whole
+from solver.data.setting import Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import SETTINGS
 from solver.data.text_setting import LeftOut, PriorShifts, Texts
 
@@ -41,7 +41,7 @@ class RefitView(pn.viewable.Viewer):
                 label="Try every change at once",
                 margin=_TIGHT,
             ),
-            *_controls(session.choices, Whole, Switch),
+            *_controls(session.choices, Whole, Positive, Switch),
             self._priors_card(),
             *_controls(session.choices, LeftOut, Choice),
             pmui.Row(self._fit, self._stop, sizing_mode="stretch_width", margin=0),
@@ -143,8 +143,20 @@ def _control(choices: FitChoices, name: str) -> pn.viewable.Viewable:
     one, of = SETTINGS[name], choices.param[name]
     if isinstance(one, Switch):
         return pmui.Switch.from_param(of, label=one.label, margin=_TIGHT)
+    if isinstance(one, Whole) and one.high is None:
+        return pmui.IntInput.from_param(
+            of, label=one.label, description=one.help, size="small", sizing_mode="stretch_width"
+        )
     if isinstance(one, Whole):
         return pmui.IntSlider.from_param(of, label=one.label, sizing_mode="stretch_width")
+    if isinstance(one, Positive):
+        return pmui.FloatInput.from_param(
+            of,
+            label=f"{one.label} ({one.unit})" if one.unit else one.label,
+            description=one.help,
+            size="small",
+            sizing_mode="stretch_width",
+        )
     if isinstance(one, Choice):
         return pmui.Select.from_param(
             of, label=one.label, size="small", sizing_mode="stretch_width"

@@ -19,16 +19,16 @@ _HOST = re.compile(r"[a-z0-9]([a-z0-9.-]*[a-z0-9])?(:\d{1,5})?")
 _PATH = re.compile(r"[A-Za-z0-9._~-]+(/[A-Za-z0-9._~-]+)*")
 
 
-class Place(NamedTuple):
-    """Where a page is served, and where browsers find it.
+class Endpoint(NamedTuple):
+    """Address at which the dashboard is served, and from which browsers reach it.
 
     Attributes
     ----------
     port : TCP port, as from `check_address`
-    address : of the interface to listen on; other machines reach it only where it is not
-        a loopback address
-    origins : hosts by which browsers reach a proxy before it, as from `check_origin`
-    prefix : path of the page, as from `check_prefix`
+    address : of the interface to listen on; a loopback address cannot be reached from other
+        machines
+    origins : hosts of reverse proxies, as browsers address them, from `check_origin`
+    prefix : URL path of the page, as from `check_prefix`
     """
 
     port: int
@@ -37,7 +37,7 @@ class Place(NamedTuple):
     prefix: str = ""
 
 
-def serve(store: SolutionStore, place: Place, ready: Callable[[str], None]) -> None:
+def serve(store: SolutionStore, endpoint: Endpoint, ready: Callable[[str], None]) -> None:
     """Serve the dashboard until it is interrupted; the store is closed at the end.
 
     Parameters
@@ -45,11 +45,11 @@ def serve(store: SolutionStore, place: Place, ready: Callable[[str], None]) -> N
     ready : called with the page's address once it can be opened
     """
     pn.extension("tabulator")
-    server = _server(store, place)
+    server = _server(store, endpoint)
     try:
         server.start()
-        path = f"{place.prefix}/" if place.prefix else ""
-        ready(f"http://{place.address}:{place.port}/{path}")
+        path = f"{endpoint.prefix}/" if endpoint.prefix else ""
+        ready(f"http://{endpoint.address}:{endpoint.port}/{path}")
         # Ctrl-C is how a person ends it.
         with contextlib.suppress(KeyboardInterrupt):
             server.io_loop.start()
@@ -58,24 +58,24 @@ def serve(store: SolutionStore, place: Place, ready: Callable[[str], None]) -> N
         store.close()
 
 
-def begin(store: SolutionStore, place: Place) -> Any:  # noqa: ANN401 of Bokeh
+def begin(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of Bokeh
     """Return a server that serves on the event loop of this thread, which somebody else runs."""
-    server = _server(store, place)
+    server = _server(store, endpoint)
     server.start()
     return server
 
 
-def _server(store: SolutionStore, place: Place) -> Any:  # noqa: ANN401 of Bokeh
+def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of Bokeh
     leave_unsaid()
-    hosts = sorted({place.address, "localhost", "127.0.0.1"})
+    hosts = sorted({endpoint.address, "localhost", "127.0.0.1"})
     # A thread is what it gives only where it is asked to make one.
     return pn.serve(
         lambda: build_app(store),
-        port=place.port,
-        address=place.address,
+        port=endpoint.port,
+        address=endpoint.address,
         # A websocket from a page of any other host is refused.
-        websocket_origin=[*(f"{host}:{place.port}" for host in hosts), *place.origins],
-        prefix=place.prefix,
+        websocket_origin=[*(f"{host}:{endpoint.port}" for host in hosts), *endpoint.origins],
+        prefix=endpoint.prefix,
         title=f"plateviz · {store.title}",
         show=False,
         start=False,

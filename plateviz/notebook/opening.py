@@ -51,15 +51,15 @@ def open(
         If a file is missing or invalid, or an argument does not apply to `path`.
     """
     given = {"truth": truth, "instrument": instrument, "orbit": orbit, "run": run}
-    chosen = {name for name, value in given.items() if value is not None}
+    given_names = {name for name, value in given.items() if value is not None}
     if reference is not None:
-        _refuse(chosen & {"run"}, "the files of an orbit")
+        _refuse(given_names & {"run"}, "the files of an orbit")
         return _open_orbit(path, reference, truth, instrument, orbit)
     target = _existing_path(path)
     if target.is_dir():
-        _refuse(chosen - {"run"}, "a survey directory")
+        _refuse(given_names - {"run"}, "a survey directory")
         return OpenSurvey(target, run)
-    _refuse(chosen - {"instrument"}, "a result file; measurements need a reference catalogue")
+    _refuse(given_names - {"instrument"}, "a result file; measurements need a reference catalogue")
     camera = MINI_MOCK if instrument is None else read_instrument(_existing_path(instrument))
     return OpenSolution(read_result(target), camera, target.name, f"plateviz.open({str(target)!r})")
 
@@ -131,9 +131,9 @@ def _existing_path(given: object) -> Path:
     return path
 
 
-def _refuse(chosen: set[str], what: str) -> None:
-    if chosen:
-        raise InputError(f"{', '.join(sorted(chosen))}: expected no such argument with {what}")
+def _refuse(given_names: set[str], what: str) -> None:
+    if given_names:
+        raise InputError(f"{', '.join(sorted(given_names))}: expected no such argument with {what}")
 
 
 def _check_same(directory: Path, settings: SurveySettings, catalogue: Path | None) -> None:

@@ -66,7 +66,7 @@ class SurveyFolder:
     def read(self, orbit: int | None) -> OrbitData:
         """Read and check one orbit; InputError if the files are invalid."""
         if orbit is None:
-            raise ValueError("an orbit of a survey is chosen by its number, got None")
+            raise ValueError("orbit: expected an orbit_id of the survey, found None")
         return read_survey_orbit(Path(self.directory), orbit)
 
     def read_instrument(self) -> Instrument:

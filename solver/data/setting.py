@@ -19,7 +19,7 @@ class Change(Enum):
 
     WHAT_IF = "at once, from the last fit"
     REFIT = "at once, by a new fit"
-    ON_REQUEST = "when a fit is asked for"
+    ON_REQUEST = "when a fit is requested"
 
 
 @dataclass(frozen=True, kw_only=True)

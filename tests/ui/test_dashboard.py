@@ -169,7 +169,7 @@ def test_a_prior_that_makes_no_sense_is_refused_in_words(page):
     entry.fill("1 deg")
     entry.press("Enter")
     page.get_by_role("button", name="Fit", exact=True).click()
-    expect(page.get_by_text("prior of distortion_x: expected a unit such as")).to_be_visible()
+    expect(page.get_by_text("prior of distortion_x: expected a unit such as um")).to_be_visible()
 
 
 def test_the_dark_theme_reaches_the_figures(page):

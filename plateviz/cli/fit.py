@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class FitRequest(NamedTuple):
-    """What was asked for on the command line."""
+    """Arguments of `plateviz fit`."""
 
     files: OrbitFiles
     orbit: int | None
@@ -32,14 +32,16 @@ class FitRequest(NamedTuple):
 
 
 def run_fit(request: FitRequest, as_json: bool) -> None:
-    """Do what was asked for; raises `FitError` where a fit has not converged."""
+    """Fit, write and print; raise `FitError` if a fit has not converged or engines disagree."""
     start = time.perf_counter()
     keep_memory()
     outputs = {engine: _output(request, engine) for engine in request.engines}
     for output in outputs.values():
         require_writable(output)
     if request.checkpoint is not None and "svi" not in request.engines:
-        raise InputError("--checkpoint: expected the engine svi, which works in blocks of steps")
+        raise InputError(
+            f"--checkpoint: expected the engine svi, found {', '.join(request.engines)}"
+        )
     summaries, results = {}, {}
     with reporting("reading the orbit") as reporter:
         focal_plane, data = request.files.read_instrument(), request.files.read(request.orbit)
@@ -66,7 +68,7 @@ def run_fit(request: FitRequest, as_json: bool) -> None:
 
 
 def _output(request: FitRequest, engine: str) -> Path:
-    """Return the file of an engine: that asked for, or beside it where there are several."""
+    """Return the result file of an engine: `request.output`, with the name of a later engine."""
     output = request.output
     if engine == request.engines[0]:
         return output
@@ -80,7 +82,7 @@ def _fit(
     engine: str,
     reporter: Reporter,
 ) -> "FitResult":
-    # What the orders are worth does not depend on the engine.
+    # The comparison of orders does not depend on the engine.
     compared = request.settings.compare_orders and engine == request.engines[0]
     settings = request.settings.with_(engine=engine, compare_orders=compared)
     resumption = None
@@ -94,13 +96,13 @@ def _fit(
 
 
 def _orders(result: "FitResult") -> dict[str, Any]:
-    """Return what the comparison of the orders adds to the summary, if there was one."""
+    """Return the summary's entries on the comparison of orders; empty if none was made."""
     from plateviz.tables.orders import order_comparison, order_verdict
 
     table = order_comparison(result)
     if table.empty:
         return {}
-    # JSON knows no NaN.
+    # JSON has no NaN.
     plain = table.astype(object).where(table.notna(), None)
     return {"orders": plain.to_dict("records"), "preferred_order": order_verdict(table)}
 
@@ -130,9 +132,9 @@ def _report(
     for summary in summaries.values():
         if not summary["converged"]:
             raise FitError(
-                f"orbit {summary['orbit']} has not converged by {summary['engine']}: "
+                f"orbit {summary['orbit']} has not converged with {summary['engine']}: "
                 f"{summary['reason']}"
             )
-    apart = [f"{row.engine}, {row.what}: {row.found:.3g}" for row in rows if not row.agrees]
-    if apart:
-        raise FitError(f"the engines of {', '.join(ENGINES)} do not agree: {'; '.join(apart)}")
+    disagreements = [f"{row.engine}, {row.what}: {row.found:.3g}" for row in rows if not row.agrees]
+    if disagreements:
+        raise FitError(f"the engines {', '.join(ENGINES)} do not agree: {'; '.join(disagreements)}")

@@ -1,8 +1,8 @@
 """The command line: `plateviz simulate | gaia | inspect | fit | survey | serve | report | ...`.
 
 A user's mistake ends with exit code 2 and one message; a fit that has no solution, or
-has not converged, with exit code 1. What takes long to import is imported by the
-command that needs it, so that `--help` and mistakes answer at once.
+has not converged, with exit code 1. Each command imports the slow modules that it needs, so
+that `--help` and error messages appear at once.
 """
 
 import sys
@@ -24,16 +24,16 @@ from solver.data.settings import ENGINES
 from solver.errors import FitError, InputError
 
 app = typer.Typer(
-    help="Plate Analysis of satellite orbits: fit, look, decide whether to trust the solution.",
+    help="Solve the astrometry of satellite orbits by Plate Analysis, and judge the solutions.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
 
-_JSON = typer.Option("--json", help="Print one JSON value for machines.")
+_JSON = typer.Option("--json", help="Print JSON instead of text.")
 _OBS = typer.Argument(
     help="Measurements and exposures: a FITS or VOTable file, a folder with measurement.* "
-    "and environment.*, or one of those files.",
+    "and environment.*, or one of these two files.",
     metavar="OBS",
 )
 
@@ -46,11 +46,11 @@ def demo(
 ) -> None:
     """Make a small survey once, fit it, and show it in the dashboard."""
     from plateviz.cli.demo import demo_directory, open_survey, simulation
-    from plateviz.dashboard.server import Place, check_address
+    from plateviz.dashboard.server import Endpoint, check_address
     from plateviz.solving.progress import reporting
     from plateviz.solving.warm_solver import WarmSolver
 
-    place = Place(check_address(address, port), address)
+    endpoint = Endpoint(check_address(address, port), address)
     directory = demo_directory()
     with ExitStack() as stack, reporting("starting the solver") as reporter:
         worker = WarmSolver()
@@ -64,24 +64,25 @@ def demo(
         first.require_done()
         # From here the server closes it, with the store.
         stack.pop_all()
-    run_server(store, place, open_browser)
+    run_server(store, endpoint, open_browser)
 
 
 @app.command()
 def simulate(
-    directory: Annotated[Path, typer.Argument(help="Survey directory to make.", metavar="DIR")],
+    directory: Annotated[Path, typer.Argument(help="Survey directory to create.", metavar="DIR")],
     orbits: Annotated[int, typer.Option(help="Number of orbits.", min=1)] = 100,
-    seed: Annotated[int, typer.Option(help="Seed of all random numbers.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.", min=0)] = 0,
     stars: Annotated[
-        int | None, typer.Option(help="Stars in the extended field, instead of 132,651.", min=1)
+        int | None,
+        typer.Option(help="Number of stars in the extended field; 132,651 by default.", min=1),
     ] = None,
     catalog: Annotated[
         Path | None,
-        typer.Option(help="Gaia table to take as the truth, instead of a synthetic one."),
+        typer.Option(help="Gaia table to use as the true catalogue; synthetic by default."),
     ] = None,
     as_json: Annotated[bool, _JSON] = False,
 ) -> None:
-    """Simulate the paper's mini-mock survey; an interrupted one is gone on with."""
+    """Simulate the paper's mini-mock survey; an interrupted simulation resumes."""
     from plateviz.cli.output import print_json
     from plateviz.solving.progress import reporting
     from solver.simulate.settings import SurveySettings
@@ -99,7 +100,7 @@ def simulate(
     if as_json:
         print_json({"output": str(directory), "orbits": orbits, "seconds": seconds})
     else:
-        typer.echo(f"{directory}: a survey of {orbits} orbits, made in {seconds:.1f} s")
+        typer.echo(f"{directory}: survey of {orbits} orbits, simulated in {seconds:.1f} s")
 
 
 app.command()(gaia)
@@ -107,10 +108,10 @@ app.command()(gaia)
 
 @app.command()
 def inspect(
-    files: Annotated[list[Path], typer.Argument(help="Files to look into.", metavar="FILE...")],
+    files: Annotated[list[Path], typer.Argument(help="Files to inspect.", metavar="FILE...")],
     as_json: Annotated[bool, _JSON] = False,
 ) -> None:
-    """Say what files are, what they hold, and everything that is wrong with them."""
+    """Describe files and their columns, and list every problem found in them."""
     from plateviz.cli.output import print_inspection, print_json
     from solver.io.inspect import inspect_files
 
@@ -124,7 +125,7 @@ def inspect(
 
 
 @app.command()
-@options.takes_settings("fit", {"engine": "Or all, to check whether they agree."})
+@options.takes_settings("fit", {"engine": "`all` runs every engine and checks that they agree."})
 def fit(
     observations: Annotated[Path, _OBS],
     reference: Annotated[Path, options.REFERENCE],
@@ -135,7 +136,7 @@ def fit(
     orbit: options.Orbit = None,
     checkpoint: Annotated[
         Path | None,
-        typer.Option(help="File to keep an svi run in; a run that was stopped goes on from it."),
+        typer.Option(help="File for the state of svi, from which a stopped fit resumes."),
     ] = None,
     instrument: options.Instrument = None,
     as_json: Annotated[bool, _JSON] = False,
@@ -156,23 +157,25 @@ def fit(
 def survey(
     directory: Annotated[Path, typer.Argument(help="Survey directory.", metavar="DIR")],
     run: Annotated[
-        str, typer.Option(help="Name of the run; one that was begun is gone on with.")
+        str, typer.Option(help="Name of the run; an incomplete run resumes.")
     ] = DEFAULT_RUN,
     orbits: Annotated[
         str | None, typer.Option(help="Orbits to fit, such as 0-9,12; all by default.")
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(help="Processes on this machine; one for each core by default.", min=1),
+        typer.Option(
+            help="Number of worker processes on this machine; one per core by default.", min=1
+        ),
     ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Address of a Dask scheduler whose workers are to do it instead."),
+        typer.Option(help="Address of a Dask scheduler whose workers fit the orbits instead."),
     ] = None,
     as_json: Annotated[bool, _JSON] = False,
     **settings: Any,  # noqa: ANN401 the options of the settings
 ) -> None:
-    """Fit every orbit of a survey; one that was interrupted is gone on with."""
+    """Fit every orbit of a survey; an interrupted run resumes."""
     from plateviz.cli.survey import parse_orbits, run_survey
 
     chosen = options.fit_settings(settings)
@@ -185,7 +188,7 @@ app.command()(reproduce)
 
 
 def main() -> None:
-    """Run the command line; a user's mistake is one message and exit code 2."""
+    """Run the command line; a user's mistake ends with one message and exit code 2."""
     try:
         app()
     except (InputError, FitError) as error:

@@ -1,4 +1,4 @@
-"""Options of the command line: those of the settings, and others that commands share."""
+"""Command-line options that several commands share: those of the fit settings, and others."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -21,15 +21,18 @@ REFERENCE = typer.Argument(
 Truth = Annotated[
     Path | None, typer.Option(help="True catalogue of a simulation, to compare with.")
 ]
-Orbit = Annotated[int | None, typer.Option(help="Orbit to take where the file holds several.")]
+Orbit = Annotated[int | None, typer.Option(help="Id of the orbit, if the file holds several.")]
 Instrument = Annotated[
-    Path | None, typer.Option(help="Instrument as a TOML file; the mini-mock's by default.")
+    Path | None, typer.Option(help="Instrument (TOML file); the mini-mock's by default.")
 ]
 Port = Annotated[
-    int, typer.Option(help="TCP port to serve on; 0 takes a free one.", min=0, max=65535)
+    int, typer.Option(help="TCP port to serve on; 0 selects a free port.", min=0, max=65535)
 ]
 Address = Annotated[
-    str, typer.Option(help="Interface to serve on. Only this machine can reach the default.")
+    str,
+    typer.Option(
+        help="Network interface to serve on; the default is reachable from this machine only."
+    ),
 ]
 OpenBrowser = Annotated[
     bool, typer.Option("--open/--no-open", help="Open the page in your browser.")
@@ -39,21 +42,21 @@ OpenBrowser = Annotated[
 def takes_settings(
     command: str, notes: Mapping[str, str] = MappingProxyType({})
 ) -> Callable[[_Function], _Function]:
-    """Give a command with `**settings` the options of all settings that it offers.
+    """Add the options of all settings that a command offers to its function with `**settings`.
 
     Parameters
     ----------
     command : name of the command
-    notes : option -> sentence to add to its help
+    notes : option -> sentence appended to its help
     """
 
     def with_options(function: _Function) -> _Function:
         signature = inspect.signature(function)
         own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
-        named: Any = function
+        command_function: Any = function
         options = [_parameter(name, one, notes) for name, one in _offered(command).items()]
-        named.__signature__ = signature.replace(parameters=[*own, *options])
-        named.__annotations__ = {
+        command_function.__signature__ = signature.replace(parameters=[*own, *options])
+        command_function.__annotations__ = {
             **{p.name: p.annotation for p in (*own, *options)},
             "return": None,
         }
@@ -63,12 +66,12 @@ def takes_settings(
 
 
 def fit_settings(values: Mapping[str, Any]) -> FitSettings:
-    """Return the settings that the options of `takes_settings` state.
+    """Return the settings given by the options of `takes_settings`.
 
     Raises
     ------
     InputError
-        If one of them cannot be used.
+        If an option has an invalid value.
     """
     fields = {}
     for name, one in SETTINGS.items():
@@ -81,7 +84,7 @@ def fit_settings(values: Mapping[str, Any]) -> FitSettings:
 
 
 def _offered(command: str) -> dict[str, Setting]:
-    """Return the settings and engine options of a command, by their Python names."""
+    """Return the settings and engine options that a command offers, by Python name."""
     every = [*SETTINGS.values(), *ENGINE_OPTIONS.values()]
     return {_python_name(one): one for one in every if one.option and command in one.commands}
 
@@ -91,26 +94,26 @@ def _python_name(one: Setting) -> str:
 
 
 def _parameter(name: str, one: Setting, notes: Mapping[str, str]) -> inspect.Parameter:
-    """Return the parameter of a command from which typer makes the option."""
+    """Return the function parameter from which typer derives the option."""
     defaults = {_python_name(SETTINGS[field]): value for field, value in DEFAULTS.items()}
     default = defaults.get(name, 0 if name == "seed" else None)
-    words = f"{one.help} {notes[name]}" if name in notes else one.help
+    text = f"{one.help} {notes[name]}" if name in notes else one.help
     annotation: Any = str
-    option = typer.Option(f"--{one.option}", help=words)
+    option = typer.Option(f"--{one.option}", help=text)
     if isinstance(one, Switch):
         annotation = bool
         if default:
-            option = typer.Option(f"--{one.option}/--no-{one.option}", help=words)
+            option = typer.Option(f"--{one.option}/--no-{one.option}", help=text)
     elif isinstance(one, Whole):
         annotation = int if default is not None else int | None
-        # The order's bounds are checked with the message that every interface gives.
+        # `FitSettings` checks a setting with two bounds, with the message of every interface.
         low = one.low if one.high is None else None
-        option = typer.Option(f"--{one.option}", help=words, min=low)
+        option = typer.Option(f"--{one.option}", help=text, min=low)
     elif isinstance(one, Positive):
         annotation = float
     elif isinstance(one, Texts):
         annotation, default = list[str] | None, None
-        option = typer.Option(f"--{one.option}", help=words, metavar=one.metavar)
+        option = typer.Option(f"--{one.option}", help=text, metavar=one.metavar)
     elif default is None:
         annotation = str | None
     return inspect.Parameter(

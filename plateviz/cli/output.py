@@ -22,7 +22,7 @@ def print_json(value: object) -> None:
 
 
 def print_fit(summary: Mapping[str, Any], output: Path) -> None:
-    """Print the summary of a fit for people."""
+    """Print the summary of a fit as text."""
     verdict = "converged" if summary["converged"] else "NOT CONVERGED"
     rows = [
         ("orbit", f"{summary['orbit']}, mean epoch MJD {summary['epoch_mjd']:.5f} (TCB)"),
@@ -37,18 +37,21 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
         ("chi2 per degree of freedom", _chi2(summary)),
         ("residual rms", _milli_pixels(summary)),
         ("normalised deviation", _deviations(summary)),
-        ("common error", _pair(summary, "mean_error_{}", "mas, of the mean of all other sources")),
+        (
+            "common error",
+            _pair(summary, "mean_error_{}", "mas, of the mean of all non-reference sources"),
+        ),
         *_truth_rows(summary.get("truth", {})),
         ("time", ", ".join(f"{k} {v:.2f} s" for k, v in summary["seconds"].items())),
         ("written", str(output)),
     ]
     width = max(len(name) for name, _ in rows)
-    for name, words in rows:
-        typer.echo(f"{name:<{width}}  {words}")
+    for name, text in rows:
+        typer.echo(f"{name:<{width}}  {text}")
 
 
 def print_orders(rows: Iterable[Mapping[str, Any]], verdict: str) -> None:
-    """Print the comparison of the orders, rows of `tables.order_comparison`, for people."""
+    """Print the comparison of orders, rows of `tables.order_comparison`, as a table."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for title in _ORDER_TITLES:
         table.add_column(title, justify="right")
@@ -67,7 +70,7 @@ def print_orders(rows: Iterable[Mapping[str, Any]], verdict: str) -> None:
 
 
 def print_reproduction(rows: Iterable[Mapping[str, Any]]) -> None:
-    """Print the paper's numbers beside ours, rows of `tables.reproduction`, for people."""
+    """Print the paper's numbers beside ours, rows of `tables.reproduction`, as a table."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("quantity, and how it is read")
     for title in ("paper", "here", "unit", "ratio"):
@@ -91,20 +94,20 @@ _ORDER_TITLES = (
 
 
 def _number(value: float | None, form: str) -> str:
-    """Return a figure in a format that may have words before it, or a dash for none."""
-    words, _, form = form.rpartition(" ")
-    return "-" if value is None else f"{words} {value:{form}}" if words else f"{value:{form}}"
+    """Return a formatted number, or a dash for None; `form` may have a prefix before a space."""
+    prefix, _, form = form.rpartition(" ")
+    return "-" if value is None else f"{prefix} {value:{form}}" if prefix else f"{value:{form}}"
 
 
 def print_agreement(rows: Iterable["Comparison"]) -> None:
-    """Print what the engines say of each other, for people."""
+    """Print the comparison of the engines, one line per number."""
     for row in rows:
         verdict = "agrees" if row.agrees else "DOES NOT AGREE"
         typer.echo(f"{row.engine}: {row.what}: {row.found:.3g} (limit {row.limit:.3g}), {verdict}")
 
 
 def print_inspection(reports: list[dict[str, Any]]) -> None:
-    """Print what `solver.inspect_files` found, for people."""
+    """Print the reports of `inspect_files` as text."""
     for report in reports:
         typer.echo(f"{report['file']}: {report['kind']}")
         for table in report["tables"]:
@@ -125,7 +128,7 @@ def _column(column: Mapping[str, Any]) -> str:
 def _outlier_row(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     if "n_outliers" not in summary:
         return []
-    return [("outliers", f"{summary['n_outliers']} more, left out; listed in the result")]
+    return [("outliers", f"{summary['n_outliers']} excluded; listed in the result")]
 
 
 def _engine(summary: Mapping[str, Any]) -> str:
@@ -161,18 +164,18 @@ def _deviations(summary: Mapping[str, Any]) -> str:
     return f"{measured} in RA, Dec of the reference sources (expected {expected})"
 
 
-def _pair(figures: Mapping[str, Any], pattern: str, words: str) -> str:
-    ra, dec = (figures[pattern.format(axis)] for axis in ("ra", "dec"))
-    return f"{ra:.3f}, {dec:.3f} {words}"
+def _pair(summary: Mapping[str, Any], pattern: str, unit: str) -> str:
+    ra, dec = (summary[pattern.format(axis)] for axis in ("ra", "dec"))
+    return f"{ra:.3f}, {dec:.3f} {unit}"
 
 
 def _truth_rows(truth: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
     return [
         (
             f"{name} against truth",
-            f"{figures['n']} sources: mean {_pair(figures, 'mean_{}', 'mas')} "
-            f"(of which {_pair(figures, 'induced_{}', '')}from the references), "
-            f"rms {_pair(figures, 'rms_{}', 'mas')}, pull sd {_pair(figures, 'pull_sd_{}', '')}",
+            f"{numbers['n']} sources: mean {_pair(numbers, 'mean_{}', 'mas')} "
+            f"(of which {_pair(numbers, 'induced_{}', '')}from the reference sources), "
+            f"rms {_pair(numbers, 'rms_{}', 'mas')}, pull sd {_pair(numbers, 'pull_sd_{}', '')}",
         )
-        for name, figures in truth.items()
+        for name, numbers in truth.items()
     ]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class ReportRequest(NamedTuple):
-    """What was asked for on the command line."""
+    """Arguments of `plateviz report`."""
 
     path: Path
     orbit: int | None
@@ -29,37 +29,45 @@ class ReportRequest(NamedTuple):
 
 def report(
     path: Annotated[
-        Path, typer.Argument(help="Survey directory, or a result of `fit`.", metavar="DIR|RESULT")
+        Path,
+        typer.Argument(help="Survey directory, or a result file of `fit`.", metavar="DIR|RESULT"),
     ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="File to write (HTML).", metavar="REPORT")
     ],
-    orbit: Annotated[int | None, typer.Option(help="Report one orbit of the survey.")] = None,
-    source: Annotated[int | None, typer.Option(help="Report one source, by its id.")] = None,
+    orbit: Annotated[int | None, typer.Option(help="Report the orbit with this id.")] = None,
+    source: Annotated[int | None, typer.Option(help="Report the source with this id.")] = None,
     survey: Annotated[
-        bool, typer.Option("--survey", help="Report the survey as a whole: the default.")
+        bool, typer.Option("--survey", help="Report the whole survey (the default).")
     ] = False,
     run: Annotated[str, typer.Option(help="Name of the run.")] = DEFAULT_RUN,
     other: Annotated[
         str | None,
-        typer.Option(help="Solution to compare the orbit with: another run, or another result."),
+        typer.Option(
+            help="Solution to compare the orbit with: the name of a run, or a result file."
+        ),
     ] = None,
     instrument: Annotated[
-        Path | None, typer.Option(help="Instrument of a result; the mini-mock's by default.")
+        Path | None,
+        typer.Option(help="Instrument (TOML file) of a result file; the mini-mock's by default."),
     ] = None,
-    pdf: Annotated[bool, typer.Option("--pdf", help="Print it with Chromium, too.")] = False,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Also print the report to PDF with Chromium.")
+    ] = False,
     pages: Annotated[
         bool,
         typer.Option(
-            "--pages", help="Write a folder: the survey as its index, and a page for each orbit."
+            "--pages", help="Write a folder: an index page of the survey, and a page per orbit."
         ),
     ] = False,
     workers: Annotated[
         int | None,
-        typer.Option(help="Processes for --pages; one for each core by default.", min=1),
+        typer.Option(
+            help="Number of worker processes for --pages; one per core by default.", min=1
+        ),
     ] = None,
 ) -> None:
-    """Write a report that opens anywhere: one HTML file that needs no network."""
+    """Write a report: one HTML file that needs no network."""
     request = ReportRequest(path, orbit, source, survey, run, other, instrument)
     if pages:
         _write_pages(request, output, pdf, workers)
@@ -68,10 +76,10 @@ def report(
 
 
 def _write_pages(request: ReportRequest, folder: Path, pdf: bool, workers: int | None) -> None:
-    chosen = (request.orbit, request.source, request.other, request.instrument)
-    if pdf or any(choice is not None for choice in chosen):
+    of_one_page = (request.orbit, request.source, request.other, request.instrument)
+    if pdf or any(option is not None for option in of_one_page):
         raise InputError(
-            "--pages: expected a survey directory and --run at most, found a choice for one page"
+            "--pages: expected no option but --run and --workers, found an option of a single page"
         )
     from plateviz.reports.folder import write_folder
     from plateviz.runs.queries import open_run
@@ -80,8 +88,8 @@ def _write_pages(request: ReportRequest, folder: Path, pdf: bool, workers: int |
     with reporting("reading") as reporter:
         run = open_run(request.path, request.run)
         made, kept = write_folder(run, folder, _facts(request.run), workers, reporter.step)
-    there = f", {kept} were there" if kept else ""
-    typer.echo(f"{folder / 'index.html'}: {made} pages of orbits made{there}")
+    already = f", {kept} already there" if kept else ""
+    typer.echo(f"{folder / 'index.html'}: {made} orbit pages written{already}")
 
 
 def _write_page(request: ReportRequest, output: Path, pdf: bool) -> None:
@@ -99,8 +107,8 @@ def _write_page(request: ReportRequest, output: Path, pdf: bool) -> None:
         require_writable(printed)
         find_chromium()
     with reporting("reading") as reporter:
-        content = _composed(request)
-        reporter.say("drawing")
+        content = _compose(request)
+        reporter.say("drawing the figures")
         from plateviz.reports.page import page_of
 
         page = page_of(content, reporter.step)
@@ -114,16 +122,20 @@ def _write_page(request: ReportRequest, output: Path, pdf: bool) -> None:
         typer.echo(f"{printed}: printed")
 
 
-def _composed(request: ReportRequest) -> "Report":
+def _compose(request: ReportRequest) -> "Report":
     if not request.path.is_dir():
-        return _of_file(request)
+        return _compose_from_file(request)
     chosen = [request.orbit is not None, request.source is not None, request.survey]
     if sum(chosen) > 1:
         raise InputError("report: expected one of --orbit, --source and --survey, found several")
     if request.instrument is not None:
-        raise InputError("--instrument: expected with a result of `plateviz fit`; a survey has one")
+        raise InputError(
+            "--instrument: expected with a result of `plateviz fit` only, found a survey"
+        )
     if request.other is not None and request.orbit is None:
-        raise InputError("--other: expected with --orbit, or with a result of `plateviz fit`")
+        raise InputError(
+            "--other: expected with --orbit or a result of `plateviz fit` only, found neither"
+        )
     from plateviz.reports.survey import source_report, survey_orbit_report, survey_report
     from plateviz.runs.queries import open_run
 
@@ -132,10 +144,10 @@ def _composed(request: ReportRequest) -> "Report":
         return source_report(run, request.source, facts)
     if request.orbit is None:
         return survey_report(run, facts)
-    return survey_orbit_report(run, request.orbit, facts, _other(request, request.orbit))
+    return survey_orbit_report(run, request.orbit, facts, _other_solution(request, request.orbit))
 
 
-def _of_file(request: ReportRequest) -> "Report":
+def _compose_from_file(request: ReportRequest) -> "Report":
     if request.orbit is not None or request.source is not None or request.survey:
         raise InputError(
             f"{request.path}: expected a survey directory with --orbit, --source or --survey, "
@@ -153,8 +165,8 @@ def _of_file(request: ReportRequest) -> "Report":
     return orbit_report(result, focal_plane, facts, other)
 
 
-def _other(request: ReportRequest, orbit: int) -> "FitResult | None":
-    """Return the solution to compare with: of another run, or of a result file."""
+def _other_solution(request: ReportRequest, orbit: int) -> "FitResult | None":
+    """Return the solution of `--other`: a result file, or the orbit in another run."""
     if request.other is None:
         return None
     from plateviz.runs.queries import open_run
@@ -167,7 +179,7 @@ def _other(request: ReportRequest, orbit: int) -> "FitResult | None":
 
 
 def _facts(run: str | None = None) -> "Facts":
-    """Return what made the report."""
+    """Return the command, the run and the versions that made the report."""
     from plateviz.reports.facts import facts_of
 
     return facts_of(shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]]), run)

@@ -1,4 +1,4 @@
-"""`plateviz reproduce`: the paper's survey, made and fitted where it is not there yet."""
+"""`plateviz reproduce`: simulate and fit the paper's survey, and print the paper's numbers."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,19 +12,21 @@ def reproduce(
     directory: Annotated[
         Path | None,
         typer.Argument(
-            help="Survey directory; the paper's survey is made there if there is none. By "
-            "default one in your cache, of some 5 GB.",
+            help="Survey directory; the paper's survey is simulated there if it holds none. "
+            "By default a folder of about 5 GB in your cache.",
             metavar="DIR",
         ),
     ] = None,
     run: Annotated[str, typer.Option(help="Name of the run.")] = DEFAULT_RUN,
     workers: Annotated[
         int | None,
-        typer.Option(help="Processes on this machine; one for each core by default.", min=1),
+        typer.Option(
+            help="Number of worker processes on this machine; one per core by default.", min=1
+        ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON value.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
-    """Print the paper's numbers beside those of the 100-orbit survey."""
+    """Print the paper's numbers beside those of a survey of 100 orbits."""
     from plateviz.cache import cache_directory
     from plateviz.cli.output import print_json, print_reproduction
     from plateviz.solving.reproduction import reproduced

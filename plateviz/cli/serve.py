@@ -1,4 +1,4 @@
-"""`plateviz serve`: the dashboard over a survey or the files of an orbit, behind a proxy or not."""
+"""`plateviz serve`: serve the dashboard of a survey or of the files of an orbit."""
 
 import webbrowser
 from pathlib import Path
@@ -9,13 +9,16 @@ import typer
 from plateviz.cli import options
 
 if TYPE_CHECKING:
-    from plateviz.dashboard.server import Place
+    from plateviz.dashboard.server import Endpoint
     from plateviz.solving.solution_store import SolutionStore
 
 
 def serve(
     path: Annotated[
-        Path, typer.Argument(help="Survey directory, or OBS as of `fit`.", metavar="DIR|OBS")
+        Path,
+        typer.Argument(
+            help="Survey directory; or, with REF, OBS as in `plateviz fit`.", metavar="DIR|OBS"
+        ),
     ],
     reference: Annotated[Path | None, options.REFERENCE] = None,
     truth: options.Truth = None,
@@ -26,7 +29,7 @@ def serve(
     allow_origin: Annotated[
         list[str] | None,
         typer.Option(
-            help="Host by which browsers reach a proxy before this server, such as "
+            help="Host of a reverse proxy, as browsers address it, such as "
             "astro.example.org or astro.example.org:8443; may be repeated.",
             metavar="HOST[:PORT]",
         ),
@@ -34,31 +37,32 @@ def serve(
     prefix: Annotated[
         str,
         typer.Option(
-            help="Path under which a proxy has the page, such as plateviz.", metavar="PATH"
+            help="URL path under which a reverse proxy has the dashboard, such as plateviz.",
+            metavar="PATH",
         ),
     ] = "",
     open_browser: options.OpenBrowser = True,
 ) -> None:
-    """Show a survey, or the orbit in some files, in the dashboard."""
-    from plateviz.dashboard.server import Place, check_address, check_origin, check_prefix
+    """Show a survey, or the files of one orbit, in the dashboard."""
+    from plateviz.dashboard.server import Endpoint, check_address, check_origin, check_prefix
     from plateviz.solving.origin import OrbitFiles, SurveyFolder
     from plateviz.solving.solution_store import SolutionStore
     from plateviz.solving.warm_solver import WarmSolver
 
     origins = tuple(map(check_origin, allow_origin or []))
-    place = Place(check_address(address, port), address, origins, check_prefix(prefix))
+    endpoint = Endpoint(check_address(address, port), address, origins, check_prefix(prefix))
     if reference is None:
         origin: OrbitFiles | SurveyFolder = SurveyFolder(str(path))
         origin.orbits()
     else:
         origin = OrbitFiles(str(path), str(reference), _text(truth), orbit, _text(instrument))
-        # Read once here, so that what is wrong with the files is said before a page opens.
+        # Read once here, so that problems in the files are reported before a page opens.
         origin.read(orbit)
-    run_server(SolutionStore(origin, WarmSolver()), place, open_browser)
+    run_server(SolutionStore(origin, WarmSolver()), endpoint, open_browser)
 
 
-def run_server(store: "SolutionStore", place: "Place", open_browser: bool) -> None:
-    """Serve a store at a place until it is interrupted."""
+def run_server(store: "SolutionStore", endpoint: "Endpoint", open_browser: bool) -> None:
+    """Serve a store at an endpoint until interrupted."""
     from plateviz.dashboard.server import serve as run
 
     def ready(page: str) -> None:
@@ -66,7 +70,7 @@ def run_server(store: "SolutionStore", place: "Place", open_browser: bool) -> No
         if open_browser:
             webbrowser.open(page)
 
-    run(store, place, ready)
+    run(store, endpoint, ready)
 
 
 def _text(path: Path | None) -> str | None:

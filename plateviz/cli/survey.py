@@ -1,4 +1,4 @@
-"""`plateviz survey`: what is asked for on the command line, and what is said of it."""
+"""`plateviz survey`: parse the orbits to fit, fit them, and print the outcome."""
 
 import re
 from pathlib import Path
@@ -14,12 +14,12 @@ _RANGE = re.compile(r"(\d+)(?:-(\d+))?")
 
 
 def parse_orbits(text: str | None) -> list[int] | None:
-    """Return the orbits of a text such as `0-9,12`; None for all of them.
+    """Return the orbits in a text such as `0-9,12`; None, for all orbits, if there is no text.
 
     Raises
     ------
     InputError
-        If it is not such a text.
+        If the text has another form.
     """
     if text is None:
         return None
@@ -43,9 +43,11 @@ def run_survey(
     scheduler: str | None,
     as_json: bool,
 ) -> None:
-    """Fit what is missing and say how it went; raises `FitError` where orbits failed."""
+    """Fit the missing orbits and print the outcome; raise `FitError` if orbits failed."""
     if workers is not None and scheduler is not None:
-        raise InputError("--workers: expected none with --scheduler, which has workers of its own")
+        raise InputError(
+            "--workers: expected none with --scheduler, which has its own workers, found both"
+        )
     report = fit_and_report(survey, name, settings, orbits, workers, scheduler)
     if as_json:
         print_json(
@@ -54,15 +56,15 @@ def run_survey(
                 "complete": report.run.is_complete,
                 "fitted": report.fitted,
                 "kept": report.kept,
-                "failed": {str(orbit): words for orbit, words in report.failed.items()},
+                "failed": {str(orbit): reason for orbit, reason in report.failed.items()},
                 "seconds": report.seconds,
             }
         )
     else:
-        words = f"{len(report.fitted)} orbits fitted"
-        words += f", {len(report.kept)} were there" if report.kept else ""
+        counts = f"{len(report.fitted)} orbits fitted"
+        counts += f", {len(report.kept)} fitted before" if report.kept else ""
         state = "complete" if report.run.is_complete else "not complete yet"
         typer.echo(
-            f"{report.run.directory}: {words}, in {report.seconds:.1f} s; the run is {state}"
+            f"{report.run.directory}: {counts}, in {report.seconds:.1f} s; the run is {state}"
         )
     require_all(report)

@@ -1,4 +1,4 @@
-"""The dashboard: one page, made anew for every browser session over a shared store."""
+"""The dashboard: one page per browser session, over a shared solution store."""
 
 import panel as pn
 import panel_material_ui as pmui
@@ -30,21 +30,21 @@ def build_app(store: SolutionStore) -> pmui.Page:
     )
     if pn.state.curdoc is not None:
         _prepare(pn.state.curdoc)
-    # The page's busy light changes with every event, and each change of the page makes Panel
-    # walk all models of all figures: half a second every time. The refit panel says it instead.
+    # The page's busy indicator changes with every event, and each change makes Panel walk all
+    # models of all figures, which takes half a second. The refit panel shows progress instead.
     with param.edit_constant(page):
         page.busy = False
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     _set_theme(session, page.dark_theme)
     _write_address(navigation)
-    _keep_up(navigation, pages)
+    _poll_while_needed(navigation, pages)
     return page
 
 
 def build_part(store: SolutionStore) -> pn.Row:
-    """Return the same, light, as a part of another page."""
+    """Return the dashboard in the light theme, as a part of another page."""
     navigation, pages = _pages(store)
-    _keep_up(navigation, pages)
+    _poll_while_needed(navigation, pages)
     sidebar = pn.Column(pages.sidebar, width=_SIDEBAR_WIDTH)
     return pn.Row(sidebar, pages, sizing_mode="stretch_width")
 
@@ -56,28 +56,28 @@ def _pages(store: SolutionStore) -> tuple[Navigation, Pages]:
 
 
 def _prepare(document: Document) -> None:
-    # Figures come styled, in both themes; a theme that names these models keeps the page's
-    # own style off them.
+    # The figures are already styled, in both themes. A theme that lists these models prevents
+    # the page's own theme from restyling them.
     document.theme = Theme(json={"attrs": {name: {} for name in _STYLED}})
-    # Where a browser loads so slowly that its session was given up and is made anew, Panel has
-    # not set this yet, and would have the style sheets fetched from far away.
+    # If a browser loads so slowly that its session has expired and is created again, Panel has
+    # not set this yet, and the page would load its style sheets from another host.
     document.template_variables["dist_url"] = get_dist_path()
 
 
 def _arguments() -> dict[str, str]:
-    # Nobody can type bytes that are no text; what is left of them is no selection either.
+    # Invalid UTF-8 is replaced; the result is no valid selection and is ignored.
     return {k: v[0].decode("utf-8", "replace") for k, v in pn.state.session_args.items()}
 
 
 def _write_address(navigation: Navigation) -> None:
-    """Write what is on the screen into the page's address when it changes."""
+    """Update the page's address when the view or the selection changes."""
     location = pn.state.location
     if location is None:
         return
 
     def write(*_: object) -> None:
         if navigation.view is not View.ORBIT or navigation.session.shown is not None:
-            # Panel declares each value as a mapping; it takes anything that has words.
+            # Panel declares the values as mappings, but accepts strings.
             location.update_query(**navigation.address())  # type: ignore[arg-type]
 
     navigation.param.watch(write, ["view", "run_name", "found"])
@@ -85,10 +85,10 @@ def _write_address(navigation: Navigation) -> None:
     navigation.session.selection.param.watch(write, ["orbit", "field", "plates", "detector"])
 
 
-def _keep_up(navigation: Navigation, pages: Pages) -> None:
-    """Ask for news of the job and draw what is due, for as long as there is any.
+def _poll_while_needed(navigation: Navigation, pages: Pages) -> None:
+    """Poll the job and draw the figures that are due, while there are any.
 
-    The page asks, it is not told: a job belongs to the server and outlives the page.
+    The page polls because a job belongs to the server and may outlive the page.
     """
     session = navigation.session
 
@@ -106,8 +106,8 @@ def _keep_up(navigation: Navigation, pages: Pages) -> None:
     session.param.watch(wake, ["stage", "shown", "other", "theme"])
     session.selection.param.watch(wake, ["field", "plates", "detector"])
     navigation.param.watch(wake, ["view", "run_name", "found"])
-    pages.on_sight(wake)
-    # Drawing before the page is there would keep it from coming.
+    pages.on_visibility(wake)
+    # Drawing before the page has loaded would delay it.
     pn.state.onload(wake)
 
 

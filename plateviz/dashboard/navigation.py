@@ -1,4 +1,4 @@
-"""Navigation: the view that one person looks at, of which run and which source. No Panel here."""
+"""Navigation: view, run and source on the screen of one browser session, without Panel."""
 
 import re
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ class View(StrEnum):
 
 
 class FoundSource(NamedTuple):
-    """One source as a run has it: its rows orbit by orbit and, once gathered, its motion."""
+    """One source of a run: a row per orbit and, once the run is complete, its motion."""
 
     source_id: int
     history: pd.DataFrame
@@ -38,8 +38,8 @@ class FoundSource(NamedTuple):
 class Navigation(param.Parameterized):
     """What is on the screen of one browser session.
 
-    `run_name` is None where the survey has no run. `found` is the source that was last looked for
-    in the run; where there is none, `message` says why.
+    `run_name` is None if the survey has no run. `found` is the result of the last search for a
+    source of the run; if it is None, `message` says why.
     """
 
     view = param.Selector(default=View.ORBIT, objects=list(View), doc="view on the screen")
@@ -51,7 +51,7 @@ class Navigation(param.Parameterized):
         """Begin with the first whole run, or with the orbit where there is no run."""
         super().__init__()
         self.session = session
-        self._sought = ""
+        self._source_text = ""
         self._runs = {run.name: run for run in session.store.runs()}
         if self._runs:
             self.param["run_name"].objects = list(self._runs)
@@ -62,12 +62,12 @@ class Navigation(param.Parameterized):
 
     @property
     def run(self) -> SurveyRun | None:
-        """The run that is shown; None where there is none."""
+        """The run on the screen; None if there is none."""
         return self._runs.get(self.run_name)
 
     @property
     def why_no_run(self) -> str:
-        """What to do for a run; empty where there is one."""
+        """Message on how to make a run; empty if there is one."""
         if self.run is not None:
             return ""
         origin = self.session.store.origin
@@ -75,68 +75,69 @@ class Navigation(param.Parameterized):
             return (
                 "This survey has not been fitted as a whole. "
                 f"`plateviz survey {origin.directory}` fits all its orbits; "
-                "then load this page anew."
+                "then reload this page."
             )
         return (
-            "These are the files of one orbit. Many orbits are a survey directory: "
-            "`plateviz survey DIR` fits them all, and `plateviz serve DIR` shows them here."
+            "These are the files of one orbit. For a survey directory, `plateviz survey DIR` "
+            "fits all orbits, and `plateviz serve DIR` shows them here."
         )
 
     def begin(self, address: Mapping[str, str]) -> None:
-        """Turn to what a page's address asks for; what is not there is not looked at.
+        """Show what a page's address requests; invalid values are ignored.
 
         Parameters
         ----------
-        address : as from `address`; one with a selection alone is of the Orbit view
+        address : query of the address, as from `address`; a selection without a view opens the
+            Orbit view
         """
-        self.session.selection.want(address)
+        self.session.selection.restore(address)
         views = {view.value: view for view in View}
         if address.get("run") in self._runs:
             self.run_name = address["run"]
         if "source" in address:
             self.find_source(address["source"])
-        of_orbit = self.session.selection.param.values()
-        selected = View.ORBIT if any(name in of_orbit for name in address) else self.view
-        self.turn_to(views.get(address.get("view", ""), selected))
+        selectable = self.session.selection.param.values()
+        default = View.ORBIT if any(name in selectable for name in address) else self.view
+        self.turn_to(views.get(address.get("view", ""), default))
 
     def address(self) -> dict[str, str]:
-        """Return what is on the screen as words for the page's address."""
-        words = {"view": self.view.value, **self.session.selection.address()}
+        """Return what is on the screen as the query of the page's address."""
+        query = {"view": self.view.value, **self.session.selection.address()}
         if self.run_name is not None:
-            words["run"] = self.run_name
+            query["run"] = self.run_name
         if self.found is not None:
-            words["source"] = str(self.found.source_id)
-        return words
+            query["source"] = str(self.found.source_id)
+        return query
 
     def turn_to(self, view: View) -> None:
-        """Put a view on the screen; the Orbit view asks for its orbit when it is first seen."""
+        """Show a view; the Orbit view requests its orbit when it is first shown."""
         self.view = view
         session = self.session
         if view is View.ORBIT and session.shown is None and session.job is None:
             self.choose_orbit(session.selection.orbit)
 
     def choose_orbit(self, orbit: int | None) -> None:
-        """Turn to an orbit with the settings on the screen; what the run has is not made again."""
+        """Show an orbit with the settings on the screen, from the run if it has that solution."""
         shown = self.session.shown
-        self._turn_to_orbit(orbit, shown.settings if shown else None)
+        self._show_orbit(orbit, shown.settings if shown else None)
 
     def open_orbit(self, orbit: int) -> None:
-        """Open an orbit as the run has it; one that the run has not is fitted."""
-        self._turn_to_orbit(orbit, None)
+        """Open the solution of an orbit in the run; fit the orbit if the run has none."""
+        self._show_orbit(orbit, None)
         self.view = View.ORBIT
 
     def find_source(self, text: str) -> None:
-        """Look for a source of the run by its id as text."""
-        self._sought = text.strip()
+        """Search the run for a source by its id as text."""
+        self._source_text = text.strip()
         self._look()
 
     def open_source(self, text: str) -> None:
-        """Look for a source, and turn to it."""
+        """Search for a source, and show the Source view."""
         with param.parameterized.batch_call_watchers(self):
             self.find_source(text)
             self.view = View.SOURCE
 
-    def _turn_to_orbit(self, orbit: int | None, settings: FitSettings | None) -> None:
+    def _show_orbit(self, orbit: int | None, settings: FitSettings | None) -> None:
         try:
             result = self._result(orbit)
         except InputError as error:
@@ -148,23 +149,23 @@ class Navigation(param.Parameterized):
             self.session.show_result(orbit, result)
 
     def _result(self, orbit: int | None) -> FitResult | None:
-        """Return an orbit as the run has it, None where it has not."""
+        """Return the solution of an orbit in the run, None if it has none."""
         if self.run is None or orbit is None or not self.run.has_fitted(orbit):
             return None
         return self.run.result(orbit)
 
     def _look(self) -> None:
         found, message = None, ""
-        if self.run is not None and self._sought:
-            found, message = _found(self.run, self._sought)
+        if self.run is not None and self._source_text:
+            found, message = _find(self.run, self._source_text)
         self.param.update(found=found, message=message)
 
 
-def _found(run: SurveyRun, sought: str) -> tuple[FoundSource | None, str]:
-    """Return a source of a run, or why there is none."""
-    if not _ID.fullmatch(sought) or abs(int(sought)) > _LARGEST_ID:
-        return None, f"Expected the id of a source, a whole number, found {sought[:40]!r}."
-    source_id = int(sought)
+def _find(run: SurveyRun, text: str) -> tuple[FoundSource | None, str]:
+    """Return a source of a run, or a message on why there is none."""
+    if not _ID.fullmatch(text) or abs(int(text)) > _LARGEST_ID:
+        return None, f"Expected the id of a source, a whole number, found {text[:40]!r}."
+    source_id = int(text)
     history = run.history(source_id)
     if history.empty:
         return None, f"Run {run.name!r} has no source {source_id}."

@@ -9,26 +9,26 @@ from typing import Any, NamedTuple
 import panel as pn
 
 from plateviz.dashboard.app import build_app
-from plateviz.dashboard.closed_pages import leave_unsaid
+from plateviz.dashboard.closed_pages import silence_closed_pages
 from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 
-# How long a page may take to load its scripts before its session is given up.
-_PATIENCE_MILLISECONDS = 120_000
+# Time for a page to load its scripts before its session is discarded.
+_LOAD_TIMEOUT_MILLISECONDS = 120_000
 _HOST = re.compile(r"[a-z0-9]([a-z0-9.-]*[a-z0-9])?(:\d{1,5})?")
 _PATH = re.compile(r"[A-Za-z0-9._~-]+(/[A-Za-z0-9._~-]+)*")
 
 
-class Place(NamedTuple):
-    """Where a page is served, and where browsers find it.
+class Endpoint(NamedTuple):
+    """Address at which the dashboard is served, and from which browsers reach it.
 
     Attributes
     ----------
     port : TCP port, as from `check_address`
-    address : of the interface to listen on; other machines reach it only where it is not
-        a loopback address
-    origins : hosts by which browsers reach a proxy before it, as from `check_origin`
-    prefix : path of the page, as from `check_prefix`
+    address : of the interface to listen on; a loopback address cannot be reached from other
+        machines
+    origins : hosts of reverse proxies, as browsers address them, from `check_origin`
+    prefix : URL path of the page, as from `check_prefix`
     """
 
     port: int
@@ -37,20 +37,20 @@ class Place(NamedTuple):
     prefix: str = ""
 
 
-def serve(store: SolutionStore, place: Place, ready: Callable[[str], None]) -> None:
-    """Serve the dashboard until it is interrupted; the store is closed at the end.
+def serve(store: SolutionStore, endpoint: Endpoint, ready: Callable[[str], None]) -> None:
+    """Serve the dashboard until interrupted; close the store at the end.
 
     Parameters
     ----------
-    ready : called with the page's address once it can be opened
+    ready : called with the page's address once the server accepts connections
     """
     pn.extension("tabulator")
-    server = _server(store, place)
+    server = _server(store, endpoint)
     try:
         server.start()
-        path = f"{place.prefix}/" if place.prefix else ""
-        ready(f"http://{place.address}:{place.port}/{path}")
-        # Ctrl-C is how a person ends it.
+        path = f"{endpoint.prefix}/" if endpoint.prefix else ""
+        ready(f"http://{endpoint.address}:{endpoint.port}/{path}")
+        # Ctrl-C is the normal way to end the server.
         with contextlib.suppress(KeyboardInterrupt):
             server.io_loop.start()
     finally:
@@ -58,43 +58,43 @@ def serve(store: SolutionStore, place: Place, ready: Callable[[str], None]) -> N
         store.close()
 
 
-def begin(store: SolutionStore, place: Place) -> Any:  # noqa: ANN401 of Bokeh
-    """Return a server that serves on the event loop of this thread, which somebody else runs."""
-    server = _server(store, place)
+def begin(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of Bokeh
+    """Start and return a server on this thread's event loop, which the caller runs."""
+    server = _server(store, endpoint)
     server.start()
     return server
 
 
-def _server(store: SolutionStore, place: Place) -> Any:  # noqa: ANN401 of Bokeh
-    leave_unsaid()
-    hosts = sorted({place.address, "localhost", "127.0.0.1"})
-    # A thread is what it gives only where it is asked to make one.
+def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of Bokeh
+    silence_closed_pages()
+    hosts = sorted({endpoint.address, "localhost", "127.0.0.1"})
+    # It returns a server, not a thread, because `threaded` is not set.
     return pn.serve(
         lambda: build_app(store),
-        port=place.port,
-        address=place.address,
-        # A websocket from a page of any other host is refused.
-        websocket_origin=[*(f"{host}:{place.port}" for host in hosts), *place.origins],
-        prefix=place.prefix,
+        port=endpoint.port,
+        address=endpoint.address,
+        # Websockets from pages of other hosts are refused.
+        websocket_origin=[*(f"{host}:{endpoint.port}" for host in hosts), *endpoint.origins],
+        prefix=endpoint.prefix,
         title=f"plateviz · {store.title}",
         show=False,
         start=False,
         verbose=False,
-        unused_session_lifetime_milliseconds=_PATIENCE_MILLISECONDS,
+        unused_session_lifetime_milliseconds=_LOAD_TIMEOUT_MILLISECONDS,
     )
 
 
 def check_address(address: str, port: int) -> int:
-    """Return the port to serve on, having found out before any work that it is free.
+    """Check, before any other work, that an address and a port are free; return the port.
 
     Parameters
     ----------
-    port : 0 for any that is free
+    port : TCP port; 0 selects a free one
 
     Raises
     ------
     InputError
-        If it could not: the port is taken, or the address is not this machine's.
+        If the port is taken, or the address does not belong to this machine.
     """
     try:
         with socket.create_server((address, port)) as probe:
@@ -106,12 +106,12 @@ def check_address(address: str, port: int) -> int:
 
 
 def check_origin(text: str) -> str:
-    """Return a host that browsers may come from, as they send it.
+    """Return the host of a reverse proxy in the form that browsers send.
 
     Raises
     ------
     InputError
-        If it is no host, with a port or without.
+        If it is not a host, with or without a port.
     """
     host = text.strip().lower()
     if not _HOST.fullmatch(host):
@@ -123,12 +123,12 @@ def check_origin(text: str) -> str:
 
 
 def check_prefix(text: str) -> str:
-    """Return the path under which a page is served, without slashes around it.
+    """Return the URL path of the page, without slashes at its ends.
 
     Raises
     ------
     InputError
-        If it cannot stand in an address.
+        If it is not a valid URL path.
     """
     path = text.strip("/")
     if path and not _PATH.fullmatch(path):

@@ -1,6 +1,6 @@
-"""Session: one person's solutions on one screen. No Panel here: views watch, this decides.
+"""Session: the solutions of one browser session and their rules, without Panel; views watch it.
 
-The old solution stays until the new one is whole; then both can be compared.
+The last solution stays on the screen until the next one is complete; then both can be compared.
 """
 
 from enum import Enum
@@ -17,18 +17,18 @@ from solver.errors import InputError
 
 
 class Stage(Enum):
-    """What the screen can show."""
+    """State of the solution on the screen."""
 
-    LOADING = "the first solution is being made"
-    READY = "the solution is what was asked for"
-    STALE = "another solution is being made"
-    FAILED = "the last request could not be met"
+    LOADING = "the first solution is being computed"
+    READY = "the solution is the requested one"
+    STALE = "another solution is being computed"
+    FAILED = "the last request failed"
 
 
 class Solution(NamedTuple):
-    """One solution of the session and what it was asked for.
+    """One solution of the session, with the orbit and settings requested.
 
-    One on trial was asked for by a change of the choices alone, and is gone with the next.
+    A what-if is requested by a change of a control, and replaced by the next one unless kept.
     """
 
     orbit: int | None
@@ -38,7 +38,7 @@ class Solution(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The solution in a few words."""
+        """Short description of the solution."""
         return (
             f"what if: {self.settings.describe()}" if self.is_what_if else self.settings.describe()
         )
@@ -47,8 +47,8 @@ class Solution(NamedTuple):
 class Session(param.Parameterized):
     """State of one browser session.
 
-    `shown` is the solution on the screen, `other` the one it is compared with; either
-    may be None. `stage` and `message` say how things stand.
+    `shown` is the solution on the screen, `other` the one that it is compared with; either may
+    be None. `stage` and `message` are the state of the last request.
     """
 
     shown = param.ClassSelector(class_=Solution, default=None, allow_None=True)
@@ -67,8 +67,8 @@ class Session(param.Parameterized):
         self.selection.param["orbit"].objects = store.orbits
         self.selection.orbit = store.orbits[0]
         self._job: Job | None = None
-        self._asked: FitSettings = FitSettings()
-        self._asked_what_if = False
+        self._requested: FitSettings = FitSettings()
+        self._requested_what_if = False
         self._next_what_if: FitSettings | None = None
         self.choices.param.watch(
             lambda *_: self.ask_what_if(),
@@ -77,46 +77,46 @@ class Session(param.Parameterized):
 
     @property
     def job(self) -> Job | None:
-        """The job that is under way, if any."""
+        """The waiting or running job; None if there is none."""
         return self._job
 
     def show_orbit(self, orbit: int | None) -> None:
-        """Turn to an orbit, with the settings of the solution on the screen."""
+        """Request an orbit with the settings of the solution on the screen."""
         self.selection.orbit = orbit
-        settings = self.shown.settings if self.shown else self._asked
+        settings = self.shown.settings if self.shown else self._requested
         self.param.update(solutions=[], other=None)
-        self._ask(settings)
+        self._request(settings)
 
     def show_result(self, orbit: int | None, result: FitResult) -> None:
-        """Turn to an orbit whose solution is at hand."""
-        self._drop_job()
+        """Show an orbit with an existing result, without a request."""
+        self._cancel_job()
         self.selection.orbit = orbit
         solution = Solution(orbit, result.settings, result)
         if self.shown is not None and self.shown._replace(result=result) == solution:
             self.param.update(stage=Stage.READY, message="")
             return
         self.param.update(solutions=[], other=None)
-        self._take(solution)
-        self.choices.take(result.settings)
+        self._put_on_screen(solution)
+        self.choices.load(result.settings)
 
     def refuse(self, message: str) -> None:
-        """Say why what was asked for cannot be had; the last solution stays."""
+        """Show why a request failed; the last solution stays."""
         self.param.update(stage=Stage.FAILED, message=message)
 
     def refit(self) -> None:
-        """Ask for the orbit with the choices made; what cannot be used is said at once."""
+        """Request a fit with the settings of the controls; report an invalid one at once."""
         try:
             settings = self.choices.settings()
         except InputError as error:
             self.refuse(str(error))
             return
-        self._ask(settings)
+        self._request(settings)
 
     def ask_what_if(self) -> None:
-        """Show what the choices would change, while the solution that was fitted is kept.
+        """Request a what-if with the settings of the controls; the fitted solution is kept.
 
-        Only the gauss-newton engine is quick enough. While one trial is under way, the last
-        of the choices made since waits for it.
+        Only the gauss-newton engine is fast enough. While a what-if is being computed, only the
+        latest settings wait.
         """
         fitted = self.fitted
         if not self.choices.what_if_at_once or fitted is None:
@@ -130,37 +130,37 @@ class Session(param.Parameterized):
             return
         known = next((s for s in self.solutions if s.settings == settings), None)
         if self._job is not None:
-            self._next_what_if = settings if self._asked_what_if else None
+            self._next_what_if = settings if self._requested_what_if else None
         elif known is not None:
-            self._bring_back(known)
+            self._return_to(known)
         elif self.shown is None or settings != self.shown.settings:
-            self._ask(settings, what_if=True)
+            self._request(settings, what_if=True)
 
     @property
     def fitted(self) -> Solution | None:
-        """The solution on the screen, or the one that a trial is compared with."""
+        """The solution on the screen, or the one that a what-if is compared with."""
         return self.other if self.shown is not None and self.shown.is_what_if else self.shown
 
     def keep(self) -> None:
-        """Keep the solution that is on trial."""
+        """Keep the what-if on the screen."""
         if self.shown is not None and self.shown.is_what_if:
             kept = self.shown._replace(is_what_if=False)
             self.param.update(solutions=[*self.solutions, kept], shown=kept)
 
     def cancel(self) -> None:
-        """Stop the job that is under way."""
+        """Cancel the waiting or running job."""
         self._next_what_if = None
         if self._job is not None:
             self.store.cancel(self._job)
 
     def poll(self) -> None:
-        """Take in what has become of the job; called every so often while there is one."""
+        """Update the state from the job; called periodically while there is one."""
         if self._job is None:
             return
         status = self._job.status
         if status is JobStatus.DONE:
             self._job = None
-            self._show(self._asked)
+            self._show_finished(self._requested)
             if self._next_what_if is not None:
                 self._next_what_if = None
                 self.ask_what_if()
@@ -169,44 +169,44 @@ class Session(param.Parameterized):
             self._job = None
             self.refuse(reason)
         else:
-            self.message = _words(self._job)
+            self.message = _progress_text(self._job)
 
     def bring_up(self, solution: Solution) -> None:
-        """Show a solution that was made before; the one on the screen becomes the other."""
+        """Show an earlier solution; the fitted one on the screen becomes the other."""
         if solution is not self.shown:
             self.param.update(shown=solution, other=self.fitted)
-            self.choices.take(solution.settings)
+            self.choices.load(solution.settings)
 
-    def _bring_back(self, solution: Solution) -> None:
-        """Leave the trial for a solution that was kept; where it was compared with that, alone."""
+    def _return_to(self, solution: Solution) -> None:
+        """Return from a what-if to a kept solution, alone if the what-if was compared with it."""
         if solution is not self.shown:
             other = self.fitted if self.fitted is not solution else None
             self.param.update(shown=solution, other=other, stage=Stage.READY, message="")
 
-    def _ask(self, settings: FitSettings, what_if: bool = False) -> None:
-        self._drop_job()
-        self._asked, self._asked_what_if = settings, what_if
+    def _request(self, settings: FitSettings, what_if: bool = False) -> None:
+        self._cancel_job()
+        self._requested, self._requested_what_if = settings, what_if
         self._job = self.store.request(self.selection.orbit, settings, what_if)
         stage = Stage.STALE if self.shown else Stage.LOADING
-        self.param.update(stage=stage, message=_words(self._job))
+        self.param.update(stage=stage, message=_progress_text(self._job))
         self.poll()
 
-    def _drop_job(self) -> None:
+    def _cancel_job(self) -> None:
         if self._job is not None:
             self.store.cancel(self._job)
         self._job, self._next_what_if = None, None
 
-    def _show(self, settings: FitSettings) -> None:
+    def _show_finished(self, settings: FitSettings) -> None:
         orbit = self.selection.orbit
-        result = self.store.result(orbit, settings, self._asked_what_if)
+        result = self.store.result(orbit, settings, self._requested_what_if)
         if result is None:
-            self.refuse("The result of the fit is gone.")
+            self.refuse("The result of the fit was removed.")
             return
-        self._take(Solution(orbit, settings, result, self._asked_what_if))
+        self._put_on_screen(Solution(orbit, settings, result, self._requested_what_if))
 
-    def _take(self, solution: Solution) -> None:
+    def _put_on_screen(self, solution: Solution) -> None:
         numbers = [d.detector_id for d in self.store.instrument.detectors]
-        self.selection.fit_to(solution.result, numbers)
+        self.selection.limit_to(solution.result, numbers)
         orbit, settings = solution.orbit, solution.settings
         before = self.fitted if self.fitted and self.fitted.orbit == orbit else None
         kept = [s for s in self.solutions if s.settings != settings]
@@ -220,17 +220,17 @@ class Session(param.Parameterized):
 
 
 def _what_if_settings(settings: FitSettings, fitted: FitSettings) -> FitSettings:
-    """Return what to try out: no orders are compared anew, but those of the fit may still hold."""
-    still_holds = settings.with_(order=fitted.order, compare_orders=True) == fitted
-    return settings.with_(compare_orders=still_holds)
+    """Return the settings of a what-if; it keeps a comparison of orders only if still valid."""
+    is_still_valid = settings.with_(order=fitted.order, compare_orders=True) == fitted
+    return settings.with_(compare_orders=is_still_valid)
 
 
-def _words(job: Job) -> str:
-    """Say how far a job is."""
+def _progress_text(job: Job) -> str:
+    """Return the progress of a job as text."""
     if job.status is JobStatus.QUEUED:
         return "waiting for the solver"
     last = job.progress[-1] if job.progress else {}
-    words = str(last.get("stage", "starting"))
+    text = str(last.get("stage", "starting"))
     if last.get("largest_step") == last.get("largest_step") and "largest_step" in last:
-        words += f", largest step {last['largest_step']:.2g} sigma"
-    return f"{words} ({job.seconds:.0f} s)"
+        text += f", largest step {last['largest_step']:.2g} sigma"
+    return f"{text} ({job.seconds:.0f} s)"

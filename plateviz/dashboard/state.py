@@ -1,4 +1,4 @@
-"""What the user of one browser session has chosen; bounds are enforced here, on the server."""
+"""Selection and settings of one browser session; their bounds are enforced on the server."""
 
 import re
 from collections.abc import Mapping
@@ -28,74 +28,76 @@ class Selection(param.Parameterized):
     )
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
-        """Start with nothing to choose from."""
+        """Start without options."""
         super().__init__(**values)
-        self._wanted: dict[str, Any] = {}
+        self._requested: dict[str, Any] = {}
 
-    def fit_to(self, result: FitResult, detectors: list[int]) -> None:
-        """Offer what a solution holds; choices that it does not hold are given up."""
+    def limit_to(self, result: FitResult, detectors: list[int]) -> None:
+        """Limit the options to those of a solution; a selection that is no option is reset."""
         exposures = result.exposures
         fields = [ALL, *(str(f) for f in sorted(exposures["field_id"].unique().tolist()))]
         plates = (int(exposures["plate_id"].min()), int(exposures["plate_id"].max()))
         numbers = [ALL, *(str(d) for d in detectors)]
-        first = self.param["field"].objects == [ALL]
+        is_first = self.param["field"].objects == [ALL]
         self.param["field"].objects = fields
         self.param["detector"].objects = numbers
         self.param["plates"].bounds = plates
-        wanted: dict[str, Any] = self.address() | {"plates": self.plates}
-        if first:
-            wanted |= {"field": fields[1], "detector": numbers[1], **self._wanted}
-        lowest, highest = (min(max(p, plates[0]), plates[1]) for p in wanted["plates"])
+        selected: dict[str, Any] = self.address() | {"plates": self.plates}
+        if is_first:
+            selected |= {"field": fields[1], "detector": numbers[1], **self._requested}
+        lowest, highest = (min(max(p, plates[0]), plates[1]) for p in selected["plates"])
         self.param.update(
-            field=wanted["field"] if wanted["field"] in fields else ALL,
-            detector=wanted["detector"] if wanted["detector"] in numbers else ALL,
+            field=selected["field"] if selected["field"] in fields else ALL,
+            detector=selected["detector"] if selected["detector"] in numbers else ALL,
             plates=(lowest, highest),
         )
 
-    def want(self, address: Mapping[str, str]) -> None:
-        """Take the wishes of a page's address; what no solution holds will be ignored.
+    def restore(self, address: Mapping[str, str]) -> None:
+        """Select what a page's address requests, once a solution is there; ignore invalid values.
 
         Parameters
         ----------
-        address : as from `address`; anything else in it is not looked at
+        address : query of the address, as from `address`; other keys are ignored
         """
-        wanted: dict[str, Any] = {k: address[k] for k in ("field", "detector") if k in address}
+        requested: dict[str, Any] = {k: address[k] for k in ("field", "detector") if k in address}
         plates = _PLATES.fullmatch(address.get("plates", ""))
         if plates:
-            wanted["plates"] = tuple(sorted(int(number) for number in plates.groups()))
-        self._wanted = wanted
+            requested["plates"] = tuple(sorted(int(number) for number in plates.groups()))
+        self._requested = requested
         orbits = {str(orbit): orbit for orbit in self.param["orbit"].objects}
         self.orbit = orbits.get(address.get("orbit", ""), self.orbit)
 
     def address(self) -> dict[str, str]:
-        """Return the selection as words for the page's address, which `want` reads back."""
+        """Return the selection as the query of the page's address; `restore` reads it back."""
         first, last = self.plates
-        words = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
-        return words if self.orbit is None else {"orbit": str(self.orbit), **words}
+        query = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
+        return query if self.orbit is None else {"orbit": str(self.orbit), **query}
 
     @property
     def detector_id(self) -> int | None:
-        """The chosen detector, None for all."""
+        """The selected detector, None for all."""
         return None if self.detector == ALL else int(self.detector)
 
     def exposures_of(self, result: FitResult) -> list[tuple[int, int]]:
-        """Return (field_id, plate_id) of the chosen exposures that the solution holds."""
+        """Return (field_id, plate_id) of the selected exposures of a solution."""
         table = result.exposures
-        chosen = table["plate_id"].between(*self.plates)
+        selected = table["plate_id"].between(*self.plates)
         if self.field != ALL:
-            chosen &= table["field_id"] == int(self.field)
-        pairs = table.loc[chosen, ["field_id", "plate_id"]]
+            selected &= table["field_id"] == int(self.field)
+        pairs = table.loc[selected, ["field_id", "plate_id"]]
         return [(int(f), int(p)) for f, p in pairs.itertuples(index=False)]
 
 
 class FitChoices(param.Parameterized):
-    """The settings of the next fit, a parameter for each that has a control.
+    """The settings of the next fit: one parameter for each setting with a control.
 
     Prior widths are a dict of group name -> text; shifts and exclusions are one text each, as on
     the command line. The parameters are added below, from `solver.data.settings`.
     """
 
-    what_if_at_once = param.Boolean(default=True, doc="whether a change is answered at once")
+    what_if_at_once = param.Boolean(
+        default=True, doc="whether a change of a control shows a what-if at once"
+    )
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
         """Start from the paper's priors."""
@@ -103,19 +105,19 @@ class FitChoices(param.Parameterized):
         self.prior_widths = default_widths()
 
     def settings(self) -> FitSettings:
-        """Return the settings; InputError says which of them cannot be used."""
+        """Return the settings; InputError names an invalid one."""
         return FitSettings(
-            **{name: _value(one, getattr(self, name)) for name, one in CONTROLS.items()}
+            **{name: _setting_value(one, getattr(self, name)) for name, one in CONTROLS.items()}
         )
 
-    def take(self, settings: FitSettings) -> None:
-        """Show the values of `settings`."""
-        values = {name: _shown(one, settings, name) for name, one in CONTROLS.items()}
+    def load(self, settings: FitSettings) -> None:
+        """Set the parameters to the values of `settings`."""
+        values = {name: _control_value(one, settings, name) for name, one in CONTROLS.items()}
         self.param.update(**values)
 
 
 CONTROLS = {name: one for name, one in SETTINGS.items() if one.control}
-# Controls whose change is answered at once.
+# Controls whose change shows a what-if at once.
 ANSWERED_AT_ONCE = tuple(n for n, one in CONTROLS.items() if one.change is not Change.ON_REQUEST)
 
 
@@ -135,22 +137,24 @@ def _parameter(one: Setting, default: Any) -> param.Parameter:  # noqa: ANN401
         return param.Dict(default={}, doc=one.help)
     if isinstance(one, Texts):
         return param.String(default="", doc=one.help)
-    raise TypeError(f"{one.label}: there is no control for a {type(one).__name__}")
+    raise TypeError(f"{one.label}: expected a setting with a control, found a {type(one).__name__}")
 
 
-def _value(one: Setting, shown: Any) -> Any:  # noqa: ANN401
-    """Return the value of a setting from what its control shows."""
+def _setting_value(one: Setting, control_value: Any) -> Any:  # noqa: ANN401
+    """Return the value of a setting from the value of its control."""
     if isinstance(one, PriorWidths):
         defaults = default_widths()
-        changed = {name: text for name, text in shown.items() if text.strip() != defaults[name]}
+        changed = {
+            name: text for name, text in control_value.items() if text.strip() != defaults[name]
+        }
         return one.parse(f"{name}={text}" for name, text in changed.items())
     if isinstance(one, Texts):
-        return one.parse(shown.replace(",", " ").split())
-    return shown
+        return one.parse(control_value.replace(",", " ").split())
+    return control_value
 
 
-def _shown(one: Setting, settings: FitSettings, name: str) -> Any:  # noqa: ANN401
-    """Return what the control of a setting shows."""
+def _control_value(one: Setting, settings: FitSettings, name: str) -> Any:  # noqa: ANN401
+    """Return the value of the control of a setting."""
     if isinstance(one, PriorWidths):
         return {g.name: format_width(g.name, settings.width(g.name)) for g in PARAMETERS}
     value = getattr(settings, name)
@@ -162,5 +166,5 @@ for _name, _one in CONTROLS.items():
 
 
 def default_widths() -> dict[str, str]:
-    """Return the paper's prior widths as people write them."""
-    return _shown(SETTINGS["prior_widths"], FitSettings(), "prior_widths")
+    """Return the paper's prior widths as texts."""
+    return _control_value(SETTINGS["prior_widths"], FitSettings(), "prior_widths")

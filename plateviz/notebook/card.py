@@ -13,29 +13,29 @@ CARD_STYLE = STYLE + (files("plateviz.notebook") / "card.css").read_text(encodin
 
 
 def card(title: str, subtitle: str, verdict: Verdict | None, items: Iterable[SummaryItem]) -> str:
-    """Return what an object is, what to think of it, and the numbers to judge it by.
+    """Return the title, the verdict and the numbers of an object as HTML.
 
     Parameters
     ----------
-    verdict : None where there is nothing to judge
-    items : in the order of the tiles
+    verdict : None if there is none
+    items : numbers, in the order of the tiles
     """
     return (
         f"<style>{CARD_STYLE}</style><div class='plateviz'>"
         f"<p class='title'><b>{escape(title)}</b> <span>{escape(subtitle)}</span></p>"
-        f"{_judged(verdict)}{strip(items)}</div>"
+        f"{_verdict(verdict)}{strip(items)}</div>"
     )
 
 
-def in_words(title: str, subtitle: str, verdict: Verdict | None) -> str:
-    """Return the same in one line of text."""
-    judged = "" if verdict is None else f": {verdict.headline}"
-    return f"{title} ({subtitle}){judged}"
+def summary_line(title: str, subtitle: str, verdict: Verdict | None) -> str:
+    """Return the title and the verdict as one line of text."""
+    headline = "" if verdict is None else f": {verdict.headline}"
+    return f"{title} ({subtitle}){headline}"
 
 
-def _judged(verdict: Verdict | None) -> str:
+def _verdict(verdict: Verdict | None) -> str:
     if verdict is None:
         return ""
-    notable = "".join(f"<li>{escape(words)}</li>" for words in verdict.notable)
+    notable = "".join(f"<li>{escape(text)}</li>" for text in verdict.notable)
     notable = f"<ul>{notable}</ul>" if notable else ""
     return f"<p class='verdict {verdict.state}'>{escape(verdict.headline)}</p>{notable}"

@@ -1,7 +1,7 @@
-"""Dashboard: the whole dashboard in a cell, and as the page of `panel serve`.
+"""Dashboard: the dashboard in a cell, or as the page of `panel serve`.
 
-In a cell it is a page of its own, served by this process and shown in a frame: so it has all
-that it has elsewhere, and no cell has to hold its scripts. It answers between cells.
+In a cell it is a separate page, served by this process and shown in a frame. It is therefore
+complete, and the notebook does not contain its scripts. It responds while no cell runs.
 """
 
 import sys
@@ -25,17 +25,17 @@ class Dashboard:
     """The dashboard of one origin, started when it is first shown."""
 
     def __init__(self, solver: LazySolver, port: int, height: int) -> None:
-        """Take what to show.
+        """Set what to show, and where.
 
         Parameters
         ----------
-        port : TCP port to serve on; 0 takes a free one
-        height : of the frame, screen pixels
+        port : TCP port to serve on; 0 selects a free port
+        height : height of the frame, screen pixels
 
         Raises
         ------
         InputError
-            If they are not numbers of a port and of pixels.
+            If the port or the height is invalid.
         """
         if not isinstance(port, int) or not 0 <= port <= _HIGHEST_PORT:
             raise InputError(f"port: expected 0 to {_HIGHEST_PORT}, found {port!r}")
@@ -47,7 +47,7 @@ class Dashboard:
 
     @property
     def address(self) -> str:
-        """Address of the page on this machine; the first call serves it.
+        """Address of the page on this machine; the first access starts the server.
 
         Raises
         ------
@@ -55,40 +55,40 @@ class Dashboard:
             If the port is taken.
         """
         if not self._servers:
-            # The server, and all that it draws with, takes seconds to import.
-            from plateviz.dashboard.server import Place, begin, check_address
+            # The server and its plotting libraries take seconds to import.
+            from plateviz.dashboard.server import Endpoint, begin, check_address
 
             port = check_address(_ADDRESS, self._port)
-            self._servers.append(begin(self._solver.store, Place(port, _ADDRESS)))
+            self._servers.append(begin(self._solver.store, Endpoint(port, _ADDRESS)))
             self._port = port
         return f"http://{_ADDRESS}:{self._port}/"
 
     def close(self) -> None:
-        """Stop serving; the solver process stays."""
+        """Stop the server; the solver process continues."""
         _stop(self._servers)
 
     def servable(self) -> Self:
-        """Make it the page where `panel serve` runs the notebook; elsewhere this changes nothing.
+        """Make it the page if `panel serve` runs the notebook; otherwise do nothing.
 
         Returns
         -------
-        The dashboard itself, which a cell shows.
+        The dashboard itself, for display in a cell.
         """
         panel = sys.modules.get("panel")
         if panel is not None and panel.state.curdoc is not None:
             from plateviz.dashboard.app import build_app
 
-            build_app(self._served()).servable()
+            build_app(self._session_store()).servable()
         return self
 
     def __panel__(self) -> "pn.viewable.Viewable":
-        """Return the dashboard as a part of a served page."""
+        """Return the dashboard as a part of a page of `panel serve`."""
         from plateviz.dashboard.app import build_part
 
-        return build_part(self._served())
+        return build_part(self._session_store())
 
-    def _served(self) -> SolutionStore:
-        """Return the store for a page of this session, with whose end it is closed."""
+    def _session_store(self) -> SolutionStore:
+        """Return the store for a page of this session; the end of the session closes it."""
         import panel as pn
 
         pn.extension("tabulator")
@@ -96,19 +96,19 @@ class Dashboard:
         return self._solver.store
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
-        words = {"text/plain": repr(self)}
+        text = {"text/plain": repr(self)}
         if notebook_shell() is None:
-            return words
+            return text
         address = escape(self.address, quote=True)
         frame = (
             f"<p><a href='{address}' target='_blank'>Open the dashboard in a tab of its own</a></p>"
             f"<iframe src='{address}' width='100%' height='{self._height}' "
             "style='border: 1px solid #d5dbe1;'></iframe>"
         )
-        return {**words, "text/html": frame}
+        return {**text, "text/html": frame}
 
     def __repr__(self) -> str:
-        """Return what it is."""
+        """Return the title."""
         return f"dashboard of {self._solver.origin.title}; the last line of a cell shows it"
 
 

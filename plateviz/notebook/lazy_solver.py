@@ -1,4 +1,4 @@
-"""LazySolver: the store of one source of orbits, whose solver process starts when it is needed."""
+"""LazySolver: the solution store of one origin; its solver process starts on first use."""
 
 import weakref
 from contextlib import suppress
@@ -16,20 +16,21 @@ from solver.errors import FitError
 
 
 class LazySolver:
-    """Solves orbits of one source; its process ends with it, or with the interpreter."""
+    """Solves orbits of one origin; the process ends with this object or the interpreter."""
 
     def __init__(self, origin: Origin) -> None:
-        """Take a origin; nothing is started yet."""
+        """Set the origin; nothing is started yet."""
         self.origin = origin
-        self._open: list[SolutionStore] = []
-        weakref.finalize(self, _close, self._open)
+        # Holds the store once it is started; the finalizer must not refer to this object.
+        self._started: list[SolutionStore] = []
+        weakref.finalize(self, _close, self._started)
 
     @property
     def store(self) -> SolutionStore:
-        """The store; the solver process starts with the first call."""
-        if not self._open:
-            self._open.append(_start_store(self.origin))
-        return self._open[0]
+        """The solution store; the first access starts the solver process."""
+        if not self._started:
+            self._started.append(_start_store(self.origin))
+        return self._started[0]
 
     def solve(
         self, orbit: int | None, settings: FitSettings, *, what_if: bool, title: str
@@ -38,14 +39,14 @@ class LazySolver:
 
         Parameters
         ----------
-        orbit : of the origin, None where that is the file of one
-        what_if : whether a step from the last fit will do
-        title : what is being done
+        orbit : orbit_id; None if the origin is files with one orbit only
+        what_if : whether a step from the last fit is enough
+        title : text of the line of progress
 
         Raises
         ------
         InputError
-            If the data cannot hold what the settings ask for.
+            If the settings do not apply to the data.
         FitError
             If there is no solution.
         """
@@ -60,27 +61,27 @@ class LazySolver:
             job.require_done()
         result = store.result(orbit, settings, what_if)
         if result is None:
-            raise FitError(f"{title}: the result is gone")
+            raise FitError(f"{title}: expected the result of the fit, found that it was removed")
         return result
 
     def close(self) -> None:
-        """End the solver process; a later question starts another."""
-        _close(self._open)
+        """End the solver process; the next fit starts another."""
+        _close(self._started)
 
 
 class HasSolver:
-    """An object whose fits a lazy solver runs; as a context manager it closes the solver."""
+    """An object that fits with a lazy solver; as a context manager it closes the solver."""
 
     def __init__(self, solver: LazySolver) -> None:
-        """Take the solver."""
+        """Set the solver."""
         self._solver = solver
 
     def close(self) -> None:
-        """End the solver process; what was solved stays at hand, and a fit starts another."""
+        """End the solver process; solutions remain available, and the next fit starts another."""
         self._solver.close()
 
     def __enter__(self) -> Self:
-        """Return this, to be closed at the end."""
+        """Return the object itself."""
         return self
 
     def __exit__(
@@ -89,39 +90,39 @@ class HasSolver:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close it."""
+        """Close the solver."""
         self.close()
 
 
 def run_job(job: Job, title: str) -> None:
-    """Have one job done by a solver process of its own, with a line of progress.
+    """Run one job in a separate solver process, with a line of progress.
 
     Raises
     ------
     InputError
-        If what was asked for cannot be done.
+        If the input of the job is invalid.
     FitError
-        If it failed otherwise.
+        If the job failed for another reason.
     """
-    worker = WarmSolver()
+    solver = WarmSolver()
     try:
         with reporting(title) as reporter:
-            reporter.follow(worker.submit(job))
+            reporter.follow(solver.submit(job))
             job.require_done()
     finally:
-        worker.close()
+        solver.close()
 
 
 def _start_store(origin: Origin) -> SolutionStore:
-    worker = WarmSolver()
+    solver = WarmSolver()
     try:
-        return SolutionStore(origin, worker)
+        return SolutionStore(origin, solver)
     except (OSError, ValueError):
-        worker.close()
+        solver.close()
         raise
 
 
-def _close(benches: list[SolutionStore]) -> None:
-    while benches:
+def _close(stores: list[SolutionStore]) -> None:
+    while stores:
         with suppress(OSError):
-            benches.pop().close()
+            stores.pop().close()

@@ -1,4 +1,4 @@
-"""What a person gives, and the object that it opens."""
+"""`open` and `simulate`: open a survey, an orbit or a solution from paths, or make a survey."""
 
 from os import PathLike
 from pathlib import Path
@@ -33,13 +33,13 @@ def open(
 
     Parameters
     ----------
-    path : a survey directory; or a result of `plateviz fit`; or, with a reference catalogue,
-        the measurements and exposures of an orbit, as `plateviz fit` takes them
-    reference : the reference catalogue, with measurements
-    truth : the true catalogue of a simulation, with measurements
+    path : a survey directory, a result file of `plateviz fit`, or, with `reference`, the
+        measurements and exposures of an orbit, as for `plateviz fit`
+    reference : the reference catalogue of the measurements
+    truth : the true catalogue of a simulation, with measurements only
     instrument : a TOML file, with measurements or a solution; the mini-mock's by default
-    orbit : the orbit to take where the files hold several
-    run : name of a survey's run; the first whole one by default
+    orbit : id of the orbit, with measurements of several orbits
+    run : name of a run of the survey; the first complete run by default
 
     Returns
     -------
@@ -48,20 +48,20 @@ def open(
     Raises
     ------
     InputError
-        If something is not there, or wrong with it.
+        If a file is missing or invalid, or an argument does not apply to `path`.
     """
     given = {"truth": truth, "instrument": instrument, "orbit": orbit, "run": run}
-    chosen = {name for name, value in given.items() if value is not None}
+    given_names = {name for name, value in given.items() if value is not None}
     if reference is not None:
-        _refuse(chosen & {"run"}, "the files of an orbit")
+        _refuse(given_names & {"run"}, "the files of an orbit")
         return _open_orbit(path, reference, truth, instrument, orbit)
-    place = _there(path)
-    if place.is_dir():
-        _refuse(chosen - {"run"}, "a survey directory")
-        return OpenSurvey(place, run)
-    _refuse(chosen - {"instrument"}, "a solution, or a reference catalogue beside measurements")
-    camera = MINI_MOCK if instrument is None else read_instrument(_there(instrument))
-    return OpenSolution(read_result(place), camera, place.name, f"plateviz.open({str(place)!r})")
+    target = _existing_path(path)
+    if target.is_dir():
+        _refuse(given_names - {"run"}, "a survey directory")
+        return OpenSurvey(target, run)
+    _refuse(given_names - {"instrument"}, "a result file; measurements need a reference catalogue")
+    camera = MINI_MOCK if instrument is None else read_instrument(_existing_path(instrument))
+    return OpenSolution(read_result(target), camera, target.name, f"plateviz.open({str(target)!r})")
 
 
 def simulate(
@@ -72,38 +72,38 @@ def simulate(
     stars: int | None = None,
     catalogue: _Path | None = None,
 ) -> OpenSurvey:
-    """Simulate the paper's mini-mock survey, and open it; one that is there is opened.
+    """Simulate the paper's mini-mock survey and open it; an existing survey is only opened.
 
     Parameters
     ----------
-    directory : to make; one that was interrupted is gone on with
+    directory : survey directory to create; an interrupted simulation resumes
     orbits : number of orbits
-    seed : of all random numbers
-    stars : in the extended field, instead of the paper's 132,651
-    catalogue : a Gaia table to take as the truth, instead of a synthetic one
+    seed : seed of the random numbers
+    stars : number of stars in the extended field; the paper's 132,651 by default
+    catalogue : Gaia table to use as the true catalogue; synthetic by default
 
     Raises
     ------
     InputError
-        If a choice cannot be used, or the directory holds something else, such as a survey of
-        other choices.
+        If an argument is invalid, or the directory holds other files or a survey with other
+        settings.
     """
-    place = path_of(directory).absolute()
+    target = path_of(directory).absolute()
     settings = SurveySettings(orbits=orbits, seed=seed)
     if stars is not None:
         settings = settings.scaled(stars)
-    table = None if catalogue is None else _there(catalogue)
-    if (place / HEADER).is_file():
-        _check_same(place, settings, table)
-        return OpenSurvey(place)
+    table = None if catalogue is None else _existing_path(catalogue)
+    if (target / HEADER).is_file():
+        _check_same(target, settings, table)
+        return OpenSurvey(target)
     request = {
         "do": "simulate",
-        "directory": str(place),
+        "directory": str(target),
         "settings": settings.to_dict(),
         "catalogue": None if table is None else str(table),
     }
     run_job(Job(request), f"simulating {orbits} orbits")
-    return OpenSurvey(place)
+    return OpenSurvey(target)
 
 
 def _open_orbit(
@@ -113,39 +113,39 @@ def _open_orbit(
     instrument: _Path | None,
     orbit: int | None,
 ) -> OpenOrbit:
-    # Of all paths the absolute ones: a notebook may change its folder, the solver's does not.
+    # Absolute paths: a notebook may change its working directory, the solver process does not.
     files = OrbitFiles(
-        str(_there(observations)),
-        str(_there(reference)),
-        None if truth is None else str(_there(truth)),
+        str(_existing_path(observations)),
+        str(_existing_path(reference)),
+        None if truth is None else str(_existing_path(truth)),
         orbit,
-        None if instrument is None else str(_there(instrument)),
+        None if instrument is None else str(_existing_path(instrument)),
     )
     return OpenOrbit(LazySolver(files), orbit, f"plateviz.open({files.observations!r}, ...)")
 
 
-def _there(given: object) -> Path:
+def _existing_path(given: object) -> Path:
     path = path_of(given).absolute()
     if not path.exists():
         raise InputError(f"{path}: expected a file or a folder, found none")
     return path
 
 
-def _refuse(chosen: set[str], what: str) -> None:
-    if chosen:
-        raise InputError(f"{', '.join(sorted(chosen))}: expected nothing of the kind with {what}")
+def _refuse(given_names: set[str], what: str) -> None:
+    if given_names:
+        raise InputError(f"{', '.join(sorted(given_names))}: expected no such argument with {what}")
 
 
 def _check_same(directory: Path, settings: SurveySettings, catalogue: Path | None) -> None:
-    """Refuse a survey that was made with other choices."""
+    """Raise `InputError` if the survey was made with other settings."""
     header = read_header(directory)
-    found, wanted = section(header, "settings"), settings.to_dict()
-    different = [name for name in {**wanted, **found} if wanted.get(name) != found.get(name)]
+    found, expected = section(header, "settings"), settings.to_dict()
+    different = [name for name in {**expected, **found} if expected.get(name) != found.get(name)]
     table = None if catalogue is None else sha256_of(catalogue)
     if section(header, "catalogue").get("sha256") != table:
         different.append("catalogue")
     if different:
         raise InputError(
-            f"{directory}: expected a survey of these choices or none, found one of other "
+            f"{directory}: expected no survey or one with these settings, found one with other "
             f"{', '.join(different)}; plateviz.open opens it"
         )

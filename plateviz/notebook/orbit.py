@@ -1,4 +1,4 @@
-"""OpenOrbit: the measurements of one orbit, to be fitted and asked what if."""
+"""OpenOrbit: the measurements of one orbit, with fits and what-ifs."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -6,11 +6,11 @@ from functools import partial
 import pandas as pd
 from astropy.table import QTable
 
-from plateviz.notebook.card import card, in_words
-from plateviz.notebook.choices import settings_with, takes_choices
+from plateviz.notebook.card import card, summary_line
 from plateviz.notebook.dashboard import Dashboard
+from plateviz.notebook.keywords import settings_with, takes_settings
+from plateviz.notebook.lazy_collection import LazyCollection, unknown_name
 from plateviz.notebook.lazy_solver import HasSolver, LazySolver
-from plateviz.notebook.named import Named, no_such
 from plateviz.notebook.solution import OpenSolution
 from plateviz.notebook.table import OpenTable
 from plateviz.runs.queries import SurveyRun
@@ -29,30 +29,30 @@ _SCHEMAS = {
 
 
 class OpenOrbit(HasSolver):
-    """The measurements of one orbit, its catalogue, and the solutions made of them.
+    """The measurements of one orbit, its catalogue, and its solutions.
 
     Attributes
     ----------
     number : orbit_id
-    origin : where it comes from, in words
+    origin : name of its origin
     """
 
     def __init__(
         self, solver: LazySolver, orbit: int | None, call: str, run: SurveyRun | None = None
     ) -> None:
-        """Read the orbit, and check it.
+        """Read and check the orbit.
 
         Parameters
         ----------
-        solver : solves the orbit
-        orbit : of its origin, None where that is the file of one
-        call : what a person wrote to get it
-        run : that has it fitted, or None
+        solver : solver of the orbit's origin
+        orbit : orbit_id; None if the origin is files with one orbit only
+        call : Python code that returns this object, for reports
+        run : run with a fit of the orbit, or None
 
         Raises
         ------
         InputError
-            If something is wrong with the files.
+            If the files are invalid.
         """
         super().__init__(solver)
         self._orbit, self._call = orbit, call
@@ -63,22 +63,22 @@ class OpenOrbit(HasSolver):
         self.origin = solver.origin.title
 
     @property
-    def tables(self) -> Named[pd.DataFrame]:
-        """What was read, as pandas has it: measurements, exposures, catalogue and truth."""
+    def tables(self) -> LazyCollection[pd.DataFrame]:
+        """The input as pandas tables: measurements, exposures, catalogue and truth."""
         found = self._tables()
         frames = {name: partial(one.frame.copy, deep=False) for name, one in found.items()}
-        return Named("table", frames)
+        return LazyCollection("table", frames)
 
     def table(self, name: str) -> QTable:
-        """Return one of `tables` with units, as astropy has it."""
+        """Return one of `tables` as an astropy table with units."""
         found = self._tables()
         if name not in found:
-            raise InputError(no_such("table", name, found))
+            raise InputError(unknown_name("table", name, found))
         return found[name].to_astropy()
 
     @property
     def solution(self) -> OpenSolution:
-        """The last solution: of `fit`, else that of the survey's run.
+        """The solution of the last `fit`, or else of the survey's run.
 
         Raises
         ------
@@ -92,48 +92,47 @@ class OpenOrbit(HasSolver):
             )
         return self._solution
 
-    @takes_choices
-    def fit(self, **choices: object) -> OpenSolution:
-        """Fit the orbit, with a line of progress; what is not chosen is the paper's.
+    @takes_settings
+    def fit(self, **settings: object) -> OpenSolution:
+        """Fit the orbit, with a line of progress; other settings are the paper's.
 
         Parameters
         ----------
-        choices : settings by the keywords of `plateviz.notebook.choices.KEYWORDS`, such as
+        settings : keywords of `plateviz.notebook.keywords.KEYWORDS`, such as
             `fit(order=3, priors={"distortion_x": "10um", "pitch_x": "flat"})`
 
         Raises
         ------
         InputError
-            If a choice cannot be used, or the data cannot hold it.
+            If a setting is invalid, or does not apply to the data.
         FitError
             If there is no solution.
         """
-        settings = settings_with(FitSettings(), choices)
-        self._solution = self._solve(settings, None)
+        self._solution = self._solve(settings_with(FitSettings(), settings), None)
         return self._solution
 
-    @takes_choices
-    def what_if(self, **choices: object) -> OpenSolution:
-        """Return the last solution under other choices; it stays the last one.
+    @takes_settings
+    def what_if(self, **settings: object) -> OpenSolution:
+        """Return a what-if of the last solution, which stays the last solution.
 
         Parameters
         ----------
-        choices : those that are to be others, as of `fit`
+        settings : those that change, as in `fit`
 
         Raises
         ------
         InputError
-            If there is no solution yet, or a choice cannot be used.
+            If there is no solution yet, or a setting is invalid.
         """
-        return self.solution.what_if(**choices)
+        return self.solution.what_if(**settings)
 
     def dashboard(self, *, port: int = 0, height: int = 900) -> Dashboard:
-        """Return the dashboard of the orbit, which a cell shows; see `OpenSurvey.dashboard`."""
+        """Return the dashboard of the orbit, for display in a cell; see `OpenSurvey.dashboard`."""
         return Dashboard(self._solver, port, height)
 
     def __repr__(self) -> str:
-        """Return what it is."""
-        return in_words(f"Orbit {self.number}", self.origin, None)
+        """Return the title."""
+        return summary_line(f"Orbit {self.number}", self.origin, None)
 
     def _repr_html_(self) -> str:
         data = self._data
@@ -161,7 +160,7 @@ class OpenOrbit(HasSolver):
         )
 
     def _solve(self, settings: FitSettings, base: OpenSolution | None) -> OpenSolution:
-        """Return a solution; by a step from the last fit where it is to be compared with one."""
+        """Return a solution: a what-if compared with `base`, or a fit if `base` is None."""
         title = f"{'what if' if base else 'fit'}: {settings.describe()}"
         result = self._solver.solve(
             self._orbit, settings, what_if=base is not None, title=f"orbit {self.number}, {title}"
@@ -181,14 +180,14 @@ class OpenOrbit(HasSolver):
 
 
 class _Refits:
-    """What a solution of an orbit asks its orbit for."""
+    """The refits of an orbit, for its solutions."""
 
     def __init__(self, orbit: OpenOrbit) -> None:
         self._orbit = orbit
 
-    def what_if(self, base: OpenSolution, choices: Mapping[str, object]) -> OpenSolution:
-        # An orbit's comparison of all orders is no matter of one step.
-        settings = settings_with(base.settings, {"compare_orders": False, **choices})
+    def what_if(self, base: OpenSolution, changes: Mapping[str, object]) -> OpenSolution:
+        # A what-if does not compare the orders unless asked to.
+        settings = settings_with(base.settings, {"compare_orders": False, **changes})
         return self._orbit._solve(settings, base)
 
 

@@ -13,25 +13,25 @@ if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
 
 Compose = Callable[["Facts"], "Report"]
-"""Gives a report of which the facts are known."""
+"""Composes a report from its facts: command, run and versions."""
 
 
 def write_report(
     compose: Compose, path: str | PathLike[str], call: str, run: str | None = None
 ) -> Path:
-    """Write a report as one HTML file that opens anywhere, with a line of progress.
+    """Write a report as one self-contained HTML file, with a line of progress.
 
     Parameters
     ----------
-    call : what a person wrote to get what is reported
-    run : of the survey, None where there is none
+    call : Python code that returns the reported object
+    run : name of the run, or None
 
     Raises
     ------
     InputError
-        If the file cannot be written, or there is nothing to report.
+        If the file cannot be written, or the object cannot be reported.
     """
-    # These draw, and take as long to import as HoloViews does.
+    # These import HoloViews, which takes seconds.
     from plateviz.reports.facts import facts_of
     from plateviz.reports.page import page_of
 
@@ -46,12 +46,12 @@ def write_report(
 
 
 def path_of(given: object) -> Path:
-    """Return the path that a person gave, with the home folder for "~".
+    """Return a path given by the user, with "~" expanded.
 
     Raises
     ------
     InputError
-        If it is no path.
+        If it is not a path.
     """
     if not isinstance(given, str | PathLike):
         raise InputError(f"expected the path of a file or a folder, found {given!r}")

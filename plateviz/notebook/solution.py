@@ -1,6 +1,6 @@
 """OpenSolution: a fitted orbit, with its tables, figures and report.
 
-What draws is imported when it is asked for: HoloViews takes seconds.
+The plots are imported on first use, since HoloViews takes seconds to import.
 """
 
 from collections.abc import Iterable, Mapping
@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 import pandas as pd
 from astropy.table import QTable
 
-from plateviz.notebook.card import card, in_words
-from plateviz.notebook.choices import takes_choices
-from plateviz.notebook.drawing import Drawing, FigureRecipe, Illustrated, drawings
-from plateviz.notebook.named import Named, no_such
+from plateviz.notebook.card import card, summary_line
+from plateviz.notebook.figures import FigureSpec, HasFigures, NotebookFigure, figure_collection
+from plateviz.notebook.keywords import takes_settings
+from plateviz.notebook.lazy_collection import LazyCollection, unknown_name
 from plateviz.notebook.report import path_of, write_report
 from plateviz.notebook.table import OpenTable, result_tables
 from plateviz.tables.summary import summary_strip
@@ -33,25 +33,25 @@ if TYPE_CHECKING:
 
 
 class Refits(Protocol):
-    """What fits the orbit of a solution again."""
+    """Fits the orbit of a solution again."""
 
-    def what_if(self, base: "OpenSolution", choices: Mapping[str, object]) -> "OpenSolution":
-        """Return the solution under other choices than those of `base`."""
+    def what_if(self, base: "OpenSolution", changes: Mapping[str, object]) -> "OpenSolution":
+        """Return the what-if of `base` with some settings changed, by keyword."""
         ...
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class OpenSolution(Illustrated):
+class OpenSolution(HasFigures):
     """A fitted orbit.
 
     Attributes
     ----------
-    result : the solution as the solver has it, `solver.data.result.FitResult`
-    instrument : that took the orbit
-    origin : where it comes from, in words
-    call : what a person wrote to get it
-    other : solution that it is compared with, or None
-    refits : what can fit the orbit again, or None
+    result : result of the solver, `solver.data.result.FitResult`
+    instrument : instrument of the orbit
+    origin : name of its origin
+    call : Python code that returns this object, for reports
+    other : solution to compare with, or None
+    refits : fits the orbit again; None for a solution without measurements
     """
 
     result: FitResult
@@ -63,27 +63,27 @@ class OpenSolution(Illustrated):
 
     @property
     def settings(self) -> FitSettings:
-        """The choices that made it."""
+        """The settings of the fit."""
         return self.result.settings
 
     @property
     def summary(self) -> dict[str, Any]:
-        """Its numbers, as `plateviz fit --json` prints them."""
+        """The numbers that `plateviz fit --json` prints."""
         return dict(self.result.summary)
 
     @property
     def verdict(self) -> Verdict:
-        """Whether to trust it: a state, a headline, reasons, and what stands out."""
+        """Whether to trust the solution: state, headline, reasons, and notable numbers."""
         return orbit_verdict(self.result)
 
     @property
-    def tables(self) -> Named[pd.DataFrame]:
-        """All its tables by name, as pandas has them: `tables.sources`, `tables["modes"]`."""
+    def tables(self) -> LazyCollection[pd.DataFrame]:
+        """All tables by name, as pandas tables: `tables.sources`, `tables["modes"]`."""
         found = self._tables()
-        return Named("table", {name: partial(_frame, one) for name, one in found.items()})
+        return LazyCollection("table", {name: partial(_frame, one) for name, one in found.items()})
 
     def table(self, name: str) -> QTable:
-        """Return a table with units, as astropy has it; InputError if there is none of that name.
+        """Return an astropy table with units; InputError if there is no table of that name.
 
         Parameters
         ----------
@@ -91,7 +91,7 @@ class OpenSolution(Illustrated):
         """
         found = self._tables()
         if name not in found:
-            raise InputError(no_such("table", name, found))
+            raise InputError(unknown_name("table", name, found))
         return found[name].to_astropy()
 
     @property
@@ -101,12 +101,12 @@ class OpenSolution(Illustrated):
 
     @property
     def residuals(self) -> pd.DataFrame:
-        """Measured minus predicted, a row per measurement."""
+        """Measured minus predicted pixel positions, a row per measurement."""
         return self.tables["residuals"]
 
     @property
     def exposures(self) -> pd.DataFrame:
-        """How each exposure fits."""
+        """Statistics of the residuals, a row per exposure."""
         return self.tables["exposures"]
 
     @property
@@ -116,12 +116,12 @@ class OpenSolution(Illustrated):
 
     @property
     def detectors(self) -> pd.DataFrame:
-        """Place, rotation and pitch of each detector."""
+        """Position, rotation and pitch of each detector."""
         return self.tables["detectors"]
 
     @property
     def distortion(self) -> pd.DataFrame:
-        """Terms of the distortion."""
+        """Distortion terms."""
         return self.tables["distortion"]
 
     def figure(
@@ -131,61 +131,62 @@ class OpenSolution(Illustrated):
         exposures: Iterable[tuple[int, int]] | None = None,
         detector: int | None = None,
         theme: str = "light",
-    ) -> Drawing:
+    ) -> NotebookFigure:
         """Return a figure that displays itself.
 
         Parameters
         ----------
         name : one of `figures`
-        exposures : (field, plate) of those to show, where the figure follows them; all by default
-        detector : to show, where the figure follows it; all by default
+        exposures : (field, plate) of the exposures to show, in figures with a selection of
+            exposures; all by default
+        detector : detector to show, in figures with a selection of detectors; all by default
         theme : "light" or "dark"
 
         Raises
         ------
         InputError
-            If there is no such figure, or nothing to show in it.
+            If there is no such figure, exposure or detector.
         """
-        return self._drawings_of(self._chosen(exposures, detector), theme)[name]
+        return self._figures_of(self._chosen(exposures, detector), theme)[name]
 
     def compared_with(self, other: "OpenSolution") -> "OpenSolution":
-        """Return this solution with another to compare it with: the figure `comparison` shows it.
+        """Return this solution with another to compare with, for the figure `comparison`.
 
         Raises
         ------
         InputError
-            If the other is no solution.
+            If `other` is not a solution.
         """
         if not isinstance(other, OpenSolution):
             raise InputError(f"expected a solution to compare with, found {other!r}")
         return replace(self, other=other)
 
-    @takes_choices
-    def what_if(self, **choices: object) -> "OpenSolution":
-        """Return the solution under other choices, by a step from the last fit where that can tell.
+    @takes_settings
+    def what_if(self, **settings: object) -> "OpenSolution":
+        """Return a what-if with some settings changed, by a step from the last fit if possible.
 
         Parameters
         ----------
-        choices : those that are to be others, as of `OpenOrbit.fit`
+        settings : those that change, as in `OpenOrbit.fit`
 
         Returns
         -------
-        The other solution, compared with this one.
+        The what-if, compared with this solution.
 
         Raises
         ------
         InputError
-            If a choice cannot be used, or there is nothing to fit again.
+            If a setting is invalid, or the solution has no measurements.
         """
         if self.refits is None:
             raise InputError(
                 f"{self.origin}: expected the measurements of an orbit to fit again, found a "
                 "solution alone; plateviz.open(OBS, REF) opens the orbit"
             )
-        return self.refits.what_if(self, choices)
+        return self.refits.what_if(self, settings)
 
     def report(self, path: str | PathLike[str]) -> Path:
-        """Write it, with what it is compared with, as one HTML file that opens anywhere.
+        """Write the solution, with any comparison, as one self-contained HTML file.
 
         Raises
         ------
@@ -195,7 +196,7 @@ class OpenSolution(Illustrated):
         return write_report(self._report, path, self.call)
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write it as `plateviz fit` does: a FITS file in the published layout.
+        """Write the solution as `plateviz fit` does: a FITS file in the published layout.
 
         Raises
         ------
@@ -207,8 +208,8 @@ class OpenSolution(Illustrated):
         return target
 
     def __repr__(self) -> str:
-        """Return what it is and the verdict."""
-        return in_words(*self._titles(), self.verdict)
+        """Return the title and the verdict."""
+        return summary_line(*self._titles(), self.verdict)
 
     def _repr_html_(self) -> str:
         return card(*self._titles(), self.verdict, summary_strip(self.result))
@@ -220,14 +221,14 @@ class OpenSolution(Illustrated):
     def _tables(self) -> dict[str, OpenTable]:
         return result_tables(self.result)
 
-    def _drawings(self, theme: str) -> Named[Drawing]:
-        return self._drawings_of(self._chosen(None, None), theme)
+    def _figures(self, theme: str) -> LazyCollection[NotebookFigure]:
+        return self._figures_of(self._chosen(None, None), theme)
 
-    def _drawings_of(self, chosen: "Chosen", theme: str) -> Named[Drawing]:
+    def _figures_of(self, chosen: "Chosen", theme: str) -> LazyCollection[NotebookFigure]:
         from plateviz.plots.gallery import diagnostics
 
         found = [one for one in diagnostics() if one.has_data(chosen)]
-        return drawings([_figure(one, chosen) for one in found], theme)
+        return figure_collection([_spec(one, chosen) for one in found], theme)
 
     def _chosen(
         self, exposures: Iterable[tuple[int, int]] | None, detector: int | None
@@ -235,19 +236,19 @@ class OpenSolution(Illustrated):
         from plateviz.plots.diagnostic import Chosen
 
         table = self.result.exposures[["field_id", "plate_id"]]
-        there = [(int(f), int(p)) for f, p in table.itertuples(index=False)]
+        available = [(int(f), int(p)) for f, p in table.itertuples(index=False)]
         numbers = [one.detector_id for one in self.instrument.detectors]
         if detector is not None and detector not in numbers:
             raise InputError(f"detector: expected one of {numbers}, found {detector!r}")
-        wanted = there if exposures is None else _pairs(exposures)
-        absent = [pair for pair in wanted if pair not in there]
-        if absent or not wanted:
+        selected = available if exposures is None else _pairs(exposures)
+        absent = [pair for pair in selected if pair not in available]
+        if absent or not selected:
             raise InputError(
                 "exposures: expected (field, plate) of the solution, such as "
-                f"{there[0]}, found {absent[0] if absent else 'none'}"
+                f"{available[0]}, found {absent[0] if absent else 'none'}"
             )
         other = None if self.other is None else self.other.result
-        return Chosen(self.result, self.instrument, tuple(wanted), detector, other)
+        return Chosen(self.result, self.instrument, tuple(selected), detector, other)
 
     def _report(self, facts: "Facts") -> "Report":
         from plateviz.reports.orbit import orbit_report
@@ -257,13 +258,13 @@ class OpenSolution(Illustrated):
 
 
 def _frame(table: OpenTable) -> pd.DataFrame:
-    # Whoever changes it changes a copy: solutions are shared.
+    # A copy, so that changes do not affect the shared solution.
     return table.frame.copy(deep=False)
 
 
-def _figure(diagnostic: "Diagnostic", chosen: "Chosen") -> FigureRecipe:
+def _spec(diagnostic: "Diagnostic", chosen: "Chosen") -> FigureSpec:
     draw = partial(diagnostic.draw, chosen)
-    return FigureRecipe(diagnostic.name, diagnostic.title, diagnostic.caption, draw)
+    return FigureSpec(diagnostic.name, diagnostic.title, diagnostic.caption, draw)
 
 
 def _pairs(exposures: object) -> list[tuple[int, int]]:

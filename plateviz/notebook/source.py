@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import pandas as pd
 from astropy.table import QTable
 
-from plateviz.notebook.card import card, in_words
-from plateviz.notebook.drawing import Drawing, FigureRecipe, Illustrated, drawings
-from plateviz.notebook.named import Named
+from plateviz.notebook.card import card, summary_line
+from plateviz.notebook.figures import FigureSpec, HasFigures, NotebookFigure, figure_collection
+from plateviz.notebook.lazy_collection import LazyCollection
 from plateviz.notebook.report import write_report
 from plateviz.notebook.table import OpenTable
 from plateviz.runs.queries import SurveyRun
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
 _LARGEST_ID = 2**63 - 1
 
 
-class OpenSource(Illustrated):
-    """One source as a run has it, orbit by orbit.
+class OpenSource(HasFigures):
+    """One source in a run, orbit by orbit.
 
     Attributes
     ----------
-    source_id : of the catalogue
+    source_id : id in the catalogue
     kind : "reference", "non-reference" or "artificial"
     """
 
     def __init__(self, run: SurveyRun, source_id: int | str, call: str) -> None:
-        """Look for a source.
+        """Find a source in a run.
 
         Parameters
         ----------
-        call : what a person wrote to get it
+        call : Python code that returns this object, for reports
 
         Raises
         ------
@@ -58,64 +58,64 @@ class OpenSource(Illustrated):
 
     @property
     def history(self) -> pd.DataFrame:
-        """Its positions, a row per orbit: `solver.data.survey_schema.HISTORY`."""
+        """Positions, a row per orbit: `solver.data.survey_schema.HISTORY`."""
         return self._history.copy(deep=False)
 
     @property
     def time_series(self) -> pd.DataFrame:
-        """Its offsets against time, as the figure `time-series` draws them."""
+        """Offsets against time, as in the figure `time-series`."""
         return time_series(self._history, self._motion)
 
     @property
     def motion(self) -> pd.DataFrame:
-        """Its fitted position, parallax and proper motion, less the catalogue's.
+        """Fitted position, parallax and proper motion, minus the catalogue's.
 
         Raises
         ------
         InputError
-            If the run is not whole: motions are fitted when all orbits are there.
+            If the run is not complete: motions are fitted once all orbits are fitted.
         """
         if self._motion is None:
             raise InputError(
-                f"run {self._run.name!r}: expected motions, found that not all orbits are fitted"
+                f"run {self._run.name!r}: expected a complete run, found orbits without a fit"
             )
         return motion_table(self._motion)
 
     def table(self) -> QTable:
-        """Return `history` with units, as astropy has it."""
+        """Return `history` as an astropy table with units."""
         return OpenTable(self._history, list(HISTORY)).to_astropy()
 
     @property
     def verdict(self) -> Verdict:
-        """Whether its orbits agree with its motion."""
+        """Whether the positions agree with the fitted motion."""
         return source_verdict(self._history, self._motion)
 
     def report(self, path: str | PathLike[str]) -> Path:
-        """Write it as one HTML file that opens anywhere; InputError if that cannot be written."""
+        """Write a self-contained HTML file; InputError if it cannot be written."""
         return write_report(self._report, path, self._call, self._run.name)
 
     def __repr__(self) -> str:
-        """Return what it is and the verdict."""
-        return in_words(*self._titles(), self.verdict)
+        """Return the title and the verdict."""
+        return summary_line(*self._titles(), self.verdict)
 
     def _repr_html_(self) -> str:
         return card(*self._titles(), self.verdict, source_strip(self._history, self._motion))
 
     def _titles(self) -> tuple[str, str]:
-        where = f"{self._run.survey.resolve().name}, run {self._run.name}"
-        return f"{self.kind.capitalize()} source {self.source_id}", where
+        origin = f"{self._run.survey.resolve().name}, run {self._run.name}"
+        return f"{self.kind.capitalize()} source {self.source_id}", origin
 
-    def _drawings(self, theme: str) -> Named[Drawing]:
-        # What draws takes seconds to import.
+    def _figures(self, theme: str) -> LazyCollection[NotebookFigure]:
+        # The plots take seconds to import.
         from plateviz.plots.gallery import source_figures
         from plateviz.plots.survey_figure import SourceTables
 
         tables = SourceTables(self._history, self._motion)
         figures = [
-            FigureRecipe(one.name, one.title, one.caption, partial(one.draw, tables))
+            FigureSpec(one.name, one.title, one.caption, partial(one.draw, tables))
             for one in source_figures()
         ]
-        return drawings(figures, theme)
+        return figure_collection(figures, theme)
 
     def _report(self, facts: "Facts") -> "Report":
         from plateviz.reports.survey import source_report
@@ -124,12 +124,12 @@ class OpenSource(Illustrated):
 
 
 def id_of(given: object) -> int:
-    """Return the id of a source that a person gave as a number or as text.
+    """Return the id of a source given as a number or as text.
 
     Raises
     ------
     InputError
-        If it is no whole number of 64 bits.
+        If it is not a 64-bit integer.
     """
     try:
         number = int(str(given))

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Self
 import pandas as pd
 from astropy.table import QTable
 
-from plateviz.notebook.card import card, in_words
-from plateviz.notebook.choices import settings_with, takes_choices
+from plateviz.notebook.card import card, summary_line
 from plateviz.notebook.dashboard import Dashboard
-from plateviz.notebook.drawing import Drawing, FigureRecipe, Illustrated, drawings
+from plateviz.notebook.figures import FigureSpec, HasFigures, NotebookFigure, figure_collection
+from plateviz.notebook.keywords import settings_with, takes_settings
+from plateviz.notebook.lazy_collection import LazyCollection, unknown_name
 from plateviz.notebook.lazy_solver import HasSolver, LazySolver, run_job
-from plateviz.notebook.named import Named, no_such
 from plateviz.notebook.orbit import OpenOrbit
 from plateviz.notebook.report import write_report
 from plateviz.notebook.source import OpenSource
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
 
 
-class OpenSurvey(HasSolver, Illustrated):
-    """A survey directory, as one of its runs has it.
+class OpenSurvey(HasSolver, HasFigures):
+    """A survey directory, with one of its runs.
 
     Attributes
     ----------
-    directory : the survey's
-    run_name : of the run whose orbits, motions and sources are told; None while there is none
+    directory : the survey directory
+    run_name : name of the run whose orbits, motions and sources are given; None if there is none
     """
 
     def __init__(self, directory: Path, run: str | None = None) -> None:
@@ -49,42 +49,44 @@ class OpenSurvey(HasSolver, Illustrated):
 
         Parameters
         ----------
-        run : the first whole run by default, else the first
+        run : name of the run; by default the first complete run, or else the first
 
         Raises
         ------
         InputError
-            If the directory is no survey, or it has no such run.
+            If the directory is not a survey, or has no such run.
         """
         super().__init__(LazySolver(SurveyFolder(str(directory))))
         self.directory = directory
         self._numbers = self._solver.origin.orbits()
-        self.run_name = open_run(directory, run).name if run is not None else self._first()
+        self.run_name = (
+            open_run(directory, run).name if run is not None else self._default_run_name()
+        )
 
     @property
     def runs(self) -> list[str]:
-        """Names of the runs that there are."""
+        """Names of the runs of the survey."""
         return [run.name for run in survey_runs(self.directory)]
 
     @property
     def orbits(self) -> pd.DataFrame:
-        """All orbits, a row each, with how the run fits them where there is one."""
+        """All orbits, a row each, with the fit of the run if there is one."""
         if self.run_name is not None:
             return self._run().orbits()
         return pd.DataFrame({"orbit_id": self._numbers, "status": "missing"})
 
     @property
     def sources(self) -> pd.DataFrame:
-        """All sources of the run: class, and how often each was measured."""
+        """All sources of the run: class, and number of measurements."""
         return source_list(self._run().counts())
 
     @property
     def motions(self) -> pd.DataFrame:
-        """Fitted motions of all sources, a row each; none until all orbits are fitted."""
+        """Fitted motions of all sources, a row each; empty until all orbits are fitted."""
         return self._run().motions()
 
     def table(self, name: str) -> QTable:
-        """Return a table with units, as astropy has it.
+        """Return an astropy table with units.
 
         Parameters
         ----------
@@ -93,7 +95,7 @@ class OpenSurvey(HasSolver, Illustrated):
         Raises
         ------
         InputError
-            If there is none of that name.
+            If there is no table of that name.
         """
         readers = {
             "orbits": lambda: OpenTable(self._run().orbits(), list(RUN_ORBITS)),
@@ -102,11 +104,11 @@ class OpenSurvey(HasSolver, Illustrated):
             "truth": lambda: self._read(TRUTH_FILE, TRUTH),
         }
         if name not in readers:
-            raise InputError(no_such("table", name, readers))
+            raise InputError(unknown_name("table", name, readers))
         return readers[name]().to_astropy()
 
     def orbit(self, number: int) -> OpenOrbit:
-        """Return one orbit, with its solution where the run has it.
+        """Return one orbit, with its solution if the run has one.
 
         Raises
         ------
@@ -131,40 +133,40 @@ class OpenSurvey(HasSolver, Illustrated):
         """
         return OpenSource(self._run(), source_id, f"{self._call()}.source({source_id})")
 
-    @takes_choices
+    @takes_settings
     def fit(
         self,
         run: str = DEFAULT_RUN,
         orbits: list[int] | None = None,
         workers: int | None = None,
-        **choices: object,
+        **settings: object,
     ) -> Self:
-        """Fit every orbit that a run does not hold yet, with a line of progress.
+        """Fit every orbit that a run does not have yet, with a line of progress.
 
         Parameters
         ----------
-        run : name of the run; one that was begun is gone on with
-        orbits : those to fit; all by default
-        workers : processes; one for each core by default
-        choices : as of `OpenOrbit.fit`
+        run : name of the run; an incomplete run resumes
+        orbits : orbit_id of the orbits to fit; all by default
+        workers : number of worker processes; one per core by default
+        settings : as in `OpenOrbit.fit`
 
         Returns
         -------
-        The survey, as the run has it.
+        The survey, with this run.
 
         Raises
         ------
         InputError
-            If a choice cannot be used, or the run was begun with others.
+            If an argument is invalid, or the run has other settings.
         """
-        settings = settings_with(FitSettings(), choices)
+        chosen = settings_with(FitSettings(), settings)
         _check_numbers("orbits", orbits or [], least=0)
         _check_numbers("workers", [] if workers is None else [workers], least=1)
         request = {
             "do": "survey",
             "directory": str(self.directory),
             "run": run,
-            "settings": settings.to_dict(),
+            "settings": chosen.to_dict(),
             "orbits": None if orbits is None else list(orbits),
             "workers": workers,
         }
@@ -178,30 +180,30 @@ class OpenSurvey(HasSolver, Illustrated):
         return run_verdict(self.orbits, self.motions)
 
     def dashboard(self, *, port: int = 0, height: int = 900) -> Dashboard:
-        """Return the dashboard, which a cell shows in a frame; under `panel serve` it is the page.
+        """Return the dashboard, for display in a frame of a cell or as the page of `panel serve`.
 
         Parameters
         ----------
-        port : to serve it on, on this machine alone; 0 takes a free one. Where the browser is on
-            another machine, one that is forwarded from there
-        height : of the frame, screen pixels
+        port : TCP port to serve on, reachable from this machine only; 0 selects a free port. If
+            the browser runs on another machine, use a port that is forwarded from there
+        height : height of the frame, screen pixels
         """
         return Dashboard(self._solver, port, height)
 
     def report(self, path: str | PathLike[str]) -> Path:
-        """Write the run as one HTML file that opens anywhere.
+        """Write the run as one self-contained HTML file.
 
         Raises
         ------
         InputError
-            If orbits of the run are missing, or the file cannot be written.
+            If the run is not complete, or the file cannot be written.
         """
         run = self._run()
         return write_report(self._report, path, self._call(), run.name)
 
     def __repr__(self) -> str:
-        """Return what it is and the verdict."""
-        return in_words(*self._titles(), None if self.run_name is None else self.verdict)
+        """Return the title and the verdict."""
+        return summary_line(*self._titles(), None if self.run_name is None else self.verdict)
 
     def _repr_html_(self) -> str:
         if self.run_name is None:
@@ -216,10 +218,10 @@ class OpenSurvey(HasSolver, Illustrated):
     def _call(self) -> str:
         return f"plateviz.open({str(self.directory)!r}, run={self.run_name!r})"
 
-    def _first(self) -> str | None:
+    def _default_run_name(self) -> str | None:
         runs = survey_runs(self.directory)
-        whole = [run for run in runs if run.is_complete]
-        return (whole or runs)[0].name if runs else None
+        complete = [run for run in runs if run.is_complete]
+        return (complete or runs)[0].name if runs else None
 
     def _run(self) -> SurveyRun:
         if self.run_name is None:
@@ -233,17 +235,17 @@ class OpenSurvey(HasSolver, Illustrated):
         frame = read_survey_table(path, schema)
         return OpenTable(frame, [column for column in schema if column.name in frame])
 
-    def _drawings(self, theme: str) -> Named[Drawing]:
-        # What draws takes seconds to import.
+    def _figures(self, theme: str) -> LazyCollection[NotebookFigure]:
+        # The plots take seconds to import.
         from plateviz.plots.gallery import survey_figures
         from plateviz.runs.survey_tables import survey_tables
 
         tables = survey_tables(self._run())
         figures = [
-            FigureRecipe(one.name, one.title, one.caption, partial(one.draw, tables))
+            FigureSpec(one.name, one.title, one.caption, partial(one.draw, tables))
             for one in survey_figures()
         ]
-        return drawings(figures, theme)
+        return figure_collection(figures, theme)
 
     def _report(self, facts: "Facts") -> "Report":
         from plateviz.reports.survey import survey_report
@@ -251,8 +253,8 @@ class OpenSurvey(HasSolver, Illustrated):
         return survey_report(self._run(), facts)
 
 
-def _check_numbers(choice: str, numbers: object, least: int) -> None:
-    """Refuse what are no whole numbers, or too small."""
+def _check_numbers(name: str, numbers: object, least: int) -> None:
+    """Raise `InputError` unless `numbers` are whole numbers of at least `least`."""
     is_list = isinstance(numbers, list | tuple | range)
     if not is_list or not all(isinstance(n, int) and n >= least for n in numbers):  # type: ignore[union-attr]
-        raise InputError(f"{choice}: expected whole numbers from {least}, found {numbers!r}")
+        raise InputError(f"{name}: expected whole numbers from {least}, found {numbers!r}")

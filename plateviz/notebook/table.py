@@ -1,4 +1,4 @@
-"""OpenTable: a table of pandas, and the same with units as a table of astropy."""
+"""OpenTable: a pandas table that converts to an astropy table with units."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,19 +13,19 @@ from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES
 from solver.units import unit_named
 
-# Of the calibration: name of the table -> what it has a row for.
+# Table of the fitted calibration -> axis with one row per element.
 FITTED: dict[str, Axis] = {"pointings": "exp", "detectors": "det", "distortion": "coef"}
 _OF_VALUE = {"value": "", "sigma_marginal": "_sigma", "prior_share": "_prior_share"}
 
 
 class OpenTable(NamedTuple):
-    """A table and what its columns mean."""
+    """A table with the units and meanings of its columns."""
 
     frame: pd.DataFrame
     columns: Sequence[Column]
 
     def to_astropy(self) -> QTable:
-        """Return the table with units: quantities, with the meaning of each column."""
+        """Return an astropy table of quantities, with the meaning of each column."""
         table = QTable()
         for column in self.columns:
             values = _values(self.frame[column.name], column)
@@ -35,12 +35,12 @@ class OpenTable(NamedTuple):
 
 
 def result_tables(result: FitResult) -> dict[str, OpenTable]:
-    """Return every table that a solution has, by name.
+    """Return all tables of a solution, by name.
 
     Returns
     -------
-    Those of `solver.data.schema.RESULT_TABLES`, and "pointings", "detectors" and "distortion": the
-    fitted calibration with a row per exposure, detector and distortion term
+    The tables of `solver.data.schema.RESULT_TABLES`, and the fitted calibration: "pointings",
+    "detectors" and "distortion", with a row per exposure, detector or distortion term
     """
     tables = {name: _fitted(result, axis) for name, axis in FITTED.items()}
     for schema in RESULT_TABLES:
@@ -51,12 +51,12 @@ def result_tables(result: FitResult) -> dict[str, OpenTable]:
 
 
 def _fitted(result: FitResult, axis: Axis) -> OpenTable:
-    """Return the fitted calibration on one axis, a row per element of it."""
+    """Return the fitted calibration on one axis, a row per element."""
     groups = groups_on(axis)
     columns = [Column("element", "str", "", "exposure, detector or distortion term")]
     names = [group.name for group in groups]
     rows = result.calibration[result.calibration["group"].isin(names)]
-    labels = rows.groupby("element")["label"].agg(lambda words: " ".join(dict.fromkeys(words)))
+    labels = rows.groupby("element")["label"].agg(lambda texts: " ".join(dict.fromkeys(texts)))
     parts: dict[str, pd.Series] = {"element": labels}
     for group in groups:
         meanings = (

@@ -1,4 +1,4 @@
-"""Fits on request: where orbits come from, jobs, the warm solver process, solutions so far.
+"""Fits on request: origins of orbits, jobs, the warm solver process, the solution store.
 
 Imports `plateviz.runs` and below; no user interface.
 """

@@ -1,4 +1,4 @@
-"""Job: one piece of work of the solver process, as everybody who waits for it sees it."""
+"""Job: one request to the solver process, with its status and progress."""
 
 import threading
 import time
@@ -10,7 +10,7 @@ from solver.errors import CancelledError, FitError, InputError
 
 
 class JobStatus(Enum):
-    """Where a job stands; the value is the word for people."""
+    """Status of a job; the value is the text shown to users."""
 
     QUEUED = "waiting"
     RUNNING = "running"
@@ -20,19 +20,19 @@ class JobStatus(Enum):
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing more will happen."""
+        """Whether the job has ended."""
         return self in (JobStatus.DONE, JobStatus.FAILED, JobStatus.CANCELLED)
 
 
 class Job:
-    """One request and what has become of it.
+    """One request, with its status and progress; readable from any thread.
 
-    It belongs to the server, not to a browser session: whoever asks for the same work
-    watches the same job, and it goes on when a page is closed. Read from any thread.
+    A job belongs to the server, not to a browser session: sessions that request the same work
+    share one job, and it continues when a page is closed.
     """
 
     def __init__(self, request: Mapping[str, object]) -> None:
-        """Take the request, without the job's id, as `plateviz.solving.solver_process` reads it."""
+        """Set the request, as in `plateviz.solving.solver_process` but without the job's id."""
         self.id = uuid.uuid4().hex
         self.request = {**request, "job": self.id}
         self._changed = threading.Condition()
@@ -45,26 +45,26 @@ class Job:
 
     @property
     def status(self) -> JobStatus:
-        """Where the job stands."""
+        """Current status."""
         return self._status
 
     @property
     def message(self) -> str:
-        """Why it failed; empty otherwise."""
+        """Reason of a failure; empty otherwise."""
         return self._message
 
     @property
     def progress(self) -> list[Mapping[str, object]]:
-        """What it has reported so far."""
+        """Progress events so far."""
         return list(self._progress)
 
     @property
     def seconds(self) -> float:
-        """Time since it was asked for, until it was over."""
+        """Seconds from the request to the end, or to now."""
         return (self._ended or time.monotonic()) - self._started
 
     def take(self, event: Mapping[str, object]) -> None:
-        """Take in an event of the solver process."""
+        """Handle an event of the solver process."""
         kind = event["event"]
         if kind == "progress":
             self._advance(JobStatus.RUNNING, event)
@@ -74,7 +74,7 @@ class Job:
             self._advance(JobStatus(kind))
 
     def fail(self, message: str, is_input_error: bool = False) -> None:
-        """Mark the job as failed, and say whether it was for what it was given."""
+        """Mark the job as failed, because of its input or for another reason."""
         with self._changed:
             if not self._status.is_over:
                 self._message, self._is_input_error = message, is_input_error
@@ -85,28 +85,28 @@ class Job:
         self._advance(JobStatus.CANCELLED)
 
     def require_done(self) -> None:
-        """Raise what ended a job that is over before its end.
+        """Raise the error of a job that did not succeed.
 
         Raises
         ------
         InputError, FitError
-            If it failed, for its input or otherwise.
+            If it failed because of its input, or for another reason.
         CancelledError
             If it was cancelled.
         """
         if self._status is JobStatus.FAILED:
             raise (InputError if self._is_input_error else FitError)(self._message)
         if self._status is not JobStatus.DONE:
-            raise CancelledError("the work was stopped; nothing was changed")
+            raise CancelledError("the job was stopped; nothing was changed")
 
     def wait(self, timeout: float | None = None) -> JobStatus:
-        """Wait until the job is over, or for `timeout` seconds."""
+        """Wait until the job is over, for `timeout` seconds at most."""
         with self._changed:
             self._changed.wait_for(lambda: self._status.is_over, timeout)
         return self._status
 
     def wait_for_news(self, seen: int, timeout: float) -> None:
-        """Wait until there are more than `seen` reports, or the job is over."""
+        """Wait for more than `seen` progress events or the end, for `timeout` seconds at most."""
         with self._changed:
             self._changed.wait_for(
                 lambda: self._status.is_over or len(self._progress) > seen, timeout
@@ -114,7 +114,7 @@ class Job:
 
     def _advance(self, status: JobStatus, event: Mapping[str, object] | None = None) -> None:
         with self._changed:
-            # What is over stays over: a late report of a killed process changes nothing.
+            # A job that is over does not change: a killed process may still send events.
             if not self._status.is_over:
                 self._status = status
                 if event is not None:

@@ -1,7 +1,7 @@
-"""Where orbits come from: a survey directory, or the files of one orbit.
+"""Origins of orbits: a survey directory, or the files of one orbit.
 
-A origin is described by plain values, so that the web process, which never loads
-measurements, can hand an orbit to the worker process, which does.
+An origin consists of plain values, so that the web process, which never loads measurements, can
+send it to the solver process, which does.
 """
 
 from dataclasses import asdict, dataclass
@@ -20,7 +20,7 @@ class OrbitFiles:
     Attributes
     ----------
     observations, reference, truth, instrument : paths; the last two may be None
-    orbit : orbit_id, or None where the file holds one orbit only
+    orbit : orbit_id, or None if the file holds one orbit only
     """
 
     observations: str
@@ -31,15 +31,15 @@ class OrbitFiles:
 
     @property
     def title(self) -> str:
-        """What people call this origin."""
+        """Name of the origin."""
         return Path(self.observations).name
 
     def orbits(self) -> list[int | None]:
-        """Return the orbits that can be shown."""
+        """Return the orbit_id of all orbits."""
         return [self.orbit]
 
     def read(self, orbit: int | None) -> OrbitData:
-        """Read and check one orbit; InputError says what is wrong with the files."""
+        """Read and check one orbit; InputError if the files are invalid."""
         truth = Path(self.truth) if self.truth else None
         return read_orbit(Path(self.observations), Path(self.reference), truth, orbit)
 
@@ -56,17 +56,17 @@ class SurveyFolder:
 
     @property
     def title(self) -> str:
-        """What people call this origin."""
+        """Name of the origin."""
         return Path(self.directory).resolve().name
 
     def orbits(self) -> list[int | None]:
-        """Return the orbits that can be shown."""
+        """Return the orbit_id of all orbits."""
         return list(survey_orbits(Path(self.directory)))
 
     def read(self, orbit: int | None) -> OrbitData:
-        """Read and check one orbit; InputError says what is wrong with the files."""
+        """Read and check one orbit; InputError if the files are invalid."""
         if orbit is None:
-            raise ValueError("an orbit of a survey is chosen by its number, got None")
+            raise ValueError("orbit: expected an orbit_id of the survey, found None")
         return read_survey_orbit(Path(self.directory), orbit)
 
     def read_instrument(self) -> Instrument:
@@ -79,7 +79,7 @@ Origin = OrbitFiles | SurveyFolder
 
 
 def origin_to_dict(origin: Origin) -> dict[str, object]:
-    """Return a origin as plain values; `origin_from_dict` reads them back."""
+    """Return an origin as plain values; `origin_from_dict` reads them back."""
     return {"kind": type(origin).__name__, **asdict(origin)}
 
 

@@ -12,7 +12,7 @@ _ERRORS = Console(stderr=True)
 
 
 class Reporter:
-    """A line of progress that work in this process or another one keeps up to date."""
+    """A line of progress for work in this process or in the solver process."""
 
     def __init__(self, progress: Progress, title: str) -> None:
         """Add the line."""
@@ -20,15 +20,15 @@ class Reporter:
         self._task = progress.add_task(title, total=None)
 
     def step(self, done: int, total: int) -> None:
-        """Say how much is done."""
+        """Show `done` of `total`."""
         self._progress.update(self._task, completed=done, total=total)
 
-    def say(self, words: str) -> None:
-        """Say what is being done."""
-        self._progress.update(self._task, description=words)
+    def say(self, text: str) -> None:
+        """Show the current activity."""
+        self._progress.update(self._task, description=text)
 
     def follow(self, job: Job) -> JobStatus:
-        """Report a job until it is over."""
+        """Show the progress of a job until it is over."""
         seen = 0
         while not job.status.is_over:
             job.wait_for_news(seen, timeout=1.0)
@@ -43,7 +43,7 @@ class Reporter:
 
 @contextmanager
 def reporting(title: str) -> Iterator[Reporter]:
-    """Give a line of progress on standard error; it is gone when the work is done."""
+    """Yield a line of progress on standard error, which is removed at the end."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=30),

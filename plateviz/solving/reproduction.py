@@ -1,4 +1,4 @@
-"""The reproduction: the paper's survey simulated, fitted and asked for the paper's numbers."""
+"""Reproduction of the paper's numbers: simulate and fit its survey, and compare."""
 
 from pathlib import Path
 
@@ -19,12 +19,12 @@ from solver.units import RAD_PER_MAS
 
 
 def reproduced(survey: Path, run: str, workers: int | None) -> pd.DataFrame:
-    """Return `tables.reproduction` of a run; what is missing of survey and run is made.
+    """Return `tables.reproduction` of a run; simulate the survey and fit orbits as needed.
 
     Raises
     ------
     InputError
-        If the directory holds something else, or a run that was begun with other settings.
+        If the directory holds other files, or the run has other settings.
     FitError
         If orbits failed.
     """
@@ -36,7 +36,7 @@ def reproduced(survey: Path, run: str, workers: int | None) -> pd.DataFrame:
 
 
 def figures_of(run: SurveyRun) -> SurveyFigures:
-    """Return what a run says of the paper's numbers; InputError if it says nothing yet."""
+    """Return the tables for the paper's numbers; InputError if the run has no fitted orbit."""
     errors = run.errors_by_count()
     if errors is None:
         raise InputError(f"{run.directory}: expected a run with fitted orbits, found none")

@@ -1,7 +1,7 @@
-"""SolutionStore: one source of orbits, one worker, and every solution made so far.
+"""SolutionStore: one origin, one solver process, and all solutions made so far.
 
-It belongs to the server and is shared by all its sessions; solutions are files in a
-scratch folder, found again by what was asked for.
+It belongs to the server and is shared by all its sessions. Solutions are files in a scratch
+folder, named after the orbit and the settings.
 """
 
 import hashlib
@@ -23,14 +23,14 @@ from solver.data.settings import FitSettings
 
 
 class SolutionStore:
-    """Fits orbits of one source on request and keeps their results."""
+    """Fits orbits of one origin on request and keeps the solutions."""
 
-    def __init__(self, origin: Origin, worker: WarmSolver) -> None:
-        """Serve `origin` with `worker`, which is closed with the store."""
+    def __init__(self, origin: Origin, solver: WarmSolver) -> None:
+        """Solve orbits of `origin` with `solver`, which is closed with the store."""
         self.origin = origin
         self.orbits = origin.orbits()
         self.instrument: Instrument = origin.read_instrument()
-        self._worker = worker
+        self._solver = solver
         self._lock = threading.Lock()
         self._jobs: dict[Path, Job] = {}
         self._scratch = Path(tempfile.mkdtemp(prefix="plateviz-"))
@@ -38,43 +38,43 @@ class SolutionStore:
 
     @property
     def title(self) -> str:
-        """What people call the origin."""
+        """Name of the origin."""
         return self.origin.title
 
     def runs(self) -> list[SurveyRun]:
-        """Return the runs of the survey as they are now; none where the origin is files."""
+        """Return the current runs of the survey; none if the origin is files."""
         origin = self.origin
         return survey_runs(Path(origin.directory)) if isinstance(origin, SurveyFolder) else []
 
     def request(self, orbit: int | None, settings: FitSettings, what_if: bool = False) -> Job:
-        """Ask for an orbit fitted with `settings`; the same question gives the same job.
+        """Request an orbit fitted with `settings`; the same request returns the same job.
 
         Parameters
         ----------
-        what_if : whether a step from the last fit will do, where that can tell
+        what_if : whether a step from the last fit is enough, where it is valid
         """
         directory = self._directory(orbit, settings, what_if)
         with self._lock:
             job = self._jobs.get(directory)
             if job is None or job.status in (JobStatus.FAILED, JobStatus.CANCELLED):
-                job = self._worker.submit(Job(self._request(orbit, settings, what_if, directory)))
+                job = self._solver.submit(Job(self._request(orbit, settings, what_if, directory)))
                 self._jobs[directory] = job
             return job
 
     def cancel(self, job: Job) -> None:
-        """Stop a job that is waiting or running."""
-        self._worker.cancel(job)
+        """Cancel a waiting or running job."""
+        self._solver.cancel(job)
 
     def result(
         self, orbit: int | None, settings: FitSettings, what_if: bool = False
     ) -> FitResult | None:
-        """Return a solution that was asked for before and is whole, else None."""
+        """Return a solution that was requested before and is complete, else None."""
         directory = self._directory(orbit, settings, what_if)
         return self._read(directory) if is_complete(directory) else None
 
     def close(self) -> None:
-        """Stop the worker and remove the scratch folder."""
-        self._worker.close()
+        """End the solver process and remove the scratch folder."""
+        self._solver.close()
         shutil.rmtree(self._scratch, ignore_errors=True)
 
     def _request(
@@ -90,6 +90,6 @@ class SolutionStore:
         }
 
     def _directory(self, orbit: int | None, settings: FitSettings, what_if: bool) -> Path:
-        question = json.dumps([orbit, settings.to_dict(), what_if], sort_keys=True)
-        name = hashlib.sha256(question.encode()).hexdigest()[:16]
+        request = json.dumps([orbit, settings.to_dict(), what_if], sort_keys=True)
+        name = hashlib.sha256(request.encode()).hexdigest()[:16]
         return self._scratch / f"orbit={'file' if orbit is None else f'{orbit:04d}'}-{name}"

@@ -1,9 +1,9 @@
 """The solver process: reads requests from standard input, writes events to standard output.
 
-One JSON object a line, both ways. It is the only process of a served plateviz that
-imports JAX, it stays warm between fits, and it ends with its standard input. An unexpected
-exception ends it with a traceback on standard error; `plateviz.solving.warm_solver` reports that
-and starts another.
+Each line is one JSON object, in both directions. This is the only process of a plateviz server
+that imports JAX. It keeps its compilations between fits, and ends when its standard input ends. An
+unexpected exception ends it with a traceback on standard error;
+`plateviz.solving.warm_solver` reports that and starts another process.
 
 Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory"},
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
@@ -33,14 +33,14 @@ from solver.simulate.survey import simulate_survey
 
 Request = dict
 Send = Callable[[dict], None]
-# Work that makes the next request quicker, for when none waits.
-Later = Iterator[None]
-# What is likely to be asked next is made ready when nothing was for so long.
-_QUIET_S = 0.3
+# Work in steps that speeds up likely next requests; done while no request waits.
+Speculative = Iterator[None]
+# Idle seconds before speculative work starts.
+_IDLE_S = 0.3
 
 
 class _Cancellations:
-    """Which jobs somebody has asked to stop."""
+    """Ids of the jobs to be cancelled."""
 
     def __init__(self) -> None:
         self._jobs: set[str] = set()
@@ -62,26 +62,28 @@ def main() -> None:
     reader = threading.Thread(target=_read, args=(sys.stdin, requests, cancellations), daemon=True)
     reader.start()
     send({"event": "ready"})
-    later: Later = iter(())
-    while (request := _next(requests, later)) is not None:
-        later = _serve(request, send, cancellations)
+    speculative: Speculative = iter(())
+    while (request := _next_request(requests, speculative)) is not None:
+        speculative = _serve(request, send, cancellations)
 
 
-def _next(requests: queue.Queue[Request | None], later: Later) -> Request | None:
-    """Wait for a request, and make ready meanwhile what may be asked of the last one."""
+def _next_request(
+    requests: queue.Queue[Request | None], speculative: Speculative
+) -> Request | None:
+    """Wait for a request; do speculative work once the process has been idle."""
     try:
-        # A page that hears of a solution needs the cores, and may ask again at once.
-        return requests.get(timeout=_QUIET_S)
+        # At first, a page that receives a solution needs the cores, and may send a request.
+        return requests.get(timeout=_IDLE_S)
     except queue.Empty:
         pass
-    for _ in later:
+    for _ in speculative:
         if not requests.empty():
             break
     return requests.get()
 
 
 def _sender() -> Send:
-    """Keep the real standard output for events; what libraries print goes to standard error."""
+    """Reserve standard output for events; redirect the prints of libraries to standard error."""
     channel = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8", buffering=1)
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     lock = threading.Lock()
@@ -102,11 +104,11 @@ def _read(
             cancellations.add(request["job"])
         else:
             requests.put(request)
-    # Nobody is left to read a result: stop at once, even in the middle of a fit.
+    # The server has ended: stop at once, even during a fit.
     os._exit(0)
 
 
-def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later:
+def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Speculative:
     job = request["job"]
     work = {"fit": _fit, "simulate": _simulate, "survey": _survey}[request["do"]]
 
@@ -116,9 +118,9 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later
 
     try:
         cancellations.check(job)
-        later = work(request, progress)
+        speculative = work(request, progress)
         send({"event": "done", "job": job})
-        return later
+        return speculative
     except CancelledError:
         send({"event": "cancelled", "job": job})
     except (InputError, FitError) as error:
@@ -127,7 +129,7 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Later
     return iter(())
 
 
-def _fit(request: Request, progress: Callable[..., None]) -> Later:
+def _fit(request: Request, progress: Callable[..., None]) -> Speculative:
     progress(stage="reading the orbit")
     fitter = _fitter(json.dumps(request["origin"], sort_keys=True), request["orbit"])
     settings = FitSettings.from_dict(request["settings"])
@@ -145,7 +147,7 @@ def _fit(request: Request, progress: Callable[..., None]) -> Later:
     return fitter.get_ready(settings.order)
 
 
-def _simulate(request: Request, progress: Callable[..., None]) -> Later:
+def _simulate(request: Request, progress: Callable[..., None]) -> Speculative:
     settings = SurveySettings.from_dict(request["settings"])
     catalogue = request.get("catalogue")
     simulate_survey(
@@ -157,8 +159,8 @@ def _simulate(request: Request, progress: Callable[..., None]) -> Later:
     return iter(())
 
 
-def _survey(request: Request, progress: Callable[..., None]) -> Later:
-    # Dask, which no other work needs, takes half a second to import.
+def _survey(request: Request, progress: Callable[..., None]) -> Speculative:
+    # Imported here since Dask takes half a second to import.
     from plateviz.runs.fit_survey import fit_survey
 
     fit_survey(
@@ -173,9 +175,9 @@ def _survey(request: Request, progress: Callable[..., None]) -> Later:
 
 
 @lru_cache(maxsize=4)
-def _fitter(origin: str, orbit: int | None) -> OrbitFitter:
-    found = origin_from_dict(json.loads(origin))
-    return OrbitFitter(found.read(orbit), found.read_instrument())
+def _fitter(origin_json: str, orbit: int | None) -> OrbitFitter:
+    origin = origin_from_dict(json.loads(origin_json))
+    return OrbitFitter(origin.read(orbit), origin.read_instrument())
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from solver.errors import FitError
 if TYPE_CHECKING:
     from plateviz.runs.fit_survey import Progress, Report
 
-_MOST_NAMED = 20
+_MAX_LISTED = 20
 
 
 def fit_and_report(
@@ -23,7 +23,7 @@ def fit_and_report(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> "Report":
-    """Fit what is missing, with a line of progress; arguments as `fit_survey`."""
+    """Fit the missing orbits, with a line of progress; arguments as for `fit_survey`."""
     keep_compilations()
     from plateviz.runs.fit_survey import fit_survey
 
@@ -32,19 +32,19 @@ def fit_and_report(
         def show(progress: "Progress") -> None:
             reporter.step(progress.done, progress.total)
             if progress.last is not None:
-                reporter.say(_state(progress, time.perf_counter() - start))
+                reporter.say(_progress_text(progress, time.perf_counter() - start))
 
         start = time.perf_counter()
         return fit_survey(survey, name, settings, orbits, workers, scheduler, show)
 
 
-def _state(progress: "Progress", elapsed: float) -> str:
-    """Say what became of the last orbit, and how long the others will take."""
+def _progress_text(progress: "Progress", elapsed: float) -> str:
+    """Return the text of the line: the outcome of the last orbit, and the time left."""
     last = progress.last
-    words = "" if last is None else f"orbit {last.orbit}"
-    words += " failed" if last is not None and last.message else ""
+    text = "" if last is None else f"orbit {last.orbit}"
+    text += " failed" if last is not None and last.message else ""
     left = elapsed / progress.done * (progress.total - progress.done)
-    return f"{words}, {_duration(left)} left"
+    return f"{text}, {_duration(left)} left"
 
 
 def _duration(seconds: float) -> str:
@@ -56,11 +56,11 @@ def _duration(seconds: float) -> str:
 def require_all(report: "Report") -> None:
     """Raise `FitError` with the reasons if orbits failed."""
     if report.failed:
-        raise FitError(_words(report.failed))
+        raise FitError(_failure_message(report.failed))
 
 
-def _words(failed: dict[int, str]) -> str:
-    lines = [f"  {message}" for _, message in sorted(failed.items())[:_MOST_NAMED]]
+def _failure_message(failed: dict[int, str]) -> str:
+    lines = [f"  {message}" for _, message in sorted(failed.items())[:_MAX_LISTED]]
     more = len(failed) - len(lines)
     lines += [f"  and {more} more"] if more > 0 else []
     return "\n".join([f"{len(failed)} orbits failed; the others are kept:", *lines])

@@ -1,7 +1,7 @@
-"""WarmSolver: keeps one solver process warm, gives it jobs, and can always stop it.
+"""WarmSolver: runs one solver process, sends it jobs, and can always stop it.
 
-The process is started afresh when it dies or does not stop on request; the job that it
-was at is reported as failed or cancelled, the ones that wait go on.
+The process is restarted if it dies or does not stop on request. The job that it was running is
+then marked as failed or cancelled; waiting jobs continue.
 """
 
 import contextlib
@@ -16,12 +16,12 @@ from typing import IO
 from plateviz.cache import keep_compilations
 from plateviz.solving.job import Job
 
-# A fit looks for a cancellation between iterations, well under a second apart.
+# A fit checks for a cancellation between iterations, which take well under a second.
 _GRACE_SECONDS = 3.0
 
 
 class WarmSolver:
-    """One solver process and the jobs that wait for it, first come, first served."""
+    """One solver process and its queue of jobs, first in, first out."""
 
     def __init__(self) -> None:
         """Start the process; it warms up while the caller goes on."""
@@ -40,7 +40,7 @@ class WarmSolver:
         return job
 
     def cancel(self, job: Job) -> None:
-        """Stop a job: at its next report, or with its process if it does not report."""
+        """Cancel a job at its next progress event; kill the process if there is none in time."""
         with self._lock:
             if job not in self._jobs:
                 return
@@ -49,12 +49,12 @@ class WarmSolver:
                 job.cancel()
                 return
             self._send({"do": "cancel", "job": job.id})
-        timer = threading.Timer(_GRACE_SECONDS, self._kill_at, args=(job,))
+        timer = threading.Timer(_GRACE_SECONDS, self._kill_if_running, args=(job,))
         timer.daemon = True
         timer.start()
 
     def close(self) -> None:
-        """End the process; jobs that are not over are cancelled."""
+        """End the process and cancel all jobs that are not over."""
         with self._lock:
             for job in self._jobs:
                 job.cancel()
@@ -73,7 +73,7 @@ class WarmSolver:
             stdout=subprocess.PIPE,
             stderr=errors,
             encoding="utf-8",
-            # Ctrl-C, or a notebook's interrupt, is for who waits for a job, who will cancel it.
+            # Ctrl-C, or a notebook's interrupt, must reach only the process that waits for a job.
             start_new_session=True,
         )
         self._process = process
@@ -81,10 +81,10 @@ class WarmSolver:
         return process
 
     def _send(self, request: dict) -> None:
-        """Hand a request to the process, to a new one where the last has ended."""
+        """Send a request to the process; start a new process if the last one has ended."""
         process = self._process or self._start()
         if process.stdin is not None:
-            # A process that dies just now is reported by its listener.
+            # If the process dies now, its listener reports it.
             with contextlib.suppress(BrokenPipeError):
                 process.stdin.write(json.dumps(request) + "\n")
                 process.stdin.flush()
@@ -92,38 +92,38 @@ class WarmSolver:
     def _listen(self, process: subprocess.Popen[str], errors: IO[str]) -> None:
         if process.stdout is not None:
             for line in process.stdout:
-                self._take(json.loads(line))
+                self._handle(json.loads(line))
         process.wait()
         with errors:
             errors.seek(0)
-            last_words = errors.read().strip().splitlines()[-1:] or ["no message"]
+            last_line = errors.read().strip().splitlines()[-1:] or ["no message"]
         with self._lock:
             self._process = None
             for stream in (process.stdin, process.stdout):
                 if stream is not None:
-                    # A request may be left in it that the process died too soon to read.
+                    # It may hold a request that the process did not read before it died.
                     with contextlib.suppress(BrokenPipeError):
                         stream.close()
             if self._jobs:
-                reason = f"the solver process ended (exit {process.returncode}): {last_words[0]}"
+                reason = f"the solver process ended (exit {process.returncode}): {last_line[0]}"
                 self._jobs[0].fail(reason)
-                self._next()
+                self._start_next_job()
 
-    def _take(self, event: dict) -> None:
+    def _handle(self, event: dict) -> None:
         with self._lock:
             if event["event"] == "ready" or not self._jobs or self._jobs[0].id != event["job"]:
                 return
             self._jobs[0].take(event)
             if self._jobs[0].status.is_over:
-                self._next()
+                self._start_next_job()
 
-    def _next(self) -> None:
-        """Leave the first job behind and begin the one after it."""
+    def _start_next_job(self) -> None:
+        """Remove the first job and start the next one."""
         self._jobs.popleft()
         if self._jobs:
             self._send(self._jobs[0].request)
 
-    def _kill_at(self, job: Job) -> None:
+    def _kill_if_running(self, job: Job) -> None:
         with self._lock:
             if self._jobs and self._jobs[0] is job and self._process is not None:
                 job.cancel()

@@ -13,24 +13,24 @@ class SviSettings:
 
     steps: int = setting(
         1500,
-        Whole(label="steps", help="Steps over which the learning rate falls."),
+        Whole(label="steps", help="Number of steps over which the learning rate falls."),
     )
     first_rate: float = setting(
         1e4,
         Positive(
             label="first rate",
-            help="Learning rate at the start, in free coordinates: whitened ones, where one is a "
-            "sigma, or the published code's degrees and micrometres.",
+            help="Learning rate at the start, in whitened coordinates, whose unit is one sigma, or "
+            "in the published code's degrees and micrometres.",
         ),
     )
     last_rate: float = setting(
-        1e-3, Setting(label="last rate", help="Learning rate at the end, in the same coordinates.")
+        1e-3, Setting(label="last rate", help="Learning rate at the end, in the same units.")
     )
     block: int = setting(
         25,
         Whole(
             label="block",
-            help="Steps between two linearisations, after which Adam starts afresh.",
+            help="Number of steps between two linearisations; each restarts Adam.",
         ),
     )
     patience: int = setting(
@@ -44,20 +44,21 @@ class SviSettings:
         0.1,
         Setting(
             label="tolerance",
-            help="Largest distance from the mode at which a loss at rest counts as converged.",
+            help="Largest distance from the mode at which a constant loss counts as converged.",
             unit="sigma",
         ),
     )
     max_steps: int = setting(
-        10_000, Whole(label="limit of steps", help="Limit of the engine, not below `steps`.")
+        10_000,
+        Whole(label="maximum number of steps", help="Maximum number of steps, not below `steps`."),
     )
     seed: int = setting(0, Whole(label="seed", help="Seed of the random draws.", low=0))
     conditioned: bool = setting(
-        True, Switch(label="conditioned", help="Whether to move in whitened coordinates.")
+        True, Switch(label="conditioned", help="Whether to step in whitened coordinates.")
     )
 
     def __post_init__(self) -> None:
-        """Refuse what no fit can use; `InputError` names the setting."""
+        """Raise `InputError`, which names the setting, if a value is invalid."""
         wholes = {n: s for n, s in settings_of(type(self)).items() if isinstance(s, Whole)}
         for name, whole in wholes.items():
             whole.check(f"svi {name}", getattr(self, name))
@@ -68,7 +69,7 @@ class SviSettings:
             )
         if not self.first_rate > self.last_rate > 0.0:
             raise InputError(
-                "expected svi learning rates that fall and are positive, "
+                "expected positive svi learning rates that fall, "
                 f"found {self.first_rate!r} to {self.last_rate!r}"
             )
         if not self.tolerance > 0.0:
@@ -83,22 +84,24 @@ class NutsSettings:
         300,
         Whole(
             label="warm-up",
-            help="Samples of each chain that adapt its step size and are thrown away.",
+            help="Number of first samples of each chain that tune its step size and are discarded.",
         ),
     )
-    samples: int = setting(500, Whole(label="samples", help="Samples kept of each chain.", low=4))
+    samples: int = setting(
+        500, Whole(label="samples", help="Number of samples kept of each chain.", low=4)
+    )
     chains: int = setting(
-        2, Whole(label="chains", help="Number of chains, run one after the other.")
+        2, Whole(label="chains", help="Number of chains; they run one after the other.")
     )
     seed: int = setting(0, Whole(label="seed", help="Seed of the random draws.", low=0))
 
     def __post_init__(self) -> None:
-        """Refuse what no run can use; `InputError` names the setting."""
+        """Raise `InputError`, which names the setting, if a value is invalid."""
         check_fields(self, "nuts ")
 
 
-# The published code's coordinates, rates and rule of convergence (paper, section
-# "Optimization"), for comparison; it took up to a million steps.
+# The published code's coordinates, learning rates and convergence criterion (paper, section
+# "Optimization"), for comparison; it takes up to a million steps.
 WARPFIELD = SviSettings(
     steps=1_000_000,
     first_rate=1e-3,
@@ -109,19 +112,25 @@ WARPFIELD = SviSettings(
     conditioned=False,
 )
 
-# Options that set fields of `SviSettings` and `NutsSettings`: `engine_settings` takes them.
+# Options that set fields of `SviSettings` and `NutsSettings`; arguments of `engine_settings`.
 ENGINE_OPTIONS: dict[str, Setting] = {
-    "seed": Whole(label="seed", help="Seed of svi and nuts.", low=0, keyword="seed", option="seed"),
+    "seed": Whole(
+        label="seed",
+        help="Seed of the random numbers of svi and nuts.",
+        low=0,
+        keyword="seed",
+        option="seed",
+    ),
     "steps": Whole(
         label="steps",
-        help="Steps over which the learning rate of svi falls.",
+        help="Number of svi steps over which the learning rate falls.",
         keyword="steps",
         option="steps",
         commands=("fit",),
     ),
     "compat": Setting(
         label="compat",
-        help="warpfield: svi in the units and with the rates of the published code.",
+        help="`warpfield` runs svi in the units and with the learning rates of the published code.",
         keyword="compat",
         option="compat",
         commands=("fit",),
@@ -132,12 +141,12 @@ ENGINE_OPTIONS: dict[str, Setting] = {
 def engine_settings(
     seed: int = 0, steps: int | None = None, compat: str | None = None
 ) -> dict[str, Any]:
-    """Return the fields `svi` and `nuts` that `ENGINE_OPTIONS` state.
+    """Return the fields `svi` and `nuts` of `FitSettings` from the values of `ENGINE_OPTIONS`.
 
     Raises
     ------
     InputError
-        If an option cannot be used.
+        If an option has an invalid value.
     """
     return {"svi": svi_settings(compat, steps, seed), "nuts": NutsSettings(seed=seed)}
 
@@ -151,7 +160,7 @@ def svi_settings(compat: str | None, steps: int | None, seed: int) -> SviSetting
     steps : over which the learning rate falls; None for the default
     """
     if compat not in (None, "warpfield"):
-        raise InputError(f"expected warpfield to be compatible with, found {compat!r}")
+        raise InputError(f"compat: expected warpfield, found {compat!r}")
     chosen = replace(WARPFIELD if compat else SviSettings(), seed=seed)
     if steps is None:
         return chosen

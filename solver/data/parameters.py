@@ -1,18 +1,18 @@
 """The one table of parameter groups (paper, table "Inputs, Model Parameters, and Priors").
 
-Everything that speaks of a parameter is derived from here: the blocks of the
-Gauss-Newton engine, the priors, the command line's `--prior`, the dashboard's controls,
-the result tables. A new group is one entry here and one term in `solver.model.forward`.
+The blocks of the Gauss-Newton engine, the priors, the command line's `--prior`, the
+dashboard's controls and the result tables are derived from this table. A new group is one
+entry here and one term in `solver.model.forward`.
 
-Axes, the words used in array shapes throughout the solver:
+Names of axes in array shapes, in all of the solver:
 
-| word | one element per                                   |
+| axis | one element per                                   |
 |------|---------------------------------------------------|
 | obs  | measurement                                       |
 | src  | source                                            |
 | exp  | exposure                                          |
 | det  | detector                                          |
-| coef | distortion term, of one direction (`distortion.terms`) |
+| coef | distortion term of one direction (`distortion.terms`) |
 """
 
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ Family = Literal["normal", "gamma", "uniform"]
 
 @dataclass(frozen=True)
 class Published:
-    """A column of the published result layout that the value of a group enters.
+    """A column of the published result layout that depends on the value of a group.
 
     Attributes
     ----------
     column : name in the file
-    words : meaning, for people
-    factor : None if the column is the value; else the column, which another group makes, is
-        multiplied by 1 + `factor` times the value
+    words : meaning, the comment of the column
+    factor : None if the column is the value of this group; otherwise the column belongs to
+        another group and is multiplied by 1 + `factor` times the value
     """
 
     column: str
@@ -48,18 +48,18 @@ class Group:
     Attributes
     ----------
     name : key in parameter sets, tables, `--prior` and the dashboard
-    label : words for people
+    label : name in labels and captions
     symbol : the paper's symbol
-    axis : what there is one value per
+    axis : axis with one value per element
     unit : unit of offsets, sigmas and prior widths
-    value_unit : unit of the whole value in tables
+    value_unit : unit of the full value, centre plus offset, in tables
     family : prior distribution about its centre
     width : standard deviation of the default prior, in `unit`
-    relative : whether `width` is a fraction of the centre instead
-    origin : where the centre of the prior comes from: the catalogue, a column of the
-        environment table, an attribute of the instrument's detectors, or zero
+    relative : whether `width` is a fraction of the centre
+    origin : origin of the prior's centre: the catalogue, a column of the environment table,
+        an attribute of the instrument's detectors, or zero
     column : that column or attribute
-    published : columns of the published layout; one of its own by default
+    published : columns of the published layout; by default one named after the group
     """
 
     name: str
@@ -77,17 +77,17 @@ class Group:
 
     @property
     def per_value_unit(self) -> float:
-        """How many of `unit` make one `value_unit`."""
+        """Number of `unit` in one `value_unit`."""
         return factor_between(self.value_unit, self.unit)
 
     @property
     def width_unit(self) -> str:
-        """Unit in which a person states the prior width; "" for a fraction or a factor."""
+        """Unit of the prior width in texts; "" for a fraction or a factor."""
         return "" if self.relative or self.axis == "src" else self.unit
 
 
-# The focal length's prior is written in the paper as a variance of 100 on a scale in
-# um/deg; the simulated scatter (1e-3) fits a standard deviation of 100 um/deg, 1.2e-3.
+# The paper gives the prior of the focal length as a variance of 100 on a scale in um/deg. The
+# simulated scatter (1e-3) agrees with a standard deviation of 100 um/deg instead (1.2e-3).
 _FOCAL_WIDTH_UM = 100.0 * 57.29577951308232
 
 SOURCES = Group(
@@ -156,7 +156,7 @@ PARAMETERS: tuple[Group, ...] = (
         column="focal_length",
         published=(
             Published("tel_f_loc_x", "focal length"),
-            Published("tel_f_loc_y", "focal length, the same"),
+            Published("tel_f_loc_y", "focal length, the same value"),
         ),
     ),
     Group(

@@ -1,4 +1,4 @@
-"""Priors in the words that people write: widths, and shifts of the centres."""
+"""Prior widths and shifts of prior centres as text."""
 
 import math
 import re
@@ -14,32 +14,32 @@ _SHIFTED = re.compile(r"(?P<group>\w+)\s*(?:\[\s*(?P<element>[^\[\]\s]+)\s*\])?"
 
 
 def group_named(name: str) -> Group:
-    """Return a parameter group; `InputError` names them all if there is none of that name."""
+    """Return a parameter group; for an unknown name, `InputError` lists all groups."""
     if name not in BY_NAME:
         raise InputError(f"expected a parameter group out of {', '.join(BY_NAME)}, found {name!r}")
     return BY_NAME[name]
 
 
 def check_width(name: str, width: float) -> None:
-    """Refuse a width that no prior of the group can have.
+    """Check that a prior of the group can have a width.
 
     Raises
     ------
     InputError
-        If there is no such group, or the width is not positive, or flat for the sources.
+        If there is no such group, or the width is not positive, or infinite for the sources.
     """
     group_named(name)
     if not width > 0 or math.isnan(width):
         raise InputError(f"expected a positive prior width for {name}, found {width!r}")
     if name == "sources" and math.isinf(width):
         raise InputError(
-            "expected a finite factor on the catalogue's uncertainties for sources, found inf: "
-            "without the reference sources nothing fixes the solution on the sky"
+            "expected a finite factor on the catalogue's uncertainties for sources, found inf; "
+            "only the reference sources constrain the solution on the sky"
         )
 
 
 def check_shift(name: str, shift: float) -> None:
-    """Refuse a shift of a prior's centre that nothing can be made of.
+    """Check the shift of a prior centre.
 
     Parameters
     ----------
@@ -48,19 +48,19 @@ def check_shift(name: str, shift: float) -> None:
     Raises
     ------
     InputError
-        If it is of no group, or not finite, or of the sources without a direction.
+        If there is no such group, the shift is not finite, or the sources have no direction.
     """
     group, element = split_name(name)
     if not math.isfinite(shift):
         raise InputError(f"expected a finite shift of the prior's centre of {name}, found {shift}")
     if group.axis == "src" and element not in ("ra", "dec"):
         raise InputError(
-            f"expected sources[ra] or sources[dec], the whole catalogue, found {name!r}"
+            f"expected sources[ra] or sources[dec], for the whole catalogue, found {name!r}"
         )
 
 
 def split_name(name: str) -> tuple[Group, str | None]:
-    """Return the group, and the element if one is named, of "GROUP" or "GROUP[ELEMENT]"."""
+    """Return the group and the element, or None, of "GROUP[ELEMENT]" or "GROUP"."""
     match = _SHIFTED.fullmatch(name.strip())
     if match is None:
         raise InputError(f"expected GROUP or GROUP[ELEMENT], found {name!r}")
@@ -68,7 +68,7 @@ def split_name(name: str) -> tuple[Group, str | None]:
 
 
 def parse_width(name: str, text: str) -> float:
-    """Return the prior width that a person wrote for group `name`, in its `width_unit`.
+    """Return the prior width in a text for group `name`, in its `width_unit`.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def parse_width(name: str, text: str) -> float:
     Raises
     ------
     InputError
-        If the group, the number or the unit is not usable.
+        If the group, the number or the unit is invalid.
     """
     unit = group_named(name).width_unit
     match = _WIDTH.fullmatch(text.strip())
@@ -95,13 +95,13 @@ def parse_width(name: str, text: str) -> float:
 
 
 def format_width(name: str, width: float) -> str:
-    """Return a prior width as `parse_width` reads it."""
+    """Return a prior width as a text that `parse_width` reads."""
     unit = BY_NAME[name].width_unit
     return "flat" if math.isinf(width) else f"{width:.6g} {unit}".strip()
 
 
 def parse_shift(text: str) -> tuple[str, float]:
-    """Return what a person wrote of the centre of a prior: which, and its shift.
+    """Return the name of a prior, "GROUP" or "GROUP[ELEMENT]", and the shift of its centre.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def parse_shift(text: str) -> tuple[str, float]:
     Raises
     ------
     InputError
-        If the group, the number or the unit is not usable.
+        If the group, the number or the unit is invalid.
     """
     name, found, value = text.partition("=")
     match = _SHIFT.fullmatch(value.strip())
@@ -127,7 +127,7 @@ def parse_shift(text: str) -> tuple[str, float]:
 
 
 def format_shift(name: str, shift: float) -> str:
-    """Return a shift as `parse_shift` reads it."""
+    """Return a shift as a text that `parse_shift` reads."""
     return f"{name}={shift:+.6g}{split_name(name)[0].unit}"
 
 

@@ -1,7 +1,7 @@
-"""Setting: everything known of one field of `FitSettings`, from which its interfaces are derived.
+"""Setting: the description of one field of `FitSettings`, from which its interfaces are derived.
 
-Checks, the command line, the notebook's keywords, the dashboard's controls, the cards of a FITS
-header, the run file and the description of a solution all come from the settings of the fields.
+The interfaces are the checks, the command-line options, the notebook's keywords, the dashboard's
+controls, the cards of a FITS header, the run file and the description of a solution.
 """
 
 import json
@@ -15,11 +15,11 @@ from solver.errors import InputError
 
 
 class Change(Enum):
-    """How the dashboard answers a change of a setting."""
+    """How the dashboard responds to a change of a setting."""
 
     WHAT_IF = "at once, from the last fit"
     REFIT = "at once, by a new fit"
-    ON_REQUEST = "when a fit is asked for"
+    ON_REQUEST = "when a fit is requested"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,19 +28,19 @@ class Setting:
 
     Attributes
     ----------
-    label : name for people: of a control, and the comment of its FITS card
-    help : one sentence for `--help`, tooltips and the documents
+    label : label of the dashboard's control, and comment of the FITS card
+    help : text for `--help`, tooltips and the documentation
     unit : unit of the value; "" for none
-    keyword : name in the notebook; "" where it is not offered
-    option : name on the command line; "" where it is not offered
+    keyword : keyword in the notebook; "" if not offered there
+    option : name on the command line; "" if not offered there
     commands : commands that have the option
     control : whether the dashboard has a control for it
-    change : how the dashboard answers a change
-    is_identity : whether another value makes another solution
-    selects : whether it decides which measurements are used
+    change : how the dashboard responds to a change
+    is_identity : whether the value affects the solution
+    selects : whether the value decides which measurements are used
     card : FITS keyword; "" for none
     phrase : text of a value in the description of a solution, with {} for the value
-    is_always_described : whether the default is described as well
+    is_always_described : whether the description includes the default value
     """
 
     label: str
@@ -59,11 +59,11 @@ class Setting:
 
     @property
     def what_if(self) -> bool:
-        """Whether a what-if can answer a change of it."""
+        """Whether a change of the setting needs a what-if only, not a fit."""
         return self.change is Change.WHAT_IF
 
     def check(self, name: str, value: Any) -> None:  # noqa: ANN401 any setting
-        """Raise `InputError` if `value` cannot be that of the setting called `name`."""
+        """Raise `InputError` if `value` is invalid for the setting called `name`."""
 
     def to_plain(self, value: Any) -> object:  # noqa: ANN401
         """Return the value as plain JSON values; `from_plain` reads them back."""
@@ -74,35 +74,35 @@ class Setting:
         return plain
 
     def card_value(self, value: Any) -> object:  # noqa: ANN401
-        """Return the value as one FITS card holds it."""
+        """Return the value of the FITS card."""
         plain = self.to_plain(value)
         return plain if isinstance(plain, bool | int | float | str) else json.dumps(plain)
 
     def described(self, value: Any, default: Any) -> list[str]:  # noqa: ANN401
-        """Return phrases for a value; none for the default unless it is always described."""
-        told = value != default or self.is_always_described
-        return [self.phrase.format(value)] if told else []
+        """Return the phrases that describe a value; none for a default that is not described."""
+        is_described = value != default or self.is_always_described
+        return [self.phrase.format(value)] if is_described else []
 
 
 @dataclass(frozen=True, kw_only=True)
 class Switch(Setting):
-    """A setting that is on or off; `phrase` describes what is not the default."""
+    """A setting that is on or off; `phrase` describes the value that is not the default."""
 
     def check(self, name: str, value: object) -> None:
-        """Refuse what is not a bool."""
+        """Raise `InputError` if the value is not a bool."""
         if not isinstance(value, bool):
             raise InputError(f"{name}: expected True or False, found {value!r}")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Whole(Setting):
-    """A whole number from `low` to `high`; None for no upper bound."""
+    """An integer from `low` to `high`; a `high` of None means no upper bound."""
 
     low: int = 1
     high: int | None = None
 
     def check(self, name: str, value: object) -> None:
-        """Refuse other numbers, and True and False."""
+        """Raise `InputError` if the value is no int, is a bool, or is out of bounds."""
         is_whole = isinstance(value, int) and not isinstance(value, bool)
         if is_whole and self.low <= value <= (self.high or math.inf):  # type: ignore[operator]
             return
@@ -118,19 +118,19 @@ class Positive(Setting):
     """A positive number."""
 
     def check(self, name: str, value: float) -> None:
-        """Refuse zero, negative numbers and NaN."""
+        """Raise `InputError` for zero, negative numbers and NaN."""
         if not value > 0.0:
             raise InputError(f"expected a positive {name}, found {value!r}")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choice(Setting):
-    """One of some names."""
+    """One of the names in `names`."""
 
     names: tuple[str, ...] = ()
 
     def check(self, name: str, value: object) -> None:
-        """Refuse other names."""
+        """Raise `InputError` for other names."""
         del name
         if value not in self.names:
             raise InputError(
@@ -153,7 +153,7 @@ class EngineSettings(Setting):
         return self.kind(**plain)
 
     def described(self, value: Any, default: Any) -> list[str]:  # noqa: ANN401
-        """Return the fields that are not their defaults."""
+        """Return a phrase for each field that differs from its default."""
         names = [
             f.name for f in fields(value) if getattr(value, f.name) != getattr(default, f.name)
         ]
@@ -161,7 +161,7 @@ class EngineSettings(Setting):
 
 
 def setting(default: Any, what: Setting) -> Any:  # noqa: ANN401 the type of the field
-    """Return a dataclass field with its setting; a mapping is made anew for each instance."""
+    """Return a dataclass field with its setting; each instance gets its own copy of a mapping."""
     if isinstance(default, Mapping):
         return field(default_factory=lambda: dict(default), metadata={"setting": what})
     return field(default=default, metadata={"setting": what})
@@ -182,10 +182,10 @@ def _default(one: Field) -> Any:  # noqa: ANN401
         return one.default
     if one.default_factory is not MISSING:
         return one.default_factory()
-    raise TypeError(f"{one.name}: a setting has a default")
+    raise TypeError(f"{one.name}: expected a default, found none")
 
 
 def check_fields(values: Any, prefix: str = "") -> None:  # noqa: ANN401 a dataclass of settings
-    """Check every field; `InputError` names the first that cannot be used."""
+    """Check every field; `InputError` names the first invalid one."""
     for name, what in settings_of(type(values)).items():
         what.check(f"{prefix}{name}", getattr(values, name))

@@ -1,4 +1,4 @@
-"""FitSettings: everything a person chooses about a fit, checked once, plain enough for JSON."""
+"""FitSettings: the settings of a fit, checked on creation and convertible to JSON."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ class FitSettings:
         5,
         Whole(
             label="Distortion order",
-            help=f"Order of the distortion, 0 to {MAX_ORDER}: highest total degree of its terms.",
+            help=f"Distortion order, 0 to {MAX_ORDER}: the highest total degree of its terms.",
             low=0,
             high=MAX_ORDER,
             keyword="order",
@@ -52,7 +52,7 @@ class FitSettings:
         ENGINES[0],
         Choice(
             label="Engine",
-            help=f"Engine that solves the orbit, one of: {', '.join(ENGINES)}.",
+            help=f"Engine that solves the orbit, one of {', '.join(ENGINES)}.",
             names=ENGINES,
             keyword="engine",
             option="engine",
@@ -64,7 +64,7 @@ class FitSettings:
         True,
         Switch(
             label="Stellar aberration",
-            help="Model the aberration by the observer's velocity.",
+            help="Model the stellar aberration due to the observer's velocity.",
             keyword="aberration",
             option="aberration",
             control=True,
@@ -76,8 +76,8 @@ class FitSettings:
     max_iterations: int = setting(
         20,
         Whole(
-            label="limit of iterations",
-            help="Limit of the gauss-newton engine.",
+            label="Maximum number of iterations",
+            help="Maximum number of iterations of the gauss-newton engine.",
             card="MAXITER",
             phrase="at most {} iterations",
         ),
@@ -85,8 +85,8 @@ class FitSettings:
     tolerance: float = setting(
         1e-3,
         Positive(
-            label="steps over sigma at convergence",
-            help="The fit has converged when every step is below this times its uncertainty.",
+            label="Largest step at convergence, sigma",
+            help="The fit has converged when every step is below this fraction of its uncertainty.",
             unit="sigma",
             card="TOLER",
             phrase="tolerance {}",
@@ -110,9 +110,9 @@ class FitSettings:
         {},
         PriorShifts(
             label="Shift of the prior centres",
-            help="Shift the centre of a prior from the value in the files, such as "
-            "focal_length=100um or detector_x[2]=-5um; may be repeated. An element is "
-            "FIELD/PLATE, a detector, K/L of a distortion term, or ra or dec of sources.",
+            help="Shift of a prior centre from the value in the files, such as "
+            "focal_length=100um or detector_x[2]=-5um; may be repeated. ELEMENT is FIELD/PLATE of "
+            "an exposure, a detector's id, K/L of a distortion term, or ra or dec of all sources.",
             keyword="centres",
             option="centre",
             metavar="GROUP[ELEMENT]=SHIFT",
@@ -126,7 +126,7 @@ class FitSettings:
         Exclusions(),
         LeftOut(
             label="Leave out",
-            help="Leave out measurements: source=ID, exposure=FIELD/PLATE or detector=ID; "
+            help="Exclude measurements: source=ID, exposure=FIELD/PLATE or detector=ID; "
             "may be repeated.",
             keyword="exclude",
             option="exclude",
@@ -143,7 +143,7 @@ class FitSettings:
         False,
         Switch(
             label="Leave out outliers",
-            help="Look for outliers, list them and leave them out.",
+            help="Find outliers, list them and exclude them from the fit.",
             keyword="robust",
             option="robust",
             control=True,
@@ -155,8 +155,8 @@ class FitSettings:
     thin: int = setting(
         1,
         Whole(
-            label="Share of the sources",
-            help="Use one in this many sources of each class, for a quick look or nuts.",
+            label="Thinning of the sources",
+            help="Use only one in this many sources of each class, for a quick look or for nuts.",
             keyword="thin",
             option="thin",
             selects=True,
@@ -168,7 +168,7 @@ class FitSettings:
         False,
         Switch(
             label="Compare all orders",
-            help="Also solve every order, to see which one the data ask for.",
+            help="Also solve every distortion order, and state which one the data prefer.",
             keyword="compare_orders",
             option="compare-orders",
             commands=("fit",),
@@ -180,15 +180,15 @@ class FitSettings:
     )
     svi: SviSettings = setting(
         SviSettings(),
-        EngineSettings(label="svi", help="The settings of that engine.", kind=SviSettings),
+        EngineSettings(label="svi", help="Settings of the svi engine.", kind=SviSettings),
     )
     nuts: NutsSettings = setting(
         NutsSettings(),
-        EngineSettings(label="nuts", help="The settings of that engine.", kind=NutsSettings),
+        EngineSettings(label="nuts", help="Settings of the nuts engine.", kind=NutsSettings),
     )
 
     def __post_init__(self) -> None:
-        """Refuse what no fit can use; `InputError` names the setting."""
+        """Raise `InputError`, which names the setting, if a value is invalid."""
         check_fields(self)
         for name in ("prior_widths", "prior_shifts"):
             object.__setattr__(self, name, dict(getattr(self, name)))
@@ -212,15 +212,15 @@ class FitSettings:
 
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> "FitSettings":
-        """Return the settings that `to_dict` wrote; what it does not name has its default."""
+        """Return the settings that `to_dict` wrote; missing fields have their defaults."""
         unknown = sorted(set(values) - set(SETTINGS))
         if unknown:
-            raise TypeError(f"settings of an unknown name: {', '.join(unknown)}")
+            raise TypeError(f"unknown settings: {', '.join(unknown)}")
         found = {name: SETTINGS[name].from_plain(value) for name, value in values.items()}
         return FitSettings(**found)
 
     def identity(self) -> dict[str, object]:
-        """Return `to_dict` with the settings that do not change the solution at their defaults."""
+        """Return `to_dict` with all settings that do not affect the solution at their defaults."""
         same = {name: DEFAULTS[name] for name, one in SETTINGS.items() if not one.is_identity}
         return self.with_(**same).to_dict()
 
@@ -229,16 +229,16 @@ class FitSettings:
         return tuple(getattr(self, name) for name, one in SETTINGS.items() if one.selects)
 
     def what_if_holds(self, other: "FitSettings") -> bool:
-        """Return whether a what-if from a fit with these settings may answer the others."""
+        """Return whether a what-if from a fit with these settings can solve with `other`."""
         refit = [name for name, one in SETTINGS.items() if one.change is Change.REFIT]
         return all(getattr(self, name) == getattr(other, name) for name in refit)
 
     def describe(self) -> str:
-        """Return in a few words what departs from the defaults, and the order in any case."""
+        """Return a short description: the order, and every setting that is not its default."""
         phrases = (
             one.described(getattr(self, name), DEFAULTS[name]) for name, one in SETTINGS.items()
         )
-        return ", ".join(phrase for some in phrases for phrase in some)
+        return ", ".join(phrase for group in phrases for phrase in group)
 
 
 SETTINGS = settings_of(FitSettings)

@@ -1,4 +1,4 @@
-"""Settings that people write as short texts: prior widths, shifts of prior centres, exclusions."""
+"""Settings written as short texts: prior widths, shifts of prior centres, and exclusions."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -20,21 +20,21 @@ from solver.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class Texts(Setting):
-    """A setting that people write as any number of short texts."""
+    """A setting that is written as any number of short texts."""
 
     metavar: str = ""
     example: str = ""
 
     def parse(self, texts: Iterable[str]) -> Any:  # noqa: ANN401
-        """Return the value that texts state; `InputError` says which cannot be used."""
+        """Return the value that the texts give; `InputError` names an invalid one."""
         raise TypeError(f"{type(self).__name__} does not read texts")
 
     def texts(self, value: Any) -> list[str]:  # noqa: ANN401
-        """Return a value as `parse` reads it."""
+        """Return a value as texts that `parse` reads."""
         raise TypeError(f"{type(self).__name__} does not write {value!r}")
 
     def merged(self, base: Any, value: Any) -> Any:  # noqa: ANN401
-        """Return what a value makes of that of other settings: mappings change by name."""
+        """Return `base` changed by `value`: a mapping is updated, another value is replaced."""
         return {**base, **value} if isinstance(base, Mapping) else value
 
 
@@ -43,7 +43,7 @@ class PriorWidths(Texts):
     """Prior widths of parameter groups, by name, in the group's `width_unit`."""
 
     def check(self, name: str, value: Mapping[str, float]) -> None:
-        """Refuse widths that no prior can have."""
+        """Raise `InputError` for a width that no prior can have."""
         del name
         for group, width in value.items():
             check_width(group, width)
@@ -67,7 +67,7 @@ class PriorWidths(Texts):
         return [f"{group}={format_width(group, width)}" for group, width in value.items()]
 
     def described(self, value: Mapping[str, float], default: object) -> list[str]:
-        """Return the widths that are not the group's own."""
+        """Return a phrase for each width that is not the group's default."""
         del default
         changed = {name: width for name, width in value.items() if width != BY_NAME[name].width}
         return [f"{name} {format_width(name, width)}" for name, width in changed.items()]
@@ -78,7 +78,7 @@ class PriorShifts(Texts):
     """Shifts of prior centres, by "GROUP" or "GROUP[ELEMENT]", in the group's unit."""
 
     def check(self, name: str, value: Mapping[str, float]) -> None:
-        """Refuse shifts that are of no group, or not finite."""
+        """Raise `InputError` for a shift of an unknown group, or one that is not finite."""
         del name
         for element, shift in value.items():
             check_shift(element, shift)
@@ -96,7 +96,7 @@ class PriorShifts(Texts):
         return [format_shift(name, shift) for name, shift in value.items()]
 
     def described(self, value: Mapping[str, float], default: object) -> list[str]:
-        """Return every shift."""
+        """Return a phrase for each shift."""
         del default
         return self.texts(value)
 
@@ -122,6 +122,6 @@ class LeftOut(Texts):
         return [name.replace(" ", "=") for name in value.names()]
 
     def described(self, value: Exclusions, default: object) -> list[str]:
-        """Return a phrase per exclusion."""
+        """Return a phrase for each exclusion."""
         del default
         return [self.phrase.format(name) for name in value.names()]

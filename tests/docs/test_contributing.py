@@ -38,7 +38,7 @@ CONTROLS = """
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices
 from plateviz.dashboard.views.refit import RefitView
-from plateviz.notebook.choices import settings_with
+from plateviz.notebook.keywords import settings_with
 from solver.data.settings import FitSettings
 
 choices = FitChoices(min_obs=3)

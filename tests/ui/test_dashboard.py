@@ -153,7 +153,7 @@ def test_what_is_left_out_is_left_out(page):
 
 
 def test_a_refit_can_be_cancelled_and_the_old_solution_stays(page):
-    page.get_by_label("Try every change at once").click()
+    page.get_by_label("What-if at every change").click()
     before = value(page, "χ² per degree of freedom")
     set_order(page, 8)
     page.get_by_role("button", name="Fit", exact=True).click()
@@ -169,7 +169,7 @@ def test_a_prior_that_makes_no_sense_is_refused_in_words(page):
     entry.fill("1 deg")
     entry.press("Enter")
     page.get_by_role("button", name="Fit", exact=True).click()
-    expect(page.get_by_text("prior of distortion_x: expected a unit out of")).to_be_visible()
+    expect(page.get_by_text("prior of distortion_x: expected a unit such as um")).to_be_visible()
 
 
 def test_the_dark_theme_reaches_the_figures(page):

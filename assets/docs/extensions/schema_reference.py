@@ -27,7 +27,7 @@ from markup import code, table
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from plateviz.notebook.choices import KEYWORDS
+from plateviz.notebook.keywords import KEYWORDS
 from solver.data.columns import Column, Table
 from solver.data.parameters import PARAMETERS, Group
 from solver.data.prior_text import format_width

@@ -1,1 +1,1 @@
-"""Views: they connect the session to tables and figures, and compute nothing."""
+"""Views: connect the session to tables and figures, without computations of their own."""

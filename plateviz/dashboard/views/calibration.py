@@ -1,4 +1,4 @@
-"""CalibrationView: the fitted calibration and the outliers as tables, a tab for each."""
+"""CalibrationView: tables of the fitted calibration and the outliers, one per tab."""
 
 import panel as pn
 import panel_material_ui as pmui
@@ -15,8 +15,8 @@ class CalibrationView(pn.viewable.Viewer):
         """Follow `session`."""
         super().__init__(**params)
         self._session = session
-        # A table of a tab that has not been opened would ask without end, in the browser, whether
-        # it can be laid out: one core of every reader.
+        # Otherwise a table in an unopened tab would check in the browser without end whether it can
+        # be laid out, which uses one core.
         self._tabs = pmui.Tabs(dynamic=True, sizing_mode="stretch_width")
         session.param.watch(self._fill, "shown")
         self._fill()

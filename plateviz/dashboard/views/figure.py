@@ -1,4 +1,4 @@
-"""FigureView: one figure on the screen, with its caption and the state it is in."""
+"""FigureView: a card with one figure, its caption and its state."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -15,64 +15,64 @@ from plateviz.dashboard.views.visibility import Visibility
 from solver.errors import InputError
 
 _BATCH = 2
-# An empty card has about the height of a figure: if it had none, all cards would be near.
+# Height of an empty card, about that of a figure; without it, all cards would be near the screen.
 _EMPTY_HEIGHT = 420
-_NOWHERE: Links = MappingProxyType({})
+_NO_LINKS: Links = MappingProxyType({})
 _LOG = logging.getLogger(__name__)
 
-Picture = Callable[[str], hv.core.Dimensioned | None]
-"""Gives what a figure shows in a theme; None while there is nothing to draw it from."""
+DrawFigure = Callable[[str], hv.core.Dimensioned | None]
+"""Draws a figure in a theme; returns None while there are no data."""
 
 
 class FigureText(Protocol):
-    """What a card says of its figure."""
+    """Name, caption and width of a figure."""
 
     @property
     def name(self) -> str:
-        """Short and unique, used in class names."""
+        """Short unique name, used in CSS class names."""
         ...
 
     @property
     def caption(self) -> str:
-        """What it shows and what good looks like."""
+        """What the figure shows, and how it looks for a good solution."""
         ...
 
     @property
     def is_wide(self) -> bool:
-        """Whether it takes the whole width of the page."""
+        """Whether the figure takes the whole width of the page."""
         ...
 
 
 class FigureView(pn.viewable.Viewer):
-    """A card with one figure; due to be drawn when what it is drawn from changes.
+    """A card with one figure, which is due to be drawn when its data change.
 
-    A figure that has still to be drawn anew is faded.
+    Until it is drawn again, the figure is faded.
     """
 
     def __init__(
         self,
         figure: FigureText,
-        picture: Picture,
+        draw_figure: DrawFigure,
         *,
         waiting: str = "",
-        links: Links = _NOWHERE,
+        links: Links = _NO_LINKS,
         **params: object,
     ) -> None:
-        """Show `figure` as `picture` gives it.
+        """Show `figure` as `draw_figure` draws it.
 
         Parameters
         ----------
-        waiting : words for as long as there is nothing to draw
-        links : where a tap on a point links
+        waiting : text while there is nothing to draw
+        links : actions for a tap on a point
         """
         super().__init__(**params)
-        self._figure, self._picture, self._leads = figure, picture, links
+        self._figure, self._draw_figure, self._links = figure, draw_figure, links
         self._waiting, self._theme = waiting, "light"
         self._is_changed = self._is_stale = False
         self.visibility = Visibility()
         self._caption = markup_pane()
-        # A plain column lays a new figure out as it takes it; others do so a moment later, in which
-        # the page may measure a figure that has no layout yet.
+        # A plain Panel column lays out a new figure at once. Other containers do so a moment later,
+        # and the page may measure a figure without a layout.
         self._body = pn.Column(sizing_mode="stretch_width", margin=0)
         self._card = pmui.Paper(
             self.visibility,
@@ -93,7 +93,7 @@ class FigureView(pn.viewable.Viewer):
             variant="outlined",
         )
         self.change(self._theme)
-        self._say("Being drawn.")
+        self._show_text("Being drawn.")
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the card."""
@@ -101,44 +101,44 @@ class FigureView(pn.viewable.Viewer):
 
     @property
     def is_due(self) -> bool:
-        """Whether it is to be drawn: it has changed, and somebody looks at it or soon will."""
+        """Whether the figure is to be drawn: it has changed, and is on or near the screen."""
         return self._is_changed and self.visibility.is_near
 
     def change(self, theme: str) -> None:
-        """Take note that the figure, or the theme it is drawn in, is another."""
+        """Mark the figure as changed, and set the theme for the next drawing."""
         self._theme, self._is_changed = theme, True
         self._caption.object = paragraph(self._figure.caption, "caption", theme)
         self._fade()
 
     def draw(self) -> None:
-        """Draw the figure as it is now."""
+        """Draw the figure from the current data."""
         self._is_changed = False
         try:
-            element = self._picture(self._theme)
+            element = self._draw_figure(self._theme)
             if element is None:
-                self._say(self._waiting)
+                self._show_text(self._waiting)
             else:
                 self._show(element)
         except (InputError, ValueError, KeyError, TypeError, ArithmeticError) as error:
-            # One figure that cannot be drawn must not take the page with it.
+            # One figure that cannot be drawn must not break the page.
             _LOG.exception("%s cannot be drawn", self._figure.name)
-            self._say(f"This figure cannot be drawn: {error}")
+            self._show_text(f"This figure cannot be drawn: {error}")
 
     def mark_stale(self, is_stale: bool) -> None:
-        """Take note that another is being made, or no longer is."""
+        """Mark the figure as stale while a new solution is being computed."""
         self._is_stale = is_stale
         self._fade()
 
     def _show(self, element: hv.core.Dimensioned) -> None:
         plot = rendered(element)
-        follow_taps(plot, self._leads)
+        follow_taps(plot, self._links)
         self._put(
             pn.pane.HoloViews(plot, backend="bokeh", linked_axes=False, align="center", margin=0)
         )
 
-    def _say(self, words: str) -> None:
+    def _show_text(self, text: str) -> None:
         pane = markup_pane()
-        pane.object = paragraph(words, "empty", self._theme)
+        pane.object = paragraph(text, "empty", self._theme)
         self._put(pane)
 
     def _put(self, body: pn.viewable.Viewable) -> None:
@@ -153,7 +153,7 @@ class FigureGrid(pn.viewable.Viewer):
     """Several figures, two in a row where there is room."""
 
     def __init__(self, views: Sequence[FigureView], **params: object) -> None:
-        """Lay out the cards, in order."""
+        """Arrange the cards in order."""
         super().__init__(**params)
         self._views = list(views)
         self._box = pmui.FlexBox(
@@ -166,29 +166,29 @@ class FigureGrid(pn.viewable.Viewer):
 
     @property
     def is_due(self) -> bool:
-        """Whether some figure is to be drawn."""
+        """Whether any figure is to be drawn."""
         return any(view.is_due for view in self._views)
 
-    def on_sight(self, call: Callable[[object], object]) -> None:
-        """Have `call` called when somebody comes near a figure, or leaves it."""
+    def on_visibility(self, call: Callable[[object], object]) -> None:
+        """Call `call` when a figure comes near the screen or leaves it."""
         for view in self._views:
             view.visibility.param.watch(call, "is_near")
 
     def change(self, theme: str) -> None:
-        """Take note that all figures are others."""
+        """Mark all figures as changed, and set their theme."""
         for view in self._views:
             view.change(theme)
 
     def mark_stale(self, is_stale: bool) -> None:
-        """Fade all figures while others are being made."""
+        """Mark all figures as stale while a new solution is being computed."""
         for view in self._views:
             view.mark_stale(is_stale)
 
     def draw_due(self) -> None:
         """Draw the first few figures that are due.
 
-        Drawing takes tenths of a second, and so does each change of the page: in batches,
-        the page opens at once, fills from the top, and answers in between.
+        A drawing takes tenths of a second, and so does each change of the page. With batches, the
+        page opens at once, fills from the top, and remains responsive.
         """
         due = [view for view in self._views if view.is_due]
         with pn.io.hold():

@@ -1,4 +1,4 @@
-"""Links: a tap on a point that stands for a source or an orbit links there."""
+"""Links: a tap on the point of a source or an orbit opens it."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -10,7 +10,7 @@ from bokeh.plotting import figure as Figure  # noqa: N812  a class by another na
 from holoviews.plotting.bokeh.element import ElementPlot
 
 Links = Mapping[str, Callable[[str], object]]
-"""Where points lead: column of their data -> what is called with its value as text."""
+"""Column of a point's data -> function that is called with its value as text."""
 
 
 def rendered(element: hv.core.Dimensioned) -> hv.plotting.Plot:
@@ -20,11 +20,11 @@ def rendered(element: hv.core.Dimensioned) -> hv.plotting.Plot:
 
 
 def follow_taps(plot: hv.plotting.Plot, links: Links) -> None:
-    """Let a tap on a point lead where its data say.
+    """Call the function of a link when its point is tapped.
 
     Parameters
     ----------
-    links : the first whose column the data of a point have is taken
+    links : the first one whose column is in the data of the point is used
     """
     found: dict[Figure, list[DataRenderer]] = {}
     for part in plot.traverse(specs=[ElementPlot]):
@@ -33,13 +33,13 @@ def follow_taps(plot: hv.plotting.Plot, links: Links) -> None:
             continue
         column = next((name for name in links if name in source.data), None)
         if column is not None:
-            source.selected.on_change("indices", partial(_lead, source, column, links[column]))
+            source.selected.on_change("indices", partial(_open_link, source, column, links[column]))
             found.setdefault(part.handles["plot"], []).append(glyphs)
     for figure, renderers in found.items():
         figure.add_tools(TapTool(renderers=renderers))
 
 
-def _lead(
+def _open_link(
     source: ColumnDataSource,
     column: str,
     call: Callable[[str], object],
@@ -48,6 +48,6 @@ def _lead(
     new: list[int],
 ) -> None:
     if new:
-        # The tap is a question, not a selection: the other points must not stay faded.
+        # A tap is not a selection: the other points must not stay faded.
         source.selected.indices = []
         call(str(source.data[column][new[0]]))

@@ -13,7 +13,7 @@ _STYLES = [STYLE, (Path(__file__).parent / "style.css").read_text(encoding="utf-
 
 
 def markup_pane() -> pn.pane.HTML:
-    """Return an empty pane that knows the classes of `style.css`."""
+    """Return an empty pane with the style sheets of the project and of `style.css`."""
     return pn.pane.HTML("", stylesheets=_STYLES, sizing_mode="stretch_width", margin=0)
 
 
@@ -28,7 +28,7 @@ def themed(markup: str, theme: str) -> str:
 
 
 def titled(role: str, name: str) -> str:
-    """Return a line that says what is shown below it."""
+    """Return a title line for what is shown below it."""
     return f"<p class='solution'><span class='muted'>{role}:</span> <b>{escape(name)}</b></p>"
 
 
@@ -38,10 +38,10 @@ def heading(text: str) -> pmui.Typography:
 
 
 def numbers(table: pd.DataFrame) -> str:
-    """Return a small table of text, as `tables.headings.in_words` gives it; a dash for nothing."""
+    """Return an HTML table of texts from `tables.headings.in_words`; empty cells have a dash."""
     head = "".join(f"<th>{escape(title)}</th>" for title in table.columns)
     rows = "".join(
-        f"<tr>{''.join(f'<td>{escape(words) or chr(0x2013)}</td>' for words in row)}</tr>"
+        f"<tr>{''.join(f'<td>{escape(text) or chr(0x2013)}</td>' for text in row)}</tr>"
         for row in table.itertuples(index=False)
     )
     return f"<table class='numbers'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"

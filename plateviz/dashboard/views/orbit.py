@@ -19,7 +19,7 @@ from plateviz.plots.gallery import diagnostics
 
 
 class OrbitPage(pn.viewable.Viewer):
-    """The Orbit view: figures of the solution on the screen, drawn when it changes."""
+    """The Orbit view: the solution on the screen, updated when it changes."""
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow the session of `navigation`."""
@@ -55,12 +55,12 @@ class OrbitPage(pn.viewable.Viewer):
     def _figure_view(self, diagnostic: Diagnostic, navigation: Navigation) -> FigureView:
         return FigureView(
             diagnostic,
-            partial(self._picture, diagnostic),
-            waiting="The first solution is being made.",
+            partial(self._draw, diagnostic),
+            waiting="The first solution is being computed.",
             links={"id": navigation.open_source} if navigation.run else {},
         )
 
-    def _picture(self, diagnostic: Diagnostic, theme: str) -> hv.core.Dimensioned | None:
+    def _draw(self, diagnostic: Diagnostic, theme: str) -> hv.core.Dimensioned | None:
         session, shown = self._session, self._session.shown
         if shown is None:
             return None

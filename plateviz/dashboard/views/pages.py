@@ -1,4 +1,4 @@
-"""Pages: the views of one browser session behind one switch."""
+"""Pages: the views of one browser session, with a switch between them."""
 
 from collections.abc import Callable
 
@@ -10,8 +10,8 @@ from plateviz.dashboard.views.orbit import OrbitPage
 from plateviz.dashboard.views.source import SourcePage
 from plateviz.dashboard.views.survey import SurveyPage
 
-# Figures that keep their size need not be laid out anew when they are seen again; and a
-# browser that can leaves out what is in a hidden view, whatever that says of itself.
+# A hidden view keeps the size of its figures, so that they need no new layout when it is shown
+# again. `content-visibility` lets browsers that support it skip the contents of a hidden view.
 _SHOWN = {
     "visibility": "inherit",
     "content-visibility": "visible",
@@ -24,7 +24,7 @@ _HIDDEN = {
     "height": "0",
     "overflow": "hidden",
 }
-# The views share one scroll bar; each is begun at its head.
+# The views share one scroll bar; each opens at its top.
 _TO_THE_TOP = """
 for (const host of document.querySelectorAll("*"))
   host.shadowRoot?.querySelector(".main-content")?.scrollTo(0, 0)
@@ -44,19 +44,19 @@ class Pages(pn.viewable.Viewer):
             View.ORBIT: OrbitPage(navigation),
             View.SOURCE: SourcePage(navigation),
         }
-        # All boxes around the figures are of a kind that keeps its changes to itself: within a
-        # plain column, every change has all figures of all views laid out anew.
-        self._places = {view: page.__panel__() for view, page in self._pages.items()}
-        self._sides = {view: page.sidebar for view, page in self._pages.items()}
+        # All containers of the figure cards are Material UI ones, whose changes stay local: in a
+        # plain Panel column, every change lays out all figures of all views again.
+        self._contents = {view: page.__panel__() for view, page in self._pages.items()}
+        self._sidebars = {view: page.sidebar for view, page in self._pages.items()}
         self._column = pmui.Column(
             self._switch(),
-            *self._places.values(),
+            *self._contents.values(),
             sizing_mode="stretch_width",
             margin=(4, 16, 24, 16),
         )
-        self.sidebar = pmui.Column(*self._sides.values(), sizing_mode="stretch_width", margin=0)
-        navigation.param.watch(self._turn, "view")
-        self._turn()
+        self.sidebar = pmui.Column(*self._sidebars.values(), sizing_mode="stretch_width", margin=0)
+        navigation.param.watch(self._show_view, "view")
+        self._show_view()
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the switch and the view."""
@@ -64,16 +64,16 @@ class Pages(pn.viewable.Viewer):
 
     @property
     def is_due(self) -> bool:
-        """Whether some figure of the view on the screen is to be drawn."""
+        """Whether any figure of the view on the screen is to be drawn."""
         return self._pages[self._navigation.view].figures.is_due
 
-    def on_sight(self, call: Callable[[object], object]) -> None:
-        """Have `call` called when somebody comes near a figure, or leaves it."""
+    def on_visibility(self, call: Callable[[object], object]) -> None:
+        """Call `call` when a figure comes near the screen or leaves it."""
         for page in self._pages.values():
-            page.figures.on_sight(call)
+            page.figures.on_visibility(call)
 
     def draw_due(self) -> None:
-        """Draw the first few figures that are due; what nobody looks at is not drawn."""
+        """Draw the first few figures that are due in the view on the screen."""
         self._pages[self._navigation.view].figures.draw_due()
 
     def _switch(self) -> pmui.RadioButtonGroup:
@@ -91,8 +91,8 @@ class Pages(pn.viewable.Viewer):
         navigation.param.watch(lambda event: switch.param.update(value=event.new), "view")
         return switch
 
-    def _turn(self, *_: object) -> None:
+    def _show_view(self, *_: object) -> None:
         shown = self._navigation.view
         for view in View:
-            self._places[view].styles = _SHOWN if view is shown else _HIDDEN
-            self._sides[view].visible = view is shown
+            self._contents[view].styles = _SHOWN if view is shown else _HIDDEN
+            self._sidebars[view].visible = view is shown

@@ -1,4 +1,4 @@
-"""RefitView: fit the orbit again with another order or other priors, watch it, stop it."""
+"""RefitView: request fits and what-ifs of the orbit, show their progress, and cancel them."""
 
 from typing import Any
 
@@ -12,12 +12,12 @@ from solver.data.setting import Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import SETTINGS
 from solver.data.text_setting import LeftOut, PriorShifts, Texts
 
-# Of a control that stands close to the next one.
+# Margin of a control close to the next one.
 _TIGHT = (0, 10)
 
 
 class RefitView(pn.viewable.Viewer):
-    """Controls of a refit, its progress, and the choice among the solutions made."""
+    """Controls of a refit, its progress, and the selection of a solution."""
 
     def __init__(self, session: Session, **params: object) -> None:
         """Follow `session`."""
@@ -33,12 +33,12 @@ class RefitView(pn.viewable.Viewer):
             label="Cancel", color="warning", variant="outlined", sizing_mode="stretch_width"
         )
         self._bar = pmui.LinearProgress(variant="indeterminate", sizing_mode="stretch_width")
-        self._news = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
+        self._message = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
         self._column = pmui.Column(
             pmui.Switch.from_param(
                 session.choices.param.what_if_at_once,
-                label="Try every change at once",
+                label="What-if at every change",
                 margin=_TIGHT,
             ),
             *_controls(session.choices, Whole, Positive, Switch),
@@ -46,7 +46,7 @@ class RefitView(pn.viewable.Viewer):
             *_controls(session.choices, LeftOut, Choice),
             pmui.Row(self._fit, self._stop, sizing_mode="stretch_width", margin=0),
             self._bar,
-            self._news,
+            self._message,
             self._keep,
             self._solutions,
             sizing_mode="stretch_width",
@@ -63,8 +63,8 @@ class RefitView(pn.viewable.Viewer):
         self._fit.on_click(lambda _: session.refit())
         self._stop.on_click(lambda _: session.cancel())
         self._keep.on_click(lambda _: session.keep())
-        self._reset.on_click(self._take_defaults)
-        self._solutions.param.watch(self._bring_up, "value")
+        self._reset.on_click(self._reset_priors)
+        self._solutions.param.watch(self._select, "value")
         session.choices.param.watch(self._show_widths, "prior_widths")
         session.param.watch(self._show_stage, ["stage", "message"])
         session.param.watch(self._show_solutions, ["solutions", "shown"])
@@ -103,7 +103,7 @@ class RefitView(pn.viewable.Viewer):
         entry.param.watch(take, "value")
         return entry
 
-    def _take_defaults(self, _: object) -> None:
+    def _reset_priors(self, _: object) -> None:
         self._session.choices.param.update(prior_widths=default_widths(), prior_shifts="")
 
     def _show_widths(self, *_: object) -> None:
@@ -112,10 +112,10 @@ class RefitView(pn.viewable.Viewer):
 
     def _show_stage(self, *_: object) -> None:
         stage, message = self._session.stage, self._session.message
-        at_work = stage in (Stage.LOADING, Stage.STALE)
-        self._bar.visible = at_work
-        self._stop.disabled = not at_work
-        self._news.param.update(
+        is_busy = stage in (Stage.LOADING, Stage.STALE)
+        self._bar.visible = is_busy
+        self._stop.disabled = not is_busy
+        self._message.param.update(
             object=message,
             visible=bool(message),
             severity="error" if stage is Stage.FAILED else "info",
@@ -128,11 +128,11 @@ class RefitView(pn.viewable.Viewer):
         if shown is not None and shown.is_what_if:
             self._keep.visible = True
             solutions[shown.label] = shown
-        # A value that is no option would be sent to the browser as it is.
+        # A value that is not among the options would be sent to the browser unchanged.
         chosen = next((s for s in solutions.values() if s is shown), None)
         self._solutions.param.update(options=solutions, value=chosen, visible=len(solutions) > 1)
 
-    def _bring_up(self, event: object) -> None:
+    def _select(self, event: object) -> None:
         chosen = event.new  # type: ignore[attr-defined]
         if isinstance(chosen, Solution):
             self._session.bring_up(chosen)
@@ -140,18 +140,22 @@ class RefitView(pn.viewable.Viewer):
 
 def _control(choices: FitChoices, name: str) -> pn.viewable.Viewable:
     """Return the control of a setting."""
-    one, of = SETTINGS[name], choices.param[name]
+    one, parameter = SETTINGS[name], choices.param[name]
     if isinstance(one, Switch):
-        return pmui.Switch.from_param(of, label=one.label, margin=_TIGHT)
+        return pmui.Switch.from_param(parameter, label=one.label, margin=_TIGHT)
     if isinstance(one, Whole) and one.high is None:
         return pmui.IntInput.from_param(
-            of, label=one.label, description=one.help, size="small", sizing_mode="stretch_width"
+            parameter,
+            label=one.label,
+            description=one.help,
+            size="small",
+            sizing_mode="stretch_width",
         )
     if isinstance(one, Whole):
-        return pmui.IntSlider.from_param(of, label=one.label, sizing_mode="stretch_width")
+        return pmui.IntSlider.from_param(parameter, label=one.label, sizing_mode="stretch_width")
     if isinstance(one, Positive):
         return pmui.FloatInput.from_param(
-            of,
+            parameter,
             label=f"{one.label} ({one.unit})" if one.unit else one.label,
             description=one.help,
             size="small",
@@ -159,10 +163,10 @@ def _control(choices: FitChoices, name: str) -> pn.viewable.Viewable:
         )
     if isinstance(one, Choice):
         return pmui.Select.from_param(
-            of, label=one.label, size="small", sizing_mode="stretch_width"
+            parameter, label=one.label, size="small", sizing_mode="stretch_width"
         )
     return pmui.TextInput.from_param(
-        of,
+        parameter,
         label=one.label,
         placeholder=one.example if isinstance(one, Texts) else "",
         description=one.help,
@@ -182,9 +186,9 @@ def _controls(choices: FitChoices, *kinds: type[Setting]) -> list[pn.viewable.Vi
 
 
 def _explanation(group: Group) -> str:
-    """Return what the number in the control of a prior width means."""
+    """Return the tooltip of the control of a prior width."""
     if group.axis == "src":
         return "Factor on the catalogue's own uncertainties."
     if group.relative:
         return "Standard deviation as a fraction of the nominal value, or flat."
-    return f"Standard deviation in {group.unit} (other units may be written), or flat."
+    return f"Standard deviation in {group.unit} or another unit that is given, or flat."

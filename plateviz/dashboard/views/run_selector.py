@@ -1,4 +1,4 @@
-"""Which run of the survey the views show."""
+"""Control that selects the run of the survey on the screen."""
 
 import panel as pn
 import panel_material_ui as pmui
@@ -7,7 +7,7 @@ from plateviz.dashboard.navigation import Navigation
 
 
 def run_selector(navigation: Navigation) -> list[pn.viewable.Viewable]:
-    """Return the control that chooses a run; none where there is no run."""
+    """Return the control that selects a run; an empty list if there is no run."""
     if navigation.run is None:
         return []
     selector = pmui.Select.from_param(

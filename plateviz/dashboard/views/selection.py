@@ -1,4 +1,4 @@
-"""SelectionView: which exposures and which detector the page shows."""
+"""SelectionView: controls for the orbit, exposures and detector on the screen."""
 
 import panel as pn
 import panel_material_ui as pmui
@@ -33,7 +33,7 @@ class SelectionView(pn.viewable.Viewer):
             def choose(event: object) -> None:
                 if event.new != selection.orbit:  # type: ignore[attr-defined]
                     navigation.choose_orbit(event.new)  # type: ignore[attr-defined]
-                    # What cannot be read is not turned to.
+                    # An orbit that cannot be read is not selected.
                     orbit.value = selection.orbit
 
             orbit.param.watch(choose, "value")

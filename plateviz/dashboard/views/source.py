@@ -39,7 +39,7 @@ _INVITATION = (
 
 
 class SourcePage(pn.viewable.Viewer):
-    """The Source view: the source that was found, else those that there are."""
+    """The Source view: the source that was found, or the list of all sources."""
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow the source of `navigation`."""
@@ -87,9 +87,9 @@ class SourcePage(pn.viewable.Viewer):
 
     def _figure_view(self, figure: SourceFigure) -> FigureView:
         links = {"orbit_id": self._open_orbit}
-        return FigureView(figure, partial(self._picture, figure), links=links)
+        return FigureView(figure, partial(self._draw, figure), links=links)
 
-    def _picture(self, figure: SourceFigure, theme: str) -> hv.core.Dimensioned | None:
+    def _draw(self, figure: SourceFigure, theme: str) -> hv.core.Dimensioned | None:
         found = self._navigation.found
         return (
             None if found is None else figure.draw(SourceTables(found.history, found.motion), theme)
@@ -114,7 +114,7 @@ class SourcePage(pn.viewable.Viewer):
         items = strip(source_strip(found.history, found.motion))
         self._head.object = themed(title + items, theme)
         if found.motion is None:
-            words = "Motions are fitted when all orbits of the run are there."
+            words = "Motions are fitted once all orbits of the run are fitted."
             self._motion.object = paragraph(words, "caption", theme)
         else:
             table = motion_table(found.motion)

@@ -1,4 +1,4 @@
-"""SummaryView: the numbers that decide whether to trust a solution, in one strip."""
+"""SummaryView: the numbers that show whether to trust a solution, in one strip."""
 
 import panel as pn
 
@@ -27,8 +27,8 @@ class SummaryView(pn.viewable.Viewer):
         session = self._session
         shown, other = session.shown, session.other
         if shown is None:
-            words = session.message if session.stage is Stage.FAILED else "No solution yet."
-            self._strip.object = paragraph(words, "empty", session.theme)
+            text = session.message if session.stage is Stage.FAILED else "No solution yet."
+            self._strip.object = paragraph(text, "empty", session.theme)
             return
         rows = [_row(shown, "(B) Solution" if other else "Solution")]
         if other is not None:

@@ -1,4 +1,4 @@
-"""SurveyPage: every orbit of a run and how its fit is, then what the orbits say together."""
+"""SurveyPage: the orbits of a run and the quality of their fits, and figures of the survey."""
 
 from functools import partial
 
@@ -22,7 +22,7 @@ from plateviz.tables.survey_tables import SurveyTables
 
 
 class SurveyPage(pn.viewable.Viewer):
-    """The Survey view of the run that is chosen."""
+    """The Survey view: the run on the screen."""
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow the run of `navigation`."""
@@ -50,9 +50,9 @@ class SurveyPage(pn.viewable.Viewer):
 
     def _figure_view(self, figure: SurveyFigure) -> FigureView:
         links = {"id": self._navigation.open_source, "orbit_id": self._open_orbit}
-        return FigureView(figure, partial(self._picture, figure), links=links)
+        return FigureView(figure, partial(self._draw, figure), links=links)
 
-    def _picture(self, figure: SurveyFigure, theme: str) -> hv.core.Dimensioned | None:
+    def _draw(self, figure: SurveyFigure, theme: str) -> hv.core.Dimensioned | None:
         run = self._navigation.run
         if run is None:
             return None
@@ -61,7 +61,7 @@ class SurveyPage(pn.viewable.Viewer):
         return figure.draw(self._tables, theme)
 
     def _read(self, *_: object) -> None:
-        # The figures' tables take longer, and wait for the first figure.
+        # The tables of the figures take longer, and are read when the first figure is drawn.
         self._tables = None
         run = self._navigation.run
         if run is not None:

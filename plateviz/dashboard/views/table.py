@@ -1,4 +1,4 @@
-"""DataTable: a table of numbers for people, whose rows can be opened."""
+"""DataTable: a table of numbers whose rows can be opened."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -11,20 +11,20 @@ from bokeh.models.widgets.tables import NumberFormatter
 from plateviz.tables.headings import Heading
 from plateviz.tables.summary import State
 
-# As `style.css` has them.
+# The same colours as in `style.css`.
 _COLOURS: Mapping[str, Mapping[State, str]] = MappingProxyType(
     {
         "light": {"good": "#1a7f5a", "warn": "#b26a00", "bad": "#c0392b"},
         "dark": {"good": "#4cc79a", "warn": "#f0b24a", "bad": "#ff8a7a"},
     }
 )
-# A table says that it is visible, even on a view that is not on the screen.
+# Tabulator makes its tables visible even in a hidden view; this prevents it.
 TABLE_STYLE = ":host .tabulator { font-size: 13px; visibility: inherit !important; }"
 _CLICKABLE = ".tabulator-row { cursor: pointer; }"
 
 
 class DataTable(pn.viewable.Viewer):
-    """A sortable table; a click on a row tells which."""
+    """A sortable table that reports the row that is clicked."""
 
     def __init__(
         self,
@@ -34,12 +34,12 @@ class DataTable(pn.viewable.Viewer):
         page_size: int = 12,
         **params: object,
     ) -> None:
-        """Show columns as `headings` say.
+        """Show the columns of `headings`.
 
         Parameters
         ----------
-        headings : column -> how it is shown; others are not
-        on_row : called with the row of the table that was clicked on
+        headings : column -> its heading and format; other columns are not shown
+        on_row : called with the row that is clicked
         """
         super().__init__(**params)
         self._headings, self._on_row = headings, on_row
@@ -78,11 +78,11 @@ class DataTable(pn.viewable.Viewer):
     def show(
         self, table: pd.DataFrame, theme: str = "light", states: pd.DataFrame | None = None
     ) -> None:
-        """Show other rows, in the colours of a theme; columns without any value are hidden.
+        """Replace the rows, in the colours of a theme; columns without values are hidden.
 
         Parameters
         ----------
-        states : how the numbers of some columns are, row by row
+        states : states of numbers, good to bad, with the rows and some columns of `table`
         """
         self._theme = theme
         self._states = pd.DataFrame() if states is None else states.reset_index(drop=True)
@@ -91,7 +91,7 @@ class DataTable(pn.viewable.Viewer):
         self._table.param.update(value=shown, hidden_columns=empty)
 
     def _colours(self, rows: pd.DataFrame) -> pd.DataFrame:
-        # Rows come as they are sorted; their index is that of the table.
+        # Rows arrive in the sorted order, with the index of the table.
         states = self._states.reindex(index=rows.index, columns=rows.columns)
         return states.map(lambda state: _css(state, self._theme))
 

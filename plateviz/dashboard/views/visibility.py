@@ -1,19 +1,19 @@
-"""Visibility: whether a part of the page is on the screen, or about to be."""
+"""Visibility: whether a part of the page is on or near the screen."""
 
 import panel as pn
 import param
 
 
 class Visibility(pn.custom.JSComponent):
-    """Lies behind what it stands in and has its size; tells when the browser comes near it.
+    """A background of its container, of the same size, that reports when it is near the screen.
 
-    A part that is not laid out, of a view that is not on the screen, say, is not near.
+    A part without a layout, such as one in a hidden view, is not near.
     """
 
     is_near = param.Boolean(default=False, doc="whether it is on the screen or close to it")
 
-    # The page scrolls within itself: only `scrollMargin` reaches beyond such an edge. A browser
-    # that does not know it tells of what is on the screen, and no sooner.
+    # The page scrolls inside a container, beyond whose edge only `scrollMargin` reaches. A browser
+    # that does not support it reports only what is on the screen.
     _esm = """
     export function render({ model, el }) {
       const near = "600px 0px"
@@ -27,6 +27,6 @@ class Visibility(pn.custom.JSComponent):
     """
 
     def __init__(self, **params: object) -> None:
-        """Fill the next positioned ancestor."""
+        """Fill the nearest positioned ancestor."""
         behind = {"position": "absolute", "inset": "0", "z-index": "-1", "pointer-events": "none"}
         super().__init__(styles=behind, margin=0, **params)

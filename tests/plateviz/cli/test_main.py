@@ -1,4 +1,4 @@
-"""The command line: exit codes, messages, and what it prints for machines."""
+"""The command line: exit codes, messages and printed output."""
 
 import json
 import socket
@@ -14,7 +14,7 @@ def sample(sample_orbit_dir):
     return [sample_orbit_dir / f"sample_{name}.fits" for name in ("obs", "ref", "truth")]
 
 
-def test_fit_prints_one_object_and_writes_the_result(run, sample, tmp_path):
+def test_fit_prints_one_json_object_and_writes_the_result(run, sample, tmp_path):
     obs, ref, truth = sample
     output = tmp_path / "r.fits"
     code, out, _ = run("fit", obs, ref, "--truth", truth, "-o", output, "--json")
@@ -28,7 +28,7 @@ def test_fit_prints_one_object_and_writes_the_result(run, sample, tmp_path):
     assert len(read_result(output).sources) == 814
 
 
-def test_fit_prints_a_summary_for_people(run, sample, tmp_path):
+def test_fit_prints_a_summary_as_text(run, sample, tmp_path):
     code, out, _ = run("fit", *sample[:2], "-o", tmp_path / "r.fits", "--order", "3")
     assert code == 0
     assert "converged: every step" in out
@@ -37,16 +37,16 @@ def test_fit_prints_a_summary_for_people(run, sample, tmp_path):
 
 
 @pytest.mark.slow
-def test_svi_that_was_stopped_goes_on_from_its_file(run, sample, tmp_path):
-    """At its limit of steps it is no solution, and says so; its file is gone all the same."""
-    output, kept = tmp_path / "r.fits", tmp_path / "run.npz"
-    options = ["--engine", "svi", "--steps", "50", "--thin", "20", "--checkpoint", kept]
+def test_svi_with_a_checkpoint_stops_at_the_limit_and_removes_it(run, sample, tmp_path):
+    """At the limit of steps, the exit code is 1 and the checkpoint file is removed."""
+    output, checkpoint = tmp_path / "r.fits", tmp_path / "run.npz"
+    options = ["--engine", "svi", "--steps", "50", "--thin", "20", "--checkpoint", checkpoint]
     code, out, err = run("fit", *sample[:2], "-o", output, *options, "--json")
     summary = json.loads(out)
     assert code == 1
     assert "the limit of steps was reached" in err
     assert (summary["engine"], summary["iterations"]) == ("svi", 100)
-    assert not kept.exists()
+    assert not checkpoint.exists()
     assert len(read_result(output).losses) == 100
 
 
@@ -79,7 +79,7 @@ def test_svi_that_was_stopped_goes_on_from_its_file(run, sample, tmp_path):
         "instrument",
     ],
 )
-def test_a_mistake_ends_with_two_and_one_message(run, sample, tmp_path, options, message):
+def test_invalid_option_exits_with_two_and_one_message(run, sample, tmp_path, options, message):
     code, out, err = run("fit", *sample[:2], "-o", tmp_path / "r.fits", *options)
     assert code == 2
     assert message in err
@@ -87,39 +87,39 @@ def test_a_mistake_ends_with_two_and_one_message(run, sample, tmp_path, options,
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_is_not_there_is_named(run, sample, tmp_path):
+def test_missing_file_is_named(run, sample, tmp_path):
     code, _, err = run("fit", tmp_path / "none.fits", sample[1], "-o", tmp_path / "r.fits")
     assert code == 2
     assert "none.fits" in err
 
 
-def test_an_output_that_cannot_be_written_is_said_before_the_fit(run, sample, tmp_path):
+def test_unwritable_output_is_refused_before_the_fit(run, sample, tmp_path):
     code, _, err = run("fit", *sample[:2], "-o", tmp_path / "no" / "r.fits")
     assert code == 2
     assert "expected to write into a folder" in err
 
 
-def test_inspect_says_what_files_are(run, sample):
+def test_inspect_lists_tables_and_columns(run, sample):
     code, out, _ = run("inspect", sample[0], sample[1])
     assert code == 0
     assert "36312 rows" in out
     assert "source_id" in out
 
 
-def test_inspect_of_something_else_ends_with_two(run, tmp_path):
+def test_inspect_of_an_unreadable_file_exits_with_two(run, tmp_path):
     (tmp_path / "x.fits").write_text("no table")
     code, out, _ = run("inspect", tmp_path / "x.fits", "--json")
     assert code == 2
     assert json.loads(out)[0]["problems"]
 
 
-def test_a_folder_that_is_no_survey_is_not_served(run, tmp_path):
+def test_serve_refuses_a_folder_without_a_survey(run, tmp_path):
     code, _, err = run("serve", tmp_path, "--port", "0", "--no-open")
     assert code == 2
     assert "survey.toml" in err
 
 
-def test_a_port_in_use_is_said_before_any_work(run, tmp_path):
+def test_serve_refuses_a_port_in_use(run, tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         code, _, err = run("serve", tmp_path, "--port", taken.getsockname()[1], "--no-open")
     assert code == 2
@@ -129,7 +129,7 @@ def test_a_port_in_use_is_said_before_any_work(run, tmp_path):
 SMALL = ("--orbits", "1", "--stars", "2000")
 
 
-def test_simulate_makes_a_survey_whose_orbit_can_be_read(run, tmp_path):
+def test_simulate_writes_a_survey_whose_orbit_can_be_read(run, tmp_path):
     folder = tmp_path / "survey"
     code, out, _ = run("simulate", folder, *SMALL, "--json")
     assert code == 0
@@ -142,13 +142,13 @@ def test_simulate_makes_a_survey_whose_orbit_can_be_read(run, tmp_path):
     assert data.truth is not None
 
 
-def test_simulate_says_what_it_made_to_people(run, tmp_path):
+def test_simulate_prints_the_number_of_orbits(run, tmp_path):
     code, out, _ = run("simulate", tmp_path / "survey", *SMALL)
     assert code == 0
-    assert "a survey of 1 orbits" in out
+    assert "survey of 1 orbits, simulated in" in out
 
 
-def test_simulate_does_not_go_on_with_another_survey(run, tmp_path):
+def test_simulate_refuses_a_survey_with_other_settings(run, tmp_path):
     run("simulate", tmp_path / "survey", *SMALL)
     before = (tmp_path / "survey" / "survey.toml").read_bytes()
     code, _, err = run("simulate", tmp_path / "survey", *SMALL, "--seed", "5")
@@ -166,14 +166,14 @@ def test_simulate_does_not_go_on_with_another_survey(run, tmp_path):
     ],
     ids=["no-orbits", "no-number", "no-catalogue"],
 )
-def test_simulate_refuses_and_writes_nothing(run, tmp_path, options, message):
+def test_simulate_with_an_invalid_option_writes_nothing(run, tmp_path, options, message):
     code, _, err = run("simulate", tmp_path / "survey", *options)
     assert code == 2
     assert message in err
     assert not (tmp_path / "survey" / "survey.toml").exists()
 
 
-def test_simulate_into_a_file_is_refused(run, tmp_path):
+def test_simulate_refuses_a_file_as_directory(run, tmp_path):
     (tmp_path / "survey").write_text("a letter")
     code, _, err = run("simulate", tmp_path / "survey", *SMALL)
     assert code == 2
@@ -192,7 +192,7 @@ def test_demo_with_a_port_in_use_makes_no_survey(run, tmp_path, monkeypatch):
     assert list(tmp_path.rglob("survey.toml")) == []
 
 
-def test_excluded_measurements_are_not_used(run, sample, tmp_path):
+def test_fit_excludes_measurements(run, sample, tmp_path):
     output = tmp_path / "r.fits"
     code, out, _ = run("fit", *sample[:2], "-o", output, "--exclude", "detector=1", "--json")
     assert code == 0
@@ -200,7 +200,7 @@ def test_excluded_measurements_are_not_used(run, sample, tmp_path):
     assert 1 not in set(read_result(output).residuals["detector_id"])
 
 
-def test_orders_are_compared_on_demand(run, sample, tmp_path, compared, monkeypatch):
+def test_fit_compares_orders(run, sample, tmp_path, compared, monkeypatch):
     monkeypatch.setattr("solver.fit.compare_orders", lambda *_: compared.orders)
     output = tmp_path / "r.fits"
     code, out, _ = run("fit", *sample[:2], "-o", output, "--compare-orders", "--json")

@@ -1,4 +1,4 @@
-"""The options of the commands that fit: one per setting, and the settings that they state."""
+"""Options of `fit` and `survey`: one per setting, and the settings that they give."""
 
 import pytest
 from typer.main import get_command
@@ -12,7 +12,7 @@ COMMANDS = get_command(app).commands
 
 
 @pytest.mark.parametrize("command", ["fit", "survey"])
-def test_command_has_an_option_for_every_setting_that_it_offers(command):
+def test_command_has_an_option_for_every_setting_it_offers(command):
     found = {name: one for one in COMMANDS[command].params for name in one.opts}
     for one in [*SETTINGS.values(), *ENGINE_OPTIONS.values()]:
         assert (f"--{one.option}" in found) == (bool(one.option) and command in one.commands)
@@ -20,7 +20,7 @@ def test_command_has_an_option_for_every_setting_that_it_offers(command):
             assert found[f"--{one.option}"].help.startswith(one.help)
 
 
-def test_no_option_leaves_the_defaults():
+def test_settings_without_options_are_the_defaults():
     assert fit_settings({}) == FitSettings()
 
 

@@ -1,4 +1,4 @@
-"""`plateviz report`: what it writes, and what it refuses."""
+"""`plateviz report`: the files that it writes and the options that it refuses."""
 
 import json
 import shutil
@@ -13,14 +13,14 @@ from solver.io.result import write_result
 
 @pytest.fixture
 def run_dir(survey_folder, fit_result):
-    """A survey with a run of which orbit 0 is there and orbit 1 has failed."""
+    """A survey with a run in which orbit 0 is fitted and orbit 1 has failed."""
     run = begin_run(survey_folder, "default", FitSettings())
     write_fitted_orbit(run.orbit_directory(0), fit_result)
-    run.keep_failure(1, "orbit 1: the data leave a direction open")
+    run.keep_failure(1, "orbit 1: the data leave a direction unconstrained")
     return survey_folder
 
 
-def test_result_file_becomes_a_page(run, fit_result, tmp_path):
+def test_result_file_is_reported_on_one_page(run, fit_result, tmp_path):
     write_result(fit_result, tmp_path / "r.fits")
     code, out, _ = run("report", tmp_path / "r.fits", "-o", tmp_path / "r.html")
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
@@ -34,7 +34,7 @@ def test_result_file_becomes_a_page(run, fit_result, tmp_path):
 def test_failed_orbit_has_a_report(run, run_dir, tmp_path):
     code, _, _ = run("report", run_dir, "--orbit", 1, "-o", tmp_path / "r.html")
     assert code == 0
-    assert "leave a direction open" in (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "leave a direction unconstrained" in (tmp_path / "r.html").read_text(encoding="utf-8")
 
 
 def test_two_results_are_compared(run, fit_result, tmp_path):
@@ -55,11 +55,11 @@ def test_two_results_are_compared(run, fit_result, tmp_path):
         (["--run", "other"], "expected a run 'other', found default"),
         (["--survey"], "found 1 of 3 orbits missing"),
         (["--other", "b"], "--other: expected with --orbit"),
-        (["--orbit", "0", "--instrument", "i.toml"], "--instrument: expected with a result"),
+        (["--orbit", "0", "--instrument", "i.toml"], "--instrument: expected with a result of"),
     ],
     ids=["no-orbit", "missing", "several", "no-run", "incomplete", "other-of-survey", "instrument"],
 )
-def test_mistake_is_one_message_and_no_file(run, run_dir, tmp_path, options, message):
+def test_invalid_options_give_one_message_and_no_file(run, run_dir, tmp_path, options, message):
     code, _, err = run("report", run_dir, *options, "-o", tmp_path / "r.html")
     assert code == 2
     assert message in err
@@ -67,14 +67,14 @@ def test_mistake_is_one_message_and_no_file(run, run_dir, tmp_path, options, mes
     assert not list(tmp_path.glob("r.html*"))
 
 
-def test_page_is_not_written_where_its_print_goes(run, run_dir, tmp_path):
+def test_page_and_its_pdf_cannot_have_the_same_name(run, run_dir, tmp_path):
     code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.pdf", "--pdf")
     assert code == 2
     assert "expected a page's name such as R.html" in err
     assert not (tmp_path / "r.pdf").exists()
 
 
-def test_page_of_an_orbit_tells_what_solved_it(run, run_dir, tmp_path):
+def test_page_of_an_orbit_lists_the_versions_of_the_fit(run, run_dir, tmp_path):
     run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html")
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
     solved = page.index("Versions that solved it")
@@ -89,21 +89,21 @@ def test_run_of_a_newer_version_is_refused(run, run_dir, tmp_path):
     assert "written by a newer plateviz" in err
 
 
-def test_place_that_cannot_be_written_is_refused_before_anything_is_drawn(run, run_dir, tmp_path):
+def test_unwritable_output_is_refused_before_drawing(run, run_dir, tmp_path):
     target = tmp_path / "no" / "such" / "r.html"
     code, _, err = run("report", run_dir, "--orbit", 0, "-o", target)
     assert code == 2
     assert str(target) in err
 
 
-def test_result_file_has_no_orbits_to_choose_from(run, fit_result, tmp_path):
+def test_result_file_with_an_orbit_option_is_refused(run, fit_result, tmp_path):
     write_result(fit_result, tmp_path / "r.fits")
     code, _, err = run("report", tmp_path / "r.fits", "--orbit", 7, "-o", tmp_path / "r.html")
     assert code == 2
     assert "expected a survey directory" in err
 
 
-def test_without_chromium_nothing_is_printed(run, run_dir, tmp_path, monkeypatch):
+def test_pdf_without_chromium_is_refused_before_writing(run, run_dir, tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda _: None)
     code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html", "--pdf")
     assert code == 2
@@ -113,16 +113,16 @@ def test_without_chromium_nothing_is_printed(run, run_dir, tmp_path, monkeypatch
 
 @pytest.fixture
 def whole_run(run_dir, fit_result):
-    """A run of which two orbits are there, and one has failed."""
+    """A run in which two orbits are fitted and one has failed."""
     write_fitted_orbit(Run(run_dir, "default").orbit_directory(2), fit_result)
     return run_dir
 
 
-def test_folder_has_a_page_for_each_orbit_and_goes_on_where_it_was(run, whole_run, tmp_path):
+def test_folder_has_a_page_per_orbit_and_keeps_written_pages(run, whole_run, tmp_path):
     folder = tmp_path / "pages"
     code, out, _ = run("report", whole_run, "--pages", "-o", folder)
     assert code == 0
-    assert "3 pages of orbits made" in out
+    assert "3 orbit pages written" in out
     names = sorted(path.name for path in folder.iterdir())
     pages = [f"orbit-{number:04d}.html" for number in range(3)]
     assert names == ["index.html", *pages, "report.json"]
@@ -133,11 +133,11 @@ def test_folder_has_a_page_for_each_orbit_and_goes_on_where_it_was(run, whole_ru
     before = (folder / pages[2]).read_bytes()
     (folder / pages[0]).unlink()
     _, out, _ = run("report", whole_run, "--pages", "-o", folder)
-    assert "1 pages of orbits made, 2 were there" in out
+    assert "1 orbit pages written, 2 already there" in out
     assert (folder / pages[2]).read_bytes() == before
 
 
-def test_folder_of_something_else_is_left_as_it_is(run, whole_run, tmp_path):
+def test_folder_with_other_files_is_left_unchanged(run, whole_run, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     code, _, err = run("report", whole_run, "--pages", "-o", tmp_path)
     assert code == 2
@@ -145,7 +145,7 @@ def test_folder_of_something_else_is_left_as_it_is(run, whole_run, tmp_path):
     assert [path.name for path in tmp_path.iterdir() if path.name != "survey"] == ["mine.txt"]
 
 
-def test_folder_of_another_run_is_left_as_it_is(run, whole_run, tmp_path):
+def test_folder_of_another_run_is_left_unchanged(run, whole_run, tmp_path):
     folder = tmp_path / "pages"
     folder.mkdir()
     (folder / "report.json").write_text('{"run": "other"}')

@@ -1,4 +1,4 @@
-"""`plateviz serve`: where it listens, and from which pages it takes a websocket."""
+"""`plateviz serve`: the options for a reverse proxy."""
 
 import pytest
 
@@ -16,22 +16,22 @@ from solver.errors import InputError
     ],
     ids=["address", "any host", "space", "query"],
 )
-def test_a_proxy_that_cannot_be_is_refused(run, tmp_path, options, message):
+def test_invalid_proxy_option_is_refused(run, tmp_path, options, message):
     code, _, err = run("serve", tmp_path, "--port", "0", "--no-open", *options)
     assert code == 2
     assert message in err
 
 
-def test_hosts_are_compared_as_browsers_send_them():
+def test_host_is_normalised_as_browsers_send_it():
     assert check_origin("Astro.Example.org:8443 ") == "astro.example.org:8443"
 
 
-def test_slashes_around_a_path_do_not_matter():
+def test_slashes_around_the_prefix_are_removed():
     assert check_prefix("/groups/plateviz/") == "groups/plateviz"
     assert check_prefix("") == ""
 
 
 @pytest.mark.parametrize("text", ["", "host:", "host:80:80", ".example.org"])
-def test_what_is_no_host_is_refused(text):
+def test_invalid_host_is_refused(text):
     with pytest.raises(InputError, match="--allow-origin"):
         check_origin(text)

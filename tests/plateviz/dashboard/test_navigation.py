@@ -1,4 +1,4 @@
-"""Which view is on the screen, of which run and which source: rules without a browser."""
+"""Navigation: the view, run and source on the screen, without a browser."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -44,7 +44,7 @@ class FakeRun:
 class SurveyStore(FakeStore):
     """A store over a survey with runs."""
 
-    source = SurveyFolder("sky")
+    origin = SurveyFolder("sky")
 
     def __init__(self, result, runs):
         super().__init__(result)
@@ -64,59 +64,59 @@ def navigation(fit_result, run):
     return Navigation(Session(SurveyStore(fit_result, [run])))
 
 
-def asked(navigation):
-    return [(orbit, settings) for orbit, settings, _ in navigation.session.store.asked]
+def requested(navigation):
+    return [(orbit, settings) for orbit, settings, _ in navigation.session.store.requested]
 
 
-def test_a_survey_that_was_fitted_is_begun_with_its_run(navigation, run):
+def test_survey_with_a_run_opens_the_survey_view(navigation, run):
     navigation.begin({})
     assert (navigation.view, navigation.run) == (View.SURVEY, run)
-    assert asked(navigation) == []
+    assert requested(navigation) == []
 
 
 @pytest.mark.parametrize(
-    ("origin", "words"),
+    ("origin", "text"),
     [(SurveyFolder("sky"), "`plateviz survey sky`"), (OrbitFiles("o", "r"), "one orbit")],
     ids=["survey", "files"],
 )
-def test_without_a_run_the_orbit_is_shown_and_what_to_do_is_said(fit_result, origin, words):
+def test_origin_without_a_run_opens_the_orbit_view_with_a_hint(fit_result, origin, text):
     store = SurveyStore(fit_result, [])
     store.origin = origin
     navigation = Navigation(Session(store))
     navigation.begin({"view": "orbit"})
     assert (navigation.view, navigation.run) == (View.ORBIT, None)
-    assert words in navigation.why_no_run
-    assert asked(navigation) == [(0, FitSettings())]
+    assert text in navigation.why_no_run
+    assert requested(navigation) == [(0, FitSettings())]
 
 
-def test_the_whole_run_is_preferred(fit_result, survey):
+def test_complete_run_is_preferred(fit_result, survey):
     runs = [FakeRun("a", survey, fit_result, is_complete=False), FakeRun("b", survey, fit_result)]
     assert Navigation(Session(SurveyStore(fit_result, runs))).run is runs[1]
 
 
-def test_an_orbit_is_read_from_the_run(navigation, run):
+def test_fitted_orbit_is_read_from_the_run(navigation, run):
     navigation.open_orbit(0)
     session = navigation.session
     assert (navigation.view, session.stage) == (View.ORBIT, Stage.READY)
     assert (session.shown.orbit, session.shown.result) == (0, run.result(0))
     assert session.solutions == [session.shown]
-    assert asked(navigation) == []
+    assert requested(navigation) == []
 
 
-def test_an_orbit_that_the_run_has_not_is_fitted(navigation):
+def test_orbit_that_is_not_in_the_run_is_fitted(navigation):
     navigation.open_orbit(1)
-    assert asked(navigation) == [(1, FitSettings())]
+    assert requested(navigation) == [(1, FitSettings())]
 
 
-def test_the_orbit_view_asks_for_its_orbit_when_it_is_first_seen(navigation, run):
+def test_orbit_view_requests_its_orbit_once(navigation, run):
     navigation.turn_to(View.ORBIT)
     navigation.turn_to(View.SURVEY)
     navigation.turn_to(View.ORBIT)
     assert run.read == [0]
-    assert asked(navigation) == []
+    assert requested(navigation) == []
 
 
-def test_an_orbit_is_chosen_with_the_settings_on_the_screen(navigation):
+def test_selected_orbit_has_the_settings_on_the_screen(navigation):
     session = navigation.session
     navigation.open_orbit(0)
     session.choices.what_if_at_once = False
@@ -125,10 +125,10 @@ def test_an_orbit_is_chosen_with_the_settings_on_the_screen(navigation):
     session.job.take({"event": "done"})
     session.poll()
     navigation.choose_orbit(0)
-    assert asked(navigation)[-1] == (0, FitSettings(order=3))
+    assert requested(navigation)[-1] == (0, FitSettings(order=3))
 
 
-def test_an_orbit_of_the_run_takes_its_settings(fit_result, survey):
+def test_orbit_of_a_run_sets_the_controls_to_its_settings(fit_result, survey):
     run = FakeRun("third", survey, fit_result, FitSettings(order=3))
     navigation = Navigation(Session(SurveyStore(fit_result, [run])))
     navigation.open_orbit(0)
@@ -136,14 +136,14 @@ def test_an_orbit_of_the_run_takes_its_settings(fit_result, survey):
     assert navigation.session.job is None
 
 
-def test_opening_an_orbit_again_keeps_what_was_made_of_it(navigation):
+def test_opening_an_orbit_again_keeps_its_solutions(navigation):
     navigation.open_orbit(0)
     shown = navigation.session.shown
     navigation.open_orbit(0)
     assert navigation.session.shown is shown
 
 
-def test_an_orbit_stops_the_fit_of_another(navigation):
+def test_opening_an_orbit_cancels_the_fit_of_another(navigation):
     navigation.open_orbit(1)
     job = navigation.session.job
     navigation.open_orbit(0)
@@ -151,7 +151,7 @@ def test_an_orbit_stops_the_fit_of_another(navigation):
     assert (navigation.session.job, navigation.session.selection.orbit) == (None, 0)
 
 
-def test_a_run_that_cannot_be_read_says_so(navigation, run):
+def test_run_that_cannot_be_read_is_reported(navigation, run):
     def fail(orbit):
         raise InputError("orbit=0000: expected a complete run")
 
@@ -159,10 +159,10 @@ def test_a_run_that_cannot_be_read_says_so(navigation, run):
     navigation.open_orbit(0)
     assert navigation.session.stage is Stage.FAILED
     assert navigation.session.message == "orbit=0000: expected a complete run"
-    assert asked(navigation) == []
+    assert requested(navigation) == []
 
 
-def test_a_source_is_found_by_its_id(navigation, survey):
+def test_source_is_found_by_its_id(navigation, survey):
     history, motion = survey.source("reference")
     navigation.open_source(f" {motion['source_id']} ")
     found = navigation.found
@@ -173,7 +173,7 @@ def test_a_source_is_found_by_its_id(navigation, survey):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("17", "Run 'default' has no source 17."),
         ("Vega", "Expected the id of a source, a whole number, found 'Vega'."),
@@ -183,19 +183,19 @@ def test_a_source_is_found_by_its_id(navigation, survey):
     ],
     ids=["unknown", "name", "too-long", "too-large", "float"],
 )
-def test_a_source_that_is_not_there_is_said_in_one_message(navigation, text, words):
+def test_source_that_is_not_found_is_reported(navigation, text, message):
     navigation.find_source(text)
     assert navigation.found is None
-    assert words in navigation.message
+    assert message in navigation.message
 
 
-def test_nothing_sought_is_no_mistake(navigation):
+def test_empty_search_has_no_message(navigation):
     navigation.find_source("Vega")
     navigation.find_source("")
     assert (navigation.found, navigation.message) == (None, "")
 
 
-def test_another_run_is_asked_for_the_same_source(fit_result, survey):
+def test_another_run_is_searched_for_the_same_source(fit_result, survey):
     empty = SimpleNamespace(history=survey.history.iloc[:0], motions=survey.motions.iloc[:0])
     runs = [FakeRun("full", survey, fit_result), FakeRun("thin", empty, fit_result)]
     navigation = Navigation(Session(SurveyStore(fit_result, runs)))
@@ -206,7 +206,7 @@ def test_another_run_is_asked_for_the_same_source(fit_result, survey):
     assert navigation.message.startswith("Run 'thin' has no source")
 
 
-def test_the_address_brings_back_what_was_on_the_screen(fit_result, survey):
+def test_address_restores_the_view_the_run_and_the_source(fit_result, survey):
     runs = [FakeRun("a", survey, fit_result), FakeRun("b", survey, fit_result)]
     first, second = (Navigation(Session(SurveyStore(fit_result, runs))) for _ in range(2))
     first.run_name = "b"
@@ -218,18 +218,18 @@ def test_the_address_brings_back_what_was_on_the_screen(fit_result, survey):
     assert second.session.selection.orbit == 0
 
 
-def test_an_address_with_a_selection_alone_is_of_the_orbit_view(navigation):
+def test_address_with_a_selection_only_opens_the_orbit_view(navigation):
     navigation.begin({"orbit": "0", "field": "1"})
     assert (navigation.view, navigation.session.shown.orbit) == (View.ORBIT, 0)
 
 
-def test_an_address_of_nonsense_is_not_looked_at(navigation):
+def test_invalid_address_is_ignored(navigation):
     navigation.begin({"view": "moon", "run": "../../etc", "source": "\x00", "who": "me"})
     assert (navigation.view, navigation.run_name) == (View.SURVEY, "default")
     assert navigation.found is None
 
 
-def test_files_have_no_runs_and_a_folder_those_that_are_there(tmp_path, made_survey):
+def test_files_and_a_survey_that_was_not_fitted_have_no_runs(tmp_path, made_survey):
     runs = {
         origin: SolutionStore.runs(SimpleNamespace(origin=origin))
         for origin in (OrbitFiles("o.fits", "r.fits"), SurveyFolder(str(Path(made_survey))))

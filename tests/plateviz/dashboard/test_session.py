@@ -1,4 +1,4 @@
-"""The session's rules, with a store whose jobs end when the test says so."""
+"""Session: its rules, with a fake store whose jobs are ended by the test."""
 
 import pytest
 
@@ -18,7 +18,7 @@ from solver.errors import InputError
 
 
 class FakeStore:
-    """A store without a solver: what it is asked for is kept, and given when told."""
+    """A store without a solver, which records its requests."""
 
     orbits = (0, 1)
     instrument = MINI_MOCK
@@ -26,11 +26,11 @@ class FakeStore:
 
     def __init__(self, result):
         self._result = result
-        self.asked, self.cancelled = [], []
+        self.requested, self.cancelled = [], []
 
     def request(self, orbit, settings, what_if=False):
-        self.asked.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
-        return self.asked[-1][2]
+        self.requested.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
+        return self.requested[-1][2]
 
     def cancel(self, job):
         self.cancelled.append(job)
@@ -50,7 +50,7 @@ def session(fit_result):
 
 @pytest.fixture
 def live(session):
-    """A session with the first solution on the screen, that tries out every change."""
+    """A session with a solution on the screen, which shows a what-if at every change."""
     finish(session)
     session.choices.what_if_at_once = True
     return session
@@ -61,16 +61,16 @@ def finish(session):
     session.poll()
 
 
-def test_the_first_orbit_is_asked_for_with_the_papers_settings(session):
+def test_first_orbit_is_requested_with_the_settings_of_the_paper(session):
     assert session.stage is Stage.LOADING
-    assert session.store.asked[0][:2] == (0, FitSettings())
+    assert session.store.requested[0][:2] == (0, FitSettings())
     finish(session)
     assert session.stage is Stage.READY
     assert session.shown.settings == FitSettings()
     assert session.other is None
 
 
-def test_the_old_solution_stays_until_the_new_one_is_whole(session):
+def test_last_solution_stays_until_the_next_one_is_complete(session):
     finish(session)
     before = session.shown
     session.choices.order = 3
@@ -85,7 +85,7 @@ def test_the_old_solution_stays_until_the_new_one_is_whole(session):
     assert len(session.solutions) == 2
 
 
-def test_a_cancelled_refit_leaves_the_old_solution(session):
+def test_cancelled_refit_leaves_the_last_solution(session):
     finish(session)
     before = session.shown
     session.choices.order = 3
@@ -98,7 +98,7 @@ def test_a_cancelled_refit_leaves_the_old_solution(session):
     assert session.job is None
 
 
-def test_a_failed_refit_says_why_and_leaves_the_old_solution(session):
+def test_failed_refit_has_a_message_and_leaves_the_last_solution(session):
     finish(session)
     before = session.shown
     session.refit()
@@ -108,22 +108,22 @@ def test_a_failed_refit_says_why_and_leaves_the_old_solution(session):
     assert session.message == "no reference star"
 
 
-def test_a_prior_that_cannot_be_used_asks_for_nothing(session):
+def test_invalid_prior_requests_nothing(session):
     finish(session)
     session.choices.prior_widths = {**session.choices.prior_widths, "distortion_x": "wide"}
     session.refit()
     assert session.stage is Stage.FAILED
     assert "distortion_x" in session.message
-    assert len(session.store.asked) == 1
+    assert len(session.store.requested) == 1
 
 
-def test_a_new_request_cancels_the_one_under_way(session):
+def test_new_request_cancels_the_running_one(session):
     first = session.job
     session.refit()
     assert session.store.cancelled == [first]
 
 
-def test_progress_is_said_in_words(session):
+def test_progress_is_shown_as_text(session):
     report = {"event": "progress", "stage": "iteration 2", "largest_step": 7.14}
     session.job.take(report)
     session.poll()
@@ -133,7 +133,7 @@ def test_progress_is_said_in_words(session):
     assert session.message.startswith("iteration 0 (")
 
 
-def test_bringing_up_an_older_solution_compares_with_the_newer(session):
+def test_earlier_solution_is_compared_with_the_later(session):
     finish(session)
     session.choices.order = 3
     session.refit()
@@ -144,7 +144,7 @@ def test_bringing_up_an_older_solution_compares_with_the_newer(session):
     assert session.choices.order == 5
 
 
-def test_a_change_is_asked_at_once(live):
+def test_change_requests_a_what_if(live):
     first = live.shown
     live.choices.order = 4
     assert live.stage is Stage.STALE
@@ -156,13 +156,15 @@ def test_a_change_is_asked_at_once(live):
     assert live.solutions == [first]
 
 
-def test_several_changes_made_at_once_are_one_what_if(live):
-    asked = len(live.store.asked)
-    live.choices.take(FitSettings(order=4, aberration=False))
-    assert [s for _, s, _ in live.store.asked[asked:]] == [FitSettings(order=4, aberration=False)]
+def test_simultaneous_changes_are_one_what_if(live):
+    requested = len(live.store.requested)
+    live.choices.load(FitSettings(order=4, aberration=False))
+    assert [s for _, s, _ in live.store.requested[requested:]] == [
+        FitSettings(order=4, aberration=False)
+    ]
 
 
-def test_the_next_trial_is_compared_with_what_was_fitted(live):
+def test_next_what_if_is_compared_with_the_fit(live):
     first = live.shown
     for order in (4, 3):
         live.choices.order = order
@@ -170,18 +172,18 @@ def test_the_next_trial_is_compared_with_what_was_fitted(live):
     assert (live.shown.settings.order, live.other) == (3, first)
 
 
-def test_only_the_last_of_the_changes_made_meanwhile_is_asked(live):
+def test_only_the_last_change_during_a_what_if_is_requested(live):
     live.choices.order = 4
     for order in (3, 2, 1):
         live.choices.order = order
     finish(live)
     finish(live)
-    assert [settings.order for _, settings, _ in live.store.asked] == [5, 4, 1]
+    assert [settings.order for _, settings, _ in live.store.requested] == [5, 4, 1]
     assert live.store.cancelled == []
     assert live.job is None
 
 
-def test_a_change_taken_back_brings_back_what_was_fitted(live):
+def test_reverted_change_returns_to_the_fit(live):
     first = live.shown
     live.choices.order = 4
     finish(live)
@@ -189,7 +191,7 @@ def test_a_change_taken_back_brings_back_what_was_fitted(live):
     assert (live.shown, live.other, live.job) == (first, None, None)
 
 
-def test_a_trial_can_be_kept(live):
+def test_what_if_can_be_kept(live):
     live.choices.order = 4
     finish(live)
     live.keep()
@@ -200,7 +202,7 @@ def test_a_trial_can_be_kept(live):
     assert live.other.settings.order == 4
 
 
-def test_a_trial_that_is_fitted_is_no_trial_any_more(live):
+def test_fit_replaces_a_what_if(live):
     first = live.shown
     live.choices.order = 4
     finish(live)
@@ -211,22 +213,22 @@ def test_a_trial_that_is_fitted_is_no_trial_any_more(live):
     assert len(live.solutions) == 2
 
 
-def test_a_trial_that_is_cancelled_drops_what_waits_for_it(live):
+def test_cancelled_what_if_drops_the_waiting_one(live):
     live.choices.order = 4
     live.choices.order = 3
     live.cancel()
     live.poll()
     assert live.job is None
-    assert len(live.store.asked) == 2
+    assert len(live.store.requested) == 2
 
 
-def test_nothing_is_asked_with_an_engine_that_takes_long(live):
+def test_slow_engine_requests_no_what_if(live):
     live.choices.engine = "svi"
     live.choices.order = 4
     assert live.job is None
 
 
-def test_a_change_that_cannot_be_used_is_said_at_once(live):
+def test_invalid_change_is_reported_at_once(live):
     live.choices.exclusions = "detector 1"
     assert live.stage is Stage.FAILED
     assert "expected source=ID" in live.message
@@ -238,44 +240,44 @@ def test_a_change_that_cannot_be_used_is_said_at_once(live):
     [({"order": 4}, True), ({"order": 4, "aberration": False}, False)],
     ids=["order-alone", "more"],
 )
-def test_a_trial_keeps_the_comparison_of_the_orders_where_it_holds(session, changes, kept):
+def test_what_if_keeps_a_comparison_of_orders_that_is_still_valid(session, changes, kept):
     session.choices.compare_orders = True
     session.refit()
     finish(session)
     session.choices.param.update(what_if_at_once=True, **changes)
-    settings = session.store.asked[-1][1]
+    settings = session.store.requested[-1][1]
     assert settings == FitSettings(**changes, compare_orders=kept)
 
 
-def test_a_comparison_that_was_not_made_waits_for_the_fit(live):
+def test_comparison_of_orders_waits_for_a_fit(live):
     live.choices.compare_orders = True
     assert live.job is None
     live.choices.order = 4
-    assert not live.store.asked[-1][1].compare_orders
+    assert not live.store.requested[-1][1].compare_orders
     live.refit()
-    assert live.store.asked[-1][1] == FitSettings(order=4, compare_orders=True)
+    assert live.store.requested[-1][1] == FitSettings(order=4, compare_orders=True)
 
 
-def test_what_is_left_out_comes_back_as_it_is_written(session):
+def test_exclusions_are_parsed_and_shown_again(session):
     session.choices.exclusions = "detector=1, exposure=0/3 source=77"
     settings = session.choices.settings()
     assert settings.exclusions.names() == ["source 77", "exposure 0/3", "detector 1"]
-    session.choices.take(settings)
+    session.choices.load(settings)
     assert session.choices.settings() == settings
 
 
-def test_another_orbit_forgets_the_solutions_of_the_last(session):
+def test_another_orbit_removes_the_solutions(session):
     finish(session)
     session.show_orbit(1)
     assert session.solutions == []
-    assert session.store.asked[-1][:2] == (1, FitSettings())
+    assert session.store.requested[-1][:2] == (1, FitSettings())
     finish(session)
     assert session.other is None
 
 
-def test_the_selection_offers_what_the_solution_holds(fit_result):
+def test_selection_has_the_exposures_and_detectors_of_the_solution(fit_result):
     selection = Selection()
-    selection.fit_to(fit_result, [0, 1, 2, 3])
+    selection.limit_to(fit_result, [0, 1, 2, 3])
     assert selection.field == "0"
     assert selection.exposures_of(fit_result) == [(0, 0)]
     selection.field = ALL
@@ -289,20 +291,20 @@ def test_the_selection_offers_what_the_solution_holds(fit_result):
 @pytest.mark.parametrize(
     ("name", "value"), [("plates", (0, 99)), ("detector", "17"), ("field", "9")]
 )
-def test_the_selection_refuses_what_is_not_there(fit_result, name, value):
+def test_selection_out_of_range_is_refused(fit_result, name, value):
     selection = Selection()
-    selection.fit_to(fit_result, [0, 1, 2, 3])
+    selection.limit_to(fit_result, [0, 1, 2, 3])
     with pytest.raises(ValueError, match=name):
         setattr(selection, name, value)
 
 
 @pytest.mark.parametrize("order", [-1, 10, 3.5])
-def test_the_order_is_bounded_on_the_server(order):
+def test_order_is_bounded_on_the_server(order):
     with pytest.raises(ValueError, match="order"):
         FitChoices(order=order)
 
 
-def test_choices_become_settings_that_name_only_what_was_changed():
+def test_settings_of_the_controls_have_only_the_changed_priors():
     choices = FitChoices()
     assert choices.settings() == FitSettings()
     choices.prior_widths = {**default_widths(), "pointing_ra": "1 arcmin", "pitch_x": "flat"}
@@ -312,32 +314,32 @@ def test_choices_become_settings_that_name_only_what_was_changed():
     choices.compare_orders = True
     assert choices.settings().compare_orders
     again = FitChoices()
-    again.take(choices.settings())
+    again.load(choices.settings())
     assert again.settings() == choices.settings()
 
 
-def test_choices_that_cannot_be_used_say_which():
+def test_invalid_control_is_named():
     choices = FitChoices()
     choices.prior_widths = {**default_widths(), "detector_x": "-3"}
     with pytest.raises(InputError, match="detector_x"):
         choices.settings()
 
 
-def test_solutions_are_described_by_what_departs_from_the_paper():
+def test_description_has_what_differs_from_the_paper():
     assert FitSettings().describe() == "order 5"
     changed = FitSettings(order=3, aberration=False, prior_widths={"distortion_x": 0.5})
     assert changed.describe() == "order 3, no aberration, distortion_x 0.5 um"
     assert FitSettings(compare_orders=True).describe() == "order 5, orders compared"
 
 
-def test_address_brings_back_the_selection(fit_result):
+def test_address_restores_the_selection(fit_result):
     numbers = [d.detector_id for d in MINI_MOCK.detectors]
     first, second = Selection(), Selection()
-    first.fit_to(fit_result, numbers)
+    first.limit_to(fit_result, numbers)
     last = first.param["plates"].bounds[1]
     first.param.update(field=ALL, detector=str(numbers[-1]), plates=(last, last))
-    second.want(first.address())
-    second.fit_to(fit_result, numbers)
+    second.restore(first.address())
+    second.limit_to(fit_result, numbers)
     assert second.address() == first.address()
 
 
@@ -349,18 +351,18 @@ def test_address_brings_back_the_selection(fit_result):
     ],
     ids=["nonsense", "half"],
 )
-def test_address_that_makes_no_sense_is_not_looked_at(fit_result, address):
+def test_invalid_address_is_ignored(fit_result, address):
     selection = Selection()
-    selection.want(address)
-    selection.fit_to(fit_result, [1, 2])
+    selection.restore(address)
+    selection.limit_to(fit_result, [1, 2])
     assert selection.plates[0] == selection.param["plates"].bounds[0]
     assert selection.field in selection.param["field"].objects
     assert selection.orbit is None
 
 
-def test_address_asks_for_an_orbit_of_the_workbench(fit_result):
+def test_address_selects_an_orbit(fit_result):
     session = Session(FakeStore(fit_result))
-    session.selection.want({"orbit": "1"})
+    session.selection.restore({"orbit": "1"})
     assert session.selection.orbit == 1
     assert session.selection.address()["orbit"] == "1"
 
@@ -376,14 +378,14 @@ def test_address_asks_for_an_orbit_of_the_workbench(fit_result):
         ("exclusions", "detector=1"),
     ],
 )
-def test_change_of_any_control_that_is_answered_at_once_asks_a_what_if(live, name, value):
+def test_change_of_any_control_answered_at_once_requests_a_what_if(live, name, value):
     assert name in ANSWERED_AT_ONCE
     setattr(live.choices, name, value)
     assert live.job.request["what_if"]
-    assert live.store.asked[-1][1] == live.choices.settings()
+    assert live.store.requested[-1][1] == live.choices.settings()
 
 
-def test_every_setting_with_a_control_is_a_parameter_of_the_choices():
+def test_every_setting_with_a_control_is_a_parameter():
     controls = {name for name, one in SETTINGS.items() if one.control}
     assert controls == set(CONTROLS) == set(FitChoices.param) - {"name", "what_if_at_once"}
     assert set(ANSWERED_AT_ONCE) == controls - {"engine", "compare_orders"}

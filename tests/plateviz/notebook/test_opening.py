@@ -1,4 +1,4 @@
-"""What a person gives to open or to simulate: what comes of it, and one message for mistakes."""
+"""`plateviz.open` and `plateviz.simulate`: what they return, and one message for mistakes."""
 
 import pytest
 
@@ -26,17 +26,17 @@ def ref(sample_orbit_dir):
     ],
     ids=["absent", "no path", "absent file"],
 )
-def test_what_is_not_there_is_refused(given, message):
+def test_missing_path_is_refused(given, message):
     with pytest.raises(InputError, match=message):
         plateviz.open(*given)
 
 
-def test_folder_that_is_no_survey_is_refused(tmp_path):
+def test_folder_without_a_survey_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"expected a survey with a file survey\.toml"):
         plateviz.open(tmp_path)
 
 
-def test_measurements_without_a_catalogue_are_no_result(obs):
+def test_measurements_without_a_catalogue_are_refused(obs):
     with pytest.raises(InputError, match="expected a result file"):
         plateviz.open(obs)
 
@@ -46,7 +46,7 @@ def test_files_in_the_wrong_order_are_refused(obs, ref):
         plateviz.open(ref, obs)
 
 
-def test_orbit_that_the_file_has_not_is_refused(obs, ref):
+def test_orbit_that_is_not_in_the_file_is_refused(obs, ref):
     with pytest.raises(InputError, match="orbit"):
         plateviz.open(obs, ref, orbit=77)
 
@@ -54,19 +54,22 @@ def test_orbit_that_the_file_has_not_is_refused(obs, ref):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"orbit": 1}, "orbit: expected nothing of the kind with a survey directory"),
-        ({"truth": "T.fits", "instrument": "I.toml"}, "instrument, truth: expected nothing"),
+        ({"orbit": 1}, "orbit: expected no such argument with a survey directory"),
+        (
+            {"truth": "T.fits", "instrument": "I.toml"},
+            "instrument, truth: expected no such",
+        ),
         ({"run": "other"}, "expected a run 'other', found none"),
     ],
     ids=["orbit", "files", "run"],
 )
-def test_options_of_something_else_are_refused(made_survey, options, message):
+def test_argument_that_does_not_apply_to_a_survey_is_refused(made_survey, options, message):
     with pytest.raises(InputError, match=message):
         plateviz.open(made_survey, **options)
 
 
-def test_run_is_of_a_survey(obs, ref):
-    with pytest.raises(InputError, match="run: expected nothing of the kind with the files"):
+def test_run_with_the_files_of_an_orbit_is_refused(obs, ref):
+    with pytest.raises(InputError, match="run: expected no such argument with the files"):
         plateviz.open(obs, ref, run="default")
 
 
@@ -88,19 +91,19 @@ def test_run_is_of_a_survey(obs, ref):
     ],
     ids=lambda value: value[:30] if isinstance(value, str) else "",
 )
-def test_mistake_with_a_survey_is_one_message_and_changes_nothing(made_survey, ask, message):
+def test_invalid_request_of_a_survey_changes_nothing(made_survey, ask, message):
     before = sorted(made_survey.iterdir())
     with pytest.raises(InputError, match=message):
         ask(plateviz.open(made_survey))
     assert sorted(made_survey.iterdir()) == before
 
 
-def test_simulated_survey_is_found_again(tmp_path):
+def test_existing_survey_is_opened_and_not_simulated_again(tmp_path):
     survey = plateviz.simulate(tmp_path / "made", orbits=1, stars=4000, seed=2)
     written = (survey.directory / "survey.toml").stat().st_mtime_ns
     again = plateviz.simulate(tmp_path / "made", orbits=1, stars=4000, seed=2)
     assert (again.directory / "survey.toml").stat().st_mtime_ns == written
-    with pytest.raises(InputError, match="found one of other orbits, seed; plateviz.open opens it"):
+    with pytest.raises(InputError, match="found one with other orbits, seed; plateviz.open"):
         plateviz.simulate(tmp_path / "made", orbits=2, stars=4000, seed=3)
 
 
@@ -113,27 +116,27 @@ def test_simulated_survey_is_found_again(tmp_path):
     ],
     ids=["orbits", "seed", "catalogue"],
 )
-def test_survey_of_wrong_choices_is_not_begun(tmp_path, options, message):
+def test_simulation_with_an_invalid_argument_is_not_begun(tmp_path, options, message):
     with pytest.raises(InputError, match=message):
         plateviz.simulate(tmp_path / "made", stars=4000, **options)
     assert not (tmp_path / "made").exists()
 
 
-def test_folder_of_something_else_is_left_as_it_is(tmp_path):
+def test_folder_with_other_files_is_left_unchanged(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(InputError, match="found notes.txt"):
         plateviz.simulate(tmp_path, orbits=1, stars=4000)
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 
-def test_dashboard_outside_a_notebook_is_words(made_survey):
+def test_dashboard_outside_a_notebook_is_text(made_survey):
     dashboard = plateviz.open(made_survey).dashboard()
     assert isinstance(dashboard.servable(), Dashboard)
     assert dashboard._repr_mimebundle_() == {"text/plain": repr(dashboard)}
     assert made_survey.name in repr(dashboard)
 
 
-def test_notebook_shows_a_mistake_without_a_traceback():
+def test_input_error_in_a_notebook_has_no_traceback():
     assert InputError("R.fits: expected so")._render_traceback_() == [
         "InputError: R.fits: expected so"
     ]

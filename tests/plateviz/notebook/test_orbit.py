@@ -1,4 +1,4 @@
-"""Surveys, orbits and sources as a notebook opens them, with a real solver process."""
+"""Surveys, orbits and sources in a notebook, with a real solver process."""
 
 import os
 import subprocess
@@ -49,7 +49,7 @@ def test_survey_has_its_catalogue_with_units(survey):
     assert len(survey.table("truth")) == len(survey.table("catalogue"))
 
 
-def test_orbit_has_what_was_read(survey):
+def test_orbit_has_its_input_tables(survey):
     orbit = survey.orbit(0)
     assert list(orbit.tables) == ["measurements", "exposures", "catalogue", "truth"]
     assert orbit.table("measurements")["nx"].unit == u.pix
@@ -65,7 +65,7 @@ def test_orbit_is_fitted(solution, orbit):
     assert "fitted, order 5" in orbit._repr_html_()
 
 
-def test_what_if_is_compared_with_what_it_was_asked_of(solution, orbit):
+def test_what_if_is_compared_with_its_solution(solution, orbit):
     other = solution.what_if(order=3, priors={"distortion_x": "10um"})
     assert other.settings.order == 3
     assert other.settings.prior_widths == {"distortion_x": 10.0}
@@ -75,13 +75,13 @@ def test_what_if_is_compared_with_what_it_was_asked_of(solution, orbit):
     assert orbit.solution is solution
 
 
-def test_what_if_starts_from_the_choices_of_its_solution(solution, orbit):
+def test_what_if_starts_from_the_settings_of_its_solution(solution, orbit):
     third = solution.what_if(order=3)
     assert third.what_if(exclude="detector=1").settings.order == 3
     assert orbit.what_if(exclude="detector=1").settings.order == 5
 
 
-def test_choice_that_cannot_be_used_changes_nothing(solution, orbit):
+def test_invalid_setting_changes_nothing(solution, orbit):
     with pytest.raises(InputError, match="order from 0 to 9"):
         orbit.fit(order=11)
     with pytest.raises(InputError, match="some measurements of orbit 1 to remain"):
@@ -97,24 +97,24 @@ def test_files_of_an_orbit_open_and_fit(sample_orbit_dir):
         assert orbit.solution.result.true_places is not None
 
 
-def test_closed_survey_opens_its_solver_again(survey, solution):
+def test_closed_survey_starts_its_solver_again(survey, solution):
     survey.close()
-    assert not survey._solver._open
+    assert not survey._solver._started
     assert survey.orbit(1).fit(order=4).summary["converged"]
 
 
-def test_dashboard_is_a_part_of_a_served_page_and_ends_with_its_session(survey):
+def test_dashboard_of_a_served_page_ends_with_its_session(survey):
     document = Document()
     with set_curdoc(document):
         part = survey.dashboard().__panel__()
     assert [type(column).__name__ for column in part] == ["Column", "Column"]
-    assert survey._solver._open
+    assert survey._solver._started
     for end in document.callbacks.session_destroyed_callbacks:
         end(None)
-    assert not survey._solver._open
+    assert not survey._solver._started
 
 
-def test_interrupted_cell_stops_its_job(survey, monkeypatch):
+def test_interrupted_cell_cancels_its_job(survey, monkeypatch):
     jobs = []
 
     def interrupt(self, job):
@@ -129,10 +129,10 @@ def test_interrupted_cell_stops_its_job(survey, monkeypatch):
         jobs[0].require_done()
 
 
-def test_solver_that_dies_is_a_failed_fit(survey, monkeypatch):
+def test_fit_fails_if_the_solver_process_ends(survey, monkeypatch):
     def kill(self, job):
         job.wait_for_news(0, 30)
-        survey._solver.store._worker._process.kill()
+        survey._solver.store._solver._process.kill()
         job.wait(30)
 
     monkeypatch.setattr("plateviz.solving.progress.Reporter.follow", kill)
@@ -143,7 +143,7 @@ def test_solver_that_dies_is_a_failed_fit(survey, monkeypatch):
 def test_solver_ends_with_the_interpreter(made_survey, tmp_path):
     code = (
         f"import plateviz; survey = plateviz.open({str(made_survey)!r})\n"
-        "store = survey._solver.store; print(store._worker._process.pid, store._scratch)"
+        "store = survey._solver.store; print(store._solver._process.pid, store._scratch)"
     )
     environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
     run = subprocess.run(
@@ -160,7 +160,7 @@ def test_solver_ends_with_the_interpreter(made_survey, tmp_path):
 
 
 @pytest.mark.slow
-def test_survey_is_fitted_and_a_star_followed(survey_folder, tmp_path):
+def test_survey_is_fitted_and_a_source_followed(survey_folder, tmp_path):
     survey = plateviz.open(survey_folder).fit(run="third", workers=2, order=3)
     assert survey.run_name == "third"
     assert (survey.orbits["status"] == "complete").all()

@@ -23,7 +23,7 @@ def solution(fit_result, instrument):
     return OpenSolution(fit_result, instrument, "test", "plateviz.open('test')")
 
 
-def test_it_says_what_it_is_and_whether_to_trust_it(solution):
+def test_text_and_card_have_the_title_and_the_verdict(solution):
     assert repr(solution).startswith(f"Orbit {solution.result.orbit_id}, order 5 (test): ")
     assert repr(solution).endswith(solution.verdict.headline)
     card = solution._repr_html_()
@@ -36,9 +36,9 @@ def test_card_does_not_restyle_the_cells_of_a_notebook(solution):
     assert ".strip .cell" in solution._repr_html_()
 
 
-def test_tables_are_those_of_the_solver_and_the_fitted_calibration(solution, fit_result):
-    there = [t.name for t in RESULT_TABLES if getattr(fit_result, t.name) is not None]
-    assert list(solution.tables) == [*FITTED, *there]
+def test_tables_are_those_of_the_result_and_the_fitted_calibration(solution, fit_result):
+    available = [t.name for t in RESULT_TABLES if getattr(fit_result, t.name) is not None]
+    assert list(solution.tables) == [*FITTED, *available]
     assert len(solution.detectors) == 4
     assert len(solution.pointings) == len(solution.exposures) == len(fit_result.exposures)
     assert list(solution.tables.residuals) == list(solution.residuals)
@@ -92,31 +92,31 @@ def test_figures_are_those_of_the_dashboard_that_have_data(solution):
     assert solution.figures.residual_map.title == solution.figure("residual-map").title
 
 
-def test_figure_draws_what_the_dashboard_draws(solution):
-    drawing = solution.figure("residual-map", detector=2, theme="dark")
-    assert "detector 2" in drawing.element.opts.get("plot").kwargs["title"]
-    assert drawing.__panel__().styles["background"] == "#121212"
+def test_figure_has_the_detector_and_the_theme(solution):
+    figure = solution.figure("residual-map", detector=2, theme="dark")
+    assert "detector 2" in figure.element.opts.get("plot").kwargs["title"]
+    assert figure.__panel__().styles["background"] == "#121212"
 
 
-def test_exposures_are_chosen(solution):
+def test_figure_has_the_selected_exposures_and_detector(solution):
     one = solution.figure("residual-map", exposures=[(0, 1)], detector=1)
-    words = one.element.opts.get("plot").kwargs
-    assert words["title"] == "Residuals on detector 1, measured minus predicted"
+    options = one.element.opts.get("plot").kwargs
+    assert options["title"] == "Residuals on detector 1, measured minus predicted"
 
 
-def test_sheet_has_every_figure(solution):
-    sheet = solution.show()
-    assert len(sheet.__panel__()[1]) == len(solution.figures)
-    assert f"{len(solution.figures)} figures" in repr(sheet)
+def test_overview_has_every_figure(solution):
+    overview = solution.show()
+    assert len(overview.__panel__()[1]) == len(solution.figures)
+    assert f"{len(solution.figures)} figures" in repr(overview)
 
 
-def test_terminal_is_given_words(solution):
+def test_figure_in_a_terminal_is_text(solution):
     assert solution.figures.pulls._repr_mimebundle_() == {
         "text/plain": "figure 'pulls': Standardised residuals"
     }
 
 
-def test_compared_solution_has_the_comparison(solution, make_fit_result, instrument):
+def test_solution_with_another_has_the_comparison_figure(solution, make_fit_result, instrument):
     other = OpenSolution(make_fit_result(2)[0], instrument, "other", "plateviz.open('other')")
     both = solution.compared_with(other)
     assert "comparison" in both.figures
@@ -124,7 +124,7 @@ def test_compared_solution_has_the_comparison(solution, make_fit_result, instrum
     assert "compared with order 5" in repr(both)
 
 
-def test_report_is_a_file_that_tells_what_made_it(solution, tmp_path):
+def test_report_states_the_call_and_the_verdict(solution, tmp_path):
     path = solution.report(tmp_path / "r.html")
     page = path.read_text("utf-8")
     assert "plateviz.open(&#39;test&#39;).report(" in page
@@ -158,7 +158,7 @@ def test_saved_solution_opens_again(solution, tmp_path):
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_mistake_is_one_message(solution, ask, message):
+def test_invalid_request_is_refused(solution, ask, message):
     with pytest.raises(InputError, match=message):
         ask(solution)
 

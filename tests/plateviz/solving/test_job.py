@@ -1,4 +1,4 @@
-"""Jobs: what they report, and that what is over stays over."""
+"""Jobs: progress and status, which do not change once a job is over."""
 
 import threading
 
@@ -8,7 +8,7 @@ from plateviz.solving.job import Job, JobStatus
 from solver.errors import CancelledError, FitError, InputError
 
 
-def test_a_job_keeps_what_it_reported():
+def test_job_keeps_its_progress():
     job = Job({"do": "fit"})
     assert job.status is JobStatus.QUEUED
     job.take({"event": "progress", "stage": "reading"})
@@ -23,7 +23,7 @@ def test_a_job_keeps_what_it_reported():
     ("event", "status"),
     [("done", JobStatus.DONE), ("cancelled", JobStatus.CANCELLED), ("failed", JobStatus.FAILED)],
 )
-def test_what_is_over_stays_over(event, status):
+def test_job_that_is_over_does_not_change(event, status):
     job = Job({"do": "fit"})
     job.take({"event": event, "message": "because"})
     job.take({"event": "progress", "stage": "too late"})
@@ -33,14 +33,14 @@ def test_what_is_over_stays_over(event, status):
     assert job.message == ("because" if event == "failed" else "")
 
 
-def test_a_cancelled_job_does_not_take_the_blame_of_its_process():
+def test_cancelled_job_does_not_fail_when_its_process_ends():
     job = Job({"do": "fit"})
     job.cancel()
     job.fail("the solver process ended")
     assert (job.status, job.message) == (JobStatus.CANCELLED, "")
 
 
-def test_the_clock_stops_with_the_job():
+def test_seconds_stop_at_the_end():
     job = Job({"do": "fit"})
     job.take({"event": "done"})
     assert job.seconds == job.seconds
@@ -52,14 +52,14 @@ def test_waiting_ends_when_another_thread_ends_the_job():
     assert job.wait(timeout=10) is JobStatus.CANCELLED
 
 
-def test_every_job_has_its_own_id_in_its_request():
+def test_request_has_the_unique_id_of_the_job():
     first, second = Job({"do": "fit"}), Job({"do": "fit"})
     assert first.id != second.id
     assert first.request == {"do": "fit", "job": first.id}
 
 
 @pytest.mark.parametrize(
-    ("event", "error", "words"),
+    ("event", "error", "message"),
     [
         ({"event": "failed", "message": "bad", "is_input_error": True}, InputError, "bad"),
         ({"event": "failed", "message": "open", "is_input_error": False}, FitError, "open"),
@@ -67,14 +67,14 @@ def test_every_job_has_its_own_id_in_its_request():
     ],
     ids=["input", "fit", "cancelled"],
 )
-def test_a_job_that_was_not_done_raises_why(event, error, words):
+def test_job_without_success_raises_its_error(event, error, message):
     job = Job({"do": "fit"})
     job.take(event)
-    with pytest.raises(error, match=words):
+    with pytest.raises(error, match=message):
         job.require_done()
 
 
-def test_a_job_that_was_done_raises_nothing():
+def test_job_with_success_raises_nothing():
     job = Job({"do": "fit"})
     job.take({"event": "done"})
     job.require_done()

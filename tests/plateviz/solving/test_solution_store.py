@@ -1,4 +1,4 @@
-"""The real solver process behind the store: fits, cancels, dies, and comes back."""
+"""The solution store with a real solver process, which fits, cancels, dies and restarts."""
 
 import pytest
 
@@ -19,7 +19,7 @@ def store(small_survey):
     store.close()
 
 
-def test_an_orbit_is_fitted_and_kept(store):
+def test_orbit_is_fitted_and_kept(store):
     job = store.request(0, FitSettings())
     assert job.wait(LONG) is JobStatus.DONE, job.message
     result = store.result(0, FitSettings())
@@ -30,7 +30,7 @@ def test_an_orbit_is_fitted_and_kept(store):
     assert "iteration 1" in stages
 
 
-def test_the_same_question_is_asked_once(store):
+def test_same_request_returns_the_same_job(store):
     first = store.request(0, FitSettings())
     assert store.request(0, FitSettings()) is first
     assert store.request(1, FitSettings()) is not first
@@ -45,7 +45,7 @@ def test_other_settings_give_another_solution(store):
     assert other.summary["chi2"] > store.result(0, FitSettings()).summary["chi2"]
 
 
-def test_what_is_wrong_with_the_input_is_reported(tmp_path, sample_orbit_dir):
+def test_invalid_input_is_reported(tmp_path, sample_orbit_dir):
     files = OrbitFiles(str(sample_orbit_dir / "sample_obs.fits"), str(tmp_path / "none.fits"))
     store = SolutionStore(files, WarmSolver())
     try:
@@ -56,7 +56,7 @@ def test_what_is_wrong_with_the_input_is_reported(tmp_path, sample_orbit_dir):
         store.close()
 
 
-def test_a_cancelled_fit_ends_and_can_be_asked_for_again(store):
+def test_cancelled_fit_ends_and_can_be_requested_again(store):
     settings = FitSettings(order=7)
     job = store.request(1, settings)
     job.wait_for_news(0, timeout=LONG)
@@ -68,7 +68,7 @@ def test_a_cancelled_fit_ends_and_can_be_asked_for_again(store):
     assert again.wait(LONG) is JobStatus.DONE
 
 
-def test_a_waiting_job_is_cancelled_without_being_begun(store):
+def test_waiting_job_is_cancelled_before_it_starts(store):
     first = store.request(0, FitSettings(order=4))
     waiting = store.request(0, FitSettings(order=2))
     store.cancel(waiting)
@@ -77,28 +77,28 @@ def test_a_waiting_job_is_cancelled_without_being_begun(store):
     assert first.wait(LONG) is JobStatus.DONE
 
 
-def test_what_is_asked_of_a_process_that_has_just_died_is_reported(store):
-    worker = store._worker
-    # While the lock is held nobody can have taken note of it.
-    with worker._lock:
-        worker._process.kill()
-        worker._process.wait()
+def test_request_to_a_process_that_has_just_died_fails(store):
+    solver = store._solver
+    # While the lock is held, the listener cannot notice the end of the process.
+    with solver._lock:
+        solver._process.kill()
+        solver._process.wait()
         job = store.request(0, FitSettings(order=1))
     assert job.wait(LONG) is JobStatus.FAILED
     assert "the solver process ended" in job.message
     assert store.request(0, FitSettings(order=1)).wait(LONG) is JobStatus.DONE
 
 
-def test_a_process_that_dies_is_reported_and_replaced(store):
+def test_process_that_dies_is_reported_and_replaced(store):
     job = store.request(1, FitSettings(order=6))
     job.wait_for_news(0, timeout=LONG)
-    store._worker._process.kill()
+    store._solver._process.kill()
     assert job.wait(LONG) is JobStatus.FAILED
     assert "the solver process ended" in job.message
     assert store.request(1, FitSettings(order=6)).wait(LONG) is JobStatus.DONE
 
 
-def test_closing_cancels_and_removes_everything(small_survey):
+def test_closing_cancels_jobs_and_removes_solutions(small_survey):
     store = SolutionStore(SurveyFolder(str(small_survey)), WarmSolver())
     job = store.request(0, FitSettings())
     scratch = store._scratch
@@ -107,14 +107,14 @@ def test_closing_cancels_and_removes_everything(small_survey):
     assert not scratch.exists()
 
 
-def test_a_fault_of_ours_does_not_hang_the_queue(small_survey):
-    worker = WarmSolver()
+def test_unexpected_exception_does_not_block_the_queue(small_survey):
+    solver = WarmSolver()
     try:
-        broken = worker.submit(Job({"do": "nothing of the kind"}))
+        broken = solver.submit(Job({"do": "nothing of the kind"}))
         assert broken.wait(LONG) is JobStatus.FAILED
         assert "KeyError" in broken.message
     finally:
-        worker.close()
+        solver.close()
 
 
 @pytest.mark.parametrize(
@@ -125,16 +125,16 @@ def test_a_fault_of_ours_does_not_hang_the_queue(small_survey):
     ],
     ids=["files", "survey"],
 )
-def test_origins_are_plain_values_and_back(origin):
+def test_origin_is_converted_to_plain_values_and_back(origin):
     assert origin_from_dict(origin_to_dict(origin)) == origin
 
 
-def test_a_folder_that_is_no_survey_is_refused(tmp_path):
+def test_folder_without_a_survey_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"survey\.toml"):
         SurveyFolder(str(tmp_path)).orbits()
 
 
-def test_a_what_if_is_a_step_from_the_last_fit(store):
+def test_what_if_is_a_step_from_the_last_fit(store):
     assert store.request(0, FitSettings()).wait(LONG) is JobStatus.DONE
     settings = FitSettings(prior_widths={"sources": 2.0})
     # The fitter of an orbit starts from its own last fit.
@@ -144,7 +144,7 @@ def test_a_what_if_is_a_step_from_the_last_fit(store):
     assert store.result(0, settings, what_if=True).summary["converged"]
 
 
-def test_a_what_if_that_a_step_cannot_tell_is_fitted(store):
+def test_what_if_beyond_a_step_is_fitted(store):
     settings = FitSettings(order=6)
     assert store.request(0, settings, what_if=True).wait(LONG) is JobStatus.DONE
     result = store.result(0, settings, what_if=True)

@@ -1,10 +1,10 @@
-"""The solver process between requests: what may be asked next is made ready, unless asked."""
+"""Speculative work of the solver process, which gives way to requests."""
 
 import queue
 
 import pytest
 
-from plateviz.solving.solver_process import _next
+from plateviz.solving.solver_process import _next_request
 
 
 @pytest.fixture
@@ -12,35 +12,35 @@ def requests():
     return queue.Queue()
 
 
-def test_a_request_that_waits_is_served_first(requests):
-    made = []
+def test_waiting_request_is_served_before_speculative_work(requests):
+    done = []
     requests.put({"job": "1"})
-    assert _next(requests, (made.append(step) for step in range(3))) == {"job": "1"}
-    assert made == []
+    assert _next_request(requests, (done.append(step) for step in range(3))) == {"job": "1"}
+    assert done == []
 
 
-def test_a_request_waits_for_one_step_at_most(requests):
-    made = []
+def test_request_waits_for_one_step_at_most(requests):
+    done = []
 
-    def later():
+    def speculative():
         for step in range(3):
-            made.append(step)
+            done.append(step)
             if step == 1:
                 requests.put({"job": "2"})
             yield
 
-    assert _next(requests, later()) == {"job": "2"}
-    assert made == [0, 1]
+    assert _next_request(requests, speculative()) == {"job": "2"}
+    assert done == [0, 1]
 
 
-def test_everything_is_made_ready_while_nobody_asks(requests):
-    made = []
+def test_speculative_work_is_finished_without_requests(requests):
+    done = []
 
-    def later():
+    def speculative():
         for step in range(3):
-            made.append(step)
+            done.append(step)
             yield
         requests.put(None)
 
-    assert _next(requests, later()) is None
-    assert made == [0, 1, 2]
+    assert _next_request(requests, speculative()) is None
+    assert done == [0, 1, 2]

@@ -14,7 +14,7 @@ def test_every_group_but_the_sources_is_calibration():
     assert {g.name for g in PARAMETERS} - {g.name for g in CALIBRATION_GROUPS} == {"sources"}
 
 
-def test_axes_partition_the_table():
+def test_every_group_is_on_one_axis():
     axes = [groups_on(axis) for axis in ("src", "exp", "coef", "det")]
     assert sorted(g.name for groups in axes for g in groups) == sorted(BY_NAME)
 
@@ -48,17 +48,17 @@ def test_focal_length_width_is_a_hundred_um_per_degree():
 
 
 @pytest.mark.parametrize("group", PARAMETERS, ids=lambda g: g.name)
-def test_units_convert(group):
+def test_value_unit_is_converted(group):
     factors = {"mas": 3.6e6, "arcsec": 3600.0, "um": 1.0}
     assert group.per_value_unit == factors[group.unit]
 
 
 @pytest.mark.parametrize("group", PARAMETERS, ids=lambda g: g.name)
-def test_widths_that_are_fractions_or_factors_have_no_unit(group):
+def test_width_that_is_a_fraction_or_a_factor_has_no_unit(group):
     assert (group.width_unit == "") == (group.relative or group.name == "sources")
 
 
-def test_group_in_any_unit_of_astropy_is_converted_and_read_back():
+def test_group_may_have_any_unit_of_astropy():
     group = Group("squeeze", "squeeze", "ε", "exp", "ppm", "%", "normal", 50.0)
     assert group.per_value_unit == 1e4
     assert factor_between("mas", "rad") == pytest.approx(4.84813681109536e-09)
@@ -66,7 +66,7 @@ def test_group_in_any_unit_of_astropy_is_converted_and_read_back():
         factor_between("um", "arcsec")
 
 
-def test_width_in_ppm_is_written_and_read_back(monkeypatch):
+def test_width_in_ppm_is_formatted_and_parsed(monkeypatch):
     group = Group("squeeze", "squeeze", "ε", "exp", "ppm", "ppm", "normal", 50.0)
     monkeypatch.setitem(BY_NAME, "squeeze", group)
     assert format_width("squeeze", 50.0) == "50 ppm"

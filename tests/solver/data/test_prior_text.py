@@ -23,7 +23,7 @@ from solver.errors import InputError
         ("position_angle", "inf", np.inf),
     ],
 )
-def test_written_width_is_read(name, text, width):
+def test_width_is_parsed(name, text, width):
     assert parse_width(name, text) == pytest.approx(width)
 
 
@@ -41,14 +41,14 @@ def test_written_width_is_read(name, text, width):
         ("nothing", "1", "'nothing'"),
     ],
 )
-def test_written_width_that_is_none_is_refused(name, text, complaint):
+def test_invalid_width_is_refused(name, text, complaint):
     with pytest.raises(InputError, match=complaint):
         parse_width(name, text)
 
 
 @pytest.mark.parametrize("name", [n for n in BY_NAME if n != "sources"])
 @pytest.mark.parametrize("width", [0.25, 3600.0, np.inf], ids=str)
-def test_formatted_width_is_read_back(name, width):
+def test_formatted_width_is_parsed_back(name, width):
     assert parse_width(name, format_width(name, width)) == width
 
 
@@ -64,7 +64,7 @@ def test_formatted_width_is_read_back(name, width):
         ("sources[ra]=100uas", "sources[ra]", 0.1),
     ],
 )
-def test_written_shift_is_read(text, name, shift):
+def test_shift_is_parsed_and_formatted(text, name, shift):
     assert parse_shift(text) == (name, pytest.approx(shift))
     assert parse_shift(format_shift(name, shift)) == (name, pytest.approx(shift))
 
@@ -83,6 +83,6 @@ def test_written_shift_is_read(text, name, shift):
         ("detector_x=1e999", "finite"),
     ],
 )
-def test_written_shift_that_is_none_is_refused(text, complaint):
+def test_invalid_shift_is_refused(text, complaint):
     with pytest.raises(InputError, match=complaint):
         parse_shift(text)

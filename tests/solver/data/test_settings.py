@@ -10,7 +10,7 @@ from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.errors import InputError
 
 
-def test_defaults_are_the_papers():
+def test_defaults_are_those_of_the_paper():
     settings = FitSettings()
     assert settings.order == 5
     assert settings.aberration
@@ -20,7 +20,7 @@ def test_defaults_are_the_papers():
 
 
 @pytest.mark.parametrize("order", [-1, 10, 5.0, "5", None, True], ids=repr)
-def test_order_that_is_none_is_refused(order):
+def test_invalid_order_is_refused(order):
     with pytest.raises(InputError, match="distortion order from 0 to 9"):
         FitSettings(order=order)
 
@@ -48,30 +48,30 @@ def test_flat_prior_is_allowed_on_the_calibration_and_not_on_the_sources():
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan")], ids=str)
-def test_tolerance_that_no_step_can_meet_is_refused(tolerance):
+def test_tolerance_that_is_not_positive_is_refused(tolerance):
     with pytest.raises(InputError, match="tolerance"):
         FitSettings(tolerance=tolerance)
 
 
 @pytest.mark.parametrize("limit", [0, -1, 2.5], ids=str)
-def test_limit_of_iterations_that_is_none_is_refused(limit):
+def test_invalid_maximum_of_iterations_is_refused(limit):
     with pytest.raises(InputError, match="max_iterations"):
         FitSettings(max_iterations=limit)
 
 
-def test_settings_survive_json():
+def test_settings_are_restored_from_json():
     settings = FitSettings(order=3, aberration=False, prior_widths={"pitch_x": 0.1}, tolerance=0.01)
     assert FitSettings.from_dict(json.loads(json.dumps(settings.to_dict()))) == settings
 
 
-def test_copy_with_changes_is_checked_too():
+def test_copy_with_changes_is_checked():
     settings = FitSettings(order=3)
     assert settings.with_(order=4) == FitSettings(order=4)
     with pytest.raises(InputError, match="order"):
         settings.with_(order=99)
 
 
-def test_widths_given_are_not_shared():
+def test_prior_widths_are_copied():
     widths = {"pitch_x": 0.1}
     settings = FitSettings(prior_widths=widths)
     widths["pitch_x"] = -5.0
@@ -84,22 +84,22 @@ def test_widths_given_are_not_shared():
         (lambda: SviSettings(steps=0), "svi steps to be 1 or more, found 0"),
         (lambda: SviSettings(patience=2.5), "svi patience to be 1 or more, found 2.5"),
         (lambda: SviSettings(max_steps=100), r"not to be below steps \(1500\), found 100"),
-        (lambda: SviSettings(last_rate=1e5), "rates that fall and are positive"),
-        (lambda: SviSettings(last_rate=0.0), "rates that fall and are positive"),
+        (lambda: SviSettings(last_rate=1e5), "positive svi learning rates that fall"),
+        (lambda: SviSettings(last_rate=0.0), "positive svi learning rates that fall"),
         (lambda: SviSettings(tolerance=0.0), "positive svi tolerance, found 0.0"),
         (lambda: SviSettings(seed=-1), "svi seed to be 0 or more, found -1"),
         (lambda: NutsSettings(chains=0), "nuts chains to be 1 or more, found 0"),
         (lambda: NutsSettings(samples=3), "nuts samples to be 4 or more, found 3"),
         (lambda: FitSettings(thin=0), "thin to be 1 or more, found 0"),
-        (lambda: svi_settings("pyro", None, 0), "expected warpfield .* found 'pyro'"),
+        (lambda: svi_settings("pyro", None, 0), "expected warpfield, found 'pyro'"),
     ],
 )
-def test_what_no_engine_can_use_is_refused(make, message):
+def test_invalid_engine_setting_is_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
 
 
-def test_choices_of_the_engines_come_back():
+def test_engine_settings_are_restored_from_json():
     settings = FitSettings(
         engine="svi", thin=3, svi=svi_settings("warpfield", 500, 7), nuts=NutsSettings(samples=9)
     )
@@ -107,7 +107,7 @@ def test_choices_of_the_engines_come_back():
     assert FitSettings.from_dict(plain) == settings
 
 
-def test_published_rates_are_the_papers():
+def test_warpfield_has_the_learning_rates_of_the_paper():
     chosen = svi_settings("warpfield", 500, 7)
     assert (chosen.first_rate, chosen.last_rate, chosen.patience) == (1e-3, 1e-10, 10_000)
     assert not chosen.conditioned
@@ -116,12 +116,12 @@ def test_published_rates_are_the_papers():
     assert svi_settings(None, None, 4) == SviSettings(seed=4)
 
 
-def test_every_engine_knows_when_it_is_there():
+def test_step_tolerance_is_that_of_the_engine():
     assert FitSettings().step_tolerance == FitSettings().tolerance
     assert FitSettings(engine="svi").step_tolerance == SviSettings().tolerance
 
 
-def test_orders_are_compared_when_asked_for_and_old_results_never_asked():
+def test_comparison_of_orders_is_off_in_files_without_it():
     settings = FitSettings(compare_orders=True)
     plain = json.loads(json.dumps(settings.to_dict()))
     assert FitSettings.from_dict(plain) == settings
@@ -129,7 +129,7 @@ def test_orders_are_compared_when_asked_for_and_old_results_never_asked():
     assert FitSettings.from_dict(plain) == FitSettings()
 
 
-def test_every_setting_states_all_that_its_interfaces_need():
+def test_every_setting_has_what_its_interfaces_need():
     for name, one in SETTINGS.items():
         assert one.label, name
         assert one.help.endswith("."), name
@@ -140,12 +140,12 @@ def test_every_setting_states_all_that_its_interfaces_need():
     assert all(len(card) <= 8 for card in cards)
 
 
-def test_settings_of_an_unknown_name_are_refused():
+def test_unknown_setting_is_refused():
     with pytest.raises(TypeError, match="flavour"):
         FitSettings.from_dict({"order": 3, "flavour": 1})
 
 
-def test_identity_leaves_out_what_does_not_change_the_solution():
+def test_identity_ignores_settings_that_do_not_affect_the_solution():
     asked = FitSettings(order=3, compare_orders=True)
     assert asked.identity() == FitSettings(order=3).identity()
     assert asked.identity() != FitSettings(order=4).identity()
@@ -160,7 +160,7 @@ def test_identity_leaves_out_what_does_not_change_the_solution():
         ({"robust": True}, False),
     ],
 )
-def test_what_if_holds_unless_the_model_or_the_outliers_change(changes, holds):
+def test_what_if_is_valid_unless_the_model_or_the_outliers_change(changes, holds):
     assert FitSettings().what_if_holds(FitSettings(**changes)) == holds
 
 
@@ -175,5 +175,5 @@ def test_what_if_holds_unless_the_model_or_the_outliers_change(changes, holds):
         ({"max_iterations": 9, "robust": True}, "order 5, at most 9 iterations, without outliers"),
     ],
 )
-def test_description_names_everything_that_departs_from_the_defaults(changes, text):
+def test_description_names_every_setting_that_is_not_its_default(changes, text):
     assert FitSettings(**changes).describe() == text

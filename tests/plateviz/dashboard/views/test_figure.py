@@ -1,4 +1,4 @@
-"""FigureView: drawn for who comes near it, and faded while it shows what no longer is."""
+"""FigureView: drawn when near the screen, and faded while out of date."""
 
 import holoviews as hv
 import pytest
@@ -8,28 +8,28 @@ from plateviz.plots.gallery import diagnostics
 
 
 @pytest.fixture
-def drawings():
+def themes():
     return []
 
 
 @pytest.fixture
-def view(drawings):
-    def picture(theme):
-        drawings.append(theme)
+def view(themes):
+    def draw(theme):
+        themes.append(theme)
         return hv.Curve([1, 2, 3])
 
-    return FigureView(diagnostics()[0], picture, waiting="Nothing yet.")
+    return FigureView(diagnostics()[0], draw, waiting="Nothing yet.")
 
 
 def opacity(view):
     return view._body.styles["opacity"]
 
 
-def words(view):
+def text(view):
     return view._body[0].object
 
 
-def test_nothing_is_due_that_nobody_is_near(view):
+def test_figure_is_due_only_near_the_screen(view):
     assert not view.is_due
     view.visibility.is_near = True
     assert view.is_due
@@ -37,7 +37,7 @@ def test_nothing_is_due_that_nobody_is_near(view):
     assert not view.is_due
 
 
-def test_a_change_out_of_sight_waits_and_fades_the_figure(view, drawings):
+def test_change_away_from_the_screen_waits_and_fades_the_figure(view, themes):
     view.visibility.is_near = True
     view.draw()
     assert opacity(view) == "1"
@@ -48,10 +48,10 @@ def test_a_change_out_of_sight_waits_and_fades_the_figure(view, drawings):
     view.visibility.is_near = True
     view.draw()
     assert opacity(view) == "1"
-    assert drawings == ["light", "dark"]
+    assert themes == ["light", "dark"]
 
 
-def test_a_figure_is_faded_while_another_is_made(view):
+def test_stale_figure_is_faded(view):
     view.draw()
     view.mark_stale(True)
     assert opacity(view) != "1"
@@ -59,32 +59,32 @@ def test_a_figure_is_faded_while_another_is_made(view):
     assert opacity(view) == "1"
 
 
-def test_the_words_say_what_is_waited_for():
+def test_empty_card_has_the_waiting_text():
     view = FigureView(diagnostics()[0], lambda theme: None, waiting="Nothing yet.")
-    assert "Being drawn." in words(view)
+    assert "Being drawn." in text(view)
     view.draw()
-    assert "Nothing yet." in words(view)
+    assert "Nothing yet." in text(view)
 
 
-def test_a_figure_that_fails_says_why_and_is_not_tried_again():
-    def picture(theme):
+def test_figure_that_fails_shows_the_reason_and_is_not_drawn_again():
+    def draw(theme):
         raise ValueError("no sources")
 
-    view = FigureView(diagnostics()[0], picture)
+    view = FigureView(diagnostics()[0], draw)
     view.visibility.is_near = True
     view.draw()
-    assert "This figure cannot be drawn: no sources" in words(view)
+    assert "This figure cannot be drawn: no sources" in text(view)
     assert not view.is_due
 
 
-def test_the_grid_draws_a_few_that_are_near_and_tells_who_comes_near():
+def test_grid_draws_a_few_figures_near_the_screen_at_a_time():
     drawn = []
     views = [
         FigureView(diagnostic, lambda theme, name=diagnostic.name: drawn.append(name))
         for diagnostic in diagnostics()[:6]
     ]
     grid, calls = FigureGrid(views), []
-    grid.on_sight(calls.append)
+    grid.on_visibility(calls.append)
     assert not grid.is_due
     for view in views[1:]:
         view.visibility.is_near = True

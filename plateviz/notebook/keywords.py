@@ -1,4 +1,4 @@
-"""Settings of a fit as keywords, with the texts of the command line for their values."""
+"""Settings of a fit as keywords; text values are written as on the command line."""
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
@@ -19,47 +19,47 @@ KEYWORDS: dict[str, Setting] = {
     **{keyword: SETTINGS[name] for keyword, name in _FIELDS.items()},
     **ENGINE_OPTIONS,
 }
-"""Keyword -> its setting: what `fit` and `what_if` of a notebook take."""
+"""Keyword -> its setting: the keywords of `fit` and `what_if` in a notebook."""
 
 
-def takes_choices(function: _Function) -> _Function:
-    """Let the signature of a function with `**choices` name the keywords, for help and Tab."""
+def takes_settings(function: _Function) -> _Function:
+    """Add the keywords to the signature of a function with `**settings`, for Tab completion."""
     signature = inspect.signature(function)
     own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
-    choices = [
+    keywords = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=_annotation(one))
         for name, one in KEYWORDS.items()
     ]
-    named: Any = function
-    named.__signature__ = signature.replace(parameters=[*own, *choices])
+    described: Any = function
+    described.__signature__ = signature.replace(parameters=[*own, *keywords])
     return function
 
 
-def settings_with(base: FitSettings, choices: Mapping[str, object]) -> FitSettings:
-    """Return settings with some of them changed.
+def settings_with(base: FitSettings, changes: Mapping[str, object]) -> FitSettings:
+    """Return `base` with some settings changed.
 
     Parameters
     ----------
-    choices : keyword of `KEYWORDS` -> value; priors and centres are changed by name, what is
-        excluded is replaced
+    changes : keyword of `KEYWORDS` -> value; priors and centres are changed by name, exclusions
+        are replaced
 
     Raises
     ------
     InputError
-        If there is no such keyword, or its value cannot be used.
+        If there is no such keyword, or its value is invalid.
     """
-    _check_names(choices)
-    changes = {
+    _check_names(changes)
+    fields = {
         _FIELDS[keyword]: _value(keyword, base, value)
-        for keyword, value in choices.items()
+        for keyword, value in changes.items()
         if keyword in _FIELDS
     }
-    options = {name: value for name, value in choices.items() if name in ENGINE_OPTIONS}
-    return base.with_(**changes, **(_engines(options) if options else {}))
+    options = {name: value for name, value in changes.items() if name in ENGINE_OPTIONS}
+    return base.with_(**fields, **(_engines(options) if options else {}))
 
 
-def _check_names(choices: Mapping[str, object]) -> None:
-    for name in choices:
+def _check_names(changes: Mapping[str, object]) -> None:
+    for name in changes:
         if name not in KEYWORDS:
             near = get_close_matches(name, KEYWORDS, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
@@ -69,7 +69,7 @@ def _check_names(choices: Mapping[str, object]) -> None:
 
 
 def _value(keyword: str, base: FitSettings, value: object) -> object:
-    """Return the value of a field from that of its keyword."""
+    """Return the value of a field of `FitSettings` from the value of its keyword."""
     one = KEYWORDS[keyword]
     if not isinstance(one, Texts):
         return value

@@ -1,4 +1,4 @@
-"""The choices of a fit as keywords: the words of the command line, and one message for mistakes."""
+"""Settings of a fit as keywords: values as on the command line, and one message for mistakes."""
 
 import inspect
 import math
@@ -6,33 +6,33 @@ import math
 import astropy.units as u
 import pytest
 
-from plateviz.notebook.choices import KEYWORDS, settings_with, takes_choices
+from plateviz.notebook.keywords import KEYWORDS, settings_with, takes_settings
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 
 PAPER = FitSettings()
 
 
-def test_nothing_chosen_leaves_the_settings_as_they_are():
+def test_no_keyword_leaves_the_settings_unchanged():
     assert settings_with(PAPER, {}) == PAPER
 
 
 @pytest.mark.parametrize(
     ("width", "expected"),
     [
-        pytest.param("10um", 10.0, id="words"),
+        pytest.param("10um", 10.0, id="text"),
         pytest.param(2.5, 2.5, id="number"),
         pytest.param(3.0 * u.um, 3.0, id="quantity"),
         pytest.param("flat", math.inf, id="flat"),
         pytest.param(math.inf, math.inf, id="infinite"),
     ],
 )
-def test_prior_is_a_word_a_number_or_a_quantity(width, expected):
+def test_prior_width_is_a_text_a_number_or_a_quantity(width, expected):
     settings = settings_with(PAPER, {"priors": {"distortion_x": width}})
     assert settings.prior_widths == {"distortion_x": expected}
 
 
-def test_centre_is_of_a_group_or_of_an_element():
+def test_centre_is_shifted_for_a_group_or_an_element():
     centres = {"focal_length": "100um", "detector_x[2]": -5}
     assert settings_with(PAPER, {"centres": centres}).prior_shifts == {
         "focal_length": 100.0,
@@ -41,24 +41,24 @@ def test_centre_is_of_a_group_or_of_an_element():
 
 
 @pytest.mark.parametrize("exclude", ["detector=2", ["detector=2"]], ids=["text", "list"])
-def test_what_is_excluded_is_said_as_on_the_command_line(exclude):
+def test_exclusion_is_written_as_on_the_command_line(exclude):
     assert settings_with(PAPER, {"exclude": exclude}).exclusions.detectors == {2}
 
 
-def test_priors_change_by_name_and_other_choices_stay():
+def test_priors_change_by_name_and_other_settings_stay():
     base = settings_with(PAPER, {"order": 3, "priors": {"pitch_x": 1.0, "pitch_y": 2.0}})
     settings = settings_with(base, {"priors": {"pitch_y": 4.0}})
     assert settings.order == 3
     assert settings.prior_widths == {"pitch_x": 1.0, "pitch_y": 4.0}
 
 
-def test_steps_and_seed_are_of_the_engines():
+def test_steps_and_seed_are_settings_of_the_engines():
     settings = settings_with(PAPER, {"engine": "svi", "steps": 30, "seed": 5})
     assert (settings.svi.steps, settings.svi.seed, settings.nuts.seed) == (30, 5, 5)
 
 
 @pytest.mark.parametrize(
-    ("choices", "message"),
+    ("changes", "message"),
     [
         ({"ordre": 3}, "found 'ordre'; did you mean order"),
         ({"order": 12}, "order from 0 to 9, found 12"),
@@ -78,15 +78,15 @@ def test_steps_and_seed_are_of_the_engines():
     ],
     ids=lambda value: str(value)[:40],
 )
-def test_mistake_is_one_message(choices, message):
+def test_invalid_keyword_or_value_is_refused(changes, message):
     with pytest.raises(InputError, match=message):
-        settings_with(PAPER, choices)
+        settings_with(PAPER, changes)
 
 
-def test_signature_names_the_choices():
-    @takes_choices
-    def fit(orbit, **choices):
-        return choices
+def test_signature_has_the_keywords():
+    @takes_settings
+    def fit(orbit, **settings):
+        return settings
 
     names = list(inspect.signature(fit).parameters)
     assert names == ["orbit", *KEYWORDS]

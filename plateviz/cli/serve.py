@@ -1,6 +1,7 @@
 """`plateviz serve`: the dashboard over a survey or the files of an orbit, behind a proxy or not."""
 
 import webbrowser
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -57,14 +58,21 @@ def serve(
     run_server(SolutionStore(origin, WarmSolver()), place, open_browser)
 
 
-def run_server(store: "SolutionStore", place: "Place", open_browser: bool) -> None:
-    """Serve a store at a place until it is interrupted."""
+def run_server(
+    store: "SolutionStore",
+    place: "Place",
+    open_browser: bool,
+    when_ready: Callable[[], object] | None = None,
+) -> None:
+    """Serve a store at a place until it is interrupted; `when_ready` is called once it serves."""
     from plateviz.dashboard.server import serve as run
 
     def ready(page: str) -> None:
         typer.echo(f"plateviz serves on {page} until you press Ctrl-C")
         if open_browser:
             webbrowser.open(page)
+        if when_ready is not None:
+            when_ready()
 
     run(store, place, ready)
 

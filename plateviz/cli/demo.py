@@ -37,7 +37,9 @@ _PATIENCE_SECONDS = 5.0
 def demo_directory() -> Path:
     """Return where the demonstration's survey is kept: a folder for each choice and version."""
     choice = json.dumps([DEMO.to_dict(), versions_of(PACKAGES)], sort_keys=True)
-    return cache_directory() / f"demo-{hashlib.sha256(choice.encode()).hexdigest()[:12]}"
+    digest = hashlib.sha256(choice.encode()).hexdigest()[:12]
+    # The page's title is the name of the survey's folder.
+    return cache_directory() / f"demo-{digest}" / "demo"
 
 
 def make_survey(directory: Path, solver: WarmSolver, reporter: Reporter) -> Run:

@@ -29,6 +29,7 @@ def test_demo_shows_the_first_orbit_and_then_the_whole_survey(tmp_path, open_pag
         page.get_by_role("button", name="Most significant motion").first.click()
         see(page, "time-series")
         expect(page.get_by_text("Rms from the truth, 2-D")).to_be_visible()
+        close(page)
 
     start = time.monotonic()
     with serving("demo", "--port", "0", env=env) as address:
@@ -36,6 +37,13 @@ def test_demo_shows_the_first_orbit_and_then_the_whole_survey(tmp_path, open_pag
         assert time.monotonic() - start < 20
         page = open_page(address)
         expect(page.get_by_text(re.compile(r"54 \(of 54\)")).first).to_be_visible()
+        close(page)
+
+
+def close(page):
+    """Close a page before its server ends: what it could no longer load would be a complaint."""
+    page.wait_for_load_state("networkidle")
+    page.context.close()
 
 
 def wait_for_file(glob, pattern):

@@ -18,7 +18,7 @@ PYTHON = [block for page in (README, *PAGES) for block in blocks_of(page, "pytho
 # Its blocks are files and changes of the code, which have tests of their own.
 EXTENDING = DOCS / "extending.md"
 # What takes too long for a page's test, and the test that runs it.
-ELSEWHERE = {"demo": "tests/ui/test_dashboard.py"}
+ELSEWHERE = {"demo": "tests/ui/test_demo.py"}
 # Smaller than the page's, and where nothing is in the way.
 SMALLER = {
     "simulate": ["--orbits", "2", "--stars", "2000"],

@@ -44,27 +44,37 @@ def demo(
     address: options.Address = "127.0.0.1",
     open_browser: options.OpenBrowser = True,
 ) -> None:
-    """Make a small survey once, fit it, and show it in the dashboard."""
-    from plateviz.cli.demo import demo_directory, open_survey, simulation
-    from plateviz.dashboard.server import Endpoint, check_address
-    from plateviz.solving.progress import reporting
+    """Make a small survey once, fit it, and show it in the dashboard.
+
+    The page opens with the first orbit; the others are fitted behind it. A demo that was
+    stopped resumes, and one that is complete opens at once.
+    """
     from plateviz.solving.warm_solver import WarmSolver
 
-    endpoint = Endpoint(check_address(address, port), address)
-    directory = demo_directory()
-    with ExitStack() as stack, reporting("starting the solver") as reporter:
-        worker = WarmSolver()
-        stack.callback(worker.close)
-        survey = simulation(directory)
-        if survey is not None:
-            reporter.follow(worker.submit(survey))
-            survey.require_done()
-        store, first = open_survey(directory, worker)
-        reporter.follow(first)
-        first.require_done()
-        # From here the server closes it, with the store.
-        stack.pop_all()
-    run_server(store, endpoint, open_browser)
+    with ExitStack() as stack:
+        # Its imports take as long as those of the server, which follow.
+        solver = WarmSolver()
+        stack.callback(solver.close)
+        from plateviz.cli.demo import (
+            BackgroundFit,
+            demo_directory,
+            make_survey,
+            request_first_orbit,
+        )
+        from plateviz.dashboard.server import Endpoint, check_address
+        from plateviz.solving.origin import SurveyFolder
+        from plateviz.solving.progress import reporting
+        from plateviz.solving.solution_store import SolutionStore
+
+        endpoint = Endpoint(check_address(address, port), address)
+        directory = demo_directory()
+        with reporting("starting the solver") as reporter:
+            run = make_survey(directory, solver, reporter)
+        store = SolutionStore(SurveyFolder(str(directory)), solver)
+        stack.callback(store.close)
+        fit = BackgroundFit(run, request_first_orbit(store, run))
+        stack.callback(fit.close)
+        run_server(store, endpoint, open_browser, fit.start)
 
 
 @app.command()

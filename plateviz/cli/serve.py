@@ -1,6 +1,7 @@
 """`plateviz serve`: serve the dashboard of a survey or of the files of an orbit."""
 
 import webbrowser
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -61,14 +62,21 @@ def serve(
     run_server(SolutionStore(origin, WarmSolver()), endpoint, open_browser)
 
 
-def run_server(store: "SolutionStore", endpoint: "Endpoint", open_browser: bool) -> None:
-    """Serve a store at an endpoint until interrupted."""
+def run_server(
+    store: "SolutionStore",
+    endpoint: "Endpoint",
+    open_browser: bool,
+    when_ready: Callable[[], object] | None = None,
+) -> None:
+    """Serve a store at an endpoint until interrupted; `when_ready` is called once it serves."""
     from plateviz.dashboard.server import serve as run
 
     def ready(page: str) -> None:
         typer.echo(f"plateviz serves on {page} until you press Ctrl-C")
         if open_browser:
             webbrowser.open(page)
+        if when_ready is not None:
+            when_ready()
 
     run(store, endpoint, ready)
 

@@ -48,7 +48,7 @@ class Navigation(param.Parameterized):
     message = param.String(default="", doc="why no source is shown")
 
     def __init__(self, session: Session) -> None:
-        """Begin with the first whole run, or with the orbit where there is no run."""
+        """Begin with the first whole run, or with the orbit while no run has been gathered."""
         super().__init__()
         self.session = session
         self._source_text = ""
@@ -57,7 +57,8 @@ class Navigation(param.Parameterized):
             self.param["run_name"].objects = list(self._runs)
             whole = [name for name, run in self._runs.items() if run.is_complete]
             self.run_name = (whole or list(self._runs))[0]
-            self.view = View.SURVEY
+            if self._runs[self.run_name].is_gathered:
+                self.view = View.SURVEY
         self.param.watch(lambda *_: self._look(), "run_name")
 
     @property

@@ -6,7 +6,6 @@ that an interrupted run can be continued at any time.
 """
 
 import logging
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -22,6 +21,7 @@ from pyarrow import parquet
 
 from plateviz.runs.dask_worker import Outcome, fit_survey_orbit
 from plateviz.runs.fitted_orbit import remove_unfinished
+from plateviz.runs.lock import locked
 from plateviz.runs.queries import (
     ERRORS_FILE,
     MOTIONS_FILE,
@@ -36,6 +36,7 @@ from solver.io.parquet import write_parquet
 from solver.io.survey import survey_orbits
 from solver.model.apparent_motion import julian_year
 from solver.results.time_series import errors_by_count, motion_table
+from solver.runtime.threads import count_cores
 
 # Rows of the history per batch: some 200 MB with all draws.
 _ROWS_AT_ONCE = 100_000
@@ -91,18 +92,35 @@ def fit_survey(
     Raises
     ------
     InputError
-        If the survey, the run or an orbit is not there as asked for, or no scheduler answers.
+        If the survey, the run or an orbit is not there as asked for, no scheduler answers, or
+        another process is fitting the run.
     """
-    start = time.perf_counter()
     wanted = _wanted(survey, orbits)
     run = begin_run(survey, name, settings)
+    with locked(run.directory) as is_ours:
+        if not is_ours:
+            raise InputError(
+                f"{run.directory}: expected a run that no other process is fitting, found one that "
+                "another process is fitting; wait for it, or give another --run NAME"
+            )
+        return _fit_missing(run, wanted, workers, scheduler, progress)
+
+
+def _fit_missing(
+    run: Run,
+    wanted: list[int],
+    workers: int | None,
+    scheduler: str | None,
+    progress: Callable[[Progress], None],
+) -> Report:
+    start = time.perf_counter()
     remove_unfinished(run.directory)
     there = set(run.complete_orbits())
     missing = [orbit for orbit in wanted if orbit not in there]
     failed: dict[int, str] = {}
     progress(Progress(0, len(missing), None))
     if missing:
-        with _client(min(workers or cores(), len(missing)), scheduler) as client:
+        with _client(min(workers or count_cores(), len(missing)), scheduler) as client:
             for done, outcome in enumerate(_outcomes(client, run, missing), start=1):
                 if outcome.message:
                     failed[outcome.orbit] = outcome.message
@@ -111,11 +129,6 @@ def fit_survey(
     fitted = [orbit for orbit in missing if orbit not in failed]
     kept = [orbit for orbit in wanted if orbit in there]
     return Report(run, fitted, kept, failed, time.perf_counter() - start)
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:

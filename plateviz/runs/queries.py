@@ -75,6 +75,11 @@ class SurveyRun:
         """Whether every orbit of the survey is fitted and gathered."""
         return self._run.is_complete
 
+    @property
+    def is_gathered(self) -> bool:
+        """Whether the tables over all orbits are there: of all orbits or of those not failed."""
+        return (self.directory / MOTIONS_FILE).is_file()
+
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""
         return self._run.header()
@@ -140,7 +145,8 @@ class SurveyRun:
         if motions.is_file():
             return pd.read_parquet(motions, columns=names)
         if not self._has_history:
-            return pd.DataFrame(columns=names)
+            kinds = {"is_reference": bool, "is_artificial": bool}
+            return pd.DataFrame(columns=names).astype(dict.fromkeys(names, np.int64) | kinds)
         return self._ask(
             "SELECT source_id, any_value(is_reference) AS is_reference, "
             "any_value(is_artificial) AS is_artificial, count(*) AS n_orbits, "

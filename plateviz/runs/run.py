@@ -42,7 +42,8 @@ _HEADER = "run.toml"
 _COMPLETE = "COMPLETE"
 _GATHERED = "gathered.json"
 _FAILED = "failed"
-_PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
+# Their versions belong to a run: results may differ between versions.
+PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _ORBIT = re.compile(r"orbit=(\d{4,})")
 
@@ -167,7 +168,7 @@ def begin_run(survey: Path, name: str, settings: FitSettings) -> Run:
 def _content(survey: Path, settings: FitSettings) -> dict[str, object]:
     inputs = [survey / name for name in (HEADER, REFERENCE, TRUTH_FILE, EXPOSURES)]
     return {
-        "versions": versions_of(_PACKAGES),
+        "versions": versions_of(PACKAGES),
         "inputs": {path.name: sha256_of(path) for path in inputs if path.is_file()},
         "settings": settings.to_dict(),
     }

@@ -6,6 +6,7 @@ then marked as failed or cancelled; waiting jobs continue.
 
 import contextlib
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -23,9 +24,15 @@ _GRACE_SECONDS = 3.0
 class WarmSolver:
     """One solver process and its queue of jobs, first in, first out."""
 
-    def __init__(self) -> None:
-        """Start the process; it warms up while the caller goes on."""
+    def __init__(self, niceness: int = 0) -> None:
+        """Start the process; it warms up while the caller goes on.
+
+        Parameters
+        ----------
+        niceness : how far the process, and all that it starts, gives way to other processes
+        """
         keep_compilations()
+        self._niceness = niceness
         self._lock = threading.RLock()
         self._jobs: deque[Job] = deque()
         self._process: subprocess.Popen[str] | None = None
@@ -76,6 +83,9 @@ class WarmSolver:
             # Ctrl-C, or a notebook's interrupt, must reach only the process that waits for a job.
             start_new_session=True,
         )
+        if self._niceness and hasattr(os, "setpriority"):
+            niceness = os.getpriority(os.PRIO_PROCESS, 0) + self._niceness
+            os.setpriority(os.PRIO_PROCESS, process.pid, niceness)
         self._process = process
         threading.Thread(target=self._listen, args=(process, errors), daemon=True).start()
         return process

@@ -36,6 +36,11 @@ def use_one_thread() -> None:
     threadpool_limits(limits=1)
 
 
+def count_cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(_cores()) or os.cpu_count() or 1
+
+
 def _cores() -> set[int]:
     return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
 

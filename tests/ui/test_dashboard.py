@@ -1,9 +1,11 @@
-"""The dashboard as a person meets it: `plateviz demo` in a real Chromium."""
+"""The dashboard over a survey without a run, in a real Chromium."""
 
 import pytest
 from playwright.sync_api import expect
 
 from plateviz.plots.gallery import diagnostics
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
 from tests.ui.conftest import see, serving
 
 expect.set_options(timeout=60_000)
@@ -18,15 +20,16 @@ ROWS = """() => Object.fromEntries(
 
 
 @pytest.fixture(scope="module")
-def demo(tmp_path_factory, chromium_path):
-    cache = tmp_path_factory.mktemp("cache")
-    with serving("demo", "--port", "0", env={"XDG_CACHE_HOME": str(cache)}) as address:
+def served(tmp_path_factory, chromium_path):
+    directory = tmp_path_factory.mktemp("survey") / "sky"
+    simulate_survey(directory, SurveySettings(orbits=3, seed=0).scaled(18_000))
+    with serving("serve", str(directory), "--port", "0") as address:
         yield address
 
 
 @pytest.fixture
-def page(demo, open_page):
-    page = open_page(demo)
+def page(served, open_page):
+    page = open_page(served)
     see(page, "residual-map")
     return page
 
@@ -197,7 +200,7 @@ def test_the_address_carries_the_selection(page, open_page):
     expect(again.get_by_role("combobox", name="Field")).to_have_text("all")
 
 
-def test_an_address_of_nonsense_opens_the_page(demo, open_page):
-    page = open_page(f"{demo}?field=%FF&plates=1e9-x&detector=none&orbit=%00")
+def test_an_address_of_nonsense_opens_the_page(served, open_page):
+    page = open_page(f"{served}?field=%FF&plates=1e9-x&detector=none&orbit=%00")
     page.locator(".figure-footprint canvas").first.wait_for(state="attached")
     expect(page.get_by_role("combobox", name="Field")).to_have_text("all")

@@ -17,6 +17,7 @@ from plateviz.dashboard.views.markup import (
     themed,
     titled,
 )
+from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.table import DataTable
 from plateviz.plots.gallery import source_figures
@@ -36,6 +37,9 @@ _INVITATION = (
     "Write a source's id on the left, choose one below, or tap a point of a figure of the "
     "Survey or the Orbit view."
 )
+_NO_SOURCES = (
+    "No orbit of this run was fitted when this page was loaded. Load it again to see its sources."
+)
 
 
 class SourcePage(pn.viewable.Viewer):
@@ -45,6 +49,7 @@ class SourcePage(pn.viewable.Viewer):
         """Follow the source of `navigation`."""
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
+        self._invitation = _INVITATION
         self._head, self._motion = markup_pane(), markup_pane()
         self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row)
         self._list = DataTable(SOURCES_OF_RUN, self._open_source, page_size=20)
@@ -57,7 +62,9 @@ class SourcePage(pn.viewable.Viewer):
             self._orbits,
             sizing_mode="stretch_width",
         )
-        self._choice = pmui.Column(self._list, sizing_mode="stretch_width")
+        self._choice = pmui.Column(
+            NotableSourceLink(navigation), self._list, sizing_mode="stretch_width"
+        )
         self._column = pmui.Column(
             self._head, self._rest, self._choice, sizing_mode="stretch_width"
         )
@@ -98,14 +105,16 @@ class SourcePage(pn.viewable.Viewer):
     def _list_sources(self, *_: object) -> None:
         run = self._navigation.run
         if run is not None:
-            self._list.show(source_list(run.counts()))
+            sources = source_list(run.counts())
+            self._invitation = _NO_SOURCES if sources.empty else _INVITATION
+            self._list.show(sources)
 
     def _show(self, *_: object) -> None:
         theme, found = self._session.theme, self._navigation.found
         self._rest.visible = found is not None
         self._choice.visible = found is None and self._navigation.run is not None
         if found is None:
-            words = self._navigation.why_no_run or self._navigation.message or _INVITATION
+            words = self._navigation.why_no_run or self._navigation.message or self._invitation
             self._head.object = paragraph(words, "empty", theme)
             return
         self._entry.value = str(found.source_id)

@@ -10,6 +10,7 @@ import panel_material_ui as pmui
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.views.figure import FigureGrid, FigureView
 from plateviz.dashboard.views.markup import heading, markup_pane, paragraph, themed, titled
+from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.table import DataTable
 from plateviz.plots.gallery import survey_figures
@@ -18,7 +19,13 @@ from plateviz.reports.strip import strip
 from plateviz.runs.survey_tables import survey_tables
 from plateviz.tables import orbit_list, orbit_states, run_strip
 from plateviz.tables.headings import ORBITS_OF_RUN
+from plateviz.tables.run_health import MISSING
 from plateviz.tables.survey_tables import SurveyTables
+
+_INCOMPLETE = (
+    "This run is not complete. Orbits that have been fitted since this page was loaded appear when "
+    "it is loaded again."
+)
 
 
 class SurveyPage(pn.viewable.Viewer):
@@ -34,7 +41,11 @@ class SurveyPage(pn.viewable.Viewer):
         self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=15)
         self.figures = FigureGrid([self._figure_view(figure) for figure in survey_figures()])
         self._rest = pmui.Column(
-            heading("Orbits"), self._table, self.figures, sizing_mode="stretch_width"
+            NotableSourceLink(navigation),
+            heading("Orbits"),
+            self._table,
+            self.figures,
+            sizing_mode="stretch_width",
         )
         self._column = pmui.Column(self._head, self._rest, sizing_mode="stretch_width")
         self.sidebar = pmui.Column(
@@ -75,7 +86,10 @@ class SurveyPage(pn.viewable.Viewer):
             self._head.object = paragraph(words, "empty", theme)
             return
         title = titled("Run", self._navigation.run_name)
-        self._head.object = themed(title + strip(run_strip(self._orbits, self._motions)), theme)
+        head = themed(title + strip(run_strip(self._orbits, self._motions)), theme)
+        if (self._orbits["status"] == MISSING).any():
+            head += paragraph(_INCOMPLETE, "caption", theme)
+        self._head.object = head
         self._table.show(orbit_list(self._orbits), theme, orbit_states(self._orbits))
         self.figures.change(theme)
 

@@ -20,6 +20,7 @@ class FakeRun:
 
     def __init__(self, name, survey, result, settings=None, is_complete=True):
         self.name, self.is_complete = name, is_complete
+        self.is_gathered = is_complete
         self._survey = survey
         self._result = replace(result, settings=settings or FitSettings())
         self.read = []
@@ -235,3 +236,9 @@ def test_files_and_a_survey_that_was_not_fitted_have_no_runs(tmp_path, made_surv
         for origin in (OrbitFiles("o.fits", "r.fits"), SurveyFolder(str(Path(made_survey))))
     }
     assert list(runs.values()) == [[], []]
+
+
+def test_run_that_is_still_being_fitted_begins_with_the_orbit(survey, fit_result):
+    begun = FakeRun("default", survey, fit_result, is_complete=False)
+    navigation = Navigation(Session(SurveyStore(fit_result, [begun])))
+    assert (navigation.view, navigation.run_name) == (View.ORBIT, "default")

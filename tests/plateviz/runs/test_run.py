@@ -2,7 +2,9 @@
 
 import pytest
 
+from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run import begin_run, runs_of
+from plateviz.tables import source_list
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 
@@ -67,3 +69,10 @@ def test_incomplete_orbit_is_not_listed(survey_folder):
     run.orbit_directory(0).mkdir()
     (run.orbit_directory(0) / "history.parquet").touch()
     assert run.complete_orbits() == []
+
+
+def test_begun_run_has_no_sources_yet(survey_folder):
+    """A page opened just then shows an empty list."""
+    run = SurveyRun(begin_run(survey_folder, "begun", FitSettings()))
+    assert not run.is_gathered
+    assert source_list(run.counts()).empty

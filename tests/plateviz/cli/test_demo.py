@@ -1,0 +1,210 @@
+"""`plateviz demo`: what it simulates, what it fits, and what it leaves alone."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from plateviz.cli import demo
+from plateviz.cli.demo import BackgroundFit, demo_directory, make_survey, request_first_orbit
+from plateviz.runs.lock import locked
+from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import DEFAULT_RUN, Run
+from plateviz.solving.job import Job
+from plateviz.solving.origin import SurveyFolder
+from plateviz.solving.progress import reporting
+from plateviz.solving.solution_store import SolutionStore
+from plateviz.solving.warm_solver import WarmSolver
+from solver.data.settings import FitSettings
+from solver.errors import FitError
+from solver.simulate.schedule import schedule
+from solver.simulate.seasons import SEASONS
+from solver.simulate.settings import SurveySettings
+
+SMALL = SurveySettings(orbits=2, seed=3).scaled(4_000)
+
+
+class NoSolver:
+    """Fails the test if anything is asked of it."""
+
+    def submit(self, job):
+        pytest.fail(f"expected no request, found {job.request}")
+
+
+class DeadSolver:
+    """A solver process that ends at each request."""
+
+    def submit(self, job):
+        job.fail("the solver process ended (exit -9): no message")
+        return job
+
+
+@pytest.fixture
+def small(monkeypatch, tmp_path):
+    """The demo with a smaller survey, in a cache of its own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(demo, "DEMO", SMALL)
+    return demo_directory()
+
+
+def made(directory):
+    """Return the run of a survey that was made for the demo."""
+    solver = WarmSolver()
+    try:
+        with reporting("simulating") as reporter:
+            return make_survey(directory, solver, reporter)
+    finally:
+        solver.close()
+
+
+def files(directory):
+    return {path: path.stat().st_mtime_ns for path in directory.rglob("*")}
+
+
+def test_survey_spreads_over_all_seasons():
+    starts = schedule(demo.DEMO).groupby("orbit_id")["obstime"].min().to_numpy()
+    edges = np.array([(season.start_mjd, season.end_mjd) for season in SEASONS])
+    in_season = (starts[:, None] >= edges[:, 0]) & (starts[:, None] < edges[:, 1])
+    assert len(starts) >= 30
+    assert in_season.any(axis=1).all()
+    assert in_season.sum(axis=0).min() >= 5
+
+
+def test_another_survey_or_version_has_a_folder_of_its_own(small, monkeypatch):
+    monkeypatch.setattr(demo, "versions_of", lambda packages: dict.fromkeys(packages, "99"))
+    upgraded = demo_directory()
+    monkeypatch.setattr(demo, "DEMO", SurveySettings(orbits=3, seed=3).scaled(4_000))
+    assert len({small, upgraded, demo_directory()}) == 3
+
+
+def test_dead_solver_process_ends_with_exit_code_one(small, run, monkeypatch):
+    monkeypatch.setattr(WarmSolver, "submit", DeadSolver.submit)
+    code, _, err = run("demo", "--port", "0", "--no-open")
+    assert code == 1
+    assert "the solver process ended" in err
+    assert list(small.rglob("survey.toml")) == []
+
+
+def test_dead_solver_process_is_no_input_error(small):
+    with reporting("simulating") as reporter, pytest.raises(FitError):
+        make_survey(small, DeadSolver(), reporter)
+
+
+@pytest.mark.slow
+def test_background_fit_completes_the_run_and_a_second_start_does_nothing(small, capsys):
+    run = made(small)
+    fit = BackgroundFit(run, None)
+    fit.start()
+    fit._thread.join(120)
+    assert run.is_complete
+    assert run.complete_orbits() == [0, 1]
+    assert "has fitted all orbits" in capsys.readouterr().out
+    assert SurveyRun(run).motions()["rms_truth_2d"].notna().all()
+
+    before = files(small)
+    with reporting("simulating") as reporter:
+        again = make_survey(small, NoSolver(), reporter)
+    store = SolutionStore(SurveyFolder(str(small)), NoSolver())
+    assert request_first_orbit(store, again) is None
+    fit = BackgroundFit(again, None)
+    fit.start()
+    fit.close()
+    assert files(small) == before
+
+
+@pytest.mark.slow
+def test_closed_background_fit_is_resumed(small):
+    run = made(small)
+    fit = BackgroundFit(run, None)
+    fit.start()
+    wait_until(lambda: run.complete_orbits())
+    fit.close()
+    assert not fit._thread.is_alive()
+    first = files(run.orbit_directory(0))
+    rest = BackgroundFit(run, None)
+    rest.start()
+    rest._thread.join(120)
+    assert run.is_complete
+    assert files(run.orbit_directory(0)) == first
+
+
+def test_background_fit_waits_for_the_first_orbit_and_ends_when_closed(small, monkeypatch):
+    monkeypatch.setattr(demo, "WarmSolver", lambda *_: pytest.fail("expected no second solver"))
+    first = Job({"do": "fit"})
+    fit = BackgroundFit(Run(small, DEFAULT_RUN), first)
+    fit.start()
+    fit_thread = fit._thread
+    assert fit_thread.is_alive()
+    with fit._lock:
+        fit._is_closed = True
+    first.cancel()
+    fit_thread.join(10)
+    assert not fit_thread.is_alive()
+
+
+@pytest.mark.slow
+def test_second_process_does_not_fit_the_same_run(small, capsys):
+    run = made(small)
+    with locked(run.directory) as is_ours:
+        assert is_ours
+        fit = BackgroundFit(run, None)
+        fit.start()
+        fit._thread.join(60)
+    assert "another process is fitting" in capsys.readouterr().out
+    assert run.complete_orbits() == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_solver_processes_end_with_the_server(small, number):
+    """Whatever ends the server, none of the processes that it started goes on."""
+    made(small)
+    code = (
+        "from plateviz.cli import demo, main\n"
+        "from solver.simulate.settings import SurveySettings\n"
+        "demo.DEMO = SurveySettings(orbits=2, seed=3).scaled(4_000)\n"
+        "main.main()"
+    )
+    server = subprocess.Popen(
+        [sys.executable, "-c", code, "demo", "--port", "0", "--no-open"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )
+    try:
+        wait_until(lambda: len(descendants(server.pid)) >= 3)
+        started = descendants(server.pid)
+        server.send_signal(number)
+        server.wait(30)
+        wait_until(lambda: not any(map(is_running, started)), seconds=30)
+    finally:
+        server.kill()
+    run = Run(small, DEFAULT_RUN)
+    assert run.settings() == FitSettings()
+
+
+def wait_until(condition, seconds=90):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def descendants(pid):
+    """Return the ids of all processes that a process started, and those that they started."""
+    listed = subprocess.run(["ps", "-eo", "pid=,ppid="], capture_output=True, text=True, check=True)
+    pairs = [tuple(map(int, line.split())) for line in listed.stdout.splitlines()]
+    found = [pid]
+    for parent in found:
+        found += [child for child, of in pairs if of == parent]
+    return found[1:]
+
+
+def is_running(pid):
+    listed = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, text=True)
+    return bool(listed.stdout.strip()) and not listed.stdout.startswith("Z")

@@ -1,0 +1,53 @@
+"""`plateviz demo` from an empty cache: first orbit, whole survey, and a second start."""
+
+import re
+import time
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.ui.conftest import see, serving
+
+expect.set_options(timeout=60_000)
+pytestmark = [pytest.mark.ui, pytest.mark.slow]
+
+# Several times what two idle cores take.
+_PATIENCE_SECONDS = 400
+
+
+def test_demo_shows_the_first_orbit_and_then_the_whole_survey(tmp_path, open_page):
+    env = {"XDG_CACHE_HOME": str(tmp_path)}
+    with serving("demo", "--port", "0", env=env) as address:
+        page = open_page(address)
+        see(page, "residual-map")
+        page.get_by_role("button", name="Survey", exact=True).click()
+        expect(page.get_by_text("This run is not complete")).to_be_visible()
+        wait_for_file(tmp_path.glob, "plateviz/demo-*/demo/runs/default/COMPLETE")
+        page.goto(address)
+        expect(page.get_by_text(re.compile(r"54 \(of 54\)")).first).to_be_visible()
+        see(page, "motion-pulls")
+        page.get_by_role("button", name="Most significant motion").first.click()
+        see(page, "time-series")
+        expect(page.get_by_text("Rms from the truth, 2-D")).to_be_visible()
+        close(page)
+
+    start = time.monotonic()
+    with serving("demo", "--port", "0", env=env) as address:
+        # A first start simulates and compiles, which takes longer even on an idle machine.
+        assert time.monotonic() - start < 20
+        page = open_page(address)
+        expect(page.get_by_text(re.compile(r"54 \(of 54\)")).first).to_be_visible()
+        close(page)
+
+
+def close(page):
+    """Close a page before its server ends: what it could no longer load would be a complaint."""
+    page.wait_for_load_state("networkidle")
+    page.context.close()
+
+
+def wait_for_file(glob, pattern):
+    end = time.monotonic() + _PATIENCE_SECONDS
+    while not list(glob(pattern)):
+        assert time.monotonic() < end, f"expected {pattern}, found none"
+        time.sleep(0.5)

@@ -18,7 +18,7 @@ PYTHON = [block for page in (README, *PAGES) for block in blocks_of(page, "pytho
 # Its blocks are files and changes of the code; test_contributing.py runs them.
 CONTRIBUTING = DOCS / "contributing.md"
 # Commands too slow for a page's test, and the test that runs them.
-ELSEWHERE = {"demo": "tests/ui/test_dashboard.py"}
+ELSEWHERE = {"demo": "tests/ui/test_demo.py"}
 # Options that make a command small, or avoid a port in use.
 SMALLER = {
     "simulate": ["--orbits", "2", "--stars", "2000"],

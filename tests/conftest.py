@@ -1,10 +1,12 @@
 """Fixtures shared by all tests."""
 
+import lzma
 import os
 from pathlib import Path
 
 import jax
 import pytest
+from xdist.scheduler import LoadFileScheduling
 
 from solver.errors import InputError
 from solver.runtime.device import require_device
@@ -19,9 +21,41 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    _share_compilations(config)
     _choose(config.getoption("--device") or os.environ.get("JAX_PLATFORMS", ""))
     # A test runs next to nothing of what it compiles. Only the CPU's compiler is known to hurry.
     jax.config.update("jax_disable_most_optimizations", jax.default_backend() == "cpu")
+
+
+def pytest_collection_modifyitems(items):
+    """Run the browser tests first: of all that one process runs, they take longest."""
+    items.sort(key=lambda item: "ui" not in item.keywords)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Run the tests of a file in one process, and those of tests/ui, which share a browser."""
+    config.option.loadscopereorder = False
+    return _ByFile(config, log)
+
+
+class _ByFile(LoadFileScheduling):
+    def _split_scope(self, nodeid):
+        file = super()._split_scope(nodeid)
+        return "tests/ui" if file.startswith("tests/ui/") else file
+
+
+def _share_compilations(config):
+    """Let every process of the tests use what another one has compiled.
+
+    The key of an entry holds the program, the compiler's options and its version.
+    """
+    folder = config.cache.mkdir("compiled")
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    # JAX has been imported and does not read the environment again.
+    jax.config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 
 def _choose(device):
@@ -36,11 +70,11 @@ def _choose(device):
 
 
 @pytest.fixture(scope="session")
-def sample_orbit_dir() -> Path:
-    """Folder of the sample orbit that lies beside the checkout; skips where it is absent."""
-    folder = REPOSITORY.parent / "shared" / "data" / "sample-orbit"
-    if not folder.is_dir():
-        pytest.skip(f"no sample orbit at {folder}")
+def sample_orbit_dir(tmp_path_factory) -> Path:
+    """Folder of the sample orbit's three FITS files, unpacked from tests/data."""
+    folder = tmp_path_factory.mktemp("sample-orbit")
+    for packed in sorted((REPOSITORY / "tests" / "data").glob("*.fits.xz")):
+        (folder / packed.stem).write_bytes(lzma.decompress(packed.read_bytes()))
     return folder
 
 

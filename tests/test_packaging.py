@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 PACKAGES = ("plateviz", "solver")
@@ -28,9 +29,17 @@ RUNTIME = [Requirement(text) for text in PROJECT["dependencies"]]
 TEST = [Requirement(text) for text in PROJECT["optional-dependencies"]["test"]]
 
 
-def _pins(python: str) -> dict[str, str]:
-    """Return name -> version of what constraints.txt pins for one version of Python."""
-    lines = [line for line in _read("constraints.txt").splitlines() if "==" in line]
+# Each file of pins, and the versions of Python that it is for.
+PINS = {
+    "constraints.txt": ("3.11", "3.12", "3.13"),
+    "constraints-3.13.txt": ("3.13",),
+}
+of_every_pin_file = pytest.mark.parametrize("name", PINS)
+
+
+def _pins(name: str, python: str) -> dict[str, str]:
+    """Return package -> version of what a file pins for one version of Python."""
+    lines = [line for line in _read(name).splitlines() if "==" in line]
     pins = [Requirement(line.rstrip(" \\")) for line in lines]
     environment = {"python_version": python, "python_full_version": f"{python}.0"}
     return {
@@ -40,22 +49,38 @@ def _pins(python: str) -> dict[str, str]:
     }
 
 
-def test_constraints_name_no_index():
-    assert not re.search(r"://|pypi|^-", _read("constraints.txt"), flags=re.MULTILINE)
+def test_every_pin_file_is_tested():
+    assert {path.name for path in REPOSITORY.glob("constraints*.txt")} == set(PINS)
+    assert all(name in _read(".ci/run") for name in PINS)
 
 
-def test_every_pin_has_a_hash():
-    blocks = re.split(r"\n(?=\S)", _read("constraints.txt").strip())
+@of_every_pin_file
+def test_constraints_name_no_index(name):
+    assert not re.search(r"://|pypi|^-", _read(name), flags=re.MULTILINE)
+
+
+@of_every_pin_file
+def test_every_pin_has_a_hash(name):
+    blocks = re.split(r"\n(?=\S)", _read(name).strip())
     unhashed = [block for block in blocks if "--hash=sha256:" not in block]
     assert [block[0] for block in unhashed] == ["#"], "only the header has none"
 
 
-@pytest.mark.parametrize("python", ["3.11", "3.12", "3.13"])
+@pytest.mark.parametrize(
+    ("name", "python"), [(name, python) for name in PINS for python in PINS[name]]
+)
 @pytest.mark.parametrize("requirement", RUNTIME + TEST, ids=lambda requirement: requirement.name)
-def test_dependency_is_pinned_within_its_bounds(requirement, python):
-    pin = _pins(python).get(canonicalize_name(requirement.name))
-    assert pin is not None, "make constraints.txt anew, with the command in its first line"
+def test_dependency_is_pinned_within_its_bounds(requirement, name, python):
+    pin = _pins(name, python).get(canonicalize_name(requirement.name))
+    assert pin is not None, f"make {name} anew, with the command in its first line"
     assert requirement.specifier.contains(pin, prereleases=True)
+
+
+def test_newest_pins_are_no_older():
+    older, newer = _pins("constraints.txt", "3.13"), _pins("constraints-3.13.txt", "3.13")
+    assert not {
+        name for name in older if name in newer and Version(newer[name]) < Version(older[name])
+    }
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -119,6 +119,7 @@ def _run(*command: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.tools
 @pytest.mark.parametrize(
     "command",
     [

@@ -145,6 +145,7 @@ def test_diagnostics_are_found_and_drawn(tree, run_in):
     assert run_in(tree, "-c", of_survey.text + COUNTED) == "2 points\n"
 
 
+@pytest.mark.tools
 def test_recipes_are_clean_code(tree, run_in):
     headings = (
         *("Add a diagnostic", "Add a parameter group", "Add a setting"),

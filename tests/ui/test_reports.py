@@ -83,15 +83,7 @@ def test_report_draws_every_figure_and_fetches_nothing(open_report, request, nam
         assert canvases.first.evaluate("canvas => canvas.width * canvas.height") > 10_000
 
 
-def test_theme_of_the_reader_can_be_changed(open_report, orbit_page):
-    page = open_report(orbit_page)
-    page.click("#theme")
-    page.wait_for_selector("body[data-drawn=dark]", state="attached")
-    background = page.evaluate("getComputedStyle(document.body).backgroundColor")
-    assert background == "rgb(18, 18, 18)"
-
-
-def test_reader_chooses_among_the_exposures_and_detectors_embedded(open_report, orbit_page):
+def test_reader_changes_theme_and_chooses_among_what_is_embedded(open_report, orbit_page):
     page = open_report(orbit_page)
     figure = page.locator("#figure-residual-map")
     titles = "() => Bokeh.documents.flatMap(d => [...d._all_models.values()]).map(m => m.text)"
@@ -99,6 +91,10 @@ def test_reader_chooses_among_the_exposures_and_detectors_embedded(open_report, 
     figure.locator("select").select_option(index=1)
     page.wait_for_selector("#figure-residual-map[data-drawn='1 light']")
     assert "Residuals on detector 0, measured minus predicted" in page.evaluate(titles)
+    page.click("#theme")
+    page.wait_for_selector("body[data-drawn=dark]", state="attached")
+    background = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert background == "rgb(18, 18, 18)"
 
 
 def test_values_behind_a_figure_can_be_saved(open_report, survey_page, tmp_path, survey):

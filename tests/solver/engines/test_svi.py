@@ -107,7 +107,7 @@ def test_resumed_fit_equals_an_uninterrupted_one(svi_problem, found):
 
 
 def test_cancelled_fit_is_resumed(small_orbit):
-    settings = replace(SETTINGS, svi=SviSettings(steps=200, patience=50))
+    settings = replace(SETTINGS, svi=SviSettings(steps=200, patience=50, max_steps=300))
     fitter = OrbitFitter(small_orbit.data, small_orbit.instrument)
 
     def cancel(row):

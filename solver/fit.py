@@ -112,11 +112,11 @@ class OrbitFitter:
         A fit of the svi engine that was stopped continues where it stopped.
         """
         start = time.perf_counter()
-        data, problem = self._cache.choose(settings)
+        data, problem = self._cache.get(settings)
         outliers = None
         if settings.robust:
             outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
-            data, problem = self._cache.choose(settings, outliers)
+            data, problem = self._cache.get(settings, outliers)
         prepared = time.perf_counter()
         estimate = run_engine(problem, settings, progress, resumption or self._resumption(settings))
         result, solution = _result(
@@ -149,7 +149,7 @@ class OrbitFitter:
         if last is None or not last.settings.what_if_holds(settings):
             return None
         start = time.perf_counter()
-        data, problem = self._cache.choose(settings, last.outliers)
+        data, problem = self._cache.get(settings, last.outliers)
         prepared = time.perf_counter()
         base = nearest(self._starts, settings)
         mode = base and solve_what_if(base.mode, base.problem, problem, settings)
@@ -182,7 +182,7 @@ class OrbitFitter:
             raise FitError(f"orbit {self._orbit_id}: {result.summary['reason']}")
         return history_table(last.problem, last.mode.reduced, last.covariance, result)
 
-    def get_ready(self, order: int) -> Iterator[None]:
+    def precompute(self, order: int) -> Iterator[None]:
         """Precompute warm starts for the what-if solutions that are likely to come next.
 
         These are lower orders (`solver.engines.warm_starts.likely`); with a warm start they
@@ -212,7 +212,7 @@ class OrbitFitter:
     def _warm_start(self, last: _LastFit, settings: FitSettings) -> list[WarmStart]:
         """Return a warm start for `settings`, in a list; an empty list if there is no solution."""
         try:
-            _, problem = self._cache.choose(settings, last.outliers)
+            _, problem = self._cache.get(settings, last.outliers)
         except InputError:
             # A prior is shifted for a term that the lower order lacks, or too few data remain.
             return []

@@ -144,7 +144,7 @@ def _fit(request: Request, progress: Callable[..., None]) -> Speculative:
         result = fitter.fit(settings, on_iteration)
     progress(stage="writing the result")
     write_fitted_orbit(Path(request["directory"]), result)
-    return fitter.get_ready(settings.order)
+    return fitter.precompute(settings.order)
 
 
 def _simulate(request: Request, progress: Callable[..., None]) -> Speculative:

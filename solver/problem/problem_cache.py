@@ -37,7 +37,7 @@ class ProblemCache:
         self._instrument = instrument
         self._entries: list[_Entry] = []
 
-    def choose(
+    def get(
         self, settings: FitSettings, outliers: pd.DataFrame | None = None
     ) -> tuple[OrbitData, Problem]:
         """Return the tables after exclusions and thinning, and their problem.

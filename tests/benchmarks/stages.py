@@ -40,13 +40,13 @@ def what_if(
     precomputed : settings of a warm start that the solver process precomputes while idle
     """
     cache = ProblemCache(data, MINI_MOCK)
-    _, solved = cache.choose(before)
+    _, solved = cache.get(before)
     mode = find_mode(solved, before)
     if precomputed is not None:
-        _, lower = cache.choose(precomputed)
+        _, lower = cache.get(precomputed)
         found = solve_what_if(mode, solved, lower, precomputed) or find_mode(lower, precomputed)
         mode, solved = linearised(lower, found), lower
-    _, changed = cache.choose(after)
+    _, changed = cache.get(after)
     is_same = changed.measurements is solved.measurements
 
     def work() -> object:

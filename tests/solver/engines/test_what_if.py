@@ -128,7 +128,7 @@ def test_precomputed_order_is_not_linearised_again(
     settings = FitSettings(**{"order": 6, **PREPARED[change](sample_orbit)})
     expected = sample_fitter.what_if(settings)
     prepared = fitted(OrbitFitter(sample_orbit))
-    assert len(list(prepared.get_ready(6))) > 4
+    assert len(list(prepared.precompute(6))) > 4
 
     def refuse(*_):
         raise AssertionError("linearised again")
@@ -143,17 +143,17 @@ def test_precomputed_order_is_not_linearised_again(
 
 def test_interrupted_precomputation_resumes_and_runs_once(orbit):
     prepared = fitted(OrbitFitter(orbit.data, orbit.instrument))
-    next(prepared.get_ready(6))
-    rest = len(list(prepared.get_ready(6)))
+    next(prepared.precompute(6))
+    rest = len(list(prepared.precompute(6)))
     assert rest > 0
-    assert list(prepared.get_ready(6)) == []
+    assert list(prepared.precompute(6)) == []
 
 
 def test_lower_order_without_a_shifted_term_is_not_precomputed(orbit):
     fitter = OrbitFitter(orbit.data, orbit.instrument)
     settings = FitSettings(order=2, prior_shifts={"distortion_x[2/0]": 1.0})
     fitter.fit(settings)
-    list(fitter.get_ready(2))
+    list(fitter.precompute(2))
     assert fitter.what_if(settings) is not None
 
 
@@ -162,7 +162,7 @@ def test_every_lower_order_is_precomputed(sample_orbit):
     variants = [FitSettings(order=order) for order in (4, 1)]
     prepared = fitted(OrbitFitter(sample_orbit))
     assert prepared.what_if(variants[-1]) is None
-    list(prepared.get_ready(6))
+    list(prepared.precompute(6))
     for settings in variants:
         found, expected = prepared.what_if(settings), fit_orbit(sample_orbit, settings=settings)
         moved = found.sources["offset_ra"] - expected.sources["offset_ra"]

@@ -32,8 +32,8 @@ def without(orbit, rank):
     ids=["lower", "higher", "widths", "centres", "aberration"],
 )
 def test_cached_problem_equals_one_built_from_the_tables(cache, small_orbit, settings):
-    _, first = cache.choose(DEFAULT)
-    data, found = cache.choose(settings)
+    _, first = cache.get(DEFAULT)
+    data, found = cache.get(settings)
     assert data is small_orbit.data
     assert found.measurements is first.measurements
     expected = build_problem(data, small_orbit.instrument, settings)
@@ -56,7 +56,7 @@ def test_other_exclusions_give_another_problem(cache, small_orbit):
     variants = [DEFAULT, *(without(small_orbit, rank) for rank in range(3))]
     variants.append(FitSettings(order=3, thin=2))
     for settings in variants:
-        data, problem = cache.choose(settings)
+        data, problem = cache.get(settings)
         expected = build_problem(
             settings.exclusions.without(small_orbit.data), small_orbit.instrument, settings
         )
@@ -71,20 +71,20 @@ def test_other_exclusions_give_another_problem(cache, small_orbit):
 
 def test_cache_distinguishes_outliers_of_different_fits(cache, small_orbit):
     rows = small_orbit.data.measurements
-    _, none = cache.choose(DEFAULT)
+    _, none = cache.get(DEFAULT)
     for outliers in (rows.iloc[:3], rows.iloc[3:4]):
-        _, problem = cache.choose(DEFAULT, outliers)
+        _, problem = cache.get(DEFAULT, outliers)
         remaining = rows.index.difference(outliers.index)
         np.testing.assert_array_equal(np.sort(problem.measurements.label), remaining)
-    _, again = cache.choose(DEFAULT)
+    _, again = cache.get(DEFAULT)
     assert again.n_obs == none.n_obs == len(rows)
 
 
 def test_cache_keeps_only_the_latest_problems(cache, small_orbit):
-    _, first = cache.choose(DEFAULT)
-    _, second = cache.choose(without(small_orbit, 0))
-    assert cache.choose(DEFAULT)[1].measurements is first.measurements
-    _, third = cache.choose(without(small_orbit, 1))
-    assert cache.choose(without(small_orbit, 1))[1].measurements is third.measurements
-    assert cache.choose(without(small_orbit, 0))[1].measurements is second.measurements
-    assert cache.choose(DEFAULT)[1].measurements is not first.measurements
+    _, first = cache.get(DEFAULT)
+    _, second = cache.get(without(small_orbit, 0))
+    assert cache.get(DEFAULT)[1].measurements is first.measurements
+    _, third = cache.get(without(small_orbit, 1))
+    assert cache.get(without(small_orbit, 1))[1].measurements is third.measurements
+    assert cache.get(without(small_orbit, 0))[1].measurements is second.measurements
+    assert cache.get(DEFAULT)[1].measurements is not first.measurements

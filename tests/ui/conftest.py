@@ -23,6 +23,26 @@ _FLAGS = [
 # Chromium's software renderer remarks on its own speed; that is no fault of the page.
 _HARMLESS = re.compile(r"GL Driver Message|GPU stall")
 
+# The views of Bokeh that are on the page: a document keeps models that are no longer drawn.
+VIEWS = """
+  const views = [];
+  const walk = view => { views.push(view); (view.child_views ?? []).forEach(walk); };
+  for (const view of Bokeh.index) walk(view);
+  const card = view => {
+    for (let e = view.el; e; e = e.parentElement ?? e.getRootNode().host)
+      for (const name of e.classList ?? []) if (name.startsWith('figure-')) return name.slice(7);
+  };
+  const figures = views.filter(view => view.model.type === 'Figure');
+  const column = (source, name) => source.data[name] ?? source.data.get?.(name);
+"""
+# Colour behind each figure that is drawn, by its name.
+BACKGROUNDS = f"""() => {{ {VIEWS}
+  const colours = {{}};
+  for (const figure of figures)
+    (colours[card(figure)] ??= new Set()).add(figure.model.background_fill_color);
+  for (const name in colours) colours[name] = [...colours[name]].join();
+  return colours; }}"""
+
 
 @pytest.fixture(scope="session")
 def chromium_path():
@@ -78,6 +98,24 @@ def see(page, name):
     card = page.locator(f".figure-{name}")
     card.scroll_into_view_if_needed()
     card.locator("canvas").first.wait_for(state="attached")
+
+
+def until(page, condition):
+    """Wait for what only the models of the page can tell; figures are drawn in batches."""
+    for _ in range(300):
+        if condition():
+            return
+        page.wait_for_timeout(100)
+    pytest.fail("it did not come about in 30 s")
+
+
+def turn_dark(page, figures):
+    """Change the theme from light to dark and go to each figure until it is drawn in it."""
+    assert set(page.evaluate(BACKGROUNDS).values()) == {"#ffffff"}
+    page.get_by_label("Toggle theme").click()
+    for figure in figures:
+        see(page, figure.name)
+        until(page, lambda name=figure.name: page.evaluate(BACKGROUNDS)[name] == "#121212")
 
 
 @pytest.fixture

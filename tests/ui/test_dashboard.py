@@ -6,7 +6,7 @@ from playwright.sync_api import expect
 from plateviz.plots.gallery import diagnostics
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
-from tests.ui.conftest import see, serving
+from tests.ui.conftest import see, serving, turn_dark, until
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -69,15 +69,6 @@ def is_faded(locator):
     )
 
 
-def until(page, condition):
-    """Wait for what only the models of the page can tell; figures are drawn in batches."""
-    for _ in range(300):
-        if condition():
-            return
-        page.wait_for_timeout(100)
-    pytest.fail("it did not come about in 30 s")
-
-
 def rests(page):
     """Whether the browser works less than one second in two, at the latest after half a minute."""
     session = page.context.new_cdp_session(page)
@@ -104,7 +95,7 @@ def shown(page):
 
 
 @pytest.mark.newest
-def test_every_figure_is_drawn_once_it_is_near_and_the_browser_rests(page):
+def test_every_figure_is_drawn_when_near_and_in_both_themes(page):
     canvas = page.locator(".figure-convergence canvas").first
     page.wait_for_timeout(1000)
     assert canvas.count() == 0
@@ -121,6 +112,7 @@ def test_every_figure_is_drawn_once_it_is_near_and_the_browser_rests(page):
     empty = [title for title, n in rows.items() if n == 0 and "Comparison" not in title]
     assert [t for t in empty if "Difference of positions" not in t] == []
     assert rests(page)
+    turn_dark(page, diagnostics())
 
 
 @pytest.mark.newest
@@ -177,16 +169,6 @@ def test_a_refit_can_be_cancelled_and_the_old_solution_stays(page):
     expect(page.get_by_text("The fit was cancelled; the last solution stays.")).to_be_visible()
     assert chi2(page) == before
     expect(page.locator(".solution")).to_have_count(1)
-
-
-def test_the_dark_theme_reaches_the_figures(page):
-    backgrounds = """() => [...new Set(Bokeh.documents.flatMap(d => [...d._all_models.values()])
-        .filter(m => m.type === 'Figure').map(m => m.background_fill_color))]"""
-    assert page.evaluate(backgrounds) == ["#ffffff"]
-    page.get_by_label("Toggle theme").click()
-    for diagnostic in diagnostics():
-        see(page, diagnostic.name)
-    until(page, lambda: page.evaluate(backgrounds) == ["#121212"])
 
 
 def choose(page, label, option):

@@ -9,8 +9,7 @@ from playwright.sync_api import expect
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
-from tests.ui.conftest import see, serving
-from tests.ui.test_dashboard import until
+from tests.ui.conftest import VIEWS, see, serving, turn_dark, until
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -19,31 +18,16 @@ N_ORBITS = 4
 # They ask for more orbits of a source than a small survey has.
 EMPTY = {"reference-scatter", "motion-pulls"}
 
-_VIEWS = """
-  const views = [];
-  const walk = view => { views.push(view); (view.child_views ?? []).forEach(walk); };
-  for (const view of Bokeh.index) walk(view);
-  const card = view => {
-    for (let e = view.el; e; e = e.parentElement ?? e.getRootNode().host)
-      for (const name of e.classList ?? []) if (name.startsWith('figure-')) return name.slice(7);
-  };
-  const figures = views.filter(view => view.model.type === 'Figure');
-  const column = (source, name) => source.data[name] ?? source.data.get?.(name);
-"""
 # Rows of the longest data source of each figure that is drawn, words apart, by its name.
-ROWS = f"""() => {{ {_VIEWS}
+ROWS = f"""() => {{ {VIEWS}
   const rows = {{}};
   for (const figure of figures)
     for (const renderer of figure.model.renderers.filter(r => r.glyph?.type !== 'Text'))
       rows[card(figure)] = Math.max(rows[card(figure)] ?? 0,
                                     renderer.data_source?.get_length() ?? 0);
   return rows; }}"""
-# Colour behind each figure that is drawn, by its name.
-BACKGROUNDS = f"""() => {{ {_VIEWS}
-  const colour = view => view.model.background_fill_color;
-  return Object.fromEntries(figures.map(view => [card(view), colour(view)])); }}"""
 # Where the first point of a figure that links somewhere is on the screen, and its value.
-POINT = f"""([name, key]) => {{ {_VIEWS}
+POINT = f"""([name, key]) => {{ {VIEWS}
   for (const figure of figures.filter(view => card(view) === name))
     for (const renderer of figure.model.renderers) {{
       const source = renderer.data_source, values = source && column(source, key);
@@ -121,10 +105,7 @@ def test_the_run_is_shown_first_in_both_themes_and_leads_to_an_orbit(page):
     expect(row(page, 0)).to_contain_text("complete")
     rows = drawn(page, survey_figures())
     assert [name for name, n in rows.items() if n == 0 and name not in EMPTY] == []
-    page.get_by_label("Toggle theme").click()
-    for figure in survey_figures():
-        see(page, figure.name)
-        until(page, lambda name=figure.name: page.evaluate(BACKGROUNDS)[name] == "#121212")
+    turn_dark(page, survey_figures())
     orbit = tap(page, "orbit-health", "orbit_id")
     expect(heading(page, f"Solution of orbit {orbit}")).to_be_visible()
 

@@ -118,6 +118,7 @@ def whole_run(run_dir, fit_result):
     return run_dir
 
 
+@pytest.mark.slow
 def test_folder_has_a_page_per_orbit_and_keeps_written_pages(run, whole_run, tmp_path):
     folder = tmp_path / "pages"
     code, out, _ = run("report", whole_run, "--pages", "-o", folder)

@@ -89,6 +89,7 @@ def test_invalid_setting_changes_nothing(solution, orbit):
     assert orbit.solution is solution
 
 
+@pytest.mark.slow
 def test_files_of_an_orbit_open_and_fit(sample_orbit_dir):
     files = [sample_orbit_dir / f"sample_{name}.fits" for name in ("obs", "ref", "truth")]
     with plateviz.open(*files[:2], truth=files[2]) as orbit:

@@ -85,6 +85,7 @@ def test_loss_falls_and_becomes_constant(found):
     assert losses[-200:].std() < 0.5
 
 
+@pytest.mark.slow
 def test_result_depends_only_on_the_seed(svi_problem):
     short = replace(SETTINGS, svi=SviSettings(steps=100, max_steps=100))
     first, again, other = (
@@ -122,6 +123,7 @@ def test_cancelled_fit_is_resumed(small_orbit):
     assert list(result.losses["step"]) == list(range(1, iterations[-1] + 1))
 
 
+@pytest.mark.slow
 def test_other_settings_start_from_the_beginning(small_orbit):
     settings = replace(SETTINGS, svi=SviSettings(steps=100, max_steps=100))
     fitter = OrbitFitter(small_orbit.data, small_orbit.instrument)

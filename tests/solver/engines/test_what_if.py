@@ -79,6 +79,7 @@ def pair(request, sample_orbit, sample_fitter):
     return sample_fitter.what_if(settings), fit_orbit(sample_orbit, settings=settings)
 
 
+@pytest.mark.slow
 def test_refit_confirms_the_positions_and_their_uncertainties(pair):
     found, expected = pair
     assert found.summary["reason"] == FitStatus.WHAT_IF.value
@@ -94,6 +95,7 @@ def test_refit_confirms_the_positions_and_their_uncertainties(pair):
             )
 
 
+@pytest.mark.slow
 def test_refit_confirms_the_diagnostics(pair):
     found, expected = pair
     for axis in "xy":
@@ -121,6 +123,7 @@ PREPARED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", PREPARED)
 def test_precomputed_order_is_not_linearised_again(
     change, sample_orbit, sample_fitter, monkeypatch
@@ -157,6 +160,7 @@ def test_lower_order_without_a_shifted_term_is_not_precomputed(orbit):
     assert fitter.what_if(settings) is not None
 
 
+@pytest.mark.slow
 def test_every_lower_order_is_precomputed(sample_orbit):
     """This includes an order that otherwise needs a refit."""
     variants = [FitSettings(order=order) for order in (4, 1)]

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from plateviz.runs.fit_survey import fit_survey
+from plateviz.runs.load_tables import survey_tables
 from plateviz.runs.queries import SurveyRun, open_run
-from plateviz.runs.survey_tables import survey_tables
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from solver.data.schema import MEASUREMENT
 from solver.data.settings import FitSettings

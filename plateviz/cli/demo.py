@@ -17,7 +17,7 @@ from plateviz.runs.run import DEFAULT_RUN, PACKAGES, Run, begin_run
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.progress import Reporter, reporting
 from plateviz.solving.solution_store import SolutionStore
-from plateviz.solving.warm_solver import WarmSolver
+from plateviz.solving.solver_queue import SolverQueue
 from solver.data.settings import FitSettings
 from solver.io.survey import HEADER
 from solver.runtime.threads import count_cores
@@ -42,7 +42,7 @@ def demo_directory() -> Path:
     return cache_directory() / f"demo-{digest}" / "demo"
 
 
-def make_survey(directory: Path, solver: WarmSolver, reporter: Reporter) -> Run:
+def make_survey(directory: Path, solver: SolverQueue, reporter: Reporter) -> Run:
     """Simulate the survey and begin its run, unless they are there; the run, complete or not.
 
     Of two processes that do so at once, the second waits and finds them.
@@ -73,7 +73,7 @@ class BackgroundFit:
         """Take a run, and the job of another process that is to be over before the fit starts."""
         self._run, self._first = run, first
         self._lock = threading.Lock()
-        self._solver: WarmSolver | None = None
+        self._solver: SolverQueue | None = None
         self._is_closed = False
         self._thread = threading.Thread(target=self._fit, daemon=True)
 
@@ -110,7 +110,7 @@ class BackgroundFit:
         with self._lock:
             if self._is_closed:
                 return None
-            self._solver = WarmSolver(_NICENESS)
+            self._solver = SolverQueue(_NICENESS)
             request = {
                 "do": "survey",
                 "directory": str(self._run.survey),

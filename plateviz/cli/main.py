@@ -49,11 +49,11 @@ def demo(
     The page opens with the first orbit; the others are fitted behind it. A demo that was
     stopped resumes, and one that is complete opens at once.
     """
-    from plateviz.solving.warm_solver import WarmSolver
+    from plateviz.solving.solver_queue import SolverQueue
 
     with ExitStack() as stack:
         # Its imports take as long as those of the server, which follow.
-        solver = WarmSolver()
+        solver = SolverQueue()
         stack.callback(solver.close)
         from plateviz.cli.demo import (
             BackgroundFit,

@@ -9,7 +9,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from solver.data.engine_settings import ENGINE_OPTIONS, engine_settings
-from solver.data.setting import Positive, Setting, Switch, Whole
+from solver.data.setting_kinds import Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import Texts
 

@@ -48,7 +48,7 @@ def serve(
     from plateviz.dashboard.server import Endpoint, check_address, check_origin, check_prefix
     from plateviz.solving.origin import OrbitFiles, SurveyFolder
     from plateviz.solving.solution_store import SolutionStore
-    from plateviz.solving.warm_solver import WarmSolver
+    from plateviz.solving.solver_queue import SolverQueue
 
     origins = tuple(map(check_origin, allow_origin or []))
     endpoint = Endpoint(check_address(address, port), address, origins, check_prefix(prefix))
@@ -59,7 +59,7 @@ def serve(
         origin = OrbitFiles(str(path), str(reference), _text(truth), orbit, _text(instrument))
         # Read once here, so that problems in the files are reported before a page opens.
         origin.read(orbit)
-    run_server(SolutionStore(origin, WarmSolver()), endpoint, open_browser)
+    run_server(SolutionStore(origin, SolverQueue()), endpoint, open_browser)
 
 
 def run_server(

@@ -6,7 +6,7 @@ from pathlib import Path
 import typer
 
 from plateviz.cli.output import print_json
-from plateviz.solving.survey_fit import fit_and_report, require_all
+from plateviz.solving.survey_progress import fit_and_report, require_all
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 

@@ -9,7 +9,7 @@ import param
 from solver.data.parameters import PARAMETERS
 from solver.data.prior_text import format_width
 from solver.data.result import FitResult
-from solver.data.setting import Change, Choice, Positive, Setting, Switch, Whole
+from solver.data.setting_kinds import Change, Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import PriorWidths, Texts
 

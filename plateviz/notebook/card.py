@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from html import escape
 from importlib.resources import files
 
-from plateviz.reports.strip import STYLE, strip
+from plateviz.reports.summary_strip import STYLE, strip
 from plateviz.tables import SummaryItem
 from plateviz.tables.verdict import Verdict
 

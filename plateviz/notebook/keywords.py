@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from solver.data.engine_settings import ENGINE_OPTIONS, engine_settings
-from solver.data.setting import Choice, Positive, Setting, Switch, Whole
+from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import SETTINGS, FitSettings
 from solver.data.text_setting import LeftOut, Texts
 from solver.errors import InputError

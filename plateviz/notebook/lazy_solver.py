@@ -9,7 +9,7 @@ from plateviz.notebook.progress import reporting
 from plateviz.solving.job import Job
 from plateviz.solving.origin import Origin
 from plateviz.solving.solution_store import SolutionStore
-from plateviz.solving.warm_solver import WarmSolver
+from plateviz.solving.solver_queue import SolverQueue
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import FitError
@@ -104,7 +104,7 @@ def run_job(job: Job, title: str) -> None:
     FitError
         If the job failed for another reason.
     """
-    solver = WarmSolver()
+    solver = SolverQueue()
     try:
         with reporting(title) as reporter:
             reporter.follow(solver.submit(job))
@@ -114,7 +114,7 @@ def run_job(job: Job, title: str) -> None:
 
 
 def _start_store(origin: Origin) -> SolutionStore:
-    solver = WarmSolver()
+    solver = SolverQueue()
     try:
         return SolutionStore(origin, solver)
     except (OSError, ValueError):

@@ -238,7 +238,7 @@ class OpenSurvey(HasSolver, HasFigures):
     def _figures(self, theme: str) -> LazyCollection[NotebookFigure]:
         # The plots take seconds to import.
         from plateviz.plots.gallery import survey_figures
-        from plateviz.runs.survey_tables import survey_tables
+        from plateviz.runs.load_tables import survey_tables
 
         tables = survey_tables(self._run())
         figures = [

@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from plateviz.reports.figure import dark_colours, packed_document
 from plateviz.reports.report import Link, Report, ReportFigure
-from plateviz.reports.strip import STYLE, strip
+from plateviz.reports.summary_strip import STYLE, strip
 
 _DRAWN_IN = "light"
 _FOLDER = files("plateviz.reports")

@@ -6,8 +6,8 @@ from plateviz.plots.gallery import source_figures, survey_figures
 from plateviz.plots.survey_figure import SourceFigure, SurveyFigure
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.report import SOLVED, Facts, Report, ReportFigure, plain
+from plateviz.runs.load_tables import survey_tables
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.survey_tables import survey_tables
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import (
     motion_table,

@@ -5,21 +5,17 @@ survey's directory. Each has one thread. An orbit's directory is either complete
 that an interrupted run can be continued at any time.
 """
 
-import logging
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-import dask.config
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-from distributed import Client, Future, LocalCluster, as_completed
 from pyarrow import parquet
 
-from plateviz.runs.dask_worker import Outcome, fit_survey_orbit
+from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
 from plateviz.runs.fitted_orbit import remove_unfinished
 from plateviz.runs.lock import locked
 from plateviz.runs.queries import (
@@ -40,15 +36,6 @@ from solver.runtime.threads import count_cores
 
 # Rows of the history per batch: some 200 MB with all draws.
 _ROWS_AT_ONCE = 100_000
-# Dask's monitoring samples each worker a hundred times a second. With as many workers as cores
-# this took a twelfth of the processor time.
-_LESS_MONITORING = {
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.tick.interval": "1s",
-    "distributed.admin.system-monitor.interval": "5s",
-}
-# Timeout of the connection to a scheduler.
-_TIMEOUT = "20s"
 
 
 class Progress(NamedTuple):
@@ -120,8 +107,8 @@ def _fit_missing(
     failed: dict[int, str] = {}
     progress(Progress(0, len(missing), None))
     if missing:
-        with _client(min(workers or count_cores(), len(missing)), scheduler) as client:
-            for done, outcome in enumerate(_outcomes(client, run, missing), start=1):
+        with dask_client(min(workers or count_cores(), len(missing)), scheduler) as client:
+            for done, outcome in enumerate(fit_on_workers(client, run, missing), start=1):
                 if outcome.message:
                     failed[outcome.orbit] = outcome.message
                 progress(Progress(done, len(missing), outcome))
@@ -142,55 +129,6 @@ def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:
             f"found {', '.join(map(str, absent[:5]))}"
         )
     return sorted(set(orbits))
-
-
-@contextmanager
-def _client(workers: int, scheduler: str | None) -> Iterator[Client]:
-    if scheduler is not None:
-        try:
-            client = Client(scheduler, timeout=_TIMEOUT)
-        except (OSError, ValueError) as error:
-            raise InputError(
-                f"--scheduler: expected the address of a Dask scheduler, found {scheduler}: {error}"
-            ) from error
-        with client:
-            yield client
-        return
-    with (
-        dask.config.set(_LESS_MONITORING),
-        LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            # No dashboard; its server still needs a port, so any free one is taken.
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            # No memory limit per worker.
-            memory_limit=0,
-            # No warnings about workers that are slow to end.
-            silence_logs=logging.ERROR,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        yield client
-
-
-def _outcomes(client: Client, run: Run, orbits: list[int]) -> Iterator[Outcome]:
-    """Fit orbits, and yield the outcome of each when it is done."""
-    where = str(run.survey.resolve())
-    futures: dict[Future, int] = {
-        client.submit(fit_survey_orbit, where, run.name, orbit, pure=False): orbit
-        for orbit in orbits
-    }
-    for future in as_completed(futures):
-        error = future.exception()
-        if error is None:
-            yield future.result()
-            continue
-        # An unexpected error must not stop the other orbits.
-        message = f"{type(error).__name__}: {error}"
-        run.keep_failure(futures[future], message)
-        yield Outcome(futures[future], float("nan"), message)
 
 
 def _gather(run: Run) -> None:

@@ -9,7 +9,7 @@ from plateviz.runs.queries import SurveyRun, open_run
 from plateviz.runs.run import Run
 from plateviz.solving.origin import SurveyFolder
 from plateviz.solving.progress import reporting
-from plateviz.solving.survey_fit import fit_and_report, require_all
+from plateviz.solving.survey_progress import fit_and_report, require_all
 from plateviz.tables.reproduction import OFTEN, SurveyFigures, reproduction
 from solver.data.settings import FitSettings
 from solver.errors import InputError

@@ -16,7 +16,7 @@ from plateviz.runs.fitted_orbit import is_complete, read_fitted_orbit
 from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
-from plateviz.solving.warm_solver import WarmSolver
+from plateviz.solving.solver_queue import SolverQueue
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
@@ -25,7 +25,7 @@ from solver.data.settings import FitSettings
 class SolutionStore:
     """Fits orbits of one origin on request and keeps the solutions."""
 
-    def __init__(self, origin: Origin, solver: WarmSolver) -> None:
+    def __init__(self, origin: Origin, solver: SolverQueue) -> None:
         """Solve orbits of `origin` with `solver`, which is closed with the store."""
         self.origin = origin
         self.orbits = origin.orbits()

@@ -3,7 +3,7 @@
 Each line is one JSON object, in both directions. This is the only process of a plateviz server
 that imports JAX. It keeps its compilations between fits, and ends when its standard input ends. An
 unexpected exception ends it with a traceback on standard error;
-`plateviz.solving.warm_solver` reports that and starts another process.
+`plateviz.solving.solver_queue` reports that and starts another process.
 
 Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory"},
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",

@@ -3,7 +3,15 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from solver.data.setting import Positive, Setting, Switch, Whole, check_fields, setting, settings_of
+from solver.data.setting_kinds import (
+    Positive,
+    Setting,
+    Switch,
+    Whole,
+    check_fields,
+    setting,
+    settings_of,
+)
 from solver.errors import InputError
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from solver.data.engine_settings import NutsSettings, SviSettings
 from solver.data.exclusions import Exclusions
 from solver.data.parameters import BY_NAME, PARAMETERS
-from solver.data.setting import (
+from solver.data.setting_kinds import (
     Change,
     Choice,
     EngineSettings,

@@ -14,7 +14,7 @@ from solver.data.prior_text import (
     parse_shift,
     parse_width,
 )
-from solver.data.setting import Setting
+from solver.data.setting_kinds import Setting
 from solver.errors import InputError
 
 

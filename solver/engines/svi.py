@@ -26,8 +26,8 @@ from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, downhill, largest_step
-from solver.engines.guide import SITES, Means, MirroredElbo, draws, guide
 from solver.engines.numpyro_model import Evidence, evidence_of, in_coordinates
+from solver.engines.svi_guide import SITES, Means, MirroredElbo, draws, guide
 from solver.linear.normal_equations import accumulate
 from solver.linear.source_elimination import ReducedSystem, eliminate_sources
 from solver.linear.whitening import Coordinates, in_bare_units, whitened

@@ -13,12 +13,12 @@ from solver.data import schema
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.io import published as layout
+from solver.io import published_layout as layout
 from solver.io.atomic import write_atomically
 from solver.io.failures import reading
 from solver.io.fits import FitsFile, read_fits
 from solver.io.header import FORMAT, ORIGIN, primary_header, result_header, versions_in
-from solver.io.published import Derived, PublishedTable
+from solver.io.published_layout import Derived, PublishedTable
 
 _SUMMARY = "SUMMARY"
 _SECTIONS = ("summary", "settings", "provenance")

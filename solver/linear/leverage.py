@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from solver.linear.derivative_products import side_by_side
 from solver.linear.linearise import Linearised
 from solver.linear.normal_equations import chunks, one_blas_thread
-from solver.linear.products import side_by_side
 from solver.linear.source_elimination import ReducedSystem
 from solver.model.forward import Index, Pair
 from solver.problem.parameter_vector import VectorLayout

@@ -20,8 +20,8 @@ from jaxtyping import Float, Int
 from threadpoolctl import ThreadpoolController
 
 from solver.linear.chi2 import Gradient
+from solver.linear.derivative_products import Rows, one_by_one, rows_of
 from solver.linear.linearise import Linearised, linearise, turning
-from solver.linear.products import Rows, one_by_one, rows_of
 from solver.linear.tile_sums import N_LOCAL, TileSums
 from solver.model.forward import Index
 from solver.problem.parameter_vector import LOCAL_GROUPS, PER_DETECTOR, PER_EXPOSURE, VectorLayout

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from solver.linear.derivative_products import Rows, in_tiles, one_by_one
 from solver.linear.linearise import Linearised
-from solver.linear.products import Rows, in_tiles, one_by_one
 from solver.problem.parameter_vector import LOCAL_GROUPS
 
 N_LOCAL = len(LOCAL_GROUPS)

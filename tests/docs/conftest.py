@@ -50,7 +50,7 @@ def command(workplace, monkeypatch):
 
     A worker in this process fits surveys; nothing is served or opened.
     """
-    monkeypatch.setattr("plateviz.runs.fit_survey._client", _worker_here)
+    monkeypatch.setattr("plateviz.runs.fit_survey.dask_client", _worker_here)
     monkeypatch.setattr("plateviz.cli.serve.run_server", lambda store, *_: store.close())
 
     def run(words):

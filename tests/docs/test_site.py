@@ -15,7 +15,7 @@ from solver.data.parameters import PARAMETERS
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, RESULT_TABLES, TRUTH
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
-from solver.io import published as layout
+from solver.io import published_layout as layout
 from solver.simulate.settings import SurveySettings
 from tests.docs.pages import DOCS, PAGES
 

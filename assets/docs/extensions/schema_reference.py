@@ -32,8 +32,8 @@ from solver.data.columns import Column, Table
 from solver.data.parameters import PARAMETERS, Group
 from solver.data.prior_text import format_width
 from solver.io import header
-from solver.io import published as layout
-from solver.io.published import Derived, PublishedTable
+from solver.io import published_layout as layout
+from solver.io.published_layout import Derived, PublishedTable
 
 _AXES = {"src": "source", "exp": "exposure", "coef": "distortion term", "det": "detector"}
 _DERIVED: dict[str, Callable] = {

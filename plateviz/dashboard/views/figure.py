@@ -9,8 +9,8 @@ import holoviews as hv
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.views.links import Links, follow_taps, rendered
 from plateviz.dashboard.views.markup import markup_pane, paragraph
+from plateviz.dashboard.views.tap_links import Links, follow_taps, rendered
 from plateviz.dashboard.views.visibility import Visibility
 from solver.errors import InputError
 

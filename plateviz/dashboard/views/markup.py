@@ -7,7 +7,7 @@ import pandas as pd
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.reports.strip import STYLE
+from plateviz.reports.summary_strip import STYLE
 
 _STYLES = [STYLE, (Path(__file__).parent / "style.css").read_text(encoding="utf-8")]
 

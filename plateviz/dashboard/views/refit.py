@@ -8,7 +8,7 @@ import panel_material_ui as pmui
 from plateviz.dashboard.session import Session, Solution, Stage
 from plateviz.dashboard.state import CONTROLS, FitChoices, default_widths
 from solver.data.parameters import PARAMETERS, Group
-from solver.data.setting import Choice, Positive, Setting, Switch, Whole
+from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import SETTINGS
 from solver.data.text_setting import LeftOut, PriorShifts, Texts
 

@@ -22,7 +22,7 @@ from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.table import DataTable
 from plateviz.plots.gallery import source_figures
 from plateviz.plots.survey_figure import SourceFigure
-from plateviz.reports.strip import strip
+from plateviz.reports.summary_strip import strip
 from plateviz.tables import (
     motion_table,
     source_class,

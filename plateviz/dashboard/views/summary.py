@@ -4,7 +4,7 @@ import panel as pn
 
 from plateviz.dashboard.session import Session, Solution, Stage
 from plateviz.dashboard.views.markup import markup_pane, paragraph, titled
-from plateviz.reports.strip import strip
+from plateviz.reports.summary_strip import strip
 from plateviz.tables import summary_strip
 
 

@@ -15,8 +15,8 @@ from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.table import DataTable
 from plateviz.plots.gallery import survey_figures
 from plateviz.plots.survey_figure import SurveyFigure
-from plateviz.reports.strip import strip
-from plateviz.runs.survey_tables import survey_tables
+from plateviz.reports.summary_strip import strip
+from plateviz.runs.load_tables import survey_tables
 from plateviz.tables import orbit_list, orbit_states, run_strip
 from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.tables.run_health import MISSING

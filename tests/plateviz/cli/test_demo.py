@@ -18,7 +18,7 @@ from plateviz.solving.job import Job
 from plateviz.solving.origin import SurveyFolder
 from plateviz.solving.progress import reporting
 from plateviz.solving.solution_store import SolutionStore
-from plateviz.solving.warm_solver import WarmSolver
+from plateviz.solving.solver_queue import SolverQueue
 from solver.data.settings import FitSettings
 from solver.errors import FitError
 from solver.simulate.schedule import schedule
@@ -53,7 +53,7 @@ def small(monkeypatch, tmp_path):
 
 def made(directory):
     """Return the run of a survey that was made for the demo."""
-    solver = WarmSolver()
+    solver = SolverQueue()
     try:
         with reporting("simulating") as reporter:
             return make_survey(directory, solver, reporter)
@@ -82,7 +82,7 @@ def test_another_survey_or_version_has_a_folder_of_its_own(small, monkeypatch):
 
 
 def test_dead_solver_process_ends_with_exit_code_one(small, run, monkeypatch):
-    monkeypatch.setattr(WarmSolver, "submit", DeadSolver.submit)
+    monkeypatch.setattr(SolverQueue, "submit", DeadSolver.submit)
     code, _, err = run("demo", "--port", "0", "--no-open")
     assert code == 1
     assert "the solver process ended" in err
@@ -133,7 +133,7 @@ def test_closed_background_fit_is_resumed(small):
 
 
 def test_background_fit_waits_for_the_first_orbit_and_ends_when_closed(small, monkeypatch):
-    monkeypatch.setattr(demo, "WarmSolver", lambda *_: pytest.fail("expected no second solver"))
+    monkeypatch.setattr(demo, "SolverQueue", lambda *_: pytest.fail("expected no second solver"))
     first = Job({"do": "fit"})
     fit = BackgroundFit(Run(small, DEFAULT_RUN), first)
     fit.start()

@@ -231,7 +231,7 @@ def test_workers_of_a_scheduler_give_the_same_run(report, fitted_survey):
 
 
 def test_scheduler_that_does_not_answer_is_refused(fitted_survey, monkeypatch):
-    monkeypatch.setattr("plateviz.runs.fit_survey._TIMEOUT", "1s")
+    monkeypatch.setattr("plateviz.runs.dask_workers._TIMEOUT", "1s")
     with pytest.raises(InputError, match="--scheduler: expected the address"):
         fit_survey(fitted_survey, "nowhere", SETTINGS, scheduler="tcp://127.0.0.1:9")
 

@@ -5,7 +5,7 @@ import pytest
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.origin import OrbitFiles, SurveyFolder, origin_from_dict, origin_to_dict
 from plateviz.solving.solution_store import SolutionStore
-from plateviz.solving.warm_solver import WarmSolver
+from plateviz.solving.solver_queue import SolverQueue
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 
@@ -14,7 +14,7 @@ LONG = 120
 
 @pytest.fixture(scope="module")
 def store(small_survey):
-    store = SolutionStore(SurveyFolder(str(small_survey)), WarmSolver())
+    store = SolutionStore(SurveyFolder(str(small_survey)), SolverQueue())
     yield store
     store.close()
 
@@ -47,7 +47,7 @@ def test_other_settings_give_another_solution(store):
 
 def test_invalid_input_is_reported(tmp_path, sample_orbit_dir):
     files = OrbitFiles(str(sample_orbit_dir / "sample_obs.fits"), str(tmp_path / "none.fits"))
-    store = SolutionStore(files, WarmSolver())
+    store = SolutionStore(files, SolverQueue())
     try:
         job = store.request(None, FitSettings())
         assert job.wait(LONG) is JobStatus.FAILED
@@ -99,7 +99,7 @@ def test_process_that_dies_is_reported_and_replaced(store):
 
 
 def test_closing_cancels_jobs_and_removes_solutions(small_survey):
-    store = SolutionStore(SurveyFolder(str(small_survey)), WarmSolver())
+    store = SolutionStore(SurveyFolder(str(small_survey)), SolverQueue())
     job = store.request(0, FitSettings())
     scratch = store._scratch
     store.close()
@@ -108,7 +108,7 @@ def test_closing_cancels_jobs_and_removes_solutions(small_survey):
 
 
 def test_unexpected_exception_does_not_block_the_queue(small_survey):
-    solver = WarmSolver()
+    solver = SolverQueue()
     try:
         broken = solver.submit(Job({"do": "nothing of the kind"}))
         assert broken.wait(LONG) is JobStatus.FAILED

@@ -12,9 +12,9 @@ from solver.data.engine_settings import WARPFIELD, SviSettings
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import find_mode
-from solver.engines.guide import Means, MirroredElbo, draws, guide
 from solver.engines.numpyro_model import evidence_of, in_coordinates
 from solver.engines.svi import blocks, rate, start_state, variational
+from solver.engines.svi_guide import Means, MirroredElbo, draws, guide
 from solver.errors import CancelledError
 from solver.fit import OrbitFitter
 from solver.linear.leverage import covariances

@@ -1,4 +1,4 @@
-"""WarmSolver: runs one solver process, sends it jobs, and can always stop it.
+"""SolverQueue: runs one solver process, sends it jobs, and can always stop it.
 
 The process is restarted if it dies or does not stop on request. The job that it was running is
 then marked as failed or cancelled; waiting jobs continue.
@@ -21,7 +21,7 @@ from plateviz.solving.job import Job
 _GRACE_SECONDS = 3.0
 
 
-class WarmSolver:
+class SolverQueue:
     """One solver process and its queue of jobs, first in, first out."""
 
     def __init__(self, niceness: int = 0) -> None:

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from solver.linear.derivative_products import in_tiles, one_by_one, rows_of, side_by_side
 from solver.linear.normal_equations import chunks
-from solver.linear.products import in_tiles, one_by_one, rows_of, side_by_side
 from solver.problem.parameter_vector import LOCAL_GROUPS
 
 

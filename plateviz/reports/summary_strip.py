@@ -6,7 +6,7 @@ from importlib.resources import files
 
 from plateviz.tables import SummaryItem
 
-STYLE = (files("plateviz.reports") / "strip.css").read_text(encoding="utf-8")
+STYLE = (files("plateviz.reports") / "summary_strip.css").read_text(encoding="utf-8")
 """The colours of both themes, and the classes of the strip."""
 
 

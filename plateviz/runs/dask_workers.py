@@ -1,0 +1,126 @@
+"""The Dask workers of a survey: how they are started, and the task that fits one orbit."""
+
+import logging
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import dask.config
+from distributed import Client, Future, LocalCluster, as_completed
+
+from plateviz.cache import keep_compilations
+from plateviz.runs.run import Run
+from solver.data.instrument import parse_instrument
+from solver.errors import FitError, InputError
+from solver.io.survey import HEADER, read_header, read_survey_orbit
+from solver.runtime.memory import keep_memory
+from solver.runtime.threads import use_one_thread
+
+# Dask's monitoring samples each worker a hundred times a second. With as many workers as cores
+# this took a twelfth of the processor time.
+_LESS_MONITORING = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
+# Timeout of the connection to a scheduler.
+_TIMEOUT = "20s"
+
+
+class Outcome(NamedTuple):
+    """Outcome of one orbit; `message` is the reason if it failed, otherwise empty."""
+
+    orbit: int
+    seconds: float
+    message: str
+
+
+def fit_survey_orbit(survey: str, name: str, orbit: int) -> Outcome:
+    """Fit one orbit of a run whose directory exists, and write it into the run.
+
+    An orbit without a solution is recorded as failed; every other error is raised.
+    """
+    start = time.perf_counter()
+    run, message = Run(Path(survey), name), ""
+    keep_memory()
+    keep_compilations()
+    use_one_thread()
+    try:
+        _fit(run, orbit)
+    except (InputError, FitError) as error:
+        message = str(error)
+        run.keep_failure(orbit, message)
+    return Outcome(orbit, time.perf_counter() - start, message)
+
+
+def _fit(run: Run, orbit: int) -> None:
+    # Imported here, because JAX sets its number of threads when it is imported.
+    from solver.fit import OrbitFitter
+
+    instrument = parse_instrument(str(read_header(run.survey)["instrument"]), run.survey / HEADER)
+    fitter = OrbitFitter(read_survey_orbit(run.survey, orbit), instrument)
+    result = fitter.fit(run.settings())
+    run.keep(orbit, result, fitter.history(result))
+
+
+@contextmanager
+def dask_client(workers: int, scheduler: str | None) -> Iterator[Client]:
+    """Give a client of a scheduler, or of workers that are started here and ended afterwards.
+
+    Parameters
+    ----------
+    workers : number of processes to start if no scheduler is given
+    scheduler : address of a Dask scheduler that has workers of its own, or None
+
+    Raises
+    ------
+    InputError
+        If no scheduler answers at that address.
+    """
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=_TIMEOUT)
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"--scheduler: expected the address of a Dask scheduler, found {scheduler}: {error}"
+            ) from error
+        with client:
+            yield client
+        return
+    with (
+        dask.config.set(_LESS_MONITORING),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            # No dashboard; its server still needs a port, so any free one is taken.
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            # No memory limit per worker.
+            memory_limit=0,
+            # No warnings about workers that are slow to end.
+            silence_logs=logging.ERROR,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+def fit_on_workers(client: Client, run: Run, orbits: list[int]) -> Iterator[Outcome]:
+    """Fit orbits, and yield the outcome of each when it is done."""
+    where = str(run.survey.resolve())
+    futures: dict[Future, int] = {
+        client.submit(fit_survey_orbit, where, run.name, orbit, pure=False): orbit
+        for orbit in orbits
+    }
+    for future in as_completed(futures):
+        error = future.exception()
+        if error is None:
+            yield future.result()
+            continue
+        # An unexpected error must not stop the other orbits.
+        message = f"{type(error).__name__}: {error}"
+        run.keep_failure(futures[future], message)
+        yield Outcome(futures[future], float("nan"), message)

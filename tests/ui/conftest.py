@@ -64,7 +64,7 @@ def browser(chromium_path):
 
 
 @contextmanager
-def serving(*arguments, env=None):
+def serving(*arguments, env=None, program=("-m", "plateviz.cli.main")):
     """Run a command of plateviz that serves; gives the address it announces.
 
     It says what it has to say into a file, since a pipe that nobody reads would fill up and hold
@@ -72,7 +72,7 @@ def serving(*arguments, env=None):
     """
     with tempfile.NamedTemporaryFile("a") as said:
         process = subprocess.Popen(
-            [sys.executable, "-m", "plateviz.cli.main", *arguments, "--no-open"],
+            [sys.executable, *program, *arguments, "--no-open"],
             stdout=said,
             stderr=subprocess.STDOUT,
             env={**os.environ, **(env or {}), "PYTHONUNBUFFERED": "1"},

@@ -57,11 +57,6 @@ class Setting:
     phrase: str = "{}"
     is_always_described: bool = False
 
-    @property
-    def what_if(self) -> bool:
-        """Whether a change of the setting needs a what-if only, not a fit."""
-        return self.change is Change.WHAT_IF
-
     def check(self, name: str, value: Any) -> None:  # noqa: ANN401 any setting
         """Raise `InputError` if `value` is invalid for the setting called `name`."""
 

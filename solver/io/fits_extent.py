@@ -12,9 +12,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from solver.errors import InputError
-
-MAX_BYTES = 2 * 1024**3
-MAX_ROWS = 20_000_000
+from solver.io.limits import MAX_BYTES, MAX_ROWS
 
 _BLOCK = 2880
 _CARD = 80

@@ -3,7 +3,12 @@
 from pathlib import Path
 
 import pyarrow as pa
+from astropy.table import Table
 from pyarrow import parquet
+
+from solver.io.arrow import from_arrow
+from solver.io.failures import reading
+from solver.io.limits import check_size
 
 
 def write_parquet(table: pa.Table, path: Path) -> None:
@@ -21,3 +26,13 @@ def write_parquet(table: pa.Table, path: Path) -> None:
         use_dictionary=[name for name in table.column_names if name not in floats],
         use_byte_stream_split=floats,
     )
+
+
+def read_parquet(path: Path) -> dict[str, Table]:
+    """Read a table, with the units that its columns or astropy's header have."""
+    with reading(str(path), "a Parquet table"):
+        with parquet.ParquetFile(path, page_checksum_verification=True) as file:
+            check_size(path, file.metadata.num_rows, file.metadata.num_columns)
+            if b"table_meta_yaml" not in (file.schema_arrow.metadata or {}):
+                return {path.stem: from_arrow(path, file.read())}
+        return {path.stem: Table.read(path, format="parquet")}

@@ -1,7 +1,8 @@
 """Priors of the calibration parameters and the sources, in offsets from their origins.
 
 Paper, table "Inputs, Model Parameters, and Priors", and Eq. (exp:priors). The centre of
-every prior is the parameter's origin, so that its offset is zero there.
+every prior is the parameter's origin, so that its offset is zero there. The default widths are in
+the table of parameter groups, `solver.data.parameters`.
 """
 
 from typing import NamedTuple

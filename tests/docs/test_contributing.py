@@ -235,7 +235,7 @@ def test_instrument_is_simulated_and_fitted(command, workplace, capsys):
 
 @pytest.mark.slow
 def test_file_format_is_read_and_fitted(tree, run_in, plateviz_in, workplace):
-    assert add("Add a file format", tree) == ["solver/io/formats.py"]
+    assert add("Add a file format", tree) == ["solver/io/feather.py", "solver/io/formats.py"]
     (use,) = uses_in("Add a file format")
     rows = len(read_result(Path("RESULT.fits")).residuals)
     assert run_in(tree, "-c", use.text) == f"{rows} measurements\n"

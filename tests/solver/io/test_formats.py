@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from pyarrow import parquet
 
 from solver.errors import InputError
-from solver.io.fits_extent import MAX_ROWS
 from solver.io.formats import read_tables
+from solver.io.limits import MAX_ROWS
 from tests.solver.io_samples import catalogue, measurement, write_fits, write_orbit, write_table
 
 SUFFIXES = (".fits", ".ecsv", ".csv", ".parquet", ".xml", ".vot", ".votable")

@@ -1,0 +1,45 @@
+"""Reading of VOTable documents, which may not make the reader download or expand anything."""
+
+import re
+from pathlib import Path
+from xml.parsers import expat
+
+from astropy.io import votable
+from astropy.table import Table
+
+from solver.errors import InputError
+from solver.io.failures import reading
+
+
+def read_votable(path: Path) -> dict[str, Table]:
+    """Read every table of a document, named after its name, ID or place."""
+    with reading(str(path), "a VOTable"):
+        _check_markup(path)
+        document = votable.parse(path, verify="ignore")
+        tables: dict[str, Table] = {}
+        for index, element in enumerate(document.iter_tables()):
+            name = element.name or element.ID or f"table{index}"
+            if name in tables:
+                raise InputError(f"{path}: expected each table name once, found {name} again")
+            tables[name] = element.to_table(use_names_over_ids=True)
+        return tables
+
+
+def _check_markup(path: Path) -> None:
+    # Entities can expand without limit, and an external stream would be downloaded.
+    def refuse_entity(*_: object) -> None:
+        raise InputError(f"{path}: expected a VOTable without entity declarations, found one")
+
+    def refuse_stream(tag: str, attributes: dict[str, str]) -> None:
+        external = "href" in attributes or "gzip" in attributes.get("encoding", "")
+        if re.fullmatch(r"(.*:)?STREAM", tag) and external:
+            raise InputError(
+                f"{path}: expected plain data inside the VOTable, "
+                "found a STREAM that is compressed or points elsewhere"
+            )
+
+    parser = expat.ParserCreate()
+    parser.EntityDeclHandler = refuse_entity
+    parser.StartElementHandler = refuse_stream
+    with path.open("rb") as stream:
+        parser.ParseFile(stream)

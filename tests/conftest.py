@@ -23,8 +23,8 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     _share_compilations(config)
     _choose(config.getoption("--device") or os.environ.get("JAX_PLATFORMS", ""))
-    # A test runs next to nothing of what it compiles. Only the CPU's compiler is known to hurry.
-    jax.config.update("jax_disable_most_optimizations", jax.default_backend() == "cpu")
+    if jax.default_backend() == "cpu":
+        _compile_in_a_hurry()
 
 
 def pytest_collection_modifyitems(items):
@@ -56,6 +56,16 @@ def _share_compilations(config):
     # JAX has been imported and does not read the environment again.
     jax.config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+
+
+def _compile_in_a_hurry():
+    """Leave out most optimisations, here and in the processes that tests start.
+
+    A test runs next to nothing of what it compiles. Only the CPU's compiler is known to hurry.
+    What one process has compiled serves another only if both compile in the same way.
+    """
+    os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = "1"
+    jax.config.update("jax_disable_most_optimizations", True)
 
 
 def _choose(device):

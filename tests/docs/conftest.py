@@ -14,7 +14,7 @@ from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT
 from solver.fit import fit_orbit
 from solver.io.result import write_result
 from solver.io.survey import read_survey_orbit
-from tests.docs.pages import REPOSITORY, build_site
+from tests.docs.pages import REPOSITORY, built_site
 
 
 @pytest.fixture(scope="session")
@@ -65,7 +65,7 @@ def command(workplace, monkeypatch):
 @pytest.fixture(scope="session")
 def site(tmp_path_factory):
     """The site, built once."""
-    return build_site(tmp_path_factory.mktemp("site"))
+    return built_site(tmp_path_factory)
 
 
 @contextmanager

@@ -1,10 +1,13 @@
 """The source of the pages: headings, fenced blocks and the marks above them."""
 
+import os
 import re
 import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+
+from plateviz.runs.lock import locked
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DOCS = REPOSITORY / "assets" / "docs"
@@ -68,7 +71,17 @@ def section_of(page, heading):
     return rest[: following.start()] if following else rest
 
 
-def build_site(folder):
+def built_site(tmp_path_factory):
+    """Return the folder of the site, which one of the processes of a test run builds."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    with locked(shared, wait=True):
+        if not (shared / "site").is_dir():
+            _build_site(shared / "building").rename(shared / "site")
+    return shared / "site"
+
+
+def _build_site(folder):
     """Build the site as in the README and return its folder; a warning is an error."""
     build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going"]
     places = ["-d", str(folder / "doctrees"), str(DOCS), str(folder / "html")]

@@ -20,6 +20,14 @@ TOKEN = "of-this-test"
 PATIENCE_MS = 240_000
 # Every picture of the tour: figures of Bokeh have a canvas each, some pictures several figures.
 LEAST_CANVASES = 9
+OF_PANEL = "application/vnd.holoviews_exec.v0+json"
+# Cells of the tour by what they display.
+CARDS = {"survey", "orbit", "fit", "what-if", "survey-fit", "star-choice"}
+TABLES = {"measurements", "tables", "detectors", "prior", "motion"}
+FIGURES = {
+    *("residuals", "uncertainty", "deviation", "comparison", "residuals-third", "prior-share"),
+    *("health", "track", "series"),
+}
 
 pytestmark = [pytest.mark.ui, pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -108,10 +116,49 @@ def wait_for_kernel(page, address):
     pytest.fail("the notebook's kernel did not start")
 
 
+def save(page, file):
+    """Save the notebook from the menu, and wait until it lies there with its outputs."""
+    without_outputs = file.read_text("utf-8")
+    page.get_by_role("menuitem", name="File", exact=True).click()
+    page.locator('li[data-command="docmanager:save"]').click()
+    for _ in range(300):
+        text = file.read_text("utf-8")
+        # Jupyter writes into the file itself.
+        if text != without_outputs and text.endswith("}\n"):
+            return nbformat.reads(text, as_version=4)
+        page.wait_for_timeout(100)
+    pytest.fail("the notebook was not saved")
+
+
+def assert_cells_show_what_they_are_to_show(notebook):
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    kinds = {o.output_type for cell in cells for o in cell.outputs}
+    assert kinds == {"execute_result", "display_data"}
+    shown = {
+        cell.id: output.data
+        for cell in cells
+        for output in cell.outputs
+        if output.output_type == "execute_result"
+    }
+    assert shown.keys() == CARDS | TABLES | FIGURES | {"pulls", "report", "dashboard"}
+    for name in FIGURES:
+        assert OF_PANEL in shown[name], name
+        assert "Figure" in shown[name]["text/html"], name
+    for name in CARDS:
+        assert "class='strip'" in shown[name]["text/html"], name
+    for name in TABLES:
+        assert "<table" in shown[name]["text/html"], name
+    assert "can be trusted" in shown["survey-fit"]["text/html"]
+    assert "<iframe src='http://127.0.0.1:" in shown["dashboard"]["text/html"]
+
+
 @pytest.mark.parametrize(
     ("application", "path"),
-    [("jupyterlab", "lab/tree"), ("notebook", "notebooks")],
-    ids=["lab", "classic"],
+    [
+        pytest.param("jupyterlab", "lab/tree", id="lab"),
+        # The two share their server and most of their code.
+        pytest.param("notebook", "notebooks", id="classic", marks=pytest.mark.full),
+    ],
 )
 def test_tour_runs_and_every_figure_is_drawn(folder, open_jupyter, application, path):
     with jupyter(application, folder) as address:
@@ -132,6 +179,9 @@ def test_tour_runs_and_every_figure_is_drawn(folder, open_jupyter, application, 
         assert page.locator(".jp-OutputArea canvas").count() >= LEAST_CANVASES
         assert page.locator(".jp-OutputArea .strip").count() >= 6
         assert page.locator("[data-mime-type='application/vnd.jupyter.stderr']").count() == 0
+        assert_cells_show_what_they_are_to_show(save(page, folder / "tour.ipynb"))
+        names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
+        assert names == {"tour.ipynb", "plateviz-tour", "plateviz-tour-star.html"}
         # Before its server ends, of which it would complain.
         page.close()
 

@@ -2,14 +2,14 @@
 
 import pytest
 
-from tests.docs.pages import build_site
+from tests.docs.pages import built_site
 
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory, chromium_path):
-    return build_site(tmp_path_factory.mktemp("site"))
+    return built_site(tmp_path_factory)
 
 
 @pytest.mark.parametrize("name", ["index", "concepts", "diagnostics", "formats", "api"])

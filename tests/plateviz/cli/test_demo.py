@@ -1,6 +1,7 @@
 """`plateviz demo`: what it simulates, what it fits, and what it leaves alone."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from solver.errors import FitError
 from solver.simulate.schedule import schedule
 from solver.simulate.seasons import SEASONS
 from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
 
 SMALL = SurveySettings(orbits=2, seed=3).scaled(4_000)
 
@@ -51,14 +53,20 @@ def small(monkeypatch, tmp_path):
     return demo_directory()
 
 
-def made(directory):
-    """Return the run of a survey that was made for the demo."""
-    solver = SolverQueue()
-    try:
-        with reporting("simulating") as reporter:
-            return make_survey(directory, solver, reporter)
-    finally:
-        solver.close()
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory):
+    """The folder of the smaller demo with its survey, and nothing fitted."""
+    directory = tmp_path_factory.mktemp("demo") / "demo"
+    simulate_survey(directory, SMALL)
+    return directory
+
+
+@pytest.fixture
+def made(small, simulated):
+    """The run of a survey that was made for the demo."""
+    shutil.copytree(simulated, small)
+    with reporting("simulating") as reporter:
+        return make_survey(small, NoSolver(), reporter)
 
 
 def files(directory):
@@ -95,8 +103,8 @@ def test_dead_solver_process_is_no_input_error(small):
 
 
 @pytest.mark.slow
-def test_background_fit_completes_the_run_and_a_second_start_does_nothing(small, capsys):
-    run = made(small)
+def test_background_fit_completes_the_run_and_a_second_start_does_nothing(small, made, capsys):
+    run = made
     fit = BackgroundFit(run, None)
     fit.start()
     fit._thread.join(120)
@@ -117,8 +125,8 @@ def test_background_fit_completes_the_run_and_a_second_start_does_nothing(small,
 
 
 @pytest.mark.slow
-def test_closed_background_fit_is_resumed(small):
-    run = made(small)
+def test_closed_background_fit_is_resumed(made):
+    run = made
     fit = BackgroundFit(run, None)
     fit.start()
     wait_until(lambda: run.complete_orbits())
@@ -147,23 +155,21 @@ def test_background_fit_waits_for_the_first_orbit_and_ends_when_closed(small, mo
 
 
 @pytest.mark.slow
-def test_second_process_does_not_fit_the_same_run(small, capsys):
-    run = made(small)
-    with locked(run.directory) as is_ours:
+def test_second_process_does_not_fit_the_same_run(made, capsys):
+    with locked(made.directory) as is_ours:
         assert is_ours
-        fit = BackgroundFit(run, None)
+        fit = BackgroundFit(made, None)
         fit.start()
         fit._thread.join(60)
     assert "another process is fitting" in capsys.readouterr().out
-    assert run.complete_orbits() == []
+    assert made.complete_orbits() == []
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_solver_processes_end_with_the_server(small, number):
+def test_solver_processes_end_with_the_server(made, number):
     """Whatever ends the server, none of the processes that it started goes on."""
-    made(small)
     code = (
         "from plateviz.cli import demo, main\n"
         "from solver.simulate.settings import SurveySettings\n"
@@ -184,8 +190,7 @@ def test_solver_processes_end_with_the_server(small, number):
         wait_until(lambda: not any(map(is_running, started)), seconds=30)
     finally:
         server.kill()
-    run = Run(small, DEFAULT_RUN)
-    assert run.settings() == FitSettings()
+    assert made.settings() == FitSettings()
 
 
 def wait_until(condition, seconds=90):

@@ -132,7 +132,7 @@ def test_folder_has_a_page_per_orbit_and_keeps_written_pages(run, whole_run, tmp
     middle = (folder / pages[1]).read_text(encoding="utf-8")
     assert all(f'<a href="{page}">' in middle for page in ("index.html", pages[0], pages[2]))
     before = (folder / pages[2]).read_bytes()
-    (folder / pages[0]).unlink()
+    (folder / pages[1]).unlink()
     _, out, _ = run("report", whole_run, "--pages", "-o", folder)
     assert "1 orbit pages written, 2 already there" in out
     assert (folder / pages[2]).read_bytes() == before

@@ -33,6 +33,7 @@ def results(optimised):
     }
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_engines_agree(results):
     rows = compare(results)
@@ -41,6 +42,7 @@ def test_engines_agree(results):
         assert row.agrees, row
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_wrong_results_do_not_agree(results):
     """Sigmas are twice as large and positions are one sigma off."""
@@ -54,6 +56,7 @@ def test_wrong_results_do_not_agree(results):
     assert not any(row.agrees for row in compare({**wrong, "gauss-newton": exact}))
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_summary_describes_the_mixing_of_the_chains(results):
     summary = results["nuts"].summary
@@ -66,6 +69,7 @@ def test_summary_describes_the_mixing_of_the_chains(results):
     assert len(results["nuts"].trace) == 2
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_calibration_uncertainties_agree_with_gauss_newton(results):
     exact, found = (results[name].calibration for name in ("gauss-newton", "nuts"))

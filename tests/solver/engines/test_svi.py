@@ -138,6 +138,7 @@ def test_other_settings_start_from_the_beginning(small_orbit):
     assert iterations[0] == settings.svi.block
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_published_coordinates_do_not_converge(svi_problem, exact):
     """This is why the engine works in whitened coordinates."""

@@ -167,6 +167,7 @@ def test_parameter_group_is_fitted(tree, run_in):
     assert "detector_skew" in run_in(tree, "-m", "plateviz.cli.main", "fit", "--help")
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_group_on_exposures_is_fitted_and_published(tree, plateviz_in, workplace):
     add("Add a parameter group", tree)
@@ -183,6 +184,7 @@ def test_group_on_exposures_is_fitted_and_published(tree, plateviz_in, workplace
     np.testing.assert_allclose(1e6 * (ratio - 1.0), rows["value"], atol=1e-6)
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_setting_reaches_every_interface(tree, run_in, plateviz_in, workplace):
     assert set(add("Add a setting", tree)) == {
@@ -201,6 +203,7 @@ def test_setting_reaches_every_interface(tree, run_in, plateviz_in, workplace):
     assert run_in(tree, "-c", CONTROLS) == "min_obs at once\n"
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_engine_agrees_with_gauss_newton(tree, plateviz_in, workplace):
     add("Add an engine", tree)
@@ -217,6 +220,7 @@ def test_engine_agrees_with_gauss_newton(tree, plateviz_in, workplace):
         assert np.max(moved / expected[f"src_{axis}_marg"]) < 0.01
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_instrument_is_simulated_and_fitted(command, workplace, capsys):
     (file,) = blocks_in("Add an instrument", "toml")
@@ -233,6 +237,7 @@ def test_instrument_is_simulated_and_fitted(command, workplace, capsys):
     assert command([*serve.split(), "--port", "0"]) == 0
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_file_format_is_read_and_fitted(tree, run_in, plateviz_in, workplace):
     assert add("Add a file format", tree) == ["solver/io/feather.py", "solver/io/formats.py"]

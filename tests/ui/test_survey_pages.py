@@ -14,7 +14,7 @@ from tests.ui.conftest import VIEWS, see, serving, turn_dark, until
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
 
-N_ORBITS = 4
+N_ORBITS = 3
 # They ask for more orbits of a source than a small survey has.
 EMPTY = {"reference-scatter", "motion-pulls"}
 
@@ -42,7 +42,7 @@ POINT = f"""([name, key]) => {{ {VIEWS}
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory, chromium_path):
     directory = tmp_path_factory.mktemp("survey") / "sky"
-    simulate_survey(directory, SurveySettings(orbits=N_ORBITS, seed=5).scaled(9_000))
+    simulate_survey(directory, SurveySettings(orbits=N_ORBITS, seed=5).scaled(6_000))
     return directory
 
 

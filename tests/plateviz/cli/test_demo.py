@@ -124,6 +124,7 @@ def test_background_fit_completes_the_run_and_a_second_start_does_nothing(small,
     assert files(small) == before
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_closed_background_fit_is_resumed(made):
     run = made
@@ -167,7 +168,9 @@ def test_second_process_does_not_fit_the_same_run(made, capsys):
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.full)]
+)
 def test_solver_processes_end_with_the_server(made, number):
     """Whatever ends the server, none of the processes that it started goes on."""
     code = (

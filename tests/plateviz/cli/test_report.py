@@ -20,6 +20,7 @@ def run_dir(survey_folder, fit_result):
     return survey_folder
 
 
+@pytest.mark.usefixtures("few_figures")
 def test_result_file_is_reported_on_one_page(run, fit_result, tmp_path):
     write_result(fit_result, tmp_path / "r.fits")
     code, out, _ = run("report", tmp_path / "r.fits", "-o", tmp_path / "r.html")
@@ -37,6 +38,7 @@ def test_failed_orbit_has_a_report(run, run_dir, tmp_path):
     assert "leave a direction unconstrained" in (tmp_path / "r.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("few_figures")
 def test_two_results_are_compared(run, fit_result, tmp_path):
     for name in ("a", "b"):
         write_result(fit_result, tmp_path / f"{name}.fits")
@@ -74,6 +76,7 @@ def test_page_and_its_pdf_cannot_have_the_same_name(run, run_dir, tmp_path):
     assert not (tmp_path / "r.pdf").exists()
 
 
+@pytest.mark.usefixtures("few_figures")
 def test_page_of_an_orbit_lists_the_versions_of_the_fit(run, run_dir, tmp_path):
     run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html")
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
@@ -121,7 +124,7 @@ def whole_run(run_dir, fit_result):
 @pytest.mark.slow
 def test_folder_has_a_page_per_orbit_and_keeps_written_pages(run, whole_run, tmp_path):
     folder = tmp_path / "pages"
-    code, out, _ = run("report", whole_run, "--pages", "-o", folder)
+    code, out, _ = run("report", whole_run, "--pages", "-o", folder, "--workers", 1)
     assert code == 0
     assert "3 orbit pages written" in out
     names = sorted(path.name for path in folder.iterdir())
@@ -133,7 +136,7 @@ def test_folder_has_a_page_per_orbit_and_keeps_written_pages(run, whole_run, tmp
     assert all(f'<a href="{page}">' in middle for page in ("index.html", pages[0], pages[2]))
     before = (folder / pages[2]).read_bytes()
     (folder / pages[1]).unlink()
-    _, out, _ = run("report", whole_run, "--pages", "-o", folder)
+    _, out, _ = run("report", whole_run, "--pages", "-o", folder, "--workers", 1)
     assert "1 orbit pages written, 2 already there" in out
     assert (folder / pages[2]).read_bytes() == before
 

@@ -160,6 +160,7 @@ def test_solver_ends_with_the_interpreter(made_survey, tmp_path):
         pytest.fail("the solver process outlived the interpreter")
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_survey_is_fitted_and_a_source_followed(survey_folder, tmp_path):
     survey = plateviz.open(survey_folder).fit(run="third", workers=2, order=3)

@@ -124,6 +124,7 @@ def test_solution_with_another_has_the_comparison_figure(solution, make_fit_resu
     assert "compared with order 5" in repr(both)
 
 
+@pytest.mark.usefixtures("few_figures")
 def test_report_states_the_call_and_the_verdict(solution, tmp_path):
     path = solution.report(tmp_path / "r.html")
     page = path.read_text("utf-8")

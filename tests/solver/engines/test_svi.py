@@ -96,6 +96,7 @@ def test_result_depends_only_on_the_seed(svi_problem):
     assert np.abs(first - other).max() > 0.0
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_resumed_fit_equals_an_uninterrupted_one(svi_problem, found):
     """Steps, means, widths and losses are compared block by block."""

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from plateviz.cli import options
+
 
 def gaia(
     output: Annotated[
@@ -46,19 +48,20 @@ def gaia(
         bool,
         typer.Option("--refresh", help="Fetch the stars again, even if they are in the cache."),
     ] = False,
+    overwrite: options.Overwrite = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
     """Fetch stars of Gaia DR3 for a simulation; later calls read them from the cache."""
     from plateviz.cli.output import print_json
-    from plateviz.gaia.archive import fetch_stars, require_format, star_query, write_stars
+    from plateviz.gaia.archive import fetch_stars, require_new_table, star_query, write_stars
     from plateviz.solving.progress import reporting
 
     start = time.perf_counter()
-    require_format(output)
+    require_new_table(output, overwrite)
     chosen = star_query(longitude, latitude, parallax_over_error)
     with reporting("querying the stars"):
         stars = fetch_stars(chosen, url, refresh)
-        write_stars(stars.table, output)
+        write_stars(stars.table, output, overwrite)
     meta, seconds = stars.table.meta, time.perf_counter() - start
     if as_json:
         provenance = {key.lower(): str(meta[key]) for key in ("QUERY", "SERVICE", "DATE")}

@@ -34,6 +34,9 @@ Address = Annotated[
         help="Network interface to serve on; the default is reachable from this machine only."
     ),
 ]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace an output that exists; never an input.")
+]
 OpenBrowser = Annotated[
     bool, typer.Option("--open/--no-open", help="Open the page in your browser.")
 ]

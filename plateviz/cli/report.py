@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from plateviz.cli import options
 from plateviz.runs.run import DEFAULT_RUN
 from solver.errors import InputError
 
@@ -66,13 +67,14 @@ def report(
             help="Number of worker processes for --pages; one per core by default.", min=1
         ),
     ] = None,
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Write a report: one HTML file that needs no network."""
     request = ReportRequest(path, orbit, source, survey, run, other, instrument)
     if pages:
         _write_pages(request, output, pdf, workers)
     else:
-        _write_page(request, output, pdf)
+        _write_page(request, output, pdf, overwrite)
 
 
 def _write_pages(request: ReportRequest, folder: Path, pdf: bool, workers: int | None) -> None:
@@ -92,19 +94,17 @@ def _write_pages(request: ReportRequest, folder: Path, pdf: bool, workers: int |
     typer.echo(f"{folder / 'index.html'}: {made} orbit pages written{already}")
 
 
-def _write_page(request: ReportRequest, output: Path, pdf: bool) -> None:
+def _write_page(request: ReportRequest, output: Path, pdf: bool, overwrite: bool) -> None:
     from plateviz.reports.pdf import find_chromium, print_pdf
     from plateviz.solving.progress import reporting
-    from solver.io.atomic import require_writable, write_atomically
+    from solver.io.atomic import write_atomically
+    from solver.io.outputs import PAGE_SUFFIXES, check_output
 
+    inputs = [Path(one) for one in (request.path, request.other, request.instrument) if one]
     printed = output.with_suffix(".pdf")
-    require_writable(output)
+    check_output(output, PAGE_SUFFIXES, inputs, overwrite)
     if pdf:
-        if printed == output:
-            raise InputError(
-                f"{output}: expected a page's name such as R.html, found that of a PDF"
-            )
-        require_writable(printed)
+        check_output(printed, (), inputs, overwrite)
         find_chromium()
     with reporting("reading") as reporter:
         content = _compose(request)
@@ -112,11 +112,11 @@ def _write_page(request: ReportRequest, output: Path, pdf: bool) -> None:
         from plateviz.reports.page import page_of
 
         page = page_of(content, reporter.step)
-        with write_atomically(output) as temporary:
+        with write_atomically(output, overwrite) as temporary:
             temporary.write_text(page, encoding="utf-8")
         if pdf:
             reporter.say("printing")
-            print_pdf(output, printed)
+            print_pdf(output, printed, overwrite)
     typer.echo(f"{output}: {content.title}, {output.stat().st_size / 1e6:.1f} MB")
     if pdf:
         typer.echo(f"{printed}: printed")

@@ -17,6 +17,7 @@ from plateviz.gaia.tap_query import answer_to, service_name
 from solver.data import columns
 from solver.errors import InputError
 from solver.io.atomic import require_writable, write_atomically
+from solver.io.outputs import check_output
 from solver.io.read_orbit import find_catalogue
 from solver.io.table_check import conform
 from solver.simulate.gaia import GAIA
@@ -153,7 +154,7 @@ def fetch_stars(chosen: StarQuery, url: str | None = None, refresh: bool = False
         raise InputError(f"{kept.parent}: expected to create the folder, found: {error}") from error
     require_writable(kept)
     table = _fetch(chosen.query, url)
-    write_stars(table, kept)
+    write_stars(table, kept, overwrite=True)
     return Stars(table, from_cache=False)
 
 
@@ -163,25 +164,22 @@ def cached_file(chosen: StarQuery, url: str | None = None) -> Path:
     return cache_directory() / "gaia" / f"{digest[:32]}.parquet"
 
 
-def require_format(path: Path) -> None:
-    """Raise InputError if `path` is not writable or its suffix is not a known format."""
-    if path.suffix.lower() not in _WRITERS:
-        raise InputError(
-            f"{path}: expected a suffix out of {', '.join(_WRITERS)}, found {path.suffix!r}"
-        )
-    require_writable(path)
+def require_new_table(path: Path, overwrite: bool) -> None:
+    """Raise InputError if the stars cannot be written to `path`, or must not replace it."""
+    check_output(path, tuple(_WRITERS), overwrite=overwrite)
 
 
-def write_stars(table: Table, path: Path) -> None:
+def write_stars(table: Table, path: Path, overwrite: bool = False) -> None:
     """Write fetched stars, with query, service and date, in the format of the suffix.
 
     Raises
     ------
     InputError
-        If the suffix is not a known format or the file cannot be written.
+        If the suffix is not a known format, the file cannot be written, or it exists and is not
+        to be overwritten.
     """
-    require_format(path)
-    with write_atomically(path) as temporary:
+    require_new_table(path, overwrite)
+    with write_atomically(path, overwrite) as temporary:
         _WRITERS[path.suffix.lower()](table, temporary)
 
 

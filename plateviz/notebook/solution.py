@@ -185,26 +185,26 @@ class OpenSolution(HasFigures):
             )
         return self.refits.what_if(self, settings)
 
-    def report(self, path: str | PathLike[str]) -> Path:
+    def report(self, path: str | PathLike[str], overwrite: bool = False) -> Path:
         """Write the solution, with any comparison, as one self-contained HTML file.
 
         Raises
         ------
         InputError
-            If the file cannot be written.
+            If the file cannot be written, or exists and is not to be overwritten.
         """
-        return write_report(self._report, path, self.call)
+        return write_report(self._report, path, self.call, overwrite)
 
-    def save(self, path: str | PathLike[str]) -> Path:
+    def save(self, path: str | PathLike[str], overwrite: bool = False) -> Path:
         """Write the solution as `plateviz fit` does: a FITS file in the published layout.
 
         Raises
         ------
         InputError
-            If the file cannot be written.
+            If the file cannot be written, or exists and is not to be overwritten.
         """
         target = path_of(path)
-        write_result(self.result, target)
+        write_result(self.result, target, overwrite)
         return target
 
     def __repr__(self) -> str:

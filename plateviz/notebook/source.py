@@ -90,9 +90,15 @@ class OpenSource(HasFigures):
         """Whether the positions agree with the fitted motion."""
         return source_verdict(self._history, self._motion)
 
-    def report(self, path: str | PathLike[str]) -> Path:
-        """Write a self-contained HTML file; InputError if it cannot be written."""
-        return write_report(self._report, path, self._call, self._run.name)
+    def report(self, path: str | PathLike[str], overwrite: bool = False) -> Path:
+        """Write a self-contained HTML file.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written, or exists and is not to be overwritten.
+        """
+        return write_report(self._report, path, self._call, overwrite, self._run.name)
 
     def __repr__(self) -> str:
         """Return the title and the verdict."""

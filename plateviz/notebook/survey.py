@@ -190,16 +190,16 @@ class OpenSurvey(HasSolver, HasFigures):
         """
         return Dashboard(self._solver, port, height)
 
-    def report(self, path: str | PathLike[str]) -> Path:
+    def report(self, path: str | PathLike[str], overwrite: bool = False) -> Path:
         """Write the run as one self-contained HTML file.
 
         Raises
         ------
         InputError
-            If the run is not complete, or the file cannot be written.
+            If the run is not complete, or the file cannot be written or overwritten.
         """
         run = self._run()
-        return write_report(self._report, path, self._call(), run.name)
+        return write_report(self._report, path, self._call(), overwrite, run.name)
 
     def __repr__(self) -> str:
         """Return the title and the verdict."""

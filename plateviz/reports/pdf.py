@@ -30,7 +30,7 @@ def find_chromium() -> Path:
     raise InputError(f"--pdf: expected one of {', '.join(_NAMES)} on the path, found none")
 
 
-def print_pdf(page: Path, target: Path) -> None:
+def print_pdf(page: Path, target: Path, overwrite: bool = False) -> None:
     """Print a report as PDF.
 
     Raises
@@ -39,7 +39,8 @@ def print_pdf(page: Path, target: Path) -> None:
         If there is no Chromium, it fails, or `target` cannot be written.
     """
     chromium = find_chromium()
-    with write_atomically(target) as temporary, TemporaryDirectory(prefix="plateviz-") as profile:
+    profile_folder = TemporaryDirectory(prefix="plateviz-")
+    with write_atomically(target, overwrite) as temporary, profile_folder as profile:
         # As root, as in many containers, Chromium starts only without its sandbox.
         as_root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
         command = [

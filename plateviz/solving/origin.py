@@ -9,7 +9,7 @@ from pathlib import Path
 
 from solver.data.instrument import MINI_MOCK, Instrument, parse_instrument, read_instrument
 from solver.data.orbit import OrbitData
-from solver.io.read_orbit import read_orbit
+from solver.io.read_orbit import observation_files, read_orbit
 from solver.io.survey import HEADER, read_header, read_survey_orbit, survey_orbits
 
 
@@ -33,6 +33,12 @@ class OrbitFiles:
     def title(self) -> str:
         """Name of the origin."""
         return Path(self.observations).name
+
+    def inputs(self) -> list[Path]:
+        """Return the files that are read, whether they exist or not."""
+        given = (self.reference, self.truth, self.instrument)
+        files = [Path(path) for path in given if path]
+        return [*observation_files(Path(self.observations)), *files]
 
     def orbits(self) -> list[int | None]:
         """Return the orbit_id of all orbits."""

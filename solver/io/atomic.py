@@ -1,5 +1,6 @@
 """Atomic file writing: a reader sees the old file or the new one, never a partial file."""
 
+import errno
 import hashlib
 import os
 import secrets
@@ -11,12 +12,13 @@ from solver.errors import InputError
 
 
 @contextmanager
-def write_atomically(path: Path) -> Iterator[Path]:
+def write_atomically(path: Path, overwrite: bool = True) -> Iterator[Path]:
     """Write to a temporary file that replaces `path` when it is complete.
 
     Parameters
     ----------
-    path : the file to write; an existing file is replaced
+    path : the file to write
+    overwrite : whether an existing file is replaced, even one that appears during the block
 
     Yields
     ------
@@ -27,7 +29,8 @@ def write_atomically(path: Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        Before the block if `path` cannot be written; after it if writing to disk fails.
+        Before the block if `path` cannot be written; after it if writing to disk fails, or
+        another process has written `path` and it must not be overwritten.
     """
     target = require_writable(path)
     temporary = target.with_name(f".{target.stem}-{secrets.token_hex(6)}{target.suffix}")
@@ -35,7 +38,10 @@ def write_atomically(path: Path) -> Iterator[Path]:
         temporary.touch(exist_ok=False)
         yield temporary
         _flush(temporary)
-        os.replace(temporary, target)
+        if overwrite:
+            os.replace(temporary, target)
+        else:
+            _move_to_new(temporary, target)
         _flush(target.parent)
     except OSError as error:
         raise InputError(f"{path}: expected to write the file, found: {error}") from error
@@ -79,6 +85,19 @@ def sha256_of(path: Path) -> str:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{path}: expected a readable file, found: {error}") from error
+
+
+def _move_to_new(temporary: Path, target: Path) -> None:
+    """Rename a file to a name that nothing has; FileExistsError if something has it."""
+    try:
+        os.link(temporary, target)
+    except FileExistsError:
+        raise
+    except OSError:
+        # A file system without hard links.
+        if target.exists():
+            raise FileExistsError(errno.EEXIST, "File exists", str(target)) from None
+        os.replace(temporary, target)
 
 
 def _flush(path: Path) -> None:

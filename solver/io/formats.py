@@ -10,6 +10,7 @@ from solver.io.ecsv import read_csv, read_ecsv
 from solver.io.failures import reading
 from solver.io.fits import read_fits
 from solver.io.limits import MAX_BYTES
+from solver.io.outputs import FITS_SUFFIXES
 from solver.io.parquet import read_parquet
 from solver.io.votable import read_votable
 
@@ -52,7 +53,7 @@ def holds_one_table(path: Path) -> bool:
 
 def is_fits(path: Path) -> bool:
     """Return whether the suffix is that of a FITS file."""
-    return path.suffix.lower() in _FITS
+    return path.suffix.lower() in FITS_SUFFIXES
 
 
 def has_reader(path: Path) -> bool:
@@ -71,11 +72,10 @@ def _read_fits(path: Path) -> dict[str, Table]:
     return read_fits(path).tables
 
 
-_FITS = (".fits", ".fit", ".fts")
 _VOTABLE = (".xml", ".vot", ".votable")
 _ONE_TABLE = (".ecsv", ".csv", ".parquet")
 _READERS: dict[str, Callable[[Path], dict[str, Table]]] = {
-    **dict.fromkeys(_FITS, _read_fits),
+    **dict.fromkeys(FITS_SUFFIXES, _read_fits),
     **dict.fromkeys(_VOTABLE, read_votable),
     ".ecsv": read_ecsv,
     ".csv": read_csv,

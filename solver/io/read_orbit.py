@@ -94,6 +94,16 @@ def find_observation(obs: Path) -> tuple[Located, Located]:
     return _named(obs, tables, MEASUREMENT), _named(obs, tables, ENVIRONMENT)
 
 
+def observation_files(obs: Path) -> list[Path]:
+    """Return every file that `find_observation` may read; none is opened."""
+    if not obs.is_dir() and not holds_one_table(obs):
+        return [obs]
+    folder = obs if obs.is_dir() else obs.parent
+    names = {*names_of(MEASUREMENT), *names_of(ENVIRONMENT)}
+    there = sorted(folder.iterdir()) if folder.is_dir() else []
+    return [obs, *(path for path in there if path.stem.lower() in names)]
+
+
 def find_catalogue(path: Path) -> Located:
     """Return the first raw table of a file that has rows.
 

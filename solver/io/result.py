@@ -14,10 +14,11 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io import published_layout as layout
-from solver.io.atomic import write_atomically
+from solver.io.atomic import sha256_of, write_atomically
 from solver.io.failures import reading
 from solver.io.fits import FitsFile, read_fits
 from solver.io.header import FORMAT, ORIGIN, primary_header, result_header, versions_in
+from solver.io.outputs import FITS_SUFFIXES, check_output
 from solver.io.published_layout import Derived, PublishedTable
 
 _SUMMARY = "SUMMARY"
@@ -35,20 +36,28 @@ _OPTIONAL = {
 _KINDS = {"int64": "iu", "float64": "f", "bool": "b", "str": "SU"}
 
 
-def write_result(result: FitResult, path: Path) -> None:
+def write_result(result: FitResult, path: Path, overwrite: bool = False) -> None:
     """Write a fitted orbit in the published result layout, atomically.
 
     Parameters
     ----------
     result : the fitted orbit; `read_result` reads back all tables and values
-    path : the FITS file; an existing file is replaced when the new one is complete
+    path : the FITS file
+    overwrite : whether an existing file is replaced, when the new one is complete
 
     Raises
     ------
     InputError
-        If `path` cannot be written.
+        If the suffix is not that of a FITS file, `path` cannot be written, it exists and is not
+        to be overwritten, or it is a file that the orbit was read from.
     """
-    with write_atomically(path) as temporary:
+    check_output(path, FITS_SUFFIXES, overwrite=overwrite)
+    if path.exists() and sha256_of(path) in result.provenance.values():
+        raise InputError(
+            f"{path}: expected another file than the inputs of the solution, found one of them, "
+            "which would be lost"
+        )
+    with write_atomically(path, overwrite) as temporary:
         hdus = fits.HDUList(
             [
                 fits.PrimaryHDU(header=primary_header(result)),

@@ -260,7 +260,7 @@ def test_version_of_a_package_that_is_not_installed(monkeypatch, tmp_path, resul
 def test_overwrites_and_leaves_nothing_else(tmp_path, result):
     path = tmp_path / "result.fits"
     path.write_text("old")
-    write_result(result, path)
+    write_result(result, path, overwrite=True)
     _assert_equal(read_result(path), result)
     assert list(tmp_path.iterdir()) == [path]
 

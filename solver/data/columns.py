@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 
@@ -19,7 +20,8 @@ class Column:
     aliases : other names accepted when reading, in order of preference
     required : whether a table without the column is rejected
     default : value of an optional column that is absent
-    positive : whether values at or below zero are rejected
+    limits : lowest and highest valid value, in `unit`; wide enough for every mission, and narrow
+        enough to reject a missing value, another unit or another time scale
     may_be_nan : whether NaN is valid
     """
 
@@ -30,7 +32,7 @@ class Column:
     aliases: tuple[str, ...] = ()
     required: bool = True
     default: float | bool | str | None = None
-    positive: bool = False
+    limits: tuple[float, float] = (-inf, inf)
     may_be_nan: bool = False
 
 

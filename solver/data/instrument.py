@@ -87,6 +87,7 @@ def _mini_mock() -> Instrument:
 
 MINI_MOCK = _mini_mock()
 
+_LARGEST_WHOLE = 2**53
 _DETECTOR_KEYS = {
     "id": "detector_id",
     "x_um": "x_um",
@@ -132,7 +133,8 @@ def parse_instrument(text: str, path: Path) -> Instrument:
     """
     try:
         content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    # Deep nesting, and integers of thousands of digits.
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: expected an instrument in TOML, found: {error}") from error
     tables = content.pop("detector", [])
     _expect_keys(path, "the file", content, {"name", "focal_length_um", "distortion_scale_um"})
@@ -196,4 +198,7 @@ def _positive(path: Path, name: str, value: object) -> float:
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    # An integer may be too large to be a float.
+    return math.isfinite(value) if isinstance(value, float) else abs(value) <= _LARGEST_WHOLE

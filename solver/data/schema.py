@@ -1,164 +1,21 @@
 """Definition of every input and result table: column name, type, unit, meaning, aliases.
 
-The input tables use the column names of the published files (paper, tables
-"Columns of the Ground Truth Catalog" and "Inputs, Model Parameters, and Priors"); the
-result tables use names of this project. `solver.io` maps them to and from files.
+The result tables use names of this project. `solver.io` maps them to and from files.
 """
 
 from solver.data.columns import Column, Table
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
+from solver.data.input_schema import CATALOGUE as CATALOGUE
+from solver.data.input_schema import ENVIRONMENT as ENVIRONMENT
+from solver.data.input_schema import EXPOSURE_KEY, FIELD, MEASURED, OBSTIME, ORBIT, PLATE, SOURCE
+from solver.data.input_schema import MEASUREMENT as MEASUREMENT
+from solver.data.input_schema import TRUTH as TRUTH
 from solver.data.order_schema import ORDERS as ORDERS
-
-_EXPOSURE_KEY = ("orbit_id", "field_id", "plate_id")
-_ORBIT = Column("orbit_id", "int64", "", "satellite orbit")
-_FIELD = Column("field_id", "int64", "", "field of the orbit")
-_PLATE = Column("plate_id", "int64", "", "exposure of the field")
-_DETECTOR = Column("detector_id", "int64", "", "detector")
-_SOURCE = Column("source_id", "int64", "", "source")
-_MEASURED = (_ORBIT, _FIELD, _PLATE, _DETECTOR, _SOURCE)
-_OBSTIME = Column(
-    "obstime", "float64", "d", "time of the exposure, MJD in TCB", ("exptime", "time", "mjd")
-)
-
-MEASUREMENT = Table(
-    "measurement",
-    (
-        *_MEASURED,
-        Column("nx", "float64", "pix", "measured x, from the detector centre"),
-        Column("ny", "float64", "pix", "measured y, from the detector centre"),
-        Column("sx", "float64", "pix", "uncertainty of nx", ("sx0",), positive=True),
-        Column("sy", "float64", "pix", "uncertainty of ny", ("sy0",), positive=True),
-    ),
-    key=(*_EXPOSURE_KEY, "detector_id", "source_id"),
-    aliases=("measurements", "obs", "observation"),
-)
-
-ENVIRONMENT = Table(
-    "environment",
-    (
-        _ORBIT,
-        _FIELD,
-        _PLATE,
-        _OBSTIME,
-        Column("ra_est", "float64", "deg", "estimated pointing, RA", ("ra est", "ra_tel", "ra")),
-        Column(
-            "dec_est", "float64", "deg", "estimated pointing, Dec", ("dec est", "dec_tel", "dec")
-        ),
-        Column(
-            "pa_est", "float64", "deg", "estimated position angle", ("pa est", "theta_tel", "pa")
-        ),
-        Column(
-            "focal_length",
-            "float64",
-            "um",
-            "estimated focal length",
-            ("focal length", "foc_tel"),
-            positive=True,
-        ),
-        *(
-            Column(
-                f"satellite_v{axis}",
-                "float64",
-                "km / s",
-                f"geocentric velocity of the satellite, BCRS {axis}",
-                required=False,
-                default=0.0,
-            )
-            for axis in "xyz"
-        ),
-    ),
-    key=_EXPOSURE_KEY,
-    aliases=("exposures", "exposure", "env"),
-)
-
-
-def _correlation(first: str, second: str) -> Column:
-    return Column(
-        f"{first}_{second}_corr",
-        "float64",
-        "",
-        f"correlation of {first} and {second}",
-        required=False,
-        default=0.0,
-    )
-
-
-_ASTROMETRY = ("ra", "dec", "parallax", "pmra", "pmdec")
-
-CATALOGUE = Table(
-    "catalogue",
-    (
-        _SOURCE,
-        Column("ra", "float64", "deg", "right ascension at ref_epoch"),
-        Column("dec", "float64", "deg", "declination at ref_epoch"),
-        Column("ra_error", "float64", "mas", "uncertainty of ra cos(dec)", positive=True),
-        Column("dec_error", "float64", "mas", "uncertainty of dec", positive=True),
-        Column("pmra", "float64", "mas / yr", "proper motion in RA, times cos(dec)"),
-        Column("pmdec", "float64", "mas / yr", "proper motion in Dec"),
-        Column("pmra_error", "float64", "mas / yr", "uncertainty of pmra"),
-        Column("pmdec_error", "float64", "mas / yr", "uncertainty of pmdec"),
-        Column("parallax", "float64", "mas", "parallax"),
-        Column(
-            "parallax_error",
-            "float64",
-            "mas",
-            "uncertainty of parallax",
-            required=False,
-            default=0.0,
-        ),
-        Column("ref_epoch", "float64", "yr", "reference epoch, Julian year in TCB"),
-        Column(
-            "is_reference",
-            "bool",
-            "",
-            "reference source",
-            ("reference_flag", "flag_ref", "is_ref"),
-        ),
-        Column(
-            "is_artificial",
-            "bool",
-            "",
-            "artificial source of a simulation",
-            ("artificial_flag", "flag_test", "flag_art", "test_flag"),
-            required=False,
-            default=False,
-        ),
-        *(
-            _correlation(first, second)
-            for i, first in enumerate(_ASTROMETRY)
-            for second in _ASTROMETRY[i + 1 :]
-        ),
-    ),
-    key=("source_id",),
-    aliases=("reference", "ref", "catalog"),
-)
-
-# The errors of a true catalogue are not used, and its flags repeat those of the catalogue.
-_TRUTH_OPTIONAL = {
-    "ra_error",
-    "dec_error",
-    "pmra_error",
-    "pmdec_error",
-    "is_reference",
-}
-
-TRUTH = Table(
-    "truth",
-    tuple(
-        Column(c.name, c.dtype, c.unit, c.meaning, c.aliases, required=False, default=c.default)
-        if c.name in _TRUTH_OPTIONAL
-        else c
-        for c in CATALOGUE
-        if not c.name.endswith("_corr")
-    ),
-    key=("source_id",),
-    aliases=("ground_truth", "gt"),
-)
 
 SOURCES = Table(
     "sources",
     (
-        _SOURCE,
+        SOURCE,
         Column("is_reference", "bool", "", "reference source"),
         Column("is_artificial", "bool", "", "artificial source of a simulation"),
         Column("n_obs", "int64", "", "number of measurements"),
@@ -185,7 +42,7 @@ SOURCES = Table(
 RESIDUALS = Table(
     "residuals",
     (
-        *_MEASURED,
+        *MEASURED,
         Column("nx", "float64", "pix", "measured x"),
         Column("ny", "float64", "pix", "measured y"),
         Column("sx", "float64", "pix", "uncertainty of nx"),
@@ -238,15 +95,15 @@ CALIBRATION = Table(
 EXPOSURES = Table(
     "exposures",
     (
-        _ORBIT,
-        _FIELD,
-        _PLATE,
-        _OBSTIME,
+        ORBIT,
+        FIELD,
+        PLATE,
+        OBSTIME,
         Column("n_obs", "int64", "", "number of measurements"),
         Column("chi2", "float64", "", "sum of squared whitened residuals"),
         Column("dof", "float64", "", "expected chi2: 2 n_obs less the leverage"),
     ),
-    key=_EXPOSURE_KEY,
+    key=EXPOSURE_KEY,
 )
 
 TRACE = Table(
@@ -265,7 +122,7 @@ TRACE = Table(
 OUTLIERS = Table(
     "outliers",
     (
-        *_MEASURED,
+        *MEASURED,
         Column("nx", "float64", "pix", "measured x"),
         Column("ny", "float64", "pix", "measured y"),
         Column("residual_x", "float64", "pix", "measured minus predicted x"),
@@ -287,7 +144,7 @@ LOSSES = Table(
 TRUE_PLACES = Table(
     "true_places",
     (
-        _SOURCE,
+        SOURCE,
         Column("ra", "float64", "deg", "true RA at the mean epoch, without aberration"),
         Column("dec", "float64", "deg", "true Dec at the mean epoch, without aberration"),
         Column("induced_ra", "float64", "mas", "shift that the reference stars' errors cause"),

@@ -177,6 +177,8 @@ RUN_ORBITS = Table(
                 ),
                 ("expected_normalised_deviation_ra", "", "expected normalised deviation, alpha*"),
                 ("expected_normalised_deviation_dec", "", "expected normalised deviation, delta"),
+                ("normalised_deviation_dof_ra", "", "its degrees of freedom, alpha*"),
+                ("normalised_deviation_dof_dec", "", "its degrees of freedom, delta"),
                 ("mean_error_ra", "mas", "sigma of the mean error of the other sources, alpha*"),
                 ("mean_error_dec", "mas", "sigma of the mean error of the other sources, delta"),
                 ("seconds", "s", "time from reading to writing"),

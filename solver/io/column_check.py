@@ -119,27 +119,21 @@ def _value_problems(values: np.ndarray, column: Column, where: str) -> list[str]
     finite = np.isfinite(values)
     if not finite.all() and not column.may_be_nan:
         found.append(f"{where}: expected finite numbers, found {_rows(~finite, 'NaN or infinite')}")
-    low, high, expected = _limits(column)
-    bad = finite & ((values <= low) if column.positive else (values < low) | (values > high))
+    low, high = column.limits
+    bad = finite & ((values < low) | (values > high))
     if bad.any():
         value = float(values[np.argmax(bad)])
-        found.append(f"{where}: expected {expected}, found {value!r}: {_rows(bad, 'invalid')}")
+        found.append(
+            f"{where}: expected values {limits_text(column)} ({column.meaning}), "
+            f"found {value!r}: {_rows(bad, 'invalid')}"
+        )
     return found
 
 
-def _limits(column: Column) -> tuple[float, float, str]:
-    if column.positive:
-        return 0.0, np.inf, "positive numbers"
-    if column.name.endswith("_error"):
-        return 0.0, np.inf, "no negative numbers"
-    if column.name.endswith("_corr"):
-        return -1.0, 1.0, "correlations from -1 to 1"
-    if column.name in ("dec", "dec_est"):
-        return -90.0, 90.0, "declinations from -90 to 90 deg"
-    if column.name == "obstime":
-        # A Julian date is larger by 2,400,000.5.
-        return -np.inf, 1e6, "modified Julian dates"
-    return -np.inf, np.inf, "numbers"
+def limits_text(column: Column) -> str:
+    """Return the limits of a column as text, such as "from -90 to 90 deg"; "" without limits."""
+    low, high = column.limits
+    return f"from {low:g} to {high:g} {column.unit}".rstrip() if np.isfinite(low) else ""
 
 
 def _integers(values: np.ndarray, where: str) -> Converted:

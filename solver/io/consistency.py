@@ -4,19 +4,38 @@ import numpy as np
 import pandas as pd
 
 _MAX_LISTED = 5
+# An orbit about the Earth takes hours; one about L2 may be cut into days.
+_LONGEST_ORBIT_D = 2.0
 _EXPOSURE = ["orbit_id", "field_id", "plate_id"]
 
 
 def exposure_problems(
     measurements: pd.DataFrame, exposures: pd.DataFrame, where: str, where_exposures: str
 ) -> list[str]:
-    """Return a message if a measured exposure has no row in the environment table."""
-    missing = sorted(exposures_of(measurements) - exposures_of(exposures))
-    if not missing:
+    """Return a message if measured exposures have no row, or their times cannot be of one orbit."""
+    measured = exposures_of(measurements)
+    missing = sorted(measured - exposures_of(exposures))
+    if missing:
+        return [
+            f"{where}: expected a row in {where_exposures} for every measured exposure "
+            f"(orbit_id, field_id, plate_id), found none for {_listed(missing)}"
+        ]
+    if "obstime" not in exposures:
         return []
+    is_measured = pd.MultiIndex.from_frame(exposures[_EXPOSURE]).isin(measured)
+    return _time_problems(exposures[is_measured], where_exposures)
+
+
+def _time_problems(exposures: pd.DataFrame, where: str) -> list[str]:
+    middle = exposures.groupby("orbit_id")["obstime"].transform("median")
+    far = exposures[(exposures["obstime"] - middle).abs() > _LONGEST_ORBIT_D / 2.0]
+    if far.empty:
+        return []
+    keys = far[_EXPOSURE].itertuples(index=False, name=None)
     return [
-        f"{where}: expected a row in {where_exposures} for every measured exposure "
-        f"(orbit_id, field_id, plate_id), found none for {_listed(missing)}"
+        f"{where}, column obstime: expected the exposures of an orbit within "
+        f"{_LONGEST_ORBIT_D:g} d, found {len(far)} of {len(exposures)} far from the others "
+        f"(orbit_id, field_id, plate_id): {_listed(list(keys))}"
     ]
 
 

@@ -1,5 +1,6 @@
 """Conversion of library exceptions on damaged files to `InputError`."""
 
+import csv
 import struct
 import warnings
 import zipfile
@@ -21,6 +22,7 @@ _RAISED_ON_DAMAGE = (
     ArrowException,
     AssertionError,
     AttributeError,
+    csv.Error,
     EOFError,
     ExpatError,
     LookupError,

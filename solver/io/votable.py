@@ -1,5 +1,6 @@
 """Reading of VOTable documents, which may not make the reader download or expand anything."""
 
+import math
 import re
 from pathlib import Path
 from xml.parsers import expat
@@ -9,6 +10,8 @@ from astropy.table import Table
 
 from solver.errors import InputError
 from solver.io.failures import reading
+
+_LARGEST_CELL = 10_000
 
 
 def read_votable(path: Path) -> dict[str, Table]:
@@ -30,7 +33,9 @@ def _check_markup(path: Path) -> None:
     def refuse_entity(*_: object) -> None:
         raise InputError(f"{path}: expected a VOTable without entity declarations, found one")
 
-    def refuse_stream(tag: str, attributes: dict[str, str]) -> None:
+    def check_element(tag: str, attributes: dict[str, str]) -> None:
+        if re.fullmatch(r"(.*:)?(FIELD|PARAM)", tag):
+            _check_cell(path, attributes.get("arraysize", ""))
         external = "href" in attributes or "gzip" in attributes.get("encoding", "")
         if re.fullmatch(r"(.*:)?STREAM", tag) and external:
             raise InputError(
@@ -40,6 +45,16 @@ def _check_markup(path: Path) -> None:
 
     parser = expat.ParserCreate()
     parser.EntityDeclHandler = refuse_entity
-    parser.StartElementHandler = refuse_stream
+    parser.StartElementHandler = check_element
     with path.open("rb") as stream:
         parser.ParseFile(stream)
+
+
+def _check_cell(path: Path, arraysize: str) -> None:
+    """Refuse a column whose declared size alone would take much memory for each row."""
+    sizes = [int(digits) for digits in re.findall(r"\d{1,18}", arraysize)]
+    if math.prod(sizes) > _LARGEST_CELL:
+        raise InputError(
+            f"{path}: expected at most {_LARGEST_CELL} values in a cell, "
+            f"found the arraysize {arraysize[:40]!r}"
+        )

@@ -33,6 +33,7 @@ from solver.data.parameters import PARAMETERS, Group
 from solver.data.prior_text import format_width
 from solver.io import header
 from solver.io import published_layout as layout
+from solver.io.column_check import limits_text
 from solver.io.published_layout import Derived, PublishedTable
 
 _AXES = {"src": "source", "exp": "exposure", "coef": "distortion term", "det": "detector"}
@@ -178,7 +179,7 @@ def _unit(column: Column) -> str:
 
 def _meaning(column: Column) -> str:
     limits = [
-        *(["above zero"] if column.positive else []),
+        *([limits_text(column)] if limits_text(column) else []),
         *(["may be NaN"] if column.may_be_nan else []),
     ]
     return f"{column.meaning} ({', '.join(limits)})" if limits else column.meaning

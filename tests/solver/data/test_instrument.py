@@ -3,7 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.data.instrument import MINI_MOCK, read_instrument, write_instrument
+from solver.data.instrument import (
+    MINI_MOCK,
+    parse_instrument,
+    read_instrument,
+    write_instrument,
+)
 from solver.errors import InputError
 
 
@@ -109,3 +114,24 @@ def test_binary_file_is_refused(tmp_path):
     path.write_bytes(b"\xff\xfe\x00\x01")
     with pytest.raises(InputError, match="image.toml"):
         read_instrument(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a = " + "[" * 5_000 + "]" * 5_000,
+        "a = " + "9" * 5_000,
+        "a = " + "{ b = " * 3_000 + "1" + " }" * 3_000,
+    ],
+    ids=["nested", "digits", "tables"],
+)
+def test_hostile_toml_is_refused_in_words(tmp_path, text):
+    (tmp_path / "i.toml").write_text(text)
+    with pytest.raises(InputError, match=r"i\.toml: expected"):
+        read_instrument(tmp_path / "i.toml")
+
+
+def test_integer_beyond_every_float_is_refused_in_words(tmp_path):
+    text = write_instrument(MINI_MOCK).replace("4860000.0", "9" * 400)
+    with pytest.raises(InputError, match="expected focal_length_um to be a positive number"):
+        parse_instrument(text, tmp_path / "i.toml")

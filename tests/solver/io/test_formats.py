@@ -284,3 +284,20 @@ def test_damaged_files_are_read_or_refused(seeds, suffix, data):
     else:
         named = all(isinstance(table, Table) for table in tables.values())
     assert named
+
+
+def test_ecsv_with_an_endless_field_is_refused_in_words(tmp_path):
+    head = (
+        "# %ECSV 1.0\n# ---\n# datatype:\n# - {name: a, datatype: string}\n# schema: astropy-2.0\n"
+    )
+    (tmp_path / "a.ecsv").write_text(f"{head}a\n{'x' * 200_000}\n")
+    with pytest.raises(InputError, match=r"a\.ecsv: expected an ECSV table, found"):
+        read_tables(tmp_path / "a.ecsv")
+
+
+@pytest.mark.parametrize("size", ["100000000", "10000x10000", "100000000*"])
+def test_votable_with_enormous_cells_is_refused_in_words(tmp_path, size):
+    path = write_table(catalogue(), tmp_path / "a.xml")
+    path.write_text(path.read_text().replace("<FIELD ", f'<FIELD arraysize="{size}" ', 1))
+    with pytest.raises(InputError, match="expected at most 10000 values in a cell"):
+        read_tables(path)

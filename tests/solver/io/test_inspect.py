@@ -90,7 +90,7 @@ def test_all_problems_are_listed(tmp_path):
     assert len(obs["problems"]) == 5
     for part in (
         "'nx': expected finite",
-        "'sx': expected positive",
+        "'sx': expected values from 1e-07 to 1000 pix",
         "for every measured exposure",
         "every measured source in",
         "at least one reference source",

@@ -252,11 +252,11 @@ MISTAKES = {
     ),
     "zero sigma": (
         {"measured": _with(measurement(), "sx", 2, 0.0)},
-        r"MEASUREMENT, column 'sx': expected positive numbers, found 0\.0.*row 3",
+        r"MEASUREMENT, column 'sx': expected values from 1e-07 to 1000 pix .*, found 0\.0.*row 3",
     ),
     "negative sigma": (
         {"measured": _with(measurement(), "sy", 2, -0.01)},
-        r"MEASUREMENT, column 'sy': expected positive numbers, found -0\.01.*row 3",
+        r"MEASUREMENT, column 'sy': expected values from 1e-07 to 1000 pix .*, found -0\.01.*row 3",
     ),
     "source not in the catalogue": (
         {"listed": catalogue()[1:]},

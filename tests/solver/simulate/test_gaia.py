@@ -145,9 +145,9 @@ def test_absent_correlations_are_zero(stars):
     ("change", "message"),
     [
         (lambda s: s.assign(parallax=np.nan), "my.csv: expected a row .* found none among 3000"),
-        (lambda s: s.assign(dec=s["dec"] - 90.0), "'dec': expected declinations"),
+        (lambda s: s.assign(dec=s["dec"] - 90.0), "'dec': expected values from -90"),
         (lambda s: s.assign(ra=s["ra"].astype(np.float32)), "'ra': expected float64"),
-        (lambda s: s.assign(ra_dec_corr=1.5), "'ra_dec_corr': expected correlations from -1 to 1"),
+        (lambda s: s.assign(ra_dec_corr=1.5), "'ra_dec_corr': expected values from -1 to 1"),
         (lambda s: s.iloc[:0], "expected at least one row, found none"),
     ],
     ids=["all-gaps", "declination", "precision", "correlation", "empty"],

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float
 from solver.data.parameters import CALIBRATION_GROUPS
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
+from solver.engines.turned_start import turned_start
 from solver.linear.chi2 import Gradient, gradient
 from solver.linear.normal_equations import NormalEquations, accumulate
 from solver.linear.source_elimination import ReducedSystem, eliminate_sources
@@ -90,14 +91,19 @@ def find_mode(
         return _iterate(problem, settings, equations, progress, begin)
     theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
     is_sampled = _rough_sample(problem)
-    if not is_sampled.all():
+    sample = problem if is_sampled.all() else thinned(problem, is_sampled)
+    equations = accumulate(sample, theta, sources[is_sampled])
+    turned = turned_start(sample, equations.gradient.chi2)
+    if turned.any():
+        theta = turned
+        equations = accumulate(sample, theta, sources[is_sampled])
+    if sample is not problem:
         rough = replace(settings, tolerance=max(settings.tolerance, _ROUGH_TOLERANCE))
-        sample = thinned(problem, is_sampled)
-        at_origin = accumulate(sample, theta, sources[is_sampled])
-        mode = _iterate(sample, rough, at_origin, lambda _: None, begin)
+        mode = _iterate(sample, rough, equations, lambda _: None, begin)
         if mode.status is FitStatus.CONVERGED:
             theta, sources[is_sampled] = mode.theta, mode.sources
-    return _iterate(problem, settings, accumulate(problem, theta, sources), progress, begin)
+        equations = accumulate(problem, theta, sources)
+    return _iterate(problem, settings, equations, progress, begin)
 
 
 def _rough_sample(problem: Problem) -> Bool[np.ndarray, " src"]:

@@ -270,3 +270,14 @@ def test_tight_prior_constrains_its_parameters(small_orbit, fit):
     tight = fit(small_orbit, prior_widths={"distortion_x": 1e-6})
     assert np.abs(coefficients(tight)[:, 0]).max() < 1e-3
     assert np.abs(coefficients(tight)[:, 1]).max() > 0.3
+
+
+@pytest.mark.parametrize("turn", [90.0, 180.0, -135.0])
+def test_wrong_position_angle_is_solved(small_orbit, result, fit, with_tables, turn):
+    exposures = small_orbit.data.exposures
+    turned = with_tables(small_orbit, exposures=exposures.assign(pa_est=exposures["pa_est"] + turn))
+    found = fit(turned)
+    assert found.summary["converged"]
+    for axis in ("ra", "dec"):
+        moved = found.sources[f"offset_{axis}"] - result.sources[f"offset_{axis}"]
+        assert (moved.abs() < 1e-3 * result.sources[f"sigma_{axis}_conditional"]).all()

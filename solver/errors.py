@@ -19,3 +19,7 @@ class CancelledError(RuntimeError):
 
 class FitError(RuntimeError):
     """A fit that has no result; the message gives the reason."""
+
+
+class DistrustError(FitError):
+    """A fit that converged to a solution that should not be trusted."""

@@ -9,9 +9,10 @@ from plateviz.cache import keep_compilations
 from plateviz.cli.output import print_agreement, print_fit, print_json, print_orders
 from plateviz.solving.origin import OrbitFiles
 from plateviz.solving.progress import Reporter, reporting
+from plateviz.tables.verdict import with_verdict
 from solver.data.settings import COUNTED, ENGINES, FitSettings
-from solver.errors import FitError, InputError
-from solver.io.atomic import require_writable
+from solver.errors import DistrustError, FitError, InputError
+from solver.io.outputs import FITS_SUFFIXES, check_output
 from solver.runtime.memory import keep_memory
 
 if TYPE_CHECKING:
@@ -29,15 +30,29 @@ class FitRequest(NamedTuple):
     engines: tuple[str, ...]
     output: Path
     checkpoint: Path | None
+    overwrite: bool
+    accept: bool
 
 
 def run_fit(request: FitRequest, as_json: bool) -> None:
-    """Fit, write and print; raise `FitError` if a fit has not converged or engines disagree."""
+    """Fit, write and print.
+
+    Raises
+    ------
+    FitError
+        If a fit has not converged or the engines disagree.
+    DistrustError
+        If a solution should not be trusted, unless the request accepts that.
+    """
     start = time.perf_counter()
     keep_memory()
     outputs = {engine: _output(request, engine) for engine in request.engines}
+    inputs = request.files.inputs()
     for output in outputs.values():
-        require_writable(output)
+        check_output(output, FITS_SUFFIXES, inputs, request.overwrite)
+    if request.checkpoint is not None:
+        # One that exists is resumed from.
+        check_output(request.checkpoint, (), [*inputs, *outputs.values()], overwrite=True)
     if request.checkpoint is not None and "svi" not in request.engines:
         raise InputError(
             f"--checkpoint: expected the engine svi, found {', '.join(request.engines)}"
@@ -53,10 +68,10 @@ def run_fit(request: FitRequest, as_json: bool) -> None:
 
         fitter = OrbitFitter(data, focal_plane)
         for engine, output in outputs.items():
-            result = _fit(fitter, data, request, engine, reporter)
+            result = with_verdict(_fit(fitter, data, request, engine, reporter))
             reporter.say("writing the result")
             fitted = time.perf_counter()
-            write_result(result, output)
+            write_result(result, output, request.overwrite)
             if engine == "svi" and request.checkpoint is not None:
                 request.checkpoint.unlink(missing_ok=True)
             seconds = {"read": read, **dict(result.summary["seconds"])}
@@ -65,6 +80,8 @@ def run_fit(request: FitRequest, as_json: bool) -> None:
             summaries[engine] |= _orders(result)
             results[engine] = result
     _report(summaries, results, outputs, as_json)
+    if not request.accept:
+        _require_trust(summaries)
 
 
 def _output(request: FitRequest, engine: str) -> Path:
@@ -105,6 +122,15 @@ def _orders(result: "FitResult") -> dict[str, Any]:
     # JSON has no NaN.
     plain = table.astype(object).where(table.notna(), None)
     return {"orders": plain.to_dict("records"), "preferred_order": order_verdict(table)}
+
+
+def _require_trust(summaries: Mapping[str, dict[str, Any]]) -> None:
+    for engine, summary in summaries.items():
+        if summary["verdict"]["state"] == "bad":
+            raise DistrustError(
+                f"orbit {summary['orbit']}, {engine}: the fit converged, but its solution should "
+                "not be trusted as it is; it is written, and --accept ends with exit code 0"
+            )
 
 
 def _report(

@@ -23,7 +23,7 @@ def print_json(value: object) -> None:
 
 def print_fit(summary: Mapping[str, Any], output: Path) -> None:
     """Print the summary of a fit as text."""
-    verdict = "converged" if summary["converged"] else "NOT CONVERGED"
+    outcome = "converged" if summary["converged"] else "NOT CONVERGED"
     rows = [
         ("orbit", f"{summary['orbit']}, mean epoch MJD {summary['epoch_mjd']:.5f} (TCB)"),
         (
@@ -33,7 +33,7 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
         ),
         *_outlier_row(summary),
         ("engine", _engine(summary)),
-        ("fit", f"{verdict}: {summary['reason']}"),
+        ("fit", f"{outcome}: {summary['reason']}"),
         ("chi2 per degree of freedom", _chi2(summary)),
         ("residual rms", _milli_pixels(summary)),
         ("normalised deviation", _deviations(summary)),
@@ -44,10 +44,14 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
         *_truth_rows(summary.get("truth", {})),
         ("time", ", ".join(f"{k} {v:.2f} s" for k, v in summary["seconds"].items())),
         ("written", str(output)),
+        ("verdict", summary["verdict"]["headline"]),
     ]
     width = max(len(name) for name, _ in rows)
     for name, text in rows:
         typer.echo(f"{name:<{width}}  {text}")
+    if summary["verdict"]["state"] != "good":
+        for sentence in summary["verdict"]["reasons"]:
+            typer.echo(f"- {sentence}")
 
 
 def print_orders(rows: Iterable[Mapping[str, Any]], verdict: str) -> None:

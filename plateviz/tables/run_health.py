@@ -8,7 +8,7 @@ import pandas as pd
 
 from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.tables.labels import dates
-from plateviz.tables.summary import State, SummaryItem, verdict
+from plateviz.tables.summary import State, SummaryItem, deviation_state, verdict
 
 COMPLETE, FAILED, MISSING = "complete", "failed", "missing"
 _OF_STATUS: Mapping[str, State] = MappingProxyType(
@@ -44,9 +44,10 @@ def orbit_states(orbits: pd.DataFrame) -> pd.DataFrame:
     }
     for axis in ("ra", "dec"):
         name = f"normalised_deviation_{axis}"
-        expected = orbits[f"expected_{name}"]
-        variance = expected**2 / (2.0 * _positive(orbits["n_reference"]))
-        columns[name] = _verdicts(orbits[name], expected, variance)
+        # Results of older versions lack it.
+        dof = orbits[f"normalised_deviation_dof_{axis}"].fillna(orbits["n_reference"])
+        numbers = zip(orbits[name], orbits[f"expected_{name}"], dof, strict=True)
+        columns[name] = [deviation_state(*row) for row in numbers]
     return pd.DataFrame(columns, index=orbits.index)
 
 

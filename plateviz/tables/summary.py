@@ -4,11 +4,15 @@ import math
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
+from scipy.special import chdtrc
+
 from solver.data.result import FitResult
 
 State = Literal["good", "warn", "bad", "neutral"]
 _GOOD_SIGMAS = 3.0
 _BAD_SHARE = 0.2
+# Probability that a normal number is further than three sigmas from its mean.
+_UNLIKELY = 2.7e-3
 
 
 class SummaryItem(NamedTuple):
@@ -61,6 +65,23 @@ def verdict(value: float, expected: float, scatter: float) -> State:
     return "bad" if departure > _BAD_SHARE * abs(expected) else "warn"
 
 
+def deviation_state(value: float, expected: float, dof: float) -> State:
+    """Return the state of a normalised deviation, by the rule of `summary_strip`.
+
+    Its square is distributed as chi2, which for few degrees of freedom is far from symmetric.
+
+    Parameters
+    ----------
+    dof : degrees of freedom of the deviation
+    """
+    if not (math.isfinite(value) and expected > 0.0 and dof > 0.0):
+        return "neutral"
+    above = float(chdtrc(dof, dof * (value / expected) ** 2))
+    if 2.0 * min(above, 1.0 - above) >= _UNLIKELY:
+        return "good"
+    return "bad" if abs(value - expected) > _BAD_SHARE * expected else "warn"
+
+
 def _rule(expected: float, scatter: float, origin: str) -> str:
     return (
         f"Expected {expected:.3f} ± {scatter:.3f} ({origin}). "
@@ -97,14 +118,19 @@ def _normalised_deviation(result: FitResult, coordinate: str, symbol: str) -> Su
     value = _number(result, f"normalised_deviation_{coordinate}")
     expected = _number(result, f"expected_normalised_deviation_{coordinate}")
     count = int(_number(result, "n_reference"))
-    scatter = expected / math.sqrt(2.0 * count) if count else float("nan")
-    origin = f"expected value over √(2 n), {count} reference sources"
+    # Older results lack it.
+    dof = float(result.summary.get(f"normalised_deviation_dof_{coordinate}", count))
+    scatter = expected / math.sqrt(2.0 * dof) if dof > 0.0 else float("nan")
+    origin = (
+        f"{count} reference sources with common errors, which scatter like {dof:.1f} "
+        "independent ones"
+    )
     return SummaryItem(
         f"Reference sources, {symbol}",
         f"{value:.3f} (expected {expected:.3f})",
         "Rms of estimate minus catalogue over the catalogue's sigma. "
         + _rule(expected, scatter, origin),
-        verdict(value, expected, scatter),
+        deviation_state(value, expected, dof),
     )
 
 

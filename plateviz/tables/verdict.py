@@ -1,6 +1,7 @@
 """The verdict on a solution, a run or a source as text: whether to trust it, and why."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,12 @@ class Verdict(NamedTuple):
     headline: str
     reasons: list[str]
     notable: list[str]
+
+
+def with_verdict(result: FitResult) -> FitResult:
+    """Return a result whose summary has the verdict on it, for the files and the command line."""
+    verdict = orbit_verdict(result)
+    return replace(result, summary={**result.summary, "verdict": verdict._asdict()})
 
 
 def orbit_verdict(result: FitResult) -> Verdict:

@@ -41,9 +41,20 @@ def primary_header(result: FitResult) -> fits.Header:
     cards += [
         *_settings(result.settings),
         ("NITER", int(result.trace["iteration"].max()) if len(result.trace) else 0, "iterations"),
+        *_verdict(result),
         *_summary_cards(result),
     ]
     return _header(cards)
+
+
+def _verdict(result: FitResult) -> list[Card]:
+    verdict = result.summary.get("verdict")
+    if verdict is None:
+        return []
+    return [
+        ("VERDICT", verdict["state"], "good, warn or bad"),
+        ("VERDTEXT", verdict["headline"], ""),
+    ]
 
 
 def _settings(settings: FitSettings) -> list[Card]:

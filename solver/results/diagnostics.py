@@ -48,6 +48,41 @@ def normalised_deviation(
     return NormalisedDeviation(np.sqrt(squares.mean(axis=0)), np.sqrt(shares.mean(axis=0)))
 
 
+def deviation_freedom(
+    reduced: ReducedSystem,
+    covariance: Covariances,
+    prior_variance: Float[np.ndarray, "src 2"],
+    is_reference: Bool[np.ndarray, " src"],
+) -> Float[np.ndarray, " 2"]:
+    """Return how many independent deviations there are in alpha* and in delta.
+
+    The estimates of all reference sources share the errors of the calibration, so that their
+    deviations vary together, by far fewer directions than there are sources. With M the
+    covariance of the normalised deviations, the sum of their squares is distributed about as
+    chi2 with (tr M)^2 / tr(M^2) degrees of freedom, scaled to its mean (Satterthwaite).
+
+    Parameters
+    ----------
+    prior_variance : mas^2
+    """
+    order = covariance.source_blocks.order
+    # T'T is the part of the covariance that two sources share through the calibration.
+    shared = reduced.factor @ covariance.cross[:, :, is_reference[order]].reshape(
+        len(reduced.factor), -1
+    )
+    shared = shared.reshape(len(reduced.factor), 2, -1)
+    variances = prior_variance[order][is_reference[order]]
+    marginal = np.diagonal(covariance.source, axis1=1, axis2=2)[order][is_reference[order]]
+    freedom = np.zeros(2)
+    for axis in range(2):
+        scaled = shared[:, axis] / np.sqrt(variances[:, axis])
+        together = -(scaled.T @ scaled)
+        np.fill_diagonal(together, 1.0 - marginal[:, axis] / variances[:, axis])
+        squares = float((together**2).sum())
+        freedom[axis] = np.trace(together) ** 2 / squares if squares > 0.0 else 0.0
+    return freedom
+
+
 def effective_parameters(
     priors: Priors, prior_hessian: Float[np.ndarray, " calib"], covariance: Covariances
 ) -> float:

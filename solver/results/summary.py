@@ -5,6 +5,7 @@ import pandas as pd
 
 from solver.data.settings import FitSettings
 from solver.results.diagnostics import (
+    deviation_freedom,
     effective_parameters,
     log_evidence,
     mean_covariance,
@@ -118,9 +119,14 @@ def _reference_figures(solution: SolvedProblem, is_reference: np.ndarray) -> dic
     variances = np.diagonal(np.linalg.inv(solution.problem.priors.precision), axis1=1, axis2=2)
     marginal = np.diagonal(solution.covariance.source, axis1=1, axis2=2)
     deviation = normalised_deviation(solution.mode.sources, variances, marginal, is_reference)
+    freedom = deviation_freedom(solution.reduced, solution.covariance, variances, is_reference)
     return {
-        f"{kind}normalised_deviation_{axis}": float(values[i])
-        for kind, values in (("", deviation.measured), ("expected_", deviation.expected))
+        f"{name}_{axis}": float(values[i])
+        for name, values in (
+            ("normalised_deviation", deviation.measured),
+            ("expected_normalised_deviation", deviation.expected),
+            ("normalised_deviation_dof", freedom),
+        )
         for i, axis in enumerate(("ra", "dec"))
     }
 

@@ -143,6 +143,8 @@ def _orbits(random: np.random.Generator, n_orbits: int, n_sources: int) -> pd.Da
             "normalised_deviation_dec": random.normal(0.33, 0.03, n_orbits),
             "expected_normalised_deviation_ra": random.normal(0.34, 0.003, n_orbits),
             "expected_normalised_deviation_dec": random.normal(0.33, 0.003, n_orbits),
+            "normalised_deviation_dof_ra": random.normal(25.0, 1.0, n_orbits),
+            "normalised_deviation_dof_dec": random.normal(25.0, 1.0, n_orbits),
             "mean_error_ra": 0.03,
             "mean_error_dec": 0.03,
             "seconds": random.uniform(3.0, 4.0, n_orbits),

@@ -29,8 +29,11 @@ def test_fit_prints_one_json_object_and_writes_the_result(run, sample, tmp_path)
 
 
 def test_fit_prints_a_summary_as_text(run, sample, tmp_path):
-    code, out, _ = run("fit", *sample[:2], "-o", tmp_path / "r.fits", "--order", "3")
-    assert code == 0
+    code, out, err = run("fit", *sample[:2], "-o", tmp_path / "r.fits", "--order", "3")
+    assert code == 3
+    assert "should not be trusted as it is; it is written, and --accept" in err
+    assert "This solution should not be trusted as it is." in out
+    assert "- χ² per degree of freedom: " in out
     assert "converged: every step" in out
     assert "gauss-newton, " in out
     assert "36312 measurements of 814 sources (58 reference)" in out

@@ -8,6 +8,7 @@ from solver.data.settings import FitSettings
 from solver.linear.chi2 import gradient
 from solver.linear.leverage import covariances
 from solver.results.diagnostics import (
+    deviation_freedom,
     effective_parameters,
     error_budget,
     induced_shift,
@@ -96,6 +97,35 @@ def test_shifting_the_reference_catalogue_moves_the_solution_by_the_induced_shif
     found = moved.mode.sources + error - solution.mode.sources
     np.testing.assert_allclose(found, expected, atol=2e-3)
     assert np.abs(expected).max() > 0.3
+
+
+def test_deviation_freedom_equals_the_dense_one(problem, reduced, dense):
+    references = np.flatnonzero(~members_of(problem))
+    variances = np.diagonal(np.linalg.inv(problem.priors.precision), axis1=1, axis2=2)
+    expected = []
+    for axis in range(2):
+        rows = dense.n_calib + 2 * references + axis
+        sigma = np.sqrt(variances[references, axis])
+        covariance = dense.covariance[np.ix_(rows, rows)] / np.outer(sigma, sigma)
+        deviations = np.eye(len(rows)) - covariance
+        expected.append(np.trace(deviations) ** 2 / np.trace(deviations @ deviations))
+    found = deviation_freedom(reduced, covariances(reduced), variances, ~members_of(problem))
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    assert (found < len(references)).all()
+
+
+def test_normalised_deviation_scatters_over_mocks_as_its_freedom_says(mocks):
+    ratios, freedoms = [], []
+    for _, solution in mocks:
+        is_reference = ~members_of(solution.problem)
+        variances = np.diagonal(np.linalg.inv(solution.problem.priors.precision), axis1=1, axis2=2)
+        marginal = np.diagonal(solution.covariance.source, axis1=1, axis2=2)
+        found = normalised_deviation(solution.mode.sources, variances, marginal, is_reference)
+        freedom = deviation_freedom(solution.reduced, solution.covariance, variances, is_reference)
+        ratios.append((found.measured / found.expected) ** 2)
+        freedoms.append(freedom)
+    tails = stats.chi2.sf(np.array(ratios) * np.array(freedoms), np.array(freedoms))
+    assert stats.kstest(tails.ravel(), "uniform").pvalue > 0.01
 
 
 def test_normalised_deviation_equals_that_of_the_paper():

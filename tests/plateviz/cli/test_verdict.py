@@ -1,0 +1,100 @@
+"""The verdict of `plateviz fit`: printed, in the result, and an exit code; and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+from astropy.io import fits
+
+from solver.io.result import read_result
+
+
+@pytest.fixture
+def orbit(sample_orbit_dir):
+    return [sample_orbit_dir / f"sample_{name}.fits" for name in ("obs", "ref")]
+
+
+def changed(path, folder, change):
+    """Write a copy of a file whose tables were changed, and return its path."""
+    copy = folder / path.name
+    with fits.open(path) as hdus:
+        for hdu in hdus[1:]:
+            change(hdu.data)
+        hdus.writeto(copy, checksum=True)
+    return copy
+
+
+@pytest.fixture
+def measured_references(orbit):
+    """Rows of the reference sources that the orbit has measured."""
+    measured = fits.getdata(orbit[0], "measurement")["source_id"]
+    table = fits.getdata(orbit[1])
+    is_reference = np.asarray(table["reference_flag"]).astype(bool)
+    return np.flatnonzero(is_reference & np.isin(table["source_id"], measured))
+
+
+def test_good_solution_says_so_everywhere(run, orbit, tmp_path):
+    code, out, _ = run("fit", *orbit, "-o", tmp_path / "r.fits", "--json")
+    assert code == 0
+    verdict = json.loads(out)["verdict"]
+    assert verdict["state"] == "good"
+    assert verdict["headline"] == "This solution can be trusted."
+    assert verdict["reasons"]
+    assert fits.getheader(tmp_path / "r.fits")["VERDICT"] == "good"
+    assert read_result(tmp_path / "r.fits").summary["verdict"] == verdict
+
+
+@pytest.mark.parametrize("obstime", [0.0, 1e6, np.nan], ids=str)
+def test_time_that_no_mission_has_is_refused(run, orbit, tmp_path, obstime):
+    def change(table):
+        if "OBSTIME" in [name.upper() for name in table.names]:
+            table["obstime"][3] = obstime
+
+    observation = changed(orbit[0], tmp_path, change)
+    code, _, err = run("fit", observation, orbit[1], "-o", tmp_path / "r.fits")
+    assert code == 2
+    assert "column 'obstime': expected" in err
+    assert "the first is row 4" in err
+    assert not (tmp_path / "r.fits").exists()
+
+
+def test_exposure_of_another_day_is_refused_by_name(run, orbit, tmp_path):
+    def change(table):
+        if "OBSTIME" in [name.upper() for name in table.names]:
+            table["obstime"][3] += 5.0
+            change.row = table[3]
+            change.key = tuple(int(table[n][3]) for n in ("orbit_id", "field_id", "plate_id"))
+
+    observation = changed(orbit[0], tmp_path, change)
+    code, _, err = run("fit", observation, orbit[1], "-o", tmp_path / "r.fits")
+    assert code == 2
+    assert "expected the exposures of an orbit within 2 d" in err
+    assert str(change.key) in err
+
+
+def test_reference_epoch_zero_is_refused(run, orbit, measured_references, tmp_path):
+    def change(table):
+        table["ref_epoch"][measured_references[0]] = 0.0
+
+    reference = changed(orbit[1], tmp_path, change)
+    code, _, err = run("fit", orbit[0], reference, "-o", tmp_path / "r.fits")
+    assert code == 2
+    assert "column 'ref_epoch': expected values from 1850 to 2150 yr" in err
+
+
+def test_wrong_references_end_with_exit_code_three(run, orbit, measured_references, tmp_path):
+    """Three references 50 mas off: every number converges, and the positions are wrong."""
+
+    def change(table):
+        table["dec"][measured_references[:3]] += 50.0 / 3.6e6
+
+    reference = changed(orbit[1], tmp_path, change)
+    code, out, err = run("fit", orbit[0], reference, "-o", tmp_path / "r.fits", "--json")
+    assert code == 3
+    assert "the fit converged, but its solution should not be trusted" in err
+    assert json.loads(out)["verdict"]["state"] == "bad"
+    assert fits.getheader(tmp_path / "r.fits")["VERDICT"] == "bad"
+    options = ["--overwrite", "--accept"]
+    code, out, err = run("fit", orbit[0], reference, "-o", tmp_path / "r.fits", *options)
+    assert code == 0
+    assert "This solution should not be trusted as it is." in out

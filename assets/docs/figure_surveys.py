@@ -17,7 +17,12 @@ from plateviz.runs.queries import SurveyRun, open_run
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from solver.data.schema import MEASUREMENT
 from solver.data.settings import FitSettings
-from solver.io.survey import measurement_path, read_survey_table, write_survey_table
+from solver.io.survey import (
+    MANIFEST,
+    measurement_path,
+    read_survey_table,
+    write_survey_table,
+)
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
@@ -51,7 +56,9 @@ class Surveys:
     def ageing(self) -> SurveyRun:
         """The same survey with measurement errors that grow with time, but not as stated."""
         directory = self.folder / "ageing"
-        shutil.copytree(self.good.survey, directory, ignore=shutil.ignore_patterns("runs"))
+        # Without the manifest, since its measurements are to be changed.
+        left_out = shutil.ignore_patterns("runs", MANIFEST)
+        shutil.copytree(self.good.survey, directory, ignore=left_out)
         random = np.random.default_rng(4)
         for orbit in range(_SKY.orbits):
             _make_noisy(measurement_path(directory, orbit), 0.01 * orbit, random)

@@ -1,8 +1,8 @@
 """The command line: `plateviz simulate | gaia | inspect | fit | survey | serve | report | ...`.
 
-A user's mistake ends with exit code 2 and one message; a fit that has no solution, or
-has not converged, with exit code 1. Each command imports the slow modules that it needs, so
-that `--help` and error messages appear at once.
+A user's mistake ends with exit code 2 and one message; a fit that has no solution, or has not
+converged, with exit code 1; one whose solution should not be trusted with exit code 3. Each
+command imports the slow modules that it needs, so that `--help` and error messages appear at once.
 """
 
 import sys
@@ -16,12 +16,13 @@ import typer
 from plateviz.cache import keep_compilations
 from plateviz.cli import options
 from plateviz.cli.gaia import gaia
+from plateviz.cli.inspect import inspect
 from plateviz.cli.report import report
 from plateviz.cli.reproduce import reproduce
 from plateviz.cli.serve import run_server, serve
 from plateviz.runs.run import DEFAULT_RUN
 from solver.data.settings import ENGINES
-from solver.errors import FitError, InputError
+from solver.errors import DistrustError, FitError, InputError
 
 app = typer.Typer(
     help="Solve the astrometry of satellite orbits by Plate Analysis, and judge the solutions.",
@@ -116,22 +117,7 @@ def simulate(
 app.command()(gaia)
 
 
-@app.command()
-def inspect(
-    files: Annotated[list[Path], typer.Argument(help="Files to inspect.", metavar="FILE...")],
-    as_json: Annotated[bool, _JSON] = False,
-) -> None:
-    """Describe files and their columns, and list every problem found in them."""
-    from plateviz.cli.output import print_inspection, print_json
-    from solver.io.inspect import inspect_files
-
-    found = inspect_files(files)
-    if as_json:
-        print_json(found)
-    else:
-        print_inspection(found)
-    if any(one["problems"] for one in found):
-        raise typer.Exit(2)
+app.command()(inspect)
 
 
 @app.command()
@@ -149,6 +135,13 @@ def fit(
         typer.Option(help="File for the state of svi, from which a stopped fit resumes."),
     ] = None,
     instrument: options.Instrument = None,
+    overwrite: options.Overwrite = False,
+    accept: Annotated[
+        bool,
+        typer.Option(
+            "--accept", help="End with exit code 0 even if the solution should not be trusted."
+        ),
+    ] = False,
     as_json: Annotated[bool, _JSON] = False,
     **settings: Any,  # noqa: ANN401 the options of the settings
 ) -> None:
@@ -159,7 +152,8 @@ def fit(
     engines = ENGINES if settings["engine"] == "all" else (settings["engine"],)
     chosen = options.fit_settings({**settings, "engine": engines[0]})
     files = OrbitFiles(str(observations), str(reference), _text(truth), orbit, _text(instrument))
-    run_fit(FitRequest(files, orbit, chosen, engines, output, checkpoint), as_json)
+    request = FitRequest(files, orbit, chosen, engines, output, checkpoint, overwrite, accept)
+    run_fit(request, as_json)
 
 
 @app.command()
@@ -182,14 +176,18 @@ def survey(
         str | None,
         typer.Option(help="Address of a Dask scheduler whose workers fit the orbits instead."),
     ] = None,
+    repair: Annotated[
+        bool,
+        typer.Option("--repair", help="Fit orbits again whose files are damaged."),
+    ] = False,
     as_json: Annotated[bool, _JSON] = False,
     **settings: Any,  # noqa: ANN401 the options of the settings
 ) -> None:
     """Fit every orbit of a survey; an interrupted run resumes."""
     from plateviz.cli.survey import parse_orbits, run_survey
 
-    chosen = options.fit_settings(settings)
-    run_survey(directory, run, chosen, parse_orbits(orbits), workers, scheduler, as_json)
+    chosen, numbers = options.fit_settings(settings), parse_orbits(orbits)
+    run_survey(directory, run, chosen, numbers, workers, scheduler, repair, as_json)
 
 
 app.command()(serve)
@@ -198,12 +196,18 @@ app.command()(reproduce)
 
 
 def main() -> None:
-    """Run the command line; a user's mistake ends with one message and exit code 2."""
+    """Run the command line; what goes wrong ends with one message and an exit code."""
     try:
         app()
     except (InputError, FitError) as error:
         typer.echo(f"plateviz: {error}", err=True)
-        sys.exit(2 if isinstance(error, InputError) else 1)
+        sys.exit(_exit_code(error))
+
+
+def _exit_code(error: InputError | FitError) -> int:
+    if isinstance(error, InputError):
+        return 2
+    return 3 if isinstance(error, DistrustError) else 1
 
 
 def _text(path: Path | None) -> str | None:

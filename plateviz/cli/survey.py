@@ -41,6 +41,7 @@ def run_survey(
     orbits: list[int] | None,
     workers: int | None,
     scheduler: str | None,
+    repair: bool,
     as_json: bool,
 ) -> None:
     """Fit the missing orbits and print the outcome; raise `FitError` if orbits failed."""
@@ -48,7 +49,7 @@ def run_survey(
         raise InputError(
             "--workers: expected none with --scheduler, which has its own workers, found both"
         )
-    report = fit_and_report(survey, name, settings, orbits, workers, scheduler)
+    report = fit_and_report(survey, name, settings, orbits, workers, scheduler, repair)
     if as_json:
         print_json(
             {

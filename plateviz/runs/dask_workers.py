@@ -12,6 +12,7 @@ from distributed import Client, Future, LocalCluster, as_completed
 
 from plateviz.cache import keep_compilations
 from plateviz.runs.run import Run
+from plateviz.tables.verdict import with_verdict
 from solver.data.instrument import parse_instrument
 from solver.errors import FitError, InputError
 from solver.io.survey import HEADER, read_header, read_survey_orbit
@@ -61,7 +62,7 @@ def _fit(run: Run, orbit: int) -> None:
 
     instrument = parse_instrument(str(read_header(run.survey)["instrument"]), run.survey / HEADER)
     fitter = OrbitFitter(read_survey_orbit(run.survey, orbit), instrument)
-    result = fitter.fit(run.settings())
+    result = with_verdict(fitter.fit(run.settings()))
     run.keep(orbit, result, fitter.history(result))
 
 

@@ -18,18 +18,15 @@ from pyarrow import parquet
 from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
 from plateviz.runs.fitted_orbit import remove_unfinished
 from plateviz.runs.lock import locked
-from plateviz.runs.queries import (
-    ERRORS_FILE,
-    MOTIONS_FILE,
-    gather_history,
-)
-from plateviz.runs.run import Run, begin_run
+from plateviz.runs.queries import gather_history
+from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run, begin_run
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, MOTIONS
 from solver.errors import InputError
 from solver.io.atomic import write_atomically
 from solver.io.parquet import write_parquet
 from solver.io.survey import survey_orbits
+from solver.io.table_check import refuse
 from solver.model.apparent_motion import julian_year
 from solver.results.time_series import errors_by_count, motion_table
 from solver.runtime.threads import count_cores
@@ -64,6 +61,7 @@ def fit_survey(
     workers: int | None = None,
     scheduler: str | None = None,
     progress: Callable[[Progress], None] = lambda _: None,
+    repair: bool = False,
 ) -> Report:
     """Fit the orbits of a survey that a run does not contain yet, and write the tables over all.
 
@@ -75,12 +73,14 @@ def fit_survey(
     workers : number of processes on this machine; one per core by default
     scheduler : address of a Dask scheduler to use instead
     progress : called after every orbit
+    repair : whether damaged orbits and tables are removed and made again; otherwise they are
+        refused
 
     Raises
     ------
     InputError
-        If the survey, the run or an orbit is not there as asked for, no scheduler answers, or
-        another process is fitting the run.
+        If the survey, the run or an orbit is not there as asked for, a file of the run is
+        damaged, no scheduler answers, or another process is fitting the run.
     """
     wanted = _wanted(survey, orbits)
     run = begin_run(survey, name, settings)
@@ -90,6 +90,10 @@ def fit_survey(
                 f"{run.directory}: expected a run that no other process is fitting, found one that "
                 "another process is fitting; wait for it, or give another --run NAME"
             )
+        if repair:
+            run.remove_damaged()
+        else:
+            refuse(run.changes())
         return _fit_missing(run, wanted, workers, scheduler, progress)
 
 

@@ -1,9 +1,12 @@
 """Fitted orbits on disk: one directory each, with Parquet files, either complete or absent.
 
 No user interface and no JAX. A directory is written under a temporary name, with the file
-`COMPLETE` last, and then renamed; it is never changed afterwards.
+`COMPLETE` last, and then renamed; it is never changed afterwards. `COMPLETE` is a manifest of the
+other files, and a file that is not the one it lists is not read. The times, which differ between
+repeated fits of the same bytes, are not in it; their file has a SHA-256 of its own.
 """
 
+import hashlib
 import json
 import os
 import secrets
@@ -14,18 +17,28 @@ from typing import Any
 
 import pandas as pd
 import pyarrow as pa
+from pyarrow.compute import Expression
 
 from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES, TRACE
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.io.parquet import write_parquet
+from solver.io.failures import reading
+from solver.io.manifest import (
+    changes,
+    manifest_of,
+    read_manifest,
+    require_digest,
+    require_unchanged,
+)
+from solver.io.parquet import read_frame, write_parquet
 
 FORMAT = 1
 _COMPLETE = "COMPLETE"
 _HEAD = "result.json"
 # In a separate file, so that repeated fits differ in this file only.
 _TIMINGS = "timings.json"
+_REMEDY = "`plateviz survey` with --repair fits the orbit again"
 
 
 def write_fitted_orbit(
@@ -46,7 +59,10 @@ def write_fitted_orbit(
         _write_head(staging, result)
         for path in staging.iterdir():
             _flush(path)
-        (staging / _COMPLETE).touch()
+        names = {path.name for path in staging.iterdir()} - {_TIMINGS}
+        manifest = manifest_of(staging, names)
+        (staging / _COMPLETE).write_text(manifest, encoding="utf-8")
+        _flush(staging / _COMPLETE)
         _flush(staging)
         if not directory.exists():
             staging.rename(directory)
@@ -62,42 +78,81 @@ def remove_unfinished(folder: Path) -> None:
             shutil.rmtree(staging, ignore_errors=True)
 
 
+def remove_fitted_orbit(directory: Path) -> None:
+    """Remove a fitted orbit, which is absent for readers from the first moment on."""
+    doomed = directory.with_name(f".{directory.name}-{secrets.token_hex(6)}")
+    directory.rename(doomed)
+    shutil.rmtree(doomed, ignore_errors=True)
+
+
 def read_fitted_orbit(directory: Path) -> FitResult:
     """Read one fitted orbit.
 
     Raises
     ------
     InputError
-        If the directory is not a complete fitted orbit, or was written by a newer version.
+        If the directory is not a complete fitted orbit, a file in it is damaged, or it was
+        written by a newer version.
     """
     if not is_complete(directory):
         raise InputError(
             f"{directory}: expected a complete fitted orbit, found no {_COMPLETE} file in it"
         )
-    head = json.loads((directory / _HEAD).read_text(encoding="utf-8"))
-    if head["format"] > FORMAT:
-        raise InputError(
-            f"{directory}: expected a fitted orbit of format {FORMAT} or older, found "
-            f"{head['format']}; it was written by a newer plateviz"
+    manifest = read_manifest(directory / _COMPLETE)
+    for name, digest in manifest.items():
+        require_unchanged(directory / name, digest, _REMEDY)
+    head, timings = _read_json(directory / _HEAD), _read_timings(directory)
+    with reading(str(directory), "a fitted orbit"):
+        if head["format"] > FORMAT:
+            raise InputError(
+                f"{directory}: expected a fitted orbit of format {FORMAT} or older, found "
+                f"{head['format']}; it was written by a newer plateviz"
+            )
+        tables = {table.name: _read_table(directory, table.name) for table in RESULT_TABLES}
+        trace = read_frame(directory / "trace.parquet")
+        tables["trace"] = trace.assign(seconds=timings["trace"])[TRACE.names]
+        return FitResult(
+            **tables,  # type: ignore[arg-type]
+            summary={**head["summary"], "seconds": timings["seconds"]},
+            settings=FitSettings.from_dict(head["settings"]),
+            provenance=head["provenance"],
         )
-    timings = json.loads((directory / _TIMINGS).read_text(encoding="utf-8"))
-    tables = {table.name: _read_table(directory, table.name) for table in RESULT_TABLES}
-    trace = pd.read_parquet(directory / "trace.parquet")
-    tables["trace"] = trace.assign(seconds=timings["trace"])[TRACE.names]
-    return FitResult(
-        **tables,  # type: ignore[arg-type]
-        summary={**head["summary"], "seconds": timings["seconds"]},
-        settings=FitSettings.from_dict(head["settings"]),
-        provenance=head["provenance"],
-    )
 
 
 def read_summary(directory: Path) -> dict[str, Any]:
-    """Return the summary of a complete fitted orbit, with its `seconds`."""
-    head, timings = (
-        json.loads((directory / name).read_text(encoding="utf-8")) for name in (_HEAD, _TIMINGS)
-    )
-    return {**head["summary"], "seconds": timings["seconds"]}
+    """Return the summary of a complete fitted orbit, with its `seconds`.
+
+    Raises
+    ------
+    InputError
+        If its files are damaged.
+    """
+    wanted = read_manifest(directory / _COMPLETE).get(_HEAD)
+    require_unchanged(directory / _HEAD, wanted, _REMEDY)
+    head, timings = _read_json(directory / _HEAD), _read_timings(directory)
+    with reading(str(directory), "the summary of a fitted orbit"):
+        return {**head["summary"], "seconds": timings["seconds"]}
+
+
+def read_kept_table(directory: Path, name: str, rows: Expression | None = None) -> pd.DataFrame:
+    """Return the rows of one table of a fitted orbit that fulfil a condition; all by default.
+
+    Raises
+    ------
+    InputError
+        If the table is missing or damaged. Only the pages that are read are checked.
+    """
+    return read_frame(directory / f"{name}.parquet", rows=rows)
+
+
+def orbit_changes(directory: Path) -> list[str]:
+    """Return a message for each file of a fitted orbit that is not as it was written."""
+    found = list(changes(directory, directory / _COMPLETE, _REMEDY))
+    try:
+        _read_timings(directory)
+    except InputError as error:
+        found.append(str(error))
+    return found
 
 
 def is_complete(directory: Path) -> bool:
@@ -123,13 +178,33 @@ def _write_head(directory: Path, result: FitResult) -> None:
         "summary": summary,
         "provenance": dict(result.provenance),
     }
+    timings["sha256"] = _digest(timings)
     for name, content in ((_HEAD, head), (_TIMINGS, timings)):
         (directory / name).write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
 def _read_table(directory: Path, name: str) -> pd.DataFrame | None:
     path = directory / f"{name}.parquet"
-    return pd.read_parquet(path) if path.is_file() else None
+    return read_frame(path) if path.is_file() else None
+
+
+def _read_timings(directory: Path) -> dict[str, Any]:
+    path = directory / _TIMINGS
+    with reading(str(path), "the times of a fit"):
+        timings = dict(_read_json(path))
+        # Older versions wrote none.
+        require_digest(path, _digest(timings), timings.pop("sha256", None), _REMEDY)
+        return timings
+
+
+def _digest(timings: Mapping[str, Any]) -> str:
+    content = {name: value for name, value in timings.items() if name != "sha256"}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _read_json(path: Path) -> Any:  # noqa: ANN401 whatever the file holds
+    with reading(str(path), "JSON"):
+        return json.loads(path.read_text(encoding="utf-8"))
 
 
 def _flush(path: Path) -> None:

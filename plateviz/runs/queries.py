@@ -11,20 +11,18 @@ from pathlib import Path
 import duckdb
 import numpy as np
 import pandas as pd
+from pyarrow.compute import Expression
+from pyarrow.compute import field as col
 
-from plateviz.runs.fitted_orbit import read_fitted_orbit, read_summary
-from plateviz.runs.run import Run, runs_of
+from plateviz.runs.fitted_orbit import read_fitted_orbit, read_kept_table, read_summary
+from plateviz.runs.run import ERRORS_FILE, HISTORY_FILE, MOTIONS_FILE, Run, runs_of
 from solver.data.result import FitResult
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from solver.errors import InputError
 from solver.io.atomic import write_atomically
+from solver.io.parquet import count_rows, read_frame, write_batches
 from solver.io.survey import survey_orbits
 
-HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE = (
-    "history.parquet",
-    "motions.parquet",
-    "errors_by_count.parquet",
-)
 # Row groups of the gathered file. Small groups are fast to read, because a source is in one or
 # two of them; many groups are slow, because the statistics of all groups are read first.
 _SMALLEST_GROUP = 8192
@@ -107,43 +105,43 @@ class SurveyRun:
 
     def motions(self) -> pd.DataFrame:
         """Return `survey_schema.MOTIONS`; no rows until the orbits are gathered."""
-        path = self.directory / MOTIONS_FILE
-        return pd.read_parquet(path) if path.is_file() else pd.DataFrame(columns=MOTIONS.names)
+        if not self.is_gathered:
+            return pd.DataFrame(columns=MOTIONS.names)
+        return self._table(MOTIONS_FILE)
 
     def motion(self, source_id: int) -> pd.Series | None:
         """Return the row of one source in `motions`, or None."""
-        path = self.directory / MOTIONS_FILE
-        if not path.is_file():
+        if not self.is_gathered:
             return None
-        # DuckDB does not accept NumPy integers, which ids from tables are.
-        found = self._ask(
-            "SELECT * FROM read_parquet(?) WHERE source_id = ?", str(path), int(source_id)
-        )
+        found = self._table(MOTIONS_FILE, rows=col("source_id") == int(source_id))
         # Without the conversion pandas would make the ids of a row floating-point numbers.
         return None if found.empty else found.astype(object).iloc[0]
 
     def errors_by_count(self) -> pd.DataFrame | None:
         """Return `survey_schema.ERRORS_BY_COUNT` of the artificial sources, or None."""
-        path = self.directory / ERRORS_FILE
-        return pd.read_parquet(path)[ERRORS_BY_COUNT.names] if path.is_file() else None
+        if not (self.directory / ERRORS_FILE).is_file():
+            return None
+        return self._table(ERRORS_FILE, ERRORS_BY_COUNT.names)
 
     def history(self, source_id: int) -> pd.DataFrame:
         """Return `survey_schema.HISTORY` of one source by epoch; no rows if it is unknown."""
         if not self._has_history:
             return pd.DataFrame(columns=HISTORY.names)
-        return self._ask(
-            f"SELECT {', '.join(HISTORY.names)} FROM read_parquet(?) "
-            "WHERE source_id = ? ORDER BY epoch",
-            self._history_files,
-            int(source_id),
-        )
+        rows = col("source_id") == int(source_id)
+        if (self.directory / HISTORY_FILE).is_file():
+            # Not the whole file, which may be large: its pages have checksums of their own.
+            found = read_frame(self.directory / HISTORY_FILE, HISTORY.names, rows)
+        else:
+            orbits = map(self._run.orbit_directory, self._run.complete_orbits())
+            parts = [read_frame(orbit / HISTORY_FILE, HISTORY.names, rows) for orbit in orbits]
+            found = pd.concat(parts, ignore_index=True)
+        return found.sort_values("epoch", ignore_index=True, kind="stable")
 
     def counts(self) -> pd.DataFrame:
         """Return source_id, is_reference, is_artificial, n_orbits and n_obs of every source."""
         names = ["source_id", "is_reference", "is_artificial", "n_orbits", "n_obs"]
-        motions = self.directory / MOTIONS_FILE
-        if motions.is_file():
-            return pd.read_parquet(motions, columns=names)
+        if self.is_gathered:
+            return self._table(MOTIONS_FILE, names)
         if not self._has_history:
             kinds = {"is_reference": bool, "is_artificial": bool}
             return pd.DataFrame(columns=names).astype(dict.fromkeys(names, np.int64) | kinds)
@@ -168,17 +166,13 @@ class SurveyRun:
         (rms conditional sigma times sqrt(n_obs)) and `sigma_often` (median marginal sigma in
         RA of sources measured often), mas
         """
+        self._run.require_unchanged(HISTORY_FILE)
         return self._ask(_CLASSES, self._history_files, often).set_index("source_class")
 
     def exposure_residuals(self, orbit: int, field: int, plate: int) -> pd.DataFrame:
         """Return `schema.RESIDUALS` of one exposure."""
-        path = self._run.orbit_directory(orbit) / "residuals.parquet"
-        return self._ask(
-            "SELECT * FROM read_parquet(?) WHERE field_id = ? AND plate_id = ?",
-            str(path),
-            field,
-            plate,
-        )
+        rows = (col("field_id") == field) & (col("plate_id") == plate)
+        return read_kept_table(self._run.orbit_directory(orbit), "residuals", rows)
 
     def result(self, orbit: int) -> FitResult:
         """Return one fitted orbit; InputError if it does not exist."""
@@ -198,6 +192,13 @@ class SurveyRun:
         figures = {name: summary.get(name) for name in RUN_ORBITS.names if name in summary}
         seconds = sum(float(value) for value in summary["seconds"].values())
         return {**figures, "epoch": summary["epoch_mjd"], "seconds": seconds}
+
+    def _table(
+        self, name: str, columns: list[str] | None = None, rows: Expression | None = None
+    ) -> pd.DataFrame:
+        """Return a table over all orbits, checked as a whole if the run is complete."""
+        self._run.require_unchanged(name)
+        return read_frame(self.directory / name, columns, rows)
 
     def _ask(self, question: str, *values: object) -> pd.DataFrame:
         try:
@@ -239,22 +240,16 @@ def gather_history(run: Run) -> Path:
     """Write the history of all fitted orbits sorted by source and epoch; return its path."""
     target = run.directory / HISTORY_FILE
     parts = [str(run.orbit_directory(orbit) / HISTORY_FILE) for orbit in run.complete_orbits()]
-    with write_atomically(target) as temporary, duckdb.connect() as connection:
-        # With one thread the written bytes are reproducible.
-        connection.execute("SET threads = 1")
-        found = connection.execute("SELECT count(*) FROM read_parquet(?)", [parts]).fetchone()
-        group = rows_of_a_group(0 if found is None else int(found[0]))
-        connection.execute(
-            "COPY (SELECT * FROM read_parquet(?, hive_partitioning = false) "
-            "ORDER BY source_id, epoch) "
-            f"TO {_quoted(temporary)} (FORMAT parquet, COMPRESSION zstd, ROW_GROUP_SIZE {group})",
-            [parts],
+    group = rows_of_a_group(sum(map(count_rows, parts)))
+    # With one thread the written bytes are reproducible.
+    with write_atomically(target) as temporary, duckdb.connect(config={"threads": 1}) as connection:
+        ordered = connection.sql(
+            "SELECT * FROM read_parquet(?, hive_partitioning = false) ORDER BY source_id, epoch",
+            params=[parts],
         )
+        # DuckDB writes no checksums.
+        write_batches(ordered.to_arrow_reader(group), temporary)
     return target
-
-
-def _quoted(path: Path) -> str:
-    return "'" + str(path).replace("'", "''") + "'"
 
 
 def _typed(table: pd.DataFrame) -> pd.DataFrame:

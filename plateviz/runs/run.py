@@ -6,7 +6,8 @@
     runs/NAME/history.parquet             all orbits sorted by source (`plateviz.runs.queries`)
     runs/NAME/motions.parquet, ...        tables computed from it
     runs/NAME/gathered.json               the orbits in these tables; written after them
-    runs/NAME/COMPLETE                    written last, when every orbit of the survey is fitted
+    runs/NAME/COMPLETE                    written last, when every orbit of the survey is fitted: a
+                                          manifest of the files that belong to no orbit
 
 No user interface and no JAX. Existing files of orbits are never changed: an interrupted run is
 continued with the missing orbits, and only with the settings with which it was created.
@@ -20,11 +21,18 @@ from pathlib import Path
 
 import pandas as pd
 
-from plateviz.runs.fitted_orbit import is_complete, write_fitted_orbit
+from plateviz.runs.fitted_orbit import (
+    is_complete,
+    orbit_changes,
+    remove_fitted_orbit,
+    write_fitted_orbit,
+)
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
+from solver.io.failures import reading
+from solver.io.manifest import changes, manifest_of, read_manifest, require_unchanged
 from solver.io.survey import (
     EXPOSURES,
     HEADER,
@@ -42,6 +50,14 @@ _HEADER = "run.toml"
 _COMPLETE = "COMPLETE"
 _GATHERED = "gathered.json"
 _FAILED = "failed"
+# The tables over all orbits.
+HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE = (
+    "history.parquet",
+    "motions.parquet",
+    "errors_by_count.parquet",
+)
+_REMEDY = "`plateviz survey` with --repair writes the run's tables again"
+_HEADER_REMEDY = "restore it from a copy, or fit the survey with another --run"
 # Their versions belong to a run: results may differ between versions.
 PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
@@ -85,8 +101,9 @@ class Run:
         """Return the reasons why orbits have no solution, by orbit."""
         reasons = {}
         for path in sorted((self.directory / _FAILED).glob("orbit=*.json")):
-            content = json.loads(path.read_text(encoding="utf-8"))
-            reasons[int(content["orbit"])] = str(content["message"])
+            with reading(str(path), "why an orbit has no solution"):
+                content = json.loads(path.read_text(encoding="utf-8"))
+                reasons[int(content["orbit"])] = str(content["message"])
         return reasons
 
     def settings(self) -> FitSettings:
@@ -95,7 +112,43 @@ class Run:
 
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""
+        self.require_unchanged(_HEADER)
         return read_header(self.directory, _HEADER)
+
+    def require_unchanged(self, name: str) -> None:
+        """Refuse a file of a complete run that is not as it was written; InputError."""
+        if self.is_complete:
+            wanted = read_manifest(self.directory / _COMPLETE).get(name)
+            remedy = _HEADER_REMEDY if name == _HEADER else _REMEDY
+            require_unchanged(self.directory / name, wanted, remedy)
+
+    def changes(self) -> list[str]:
+        """Return a message for each file of the run that is not as it was written."""
+        found = [
+            message
+            for orbit in self.complete_orbits()
+            for message in orbit_changes(self.orbit_directory(orbit))
+        ]
+        if self.is_complete:
+            found += changes(self.directory, self.directory / _COMPLETE, _REMEDY)
+        return found
+
+    def remove_damaged(self) -> list[int]:
+        """Remove the orbits and the tables over all orbits that are not as they were written.
+
+        Returns
+        -------
+        The removed orbits, which have to be fitted again.
+        """
+        damaged = [
+            orbit for orbit in self.complete_orbits() if orbit_changes(self.orbit_directory(orbit))
+        ]
+        if self.changes():
+            for name in (_COMPLETE, _GATHERED):
+                (self.directory / name).unlink(missing_ok=True)
+        for orbit in damaged:
+            remove_fitted_orbit(self.orbit_directory(orbit))
+        return damaged
 
     def keep(self, orbit: int, result: FitResult, history: pd.DataFrame) -> None:
         """Write a fitted orbit with its part of the history, and remove a recorded failure."""
@@ -113,7 +166,10 @@ class Run:
     def gathered_orbits(self) -> list[int]:
         """Return the orbits that the tables over all orbits contain."""
         path = self.directory / _GATHERED
-        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
+        if not path.is_file():
+            return []
+        with reading(str(path), "the orbits in the tables of a run"):
+            return [int(orbit) for orbit in json.loads(path.read_text(encoding="utf-8"))]
 
     def mark_gathered(self, orbits: list[int]) -> None:
         """Record the gathered orbits; call after the tables over all orbits are written."""
@@ -122,8 +178,14 @@ class Run:
 
     def mark_complete(self) -> None:
         """Mark the run as complete; it is not changed afterwards."""
-        with write_atomically(self.directory / _COMPLETE):
-            pass
+        names = [
+            name
+            for name in (_HEADER, _GATHERED, HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE)
+            if (self.directory / name).is_file()
+        ]
+        manifest = manifest_of(self.directory, names)
+        with write_atomically(self.directory / _COMPLETE) as temporary:
+            temporary.write_text(manifest, encoding="utf-8")
 
     def _failure_path(self, orbit: int) -> Path:
         return self.directory / _FAILED / f"orbit={orbit:04d}.json"

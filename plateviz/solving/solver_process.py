@@ -23,6 +23,7 @@ from typing import TextIO
 
 from plateviz.runs.fitted_orbit import write_fitted_orbit
 from plateviz.solving.origin import origin_from_dict
+from plateviz.tables.verdict import with_verdict
 from solver.data.settings import COUNTED, FitSettings
 from solver.engines.gauss_newton import Iteration
 from solver.errors import CancelledError, FitError, InputError
@@ -143,7 +144,7 @@ def _fit(request: Request, progress: Callable[..., None]) -> Speculative:
     if result is None:
         result = fitter.fit(settings, on_iteration)
     progress(stage="writing the result")
-    write_fitted_orbit(Path(request["directory"]), result)
+    write_fitted_orbit(Path(request["directory"]), with_verdict(result))
     return fitter.precompute(settings.order)
 
 

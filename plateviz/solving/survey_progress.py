@@ -22,6 +22,7 @@ def fit_and_report(
     orbits: list[int] | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    repair: bool = False,
 ) -> "Report":
     """Fit the missing orbits, with a line of progress; arguments as for `fit_survey`."""
     keep_compilations()
@@ -35,7 +36,7 @@ def fit_and_report(
                 reporter.say(_progress_text(progress, time.perf_counter() - start))
 
         start = time.perf_counter()
-        return fit_survey(survey, name, settings, orbits, workers, scheduler, show)
+        return fit_survey(survey, name, settings, orbits, workers, scheduler, show, repair)
 
 
 def _progress_text(progress: "Progress", elapsed: float) -> str:

@@ -18,6 +18,7 @@ from solver.io.fits import read_fits
 from solver.io.formats import has_reader, is_fits, place, read_tables
 from solver.io.read_orbit import names_of
 from solver.io.result import is_result, to_result
+from solver.io.survey import survey_changes
 from solver.io.table_check import examine, matched_names
 
 _INPUTS = (MEASUREMENT, ENVIRONMENT, CATALOGUE, TRUTH)
@@ -93,6 +94,7 @@ def _inspect_folder(finding: _Finding) -> None:
             if path.name in _SURVEY_TABLES:
                 _inspect_in_folder(finding, path, _SURVEY_TABLES[path.name])
         finding.kind = "survey"
+        finding.problems += survey_changes(finding.path)
         return
     for path in files:
         _inspect_in_folder(finding, path)

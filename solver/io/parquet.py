@@ -1,10 +1,12 @@
-"""Parquet files: small, and fast to write and to read."""
+"""Parquet files: small, fast to write and to read, and with a checksum of each page."""
 
 from pathlib import Path
 
+import pandas as pd
 import pyarrow as pa
 from astropy.table import Table
 from pyarrow import parquet
+from pyarrow.compute import Expression
 
 from solver.io.arrow import from_arrow
 from solver.io.failures import reading
@@ -25,7 +27,50 @@ def write_parquet(table: pa.Table, path: Path) -> None:
         compression="zstd",
         use_dictionary=[name for name in table.column_names if name not in floats],
         use_byte_stream_split=floats,
+        write_page_checksum=True,
     )
+
+
+def count_rows(path: str) -> int:
+    """Return the number of rows of a table; InputError if it cannot be read."""
+    with reading(path, "a table of plateviz"):
+        return int(parquet.read_metadata(path).num_rows)
+
+
+def write_batches(batches: pa.RecordBatchReader, path: Path) -> None:
+    """Write batches of rows, each as a row group, which can be read without the others."""
+    with parquet.ParquetWriter(
+        path, batches.schema, compression="zstd", write_page_checksum=True
+    ) as writer:
+        for batch in batches:
+            writer.write_batch(batch, row_group_size=len(batch))
+
+
+def read_frame(
+    path: Path, columns: list[str] | None = None, rows: Expression | None = None
+) -> pd.DataFrame:
+    """Read a table that this project wrote, and verify the checksums of the pages that are read.
+
+    Parameters
+    ----------
+    columns : names of columns to read; all by default
+    rows : condition of the rows to read; pages of others are skipped as far as possible
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, or lacks a column.
+    """
+    with reading(str(path), "a table of plateviz"):
+        content = parquet.read_table(
+            str(path),
+            columns=columns,
+            filters=rows,
+            # Otherwise a folder called orbit=0000 becomes a column.
+            partitioning=None,
+            page_checksum_verification=True,
+        )
+        return content.to_pandas()
 
 
 def read_parquet(path: Path) -> dict[str, Table]:
@@ -33,6 +78,7 @@ def read_parquet(path: Path) -> dict[str, Table]:
     with reading(str(path), "a Parquet table"):
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
             check_size(path, file.metadata.num_rows, file.metadata.num_columns)
+            content = file.read()
             if b"table_meta_yaml" not in (file.schema_arrow.metadata or {}):
-                return {path.stem: from_arrow(path, file.read())}
+                return {path.stem: from_arrow(path, content)}
         return {path.stem: Table.read(path, format="parquet")}

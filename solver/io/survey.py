@@ -5,10 +5,12 @@
     truth.parquet                      `schema.TRUTH`, if there is truth
     exposures.parquet                  `schema.ENVIRONMENT` of all orbits
     measurements/orbit=0000.parquet    `schema.MEASUREMENT` of one orbit
+    manifest.sha256                    SHA-256 of every other file, checked when it is read
 
 A directory without `survey.toml` is not read: it is unfinished or not a survey.
 """
 
+import hashlib
 import json
 import math
 import re
@@ -25,6 +27,7 @@ from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
 from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
+from solver.io.manifest import changes, manifest_of, read_manifest, require_digest
 from solver.io.parquet import write_parquet
 from solver.io.read_orbit import find_catalogue
 from solver.io.table_check import conform, refuse
@@ -35,6 +38,11 @@ REFERENCE = "reference.parquet"
 TRUTH_FILE = "truth.parquet"
 EXPOSURES = "exposures.parquet"
 MEASUREMENTS = "measurements"
+MANIFEST = "manifest.sha256"
+REMEDY = (
+    f"restore it from a copy, or simulate the survey again; if it was changed on purpose, delete "
+    f"{MANIFEST}"
+)
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _ORBIT_FILE = re.compile(r"orbit=(\d{4,})\.parquet")
@@ -80,19 +88,21 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
             f"{directory}: expected an orbit out of {_ranges(orbits)}, found {orbit_id}"
         )
     paths = [measurement_path(directory, orbit_id), directory / REFERENCE, directory / EXPOSURES]
+    if (directory / TRUTH_FILE).is_file():
+        paths.append(directory / TRUTH_FILE)
+    provenance = _require_unchanged(directory, paths)
     measurements, catalogue, exposures = (
         read_survey_table(path, schema)
-        for path, schema in zip(paths, (MEASUREMENT, CATALOGUE, ENVIRONMENT), strict=True)
+        for path, schema in zip(paths, (MEASUREMENT, CATALOGUE, ENVIRONMENT), strict=False)
     )
     _check_orbit(measurements, orbit_id, paths[0])
-    where, where_catalogue, where_exposures = map(str, paths)
+    where, where_catalogue, where_exposures = map(str, paths[:3])
     found = exposure_problems(measurements, exposures, where, where_exposures)
     found += catalogue_problems(measurements, catalogue, where, where_catalogue)
     truth = None
-    if (path := directory / TRUTH_FILE).is_file():
+    if (path := directory / TRUTH_FILE) in paths:
         truth = read_survey_table(path, TRUTH)
         found += truth_problems(measurements, truth, where, str(path))
-        paths.append(path)
     refuse(found)
     key = list(ENVIRONMENT.key)
     return OrbitData(
@@ -100,8 +110,39 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
         exposures=exposures.merge(measurements[key].drop_duplicates(), on=key, validate="1:1"),
         catalogue=_measured(catalogue, measurements),
         truth=None if truth is None else _measured(truth, measurements),
-        provenance={str(path.relative_to(directory)): sha256_of(path) for path in paths},
+        provenance=provenance,
     )
+
+
+def write_manifest(directory: Path, content: Mapping[str, object]) -> None:
+    """Write the manifest of a survey, before its header with `content`, which is written last.
+
+    Raises
+    ------
+    InputError
+        If a table cannot be read or the manifest cannot be written.
+    """
+    tables = [*directory.glob("*.parquet"), *directory.glob(f"{MEASUREMENTS}/*.parquet")]
+    names = [path.relative_to(directory).as_posix() for path in tables]
+    header = hashlib.sha256(_header_text(content).encode()).hexdigest()
+    with write_atomically(directory / MANIFEST) as path:
+        path.write_text(f"{manifest_of(directory, names)}{header}  {HEADER}\n", encoding="utf-8")
+
+
+def survey_changes(directory: Path) -> list[str]:
+    """Return a message for each file of a survey that is not as it was written."""
+    manifest = directory / MANIFEST
+    return list(changes(directory, manifest, REMEDY)) if manifest.is_file() else []
+
+
+def _require_unchanged(directory: Path, paths: list[Path]) -> dict[str, str]:
+    """Return name -> SHA-256 of files; InputError if a manifest has others."""
+    found = {path.relative_to(directory).as_posix(): sha256_of(path) for path in paths}
+    manifest = directory / MANIFEST
+    wanted = read_manifest(manifest) if manifest.is_file() else {}
+    for name, digest in found.items():
+        require_digest(directory / name, digest, wanted.get(name), REMEDY)
+    return found
 
 
 def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
@@ -117,13 +158,16 @@ def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
         If the file is missing or unreadable, or its format is not supported.
     """
     path = Path(directory) / name
+    if name == HEADER and path.is_file():
+        _require_unchanged(Path(directory), [path])
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise InputError(
             f"{directory}: expected a survey with a file {name}, found none"
         ) from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    # A ValueError is wrong TOML or not UTF-8; the other one is deep nesting.
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: expected the header of a survey, found: {error}") from error
     if content.get("format") != FORMAT:
         raise InputError(
@@ -146,13 +190,17 @@ def write_header(directory: Path, content: Mapping[str, object], name: str = HEA
     InputError
         If the file cannot be written.
     """
+    with write_atomically(Path(directory) / name) as path:
+        path.write_text(_header_text(content), encoding="utf-8")
+
+
+def _header_text(content: Mapping[str, object]) -> str:
     values = {"format": FORMAT, **content}
     lines = [f"{k} = {_toml(v)}" for k, v in values.items() if not isinstance(v, Mapping)]
     for key, table in values.items():
         if isinstance(table, Mapping):
             lines += ["", f"[{key}]", *(f"{_key(k)} = {_toml(v)}" for k, v in table.items())]
-    with write_atomically(Path(directory) / name) as path:
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
 
 
 def read_survey_table(path: Path, schema: Table) -> pd.DataFrame:

@@ -20,6 +20,7 @@ from solver.io.survey import (
     read_header,
     section,
     write_header,
+    write_manifest,
     write_survey_table,
 )
 from solver.runtime.device import require_device
@@ -87,6 +88,7 @@ def simulate_survey(
             write_survey_table(measurements, MEASUREMENT, path)
         if progress is not None:
             progress(orbit_id + 1, settings.orbits)
+    write_manifest(directory, header)
     write_header(directory, header, HEADER)
     (directory / UNFINISHED).unlink(missing_ok=True)
 

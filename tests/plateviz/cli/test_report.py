@@ -72,7 +72,7 @@ def test_invalid_options_give_one_message_and_no_file(run, run_dir, tmp_path, op
 def test_page_and_its_pdf_cannot_have_the_same_name(run, run_dir, tmp_path):
     code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.pdf", "--pdf")
     assert code == 2
-    assert "expected a page's name such as R.html" in err
+    assert "expected a name that ends in .html or .htm" in err
     assert not (tmp_path / "r.pdf").exists()
 
 
@@ -87,6 +87,7 @@ def test_page_of_an_orbit_lists_the_versions_of_the_fit(run, run_dir, tmp_path):
 def test_run_of_a_newer_version_is_refused(run, run_dir, tmp_path):
     head = Run(run_dir, "default").orbit_directory(0) / "result.json"
     head.write_text(json.dumps({**json.loads(head.read_text()), "format": 99}))
+    head.with_name("COMPLETE").write_text("")
     code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html")
     assert code == 2
     assert "written by a newer plateviz" in err

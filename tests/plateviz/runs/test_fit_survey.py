@@ -195,7 +195,7 @@ def test_runs_are_found_by_name(run, fitted_survey):
 def test_unreadable_table_is_reported(fitted_survey):
     torn = begin_run(fitted_survey, "torn", SETTINGS)
     (torn.directory / "history.parquet").write_bytes(b"PAR1")
-    with pytest.raises(InputError, match="torn: expected the tables of a run, found"):
+    with pytest.raises(InputError, match=r"history\.parquet: expected a table of plateviz, found"):
         SurveyRun(torn).history(1)
 
 

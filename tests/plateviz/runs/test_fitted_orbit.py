@@ -61,5 +61,6 @@ def test_fitted_orbit_of_a_newer_version_is_refused(fit_result, tmp_path):
     write_fitted_orbit(tmp_path / "run", fit_result)
     head = json.loads((tmp_path / "run" / "result.json").read_text())
     (tmp_path / "run" / "result.json").write_text(json.dumps({**head, "format": FORMAT + 1}))
+    (tmp_path / "run" / "COMPLETE").write_text("")
     with pytest.raises(InputError, match="written by a newer plateviz"):
         read_fitted_orbit(tmp_path / "run")

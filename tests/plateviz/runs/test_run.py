@@ -32,6 +32,7 @@ def test_run_with_other_inputs_is_refused(survey_folder):
     begin_run(survey_folder, "inputs", FitSettings())
     with (survey_folder / "survey.toml").open("a", encoding="utf-8") as header:
         header.write("# changed\n")
+    (survey_folder / "manifest.sha256").unlink()
     with pytest.raises(InputError, match=r"found other inputs \(survey\.toml\)"):
         begin_run(survey_folder, "inputs", FitSettings())
 

@@ -43,6 +43,7 @@ def survey(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_directory_has_the_designed_files(survey: Path) -> None:
     assert sorted(str(p.relative_to(survey)) for p in survey.rglob("*") if p.is_file()) == [
         "exposures.parquet",
+        "manifest.sha256",
         "measurements/orbit=0000.parquet",
         "measurements/orbit=0001.parquet",
         "measurements/orbit=0002.parquet",

@@ -1,0 +1,169 @@
+"""Damaged files of surveys and runs: refused by name, never read as changed, and repaired."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from plateviz.runs.fit_survey import fit_survey
+from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+from solver.io.survey import measurement_path, read_survey_orbit, survey_orbits
+
+pytestmark = pytest.mark.slow
+
+# Flips of one bit at places spread over a file; the quick share of a campaign.
+FLIPS = 6
+
+
+@pytest.fixture(scope="module")
+def whole(made_survey, tmp_path_factory):
+    """A survey of three orbits with a complete run."""
+    survey = shutil.copytree(made_survey, tmp_path_factory.mktemp("whole") / "survey")
+    fit_survey(survey, "default", FitSettings(order=3), workers=1)
+    return survey
+
+
+@pytest.fixture
+def survey(whole, tmp_path):
+    return shutil.copytree(whole, tmp_path / "survey")
+
+
+def contents(folder):
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in paths
+        if path.name != "timings.json"
+    }
+
+
+def flip(path, position, bit=3):
+    content = bytearray(path.read_bytes())
+    content[position] ^= 1 << bit
+    path.write_bytes(content)
+
+
+def positions(path, seed):
+    return np.random.default_rng(seed).integers(0, path.stat().st_size, FLIPS)
+
+
+def read_all(run):
+    """Read a run as the dashboard and the reports do."""
+    opened = SurveyRun(run)
+    opened.header()
+    opened.orbits()
+    for orbit in run.complete_orbits():
+        opened.result(orbit)
+    motions = opened.motions()
+    opened.counts()
+    opened.errors_by_count()
+    opened.classes(1)
+    for source in motions["source_id"].iloc[:: len(motions) // 3]:
+        opened.history(source)
+        opened.motion(source)
+
+
+def test_whole_run_has_no_changes(whole):
+    run = Run(whole, "default")
+    assert run.changes() == []
+    read_all(run)
+
+
+@pytest.mark.parametrize(
+    "name", ["measurements/orbit=0001.parquet", "reference.parquet", "survey.toml"]
+)
+def test_flipped_bit_of_a_survey_is_refused_by_name(run, survey, name):
+    path = survey / name
+    intact = path.read_bytes()
+    for position in positions(path, 1):
+        path.write_bytes(intact)
+        flip(path, position)
+        with pytest.raises(InputError, match=re.escape(name.rpartition("/")[2])):
+            read_survey_orbit(survey, 1)
+        code, out, _ = run("inspect", survey)
+        assert code == 2
+        assert str(path) in out.replace("\n", "")
+
+
+def test_missing_measurements_are_found(run, survey):
+    measurement_path(survey, 2).unlink()
+    code, out, _ = run("inspect", survey)
+    assert code == 2
+    assert "orbit=0002.parquet: expected the file that was written, found none" in out
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "orbit=0001/sources.parquet",
+        "orbit=0001/residuals.parquet",
+        "orbit=0001/result.json",
+        "orbit=0001/timings.json",
+        "motions.parquet",
+        "history.parquet",
+        "run.toml",
+    ],
+)
+def test_flipped_bit_of_a_run_is_refused_by_name(survey, name):
+    run = Run(survey, "default")
+    path = run.directory / name
+    intact = path.read_bytes()
+    for position in positions(path, 2):
+        path.write_bytes(intact)
+        flip(path, position)
+        with pytest.raises(InputError, match=re.escape(path.name)):
+            read_all(run)
+        assert any(path.name in message for message in run.changes())
+        with pytest.raises(InputError, match=re.escape(path.name)):
+            fit_survey(survey, "default", FitSettings(order=3))
+
+
+def test_page_of_the_history_is_checked_where_the_file_is_not(survey):
+    """Reading one source does not read the whole file, and yet no changed value is returned."""
+    run = SurveyRun(Run(survey, "default"))
+    path = run.directory / "history.parquet"
+    intact, sources = path.read_bytes(), run.motions()["source_id"]
+    before = {source: run.history(source) for source in sources.iloc[::40]}
+    for position in positions(path, 3):
+        path.write_bytes(intact)
+        flip(path, position)
+        for source, expected in before.items():
+            try:
+                found = run.history(source)
+            except InputError:
+                continue
+            assert found.equals(expected)
+
+
+@pytest.mark.parametrize(
+    "name", ["orbit=0001/sources.parquet", "orbit=0001/COMPLETE", "history.parquet"]
+)
+def test_repaired_run_has_the_same_bytes(whole, survey, name):
+    run = Run(survey, "default")
+    path = run.directory / name
+    flip(path, path.stat().st_size // 2)
+    report = fit_survey(survey, "default", FitSettings(order=3), workers=1, repair=True)
+    assert report.fitted == ([1] if name.startswith("orbit") else [])
+    assert run.changes() == []
+    assert contents(run.directory) == contents(Run(whole, "default").directory)
+
+
+def test_repair_of_a_whole_run_changes_nothing(survey):
+    directory = Run(survey, "default").directory
+    before = {path: path.stat().st_mtime_ns for path in directory.rglob("*")}
+    fit_survey(survey, "default", FitSettings(order=3), repair=True)
+    assert {path: path.stat().st_mtime_ns for path in directory.rglob("*")} == before
+
+
+def test_run_of_an_older_version_without_manifests_is_read(survey):
+    run = Run(survey, "default")
+    for complete in [run.directory / "COMPLETE", *run.directory.glob("orbit=*/COMPLETE")]:
+        complete.write_text("")
+    (survey / "manifest.sha256").unlink()
+    read_all(run)
+    assert survey_orbits(survey) == [0, 1, 2]
+    assert run.changes() == []

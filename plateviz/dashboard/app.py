@@ -1,5 +1,7 @@
 """The dashboard: one page per browser session, over a shared solution store."""
 
+from html import escape
+
 import panel as pn
 import panel_material_ui as pmui
 import param
@@ -20,9 +22,11 @@ _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 def build_app(store: SolutionStore) -> pmui.Page:
     """Return the page of one session over `store`."""
     navigation, pages = _pages(store)
-    session = navigation.session
+    session, title = navigation.session, f"plateviz · {store.title}"
     page = pmui.Page(
-        title=f"plateviz · {store.title}",
+        title=title,
+        # The page's template puts it into an attribute as it is.
+        meta_title=escape(title, quote=True),
         sidebar=[pages.sidebar],
         main=[pages],
         sidebar_width=_SIDEBAR_WIDTH,

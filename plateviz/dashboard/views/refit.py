@@ -1,5 +1,6 @@
 """RefitView: request fits and what-ifs of the orbit, show their progress, and cancel them."""
 
+from html import escape
 from typing import Any
 
 import panel as pn
@@ -116,7 +117,8 @@ class RefitView(pn.viewable.Viewer):
         self._bar.visible = is_busy
         self._stop.disabled = not is_busy
         self._message.param.update(
-            object=message,
+            # It is taken for Markdown, in which HTML would be kept.
+            object=escape(message),
             visible=bool(message),
             severity="error" if stage is Stage.FAILED else "info",
         )

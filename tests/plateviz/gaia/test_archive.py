@@ -119,7 +119,7 @@ def test_repeated_query_needs_no_network(run, service, tmp_path):
 
 def test_refresh_queries_again(run, url, service, tmp_path):
     run("gaia", tmp_path / "gaia.ecsv", "--url", url)
-    code, out, _ = run("gaia", tmp_path / "gaia.ecsv", "--url", url, "--refresh")
+    code, out, _ = run("gaia", tmp_path / "gaia.ecsv", "--url", url, "--refresh", "--overwrite")
     assert code == 0
     assert "fetched" in out
     assert len(service.queries) == 2
@@ -133,7 +133,7 @@ def test_queued_job_is_polled_until_it_ends(run, url, service, tmp_path):
 
 def test_different_selection_is_not_taken_from_the_cache(run, url, service, tmp_path):
     run("gaia", tmp_path / "gaia.ecsv", "--url", url)
-    run("gaia", tmp_path / "gaia.ecsv", "--url", url, "--parallax-over-error", "10")
+    run("gaia", tmp_path / "other.ecsv", "--url", url, "--parallax-over-error", "10")
     assert len(service.queries) == 2
 
 
@@ -141,7 +141,7 @@ def test_damaged_cache_is_fetched_again(run, url, service, tmp_path):
     run("gaia", tmp_path / "gaia.ecsv", "--url", url)
     kept = cached_file(star_query(), url)
     kept.write_bytes(kept.read_bytes()[:1000])
-    assert run("gaia", tmp_path / "gaia.ecsv", "--url", url)[0] == 0
+    assert run("gaia", tmp_path / "again.ecsv", "--url", url)[0] == 0
     assert len(service.queries) == 2
     assert len(find_catalogue(kept).table) > 0
 
@@ -237,7 +237,7 @@ def test_failed_refresh_changes_no_file(run, service, tmp_path):
         run("gaia", tmp_path / "gaia.fits", "--url", url)
     kept, output = cached_file(star_query(), url), tmp_path / "gaia.fits"
     before = kept.read_bytes(), output.read_bytes()
-    code, _, err = run("gaia", output, "--url", url, "--refresh")
+    code, _, err = run("gaia", output, "--url", url, "--refresh", "--overwrite")
     assert code == 2
     assert "found ConnectionRefusedError" in err
     assert (kept.read_bytes(), output.read_bytes()) == before
@@ -250,7 +250,10 @@ def test_missing_astroquery_is_reported(run, service, monkeypatch, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("gaia.txt", "expected a suffix out of .fits"), ("no/gaia.fits", "to write into a folder")],
+    [
+        ("gaia.txt", "expected a name that ends in .fits"),
+        ("no/gaia.fits", "to write into a folder"),
+    ],
     ids=["format", "folder"],
 )
 def test_unwritable_output_is_reported_before_the_query(run, url, service, tmp_path, name, message):

@@ -1,0 +1,68 @@
+"""Texts of files, folders and clients that pretend to be HTML: shown, and never run."""
+
+import subprocess
+import sys
+
+import pytest
+
+from solver.io.survey import measurement_path
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
+from tests.ui.conftest import see, serving
+
+pytestmark = [pytest.mark.ui, pytest.mark.slow]
+
+# A file name may hold anything but a slash.
+HOSTILE = 'a"><img src=x onerror="window.ran = 1"><b class=hostile>'
+# Whether a script of such a text ran, or an element of it is anywhere on the page.
+FOUND = """() => {
+  const walk = root => [...root.querySelectorAll('*')].some(
+    e => e.matches('img[src=x], b.hostile') || (e.shadowRoot && walk(e.shadowRoot)));
+  return Boolean(window.ran) || walk(document); }"""
+
+
+@pytest.fixture(scope="module")
+def survey(tmp_path_factory, chromium_path):
+    """A survey in a hostile folder, with a run of which one orbit cannot be read."""
+    directory = tmp_path_factory.mktemp("surveys") / HOSTILE
+    simulate_survey(directory, SurveySettings(orbits=2, seed=5).scaled(3_000))
+    measurement_path(directory, 1).write_bytes(b"PAR1")
+    command = [sys.executable, "-m", "plateviz.cli.main", "survey", str(directory)]
+    run = subprocess.run([*command, "--workers", "1"], capture_output=True, text=True)
+    assert "orbits failed" in run.stderr
+    return directory
+
+
+def assert_harmless(page):
+    page.wait_for_timeout(500)
+    assert not page.evaluate(FOUND)
+
+
+def test_dashboard_shows_hostile_names_as_text(survey, open_page):
+    with serving("serve", str(survey), "--port", "0") as address:
+        page = open_page(f"{address}?view=survey")
+        see(page, "orbit-health")
+        assert HOSTILE in page.title()
+        assert page.locator("meta[name=title]").get_attribute("content").endswith(HOSTILE)
+        assert_harmless(page)
+        page.get_by_role("button", name="Orbit", exact=True).click()
+        see(page, "residual-map")
+        assert_harmless(page)
+        failed = open_page(f"{address}?orbit=1")
+        failed.get_by_text("orbit=0001.parquet").first.wait_for()
+        assert_harmless(failed)
+        client = open_page(f"{address}?view=source&source={HOSTILE}&run={HOSTILE}&orbit={HOSTILE}")
+        client.get_by_text("plateviz").first.wait_for()
+        assert_harmless(client)
+        for one in (page, failed, client):
+            one.context.close()
+
+
+def test_report_shows_hostile_names_as_text(survey, browser, tmp_path):
+    command = [sys.executable, "-m", "plateviz.cli.main", "report", str(survey), "--orbit", "0"]
+    subprocess.run([*command, "-o", str(tmp_path / "r.html")], check=True, capture_output=True)
+    page = browser.new_page()
+    page.goto((tmp_path / "r.html").as_uri())
+    page.get_by_text(HOSTILE).first.wait_for(state="attached")
+    assert_harmless(page)
+    page.close()

@@ -25,7 +25,7 @@ from solver.data.survey_schema import ERRORS_BY_COUNT, MOTIONS
 from solver.errors import InputError
 from solver.io.atomic import write_atomically
 from solver.io.parquet import write_parquet
-from solver.io.survey import survey_orbits
+from solver.io.survey import survey_changes, survey_orbits
 from solver.io.table_check import refuse
 from solver.model.apparent_motion import julian_year
 from solver.results.time_series import errors_by_count, motion_table
@@ -91,6 +91,8 @@ def fit_survey(
                 "another process is fitting; wait for it, or give another --run NAME"
             )
         if repair:
+            # An orbit that could not be fitted again is not removed.
+            refuse(survey_changes(survey))
             run.remove_damaged()
         else:
             refuse(run.changes())

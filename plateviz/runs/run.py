@@ -129,9 +129,7 @@ class Run:
             for orbit in self.complete_orbits()
             for message in orbit_changes(self.orbit_directory(orbit))
         ]
-        if self.is_complete:
-            found += changes(self.directory, self.directory / _COMPLETE, _REMEDY)
-        return found
+        return found + self._table_changes()
 
     def remove_damaged(self) -> list[int]:
         """Remove the orbits and the tables over all orbits that are not as they were written.
@@ -143,7 +141,7 @@ class Run:
         damaged = [
             orbit for orbit in self.complete_orbits() if orbit_changes(self.orbit_directory(orbit))
         ]
-        if self.changes():
+        if damaged or self._table_changes():
             for name in (_COMPLETE, _GATHERED):
                 (self.directory / name).unlink(missing_ok=True)
         for orbit in damaged:
@@ -186,6 +184,11 @@ class Run:
         manifest = manifest_of(self.directory, names)
         with write_atomically(self.directory / _COMPLETE) as temporary:
             temporary.write_text(manifest, encoding="utf-8")
+
+    def _table_changes(self) -> list[str]:
+        if not self.is_complete:
+            return []
+        return list(changes(self.directory, self.directory / _COMPLETE, _REMEDY))
 
     def _failure_path(self, orbit: int) -> Path:
         return self.directory / _FAILED / f"orbit={orbit:04d}.json"

@@ -12,8 +12,8 @@ from solver.linear.chi2 import gradient
 from solver.problem.problem import Problem
 
 _TURNS_DEG = (90.0, 180.0, 270.0)
-# Chi2 per coordinate above which an angle is suspected: residuals of a thousand sigmas. An orbit
-# with usual estimates stays below, and pays nothing.
+# Chi2 per coordinate above which an angle is suspected: residuals of a thousand sigmas. Below,
+# nothing more is computed.
 _SUSPICIOUS = 1e6
 _POSITION_ANGLE = next(group for group in PARAMETERS if group.name == "position_angle")
 

@@ -140,7 +140,7 @@ def test_page_of_the_history_is_checked_where_the_file_is_not(survey):
 
 
 @pytest.mark.parametrize(
-    "name", ["orbit=0001/sources.parquet", "orbit=0001/COMPLETE", "history.parquet"]
+    "name", ["orbit=0001/sources.parquet", "orbit=0001/COMPLETE", "history.parquet", "COMPLETE"]
 )
 def test_repaired_run_has_the_same_bytes(whole, survey, name):
     run = Run(survey, "default")
@@ -150,6 +150,17 @@ def test_repaired_run_has_the_same_bytes(whole, survey, name):
     assert report.fitted == ([1] if name.startswith("orbit") else [])
     assert run.changes() == []
     assert contents(run.directory) == contents(Run(whole, "default").directory)
+
+
+def test_orbit_is_not_removed_if_it_could_not_be_fitted_again(survey):
+    run = Run(survey, "default")
+    flip(run.orbit_directory(1) / "timings.json", 20)
+    flip(measurement_path(survey, 1), 2000)
+    before = contents(survey)
+    with pytest.raises(InputError, match=r"measurements/orbit=0001\.parquet: expected the file"):
+        fit_survey(survey, "default", FitSettings(order=3), workers=1, repair=True)
+    assert contents(survey) == before
+    assert run.complete_orbits() == [0, 1, 2]
 
 
 def test_repair_of_a_whole_run_changes_nothing(survey):

@@ -19,7 +19,7 @@ from plateviz.cli.gaia import gaia
 from plateviz.cli.inspect import inspect
 from plateviz.cli.report import report
 from plateviz.cli.reproduce import reproduce
-from plateviz.cli.serve import run_server, serve
+from plateviz.cli.serve import open_endpoint, run_server, serve
 from plateviz.runs.run import DEFAULT_RUN
 from solver.data.settings import ENGINES
 from solver.errors import DistrustError, FitError, InputError
@@ -43,6 +43,8 @@ _OBS = typer.Argument(
 def demo(
     port: options.Port = 5006,
     address: options.Address = "127.0.0.1",
+    password_file: options.PasswordFile = None,
+    no_password: options.NoPassword = False,
     open_browser: options.OpenBrowser = True,
 ) -> None:
     """Make a small survey once, fit it, and show it in the dashboard.
@@ -62,12 +64,11 @@ def demo(
             make_survey,
             request_first_orbit,
         )
-        from plateviz.dashboard.server import Endpoint, check_address
         from plateviz.solving.origin import SurveyFolder
         from plateviz.solving.progress import reporting
         from plateviz.solving.solution_store import SolutionStore
 
-        endpoint = Endpoint(check_address(address, port), address)
+        endpoint = open_endpoint(port, address, password_file, no_password)
         directory = demo_directory()
         with reporting("starting the solver") as reporter:
             run = make_survey(directory, solver, reporter)
@@ -180,6 +181,12 @@ def survey(
         bool,
         typer.Option("--repair", help="Fit orbits again whose files are damaged."),
     ] = False,
+    accept: Annotated[
+        bool,
+        typer.Option(
+            "--accept", help="End with exit code 0 even if solutions should not be trusted."
+        ),
+    ] = False,
     as_json: Annotated[bool, _JSON] = False,
     **settings: Any,  # noqa: ANN401 the options of the settings
 ) -> None:
@@ -187,7 +194,7 @@ def survey(
     from plateviz.cli.survey import parse_orbits, run_survey
 
     chosen, numbers = options.fit_settings(settings), parse_orbits(orbits)
-    run_survey(directory, run, chosen, numbers, workers, scheduler, repair, as_json)
+    run_survey(directory, run, chosen, numbers, workers, scheduler, repair, accept, as_json)
 
 
 app.command()(serve)

@@ -34,6 +34,14 @@ Address = Annotated[
         help="Network interface to serve on; the default is reachable from this machine only."
     ),
 ]
+PasswordFile = Annotated[
+    Path | None,
+    typer.Option(help="File with the password to ask for; needed to serve other machines."),
+]
+NoPassword = Annotated[
+    bool,
+    typer.Option("--no-password", help="Serve other machines without a password."),
+]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace an output that exists; never an input.")
 ]

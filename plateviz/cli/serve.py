@@ -42,16 +42,19 @@ def serve(
             metavar="PATH",
         ),
     ] = "",
+    password_file: options.PasswordFile = None,
+    no_password: options.NoPassword = False,
     open_browser: options.OpenBrowser = True,
 ) -> None:
     """Show a survey, or the files of one orbit, in the dashboard."""
-    from plateviz.dashboard.server import Endpoint, check_address, check_origin, check_prefix
+    from plateviz.dashboard.server import check_origin, check_prefix
     from plateviz.solving.origin import OrbitFiles, SurveyFolder
     from plateviz.solving.solution_store import SolutionStore
     from plateviz.solving.solver_queue import SolverQueue
 
     origins = tuple(map(check_origin, allow_origin or []))
-    endpoint = Endpoint(check_address(address, port), address, origins, check_prefix(prefix))
+    endpoint = open_endpoint(port, address, password_file, no_password)
+    endpoint = endpoint._replace(origins=origins, prefix=check_prefix(prefix))
     if reference is None:
         origin: OrbitFiles | SurveyFolder = SurveyFolder(str(path))
         origin.orbits()
@@ -60,6 +63,18 @@ def serve(
         # Read once here, so that problems in the files are reported before a page opens.
         origin.read(orbit)
     run_server(SolutionStore(origin, SolverQueue()), endpoint, open_browser)
+
+
+def open_endpoint(
+    port: int, address: str, password_file: Path | None, no_password: bool
+) -> "Endpoint":
+    """Return where to serve, and with which password; `InputError` if it cannot or must not be."""
+    from plateviz.dashboard.password import read_password, require_password
+    from plateviz.dashboard.server import Endpoint, check_address
+
+    password = None if password_file is None else read_password(password_file)
+    require_password(address, password, no_password)
+    return Endpoint(check_address(address, port), address, password=password)
 
 
 def run_server(

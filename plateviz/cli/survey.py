@@ -6,7 +6,7 @@ from pathlib import Path
 import typer
 
 from plateviz.cli.output import print_json
-from plateviz.solving.survey_progress import fit_and_report, require_all
+from plateviz.solving.survey_progress import fit_and_report, require_all, require_trust
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 
@@ -42,9 +42,18 @@ def run_survey(
     workers: int | None,
     scheduler: str | None,
     repair: bool,
+    accept: bool,
     as_json: bool,
 ) -> None:
-    """Fit the missing orbits and print the outcome; raise `FitError` if orbits failed."""
+    """Fit the missing orbits and print the outcome.
+
+    Raises
+    ------
+    FitError
+        If orbits failed.
+    DistrustError
+        If solutions should not be trusted, unless the request accepts that.
+    """
     if workers is not None and scheduler is not None:
         raise InputError(
             "--workers: expected none with --scheduler, which has its own workers, found both"
@@ -58,6 +67,7 @@ def run_survey(
                 "fitted": report.fitted,
                 "kept": report.kept,
                 "failed": {str(orbit): reason for orbit, reason in report.failed.items()},
+                "distrusted": {str(orbit): why for orbit, why in report.distrusted.items()},
                 "seconds": report.seconds,
             }
         )
@@ -69,3 +79,5 @@ def run_survey(
             f"{report.run.directory}: {counts}, in {report.seconds:.1f} s; the run is {state}"
         )
     require_all(report)
+    if not accept:
+        require_trust(report)

@@ -2,6 +2,7 @@
 
 import contextlib
 import re
+import secrets
 import socket
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -10,11 +11,16 @@ import panel as pn
 
 from plateviz.dashboard.app import build_app
 from plateviz.dashboard.closed_pages import silence_closed_pages
+from plateviz.dashboard.headers import NotebookHeaders, SecurityHeaders
+from plateviz.dashboard.password import PasswordLogin
+from plateviz.dashboard.refused_requests import check_websockets, refuse_paths
 from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 
 # Time for a page to load its scripts before its session is discarded.
 _LOAD_TIMEOUT_MILLISECONDS = 120_000
+# A page sends events and a few properties; a selection of 8000 sources takes 60 kB.
+_MESSAGE_BYTES = 2**20
 _HOST = re.compile(r"[a-z0-9]([a-z0-9.-]*[a-z0-9])?(:\d{1,5})?")
 _PATH = re.compile(r"[A-Za-z0-9._~-]+(/[A-Za-z0-9._~-]+)*")
 
@@ -29,12 +35,16 @@ class Endpoint(NamedTuple):
         machines
     origins : hosts of reverse proxies, as browsers address them, from `check_origin`
     prefix : URL path of the page, as from `check_prefix`
+    password : asked for before the page opens, if there is one
+    in_notebook : whether notebooks of this machine show the page in a frame
     """
 
     port: int
     address: str
     origins: tuple[str, ...] = ()
     prefix: str = ""
+    password: str | None = None
+    in_notebook: bool = False
 
 
 def serve(store: SolutionStore, endpoint: Endpoint, ready: Callable[[str], None]) -> None:
@@ -67,9 +77,10 @@ def begin(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of B
 
 def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of Bokeh
     silence_closed_pages()
+    check_websockets()
     hosts = sorted({endpoint.address, "localhost", "127.0.0.1"})
-    # It returns a server, not a thread, because `threaded` is not set.
-    return pn.serve(
+    # A server, not a thread, because `threaded` is not set.
+    server: Any = pn.serve(
         lambda: build_app(store),
         port=endpoint.port,
         address=endpoint.address,
@@ -81,7 +92,21 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
         start=False,
         verbose=False,
         unused_session_lifetime_milliseconds=_LOAD_TIMEOUT_MILLISECONDS,
+        # A client cannot choose its session, nor have a payload of its own decompressed.
+        sign_sessions=True,
+        secret_key=secrets.token_bytes(),
+        websocket_max_message_size=_MESSAGE_BYTES,
+        cookie_secret=secrets.token_hex(),
+        **_login(endpoint.password),
     )
+    application = server._tornado  # noqa: SLF001 it has no public name
+    refuse_paths(application)
+    application.add_transform(NotebookHeaders if endpoint.in_notebook else SecurityHeaders)
+    return server
+
+
+def _login(password: str | None) -> dict[str, Any]:
+    return {} if password is None else {"auth_provider": PasswordLogin(password)}
 
 
 def check_address(address: str, port: int) -> int:

@@ -59,7 +59,8 @@ class Dashboard:
             from plateviz.dashboard.server import Endpoint, begin, check_address
 
             port = check_address(_ADDRESS, self._port)
-            self._servers.append(begin(self._solver.store, Endpoint(port, _ADDRESS)))
+            endpoint = Endpoint(port, _ADDRESS, in_notebook=True)
+            self._servers.append(begin(self._solver.store, endpoint))
             self._port = port
         return f"http://{_ADDRESS}:{self._port}/"
 

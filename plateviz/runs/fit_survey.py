@@ -16,7 +16,7 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
-from plateviz.runs.fitted_orbit import remove_unfinished
+from plateviz.runs.fitted_orbit import read_summary, remove_unfinished
 from plateviz.runs.lock import locked
 from plateviz.runs.queries import gather_history
 from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run, begin_run
@@ -44,12 +44,21 @@ class Progress(NamedTuple):
 
 
 class Report(NamedTuple):
-    """Result of a call: orbits fitted now, orbits fitted before, and reasons of failed ones."""
+    """Result of a call.
+
+    Attributes
+    ----------
+    fitted : orbits fitted now
+    kept : orbits fitted before
+    failed : reasons why orbits have no solution, by orbit
+    distrusted : reasons why solutions of these orbits should not be trusted, by orbit
+    """
 
     run: Run
     fitted: list[int]
     kept: list[int]
     failed: dict[int, str]
+    distrusted: dict[int, list[str]]
     seconds: float
 
 
@@ -121,7 +130,18 @@ def _fit_missing(
     _gather(run)
     fitted = [orbit for orbit in missing if orbit not in failed]
     kept = [orbit for orbit in wanted if orbit in there]
-    return Report(run, fitted, kept, failed, time.perf_counter() - start)
+    distrusted = _distrusted(run, sorted([*fitted, *kept]))
+    return Report(run, fitted, kept, failed, distrusted, time.perf_counter() - start)
+
+
+def _distrusted(run: Run, orbits: list[int]) -> dict[int, list[str]]:
+    """Return the reasons of bad verdicts, which runs of older versions do not have."""
+    found = {}
+    for orbit in orbits:
+        verdict = read_summary(run.orbit_directory(orbit)).get("verdict")
+        if verdict is not None and verdict["state"] == "bad":
+            found[orbit] = [str(reason) for reason in verdict["reasons"]]
+    return found
 
 
 def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:

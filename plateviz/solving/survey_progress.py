@@ -2,12 +2,13 @@
 
 import time
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from plateviz.cache import keep_compilations
 from plateviz.solving.progress import reporting
 from solver.data.settings import FitSettings
-from solver.errors import FitError
+from solver.errors import DistrustError, FitError
 
 if TYPE_CHECKING:
     from plateviz.runs.fit_survey import Progress, Report
@@ -58,6 +59,20 @@ def require_all(report: "Report") -> None:
     """Raise `FitError` with the reasons if orbits failed."""
     if report.failed:
         raise FitError(_failure_message(report.failed))
+
+
+def require_trust(report: "Report") -> None:
+    """Raise `DistrustError` with the orbits whose solutions should not be trusted, if any."""
+    orbits = list(map(str, report.distrusted))
+    if orbits:
+        listed = ", ".join(orbits[:_MAX_LISTED])
+        listed += f" and {len(orbits) - _MAX_LISTED} more" if len(orbits) > _MAX_LISTED else ""
+        counted = "1 orbit" if len(orbits) == 1 else f"{len(orbits)} orbits"
+        raise DistrustError(
+            f"the solutions of {counted} should not be trusted as they are: {listed}; they are "
+            f"written. `plateviz report {quote(str(report.run.survey))} --run {report.run.name} "
+            f"--orbit {orbits[0]}` says why, and --accept ends with exit code 0"
+        )
 
 
 def _failure_message(failed: dict[int, str]) -> str:

@@ -35,3 +35,22 @@ def test_slashes_around_the_prefix_are_removed():
 def test_invalid_host_is_refused(text):
     with pytest.raises(InputError, match="--allow-origin"):
         check_origin(text)
+
+
+def test_other_machines_are_served_with_a_password_only(run, tmp_path):
+    options = ["serve", tmp_path, "--port", "0", "--no-open"]
+    code, _, err = run(*options, "--address", "0.0.0.0")
+    assert code == 2
+    assert "--address 0.0.0.0: expected a password" in err
+    (tmp_path / "short").write_text("secret\n")
+    code, _, err = run(*options, "--password-file", tmp_path / "short")
+    assert code == 2
+    assert "at least 12 characters" in err
+    code, _, err = run(*options, "--password-file", tmp_path / "nowhere")
+    assert code == 2
+    assert "--password-file: expected a text file" in err
+    # What is missing now is the survey.
+    for more in (["--address", "0.0.0.0", "--no-password"], ["--address", "localhost"]):
+        code, _, err = run(*options, *more)
+        assert code == 2
+        assert "survey.toml" in err

@@ -1,12 +1,16 @@
-"""The verdict of `plateviz fit`: printed, in the result, and an exit code; and what is refused."""
+"""The verdict of `plateviz fit` and `survey`: printed, written, an exit code; what is refused."""
 
 import json
+import shutil
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from astropy.io import fits
 
+from solver.io.parquet import read_frame, write_parquet
 from solver.io.result import read_result
+from solver.io.survey import MANIFEST, REFERENCE, measurement_path
 
 
 @pytest.fixture
@@ -98,3 +102,23 @@ def test_wrong_references_end_with_exit_code_three(run, orbit, measured_referenc
     code, out, err = run("fit", orbit[0], reference, "-o", tmp_path / "r.fits", *options)
     assert code == 0
     assert "This solution should not be trusted as it is." in out
+
+
+@pytest.mark.slow
+def test_survey_names_the_orbits_whose_solutions_should_not_be_trusted(run, made_survey, tmp_path):
+    survey = shutil.copytree(made_survey, tmp_path / "survey")
+    # Changed on purpose.
+    (survey / MANIFEST).unlink()
+    catalogue = read_frame(survey / REFERENCE)
+    measured = read_frame(measurement_path(survey, 0))["source_id"]
+    rows = catalogue.index[catalogue["is_reference"] & catalogue["source_id"].isin(measured)][:3]
+    catalogue.loc[rows, "dec"] += 50.0 / 3.6e6
+    write_parquet(pa.Table.from_pandas(catalogue, preserve_index=False), survey / REFERENCE)
+    options = ["survey", survey, "--order", "3", "--orbits", "0", "--workers", "1", "--json"]
+    code, out, err = run(*options)
+    assert code == 3
+    assert list(json.loads(out)["distrusted"]) == ["0"]
+    assert "the solutions of 1 orbit should not be trusted as they are: 0" in err
+    code, out, _ = run(*options, "--accept")
+    assert code == 0
+    assert json.loads(out)["kept"] == [0]

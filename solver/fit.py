@@ -13,6 +13,7 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, find_mode
+from solver.engines.no_solution import likely_cause
 from solver.engines.robust import find_outliers, outlier_table
 from solver.engines.run_engine import Resumption, run_engine
 from solver.engines.warm_starts import WarmStart, likely, nearest
@@ -266,7 +267,7 @@ def _result(
 ) -> tuple[FitResult, SolvedProblem]:
     mode = estimate.mode
     if mode.reduced is None:
-        raise FitError(f"orbit {data.orbit_id}: {mode.status.value}")
+        raise FitError(f"orbit {data.orbit_id}: {mode.status.value}. {likely_cause(problem, mode)}")
     start, prepared = times
     solved = time.perf_counter()
     solution = solved_problem(problem, estimate, mode.reduced)

@@ -235,14 +235,23 @@ def test_iteration_limit_is_reported(small_orbit, fit):
 
 def test_singular_orbit_raises(small_orbit, fit):
     names = ("focal_length", "pitch_x", "pitch_y", "detector_x", "detector_y")
-    with pytest.raises(FitError, match="orbit 7: .* leave a direction of the solution open"):
+    what = "orbit 7: .* leave a direction of the solution open.*Narrow a prior that holds"
+    with pytest.raises(FitError, match=what):
         fit(small_orbit, prior_widths=dict.fromkeys(names, np.inf))
 
 
 def test_nan_measurements_raise(small_orbit, with_tables, fit):
     broken = small_orbit.data.measurements.assign(ny=np.nan)
-    with pytest.raises(FitError, match="orbit 7: the residuals are not finite"):
+    with pytest.raises(FitError, match="orbit 7: the residuals are not finite.*likely no number"):
         fit(with_tables(small_orbit, measurements=broken))
+
+
+def test_too_small_uncertainties_are_named(small_orbit, with_tables, fit):
+    """Ten thousand times too small: the priors vanish beside them."""
+    table = small_orbit.data.measurements
+    too_small = table.assign(sx=table["sx"] * 1e-4, sy=table["sy"] * 1e-4)
+    with pytest.raises(FitError, match=r"uncertainties sx, sy of [\d.e-]+ pixel .*check the unit"):
+        fit(with_tables(small_orbit, measurements=too_small))
 
 
 def test_exception_in_progress_stops_the_fit(small_orbit):

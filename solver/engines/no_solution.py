@@ -1,0 +1,73 @@
+"""Why a fit has no solution with uncertainties: the likely cause, and what to do about it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.data.result import FitStatus
+from solver.engines.gauss_newton import Mode
+from solver.linear.source_elimination import eliminate_sources
+from solver.problem.problem import Problem
+
+# A start within this share of the largest pixel coordinate is near enough.
+_NEAR = 0.5
+# Priors a hundred times narrower.
+_TIGHTENED = 1e4
+
+
+class _Figures(NamedTuple):
+    residual_pix: float
+    sigma_pix: float
+    half_width_pix: float
+
+
+def likely_cause(problem: Problem, mode: Mode) -> str:
+    """Return what most likely left a fit without a solution, and what to do, as sentences.
+
+    Parameters
+    ----------
+    mode : from an engine, without a reduced system
+    """
+    figures = _figures(problem, mode)
+    if mode.status is FitStatus.NOT_FINITE or not np.isfinite(figures.residual_pix):
+        return (
+            "Some estimate of an exposure, or a measurement, is likely no number or in a wrong "
+            "unit: check obstime (MJD), ra_est, dec_est and pa_est (deg), focal_length (um)."
+        )
+    if figures.residual_pix > _NEAR * figures.half_width_pix:
+        return (
+            f"The stars are predicted some {figures.residual_pix:.0f} pixels from where they were "
+            "measured, so an estimate of the exposures is likely wrong: check ra_est, dec_est and "
+            "pa_est (deg), focal_length (um), and that source_id means the same in both files."
+        )
+    if _tight_priors_hold_it(problem, mode):
+        return (
+            f"The measurements have uncertainties sx, sy of {figures.sigma_pix:.2g} pixel (median) "
+            "and outweigh the priors so far that rounding hides these: check the unit of sx and "
+            "sy, or narrow the priors that were widened."
+        )
+    return (
+        f"{_references(problem)} were measured. Narrow a prior that holds what they leave open "
+        "(focal_length, the detectors' places), lower the order, or add reference sources."
+    )
+
+
+def _figures(problem: Problem, mode: Mode) -> _Figures:
+    measurements = problem.measurements
+    sigma = float(np.median(measurements.sigma))
+    chi2 = mode.equations.gradient.chi2
+    in_sigmas = np.sqrt(chi2 / (2 * problem.n_obs))
+    return _Figures(in_sigmas * sigma, sigma, float(np.abs(measurements.measured).max()))
+
+
+def _tight_priors_hold_it(problem: Problem, mode: Mode) -> bool:
+    priors = problem.priors
+    tight = priors._replace(
+        width=priors.width / np.sqrt(_TIGHTENED), precision=priors.precision * _TIGHTENED
+    )
+    return eliminate_sources(mode.equations, tight) is not None
+
+
+def _references(problem: Problem) -> str:
+    count = int(problem.sources["is_reference"].sum())
+    return f"{count} reference source" + ("" if count == 1 else "s")

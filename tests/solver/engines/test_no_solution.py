@@ -1,0 +1,23 @@
+"""The likely cause of a fit without a solution, where a fit itself would still find one."""
+
+import numpy as np
+from tests.solver.small_orbit import make_orbit
+
+from solver.data.instrument import MINI_MOCK
+from solver.data.result import FitStatus
+from solver.data.settings import FitSettings
+from solver.engines.gauss_newton import Mode
+from solver.engines.no_solution import likely_cause
+from solver.linear.normal_equations import accumulate
+from solver.problem.problem import build_problem
+
+
+def test_wrong_unit_of_the_focal_length_is_named():
+    data = make_orbit().data
+    data.exposures["focal_length"] *= 1e3
+    problem = build_problem(data, MINI_MOCK, FitSettings())
+    at = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
+    mode = Mode(*at, None, FitStatus.SINGULAR, [], accumulate(problem, *at))
+    cause = likely_cause(problem, mode)
+    assert "pixels from where they were measured" in cause
+    assert "focal_length (um)" in cause

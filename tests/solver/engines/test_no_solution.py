@@ -1,7 +1,6 @@
 """The likely cause of a fit without a solution, where a fit itself would still find one."""
 
 import numpy as np
-from tests.solver.small_orbit import make_orbit
 
 from solver.data.instrument import MINI_MOCK
 from solver.data.result import FitStatus
@@ -10,6 +9,7 @@ from solver.engines.gauss_newton import Mode
 from solver.engines.no_solution import likely_cause
 from solver.linear.normal_equations import accumulate
 from solver.problem.problem import build_problem
+from tests.solver.small_orbit import make_orbit
 
 
 def test_wrong_unit_of_the_focal_length_is_named():

@@ -34,6 +34,14 @@ PINS = {
     "constraints.txt": ("3.11", "3.12", "3.13"),
     "constraints-3.13.txt": ("3.13",),
 }
+# The first version without the holes that are known.
+KNOWN_HOLES = {
+    "bokeh": "3.8.2",
+    "jinja2": "3.1.6",
+    "jupyter-server": "2.20",
+    "pyarrow": "23.0.1",
+    "tornado": "6.5.5",
+}
 of_every_pin_file = pytest.mark.parametrize("name", PINS)
 
 
@@ -74,6 +82,19 @@ def test_dependency_is_pinned_within_its_bounds(requirement, name, python):
     pin = _pins(name, python).get(canonicalize_name(requirement.name))
     assert pin is not None, f"make {name} anew, with the command in its first line"
     assert requirement.specifier.contains(pin, prereleases=True)
+
+
+@pytest.mark.parametrize("package", KNOWN_HOLES)
+def test_floor_and_pins_are_above_known_holes(package):
+    extras = PROJECT["optional-dependencies"].values()
+    declared = [*RUNTIME, *(Requirement(text) for extra in extras for text in extra)]
+    floors = [one.specifier for one in declared if one.name == package]
+    safe = Version(KNOWN_HOLES[package])
+    assert floors
+    for specifier in floors:
+        assert min(Version(one.version) for one in specifier if one.operator == ">=") >= safe
+    for name, pythons in PINS.items():
+        assert all(Version(_pins(name, python)[package]) >= safe for python in pythons)
 
 
 def test_newest_pins_are_no_older():

@@ -63,6 +63,10 @@ def _is_pickle(node: ast.AST) -> bool:
     )
 
 
+def _is_eval(node: ast.AST) -> bool:
+    return _called(node) in ("eval", "exec", "__import__")
+
+
 def _is_stub(node: ast.AST) -> bool:
     return isinstance(node, ast.Name) and node.id == "NotImplementedError"
 
@@ -86,6 +90,7 @@ BANNED: dict[str, tuple[Rule, str]] = {
     "pickle": (_is_pickle, "from pickle import load"),
     "pickled array": (_is_pickle, "np.load(path, allow_pickle=True)"),
     "pickled frame": (_is_pickle, "pd.read_pickle(path)"),
+    "evaluated text": (_is_eval, "eval(text)"),
     "stub": (_is_stub, "raise NotImplementedError"),
     "arrows of one length": (_is_vector_field, "hv.VectorField(rows)"),
     "long function": (_is_long_function, "def f():\n" + "    g()\n" * (MAX_STATEMENTS + 1)),

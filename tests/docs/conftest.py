@@ -38,6 +38,7 @@ def workplace(stock, tmp_path, monkeypatch):
     """A copy of them in the current folder."""
     folder = tmp_path / "work"
     shutil.copytree(stock, folder)
+    (folder / "PASSWORD").write_text("seven red plates\n")
     monkeypatch.chdir(folder)
     # The solver process must use the checkout too, not an installed copy.
     monkeypatch.setenv("PYTHONPATH", str(REPOSITORY))

@@ -24,7 +24,18 @@ SMALLER = {
     "simulate": ["--orbits", "2", "--stars", "2000"],
     "serve": ["--port", "0"],
 }
-_OTHER_PROGRAMS = {"pytest", "ruff", "pyright", "dask", "ssh", ".", "jupyter", "panel"}
+_OTHER_PROGRAMS = {
+    "pytest",
+    "ruff",
+    "pyright",
+    "dask",
+    "pip-audit",
+    "printf",
+    "ssh",
+    ".",
+    "jupyter",
+    "panel",
+}
 EXTRAS = tomllib.loads((REPOSITORY / "pyproject.toml").read_text("utf-8"))["project"][
     "optional-dependencies"
 ]

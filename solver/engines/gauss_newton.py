@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float
 from solver.data.parameters import CALIBRATION_GROUPS
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
-from solver.engines.turned_start import turned_start
+from solver.engines.attitude_start import attitude_start
 from solver.linear.chi2 import Gradient, gradient
 from solver.linear.normal_equations import NormalEquations, accumulate
 from solver.linear.source_elimination import ReducedSystem, eliminate_sources
@@ -83,27 +83,41 @@ def find_mode(
     Parameters
     ----------
     progress : called after every iteration; an exception it raises stops the fit
-    start : warm start, of a problem with the same parameters
+    start : another point to start from, of a problem with the same parameters
     """
     begin = time.perf_counter()
     if start is not None:
-        equations = accumulate(problem, start.theta, start.sources)
+        equations = _starting_at(problem, start.theta, start.sources)
         return _iterate(problem, settings, equations, progress, begin)
-    theta, sources = np.zeros(problem.layout.size), np.zeros((problem.n_src, 2))
-    is_sampled = _rough_sample(problem)
+    sources, is_sampled = np.zeros((problem.n_src, 2)), _rough_sample(problem)
     sample = problem if is_sampled.all() else thinned(problem, is_sampled)
-    equations = accumulate(sample, theta, sources[is_sampled])
-    turned = turned_start(sample, equations.gradient.chi2)
-    if turned.any():
-        theta = turned
-        equations = accumulate(sample, theta, sources[is_sampled])
+    equations = _starting_at(sample, np.zeros(problem.layout.size), sources[is_sampled])
     if sample is not problem:
+        theta, _ = equations.at
         rough = replace(settings, tolerance=max(settings.tolerance, _ROUGH_TOLERANCE))
         mode = _iterate(sample, rough, equations, lambda _: None, begin)
         if mode.status is FitStatus.CONVERGED:
             theta, sources[is_sampled] = mode.theta, mode.sources
         equations = accumulate(problem, theta, sources)
     return _iterate(problem, settings, equations, progress, begin)
+
+
+def _starting_at(
+    problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
+) -> NormalEquations:
+    """Linearise at a point, or at the attitudes that the measurements imply if it is far off."""
+    equations = accumulate(problem, theta, sources)
+    moved = attitude_start(problem, theta, sources, equations.gradient.chi2)
+    if moved is theta:
+        return equations
+    before, after = (
+        objective(problem, at, sources, found)
+        for at, found in (
+            (theta, equations.gradient),
+            (moved, gradient(problem, moved, sources)),
+        )
+    )
+    return accumulate(problem, moved, sources) if after < before else equations
 
 
 def _rough_sample(problem: Problem) -> Bool[np.ndarray, " src"]:

@@ -71,13 +71,13 @@ class Priors(NamedTuple):
         self, theta: Float[np.ndarray, " calib"]
     ) -> tuple[Float[np.ndarray, " gamma"], Float[np.ndarray, " gamma"]]:
         centre = self.centre[self.is_gamma]
-        # The density vanishes at or below zero: the penalty becomes huge, and the engine
-        # shortens its step.
-        value = np.maximum(centre + theta[self.is_gamma], np.finfo(float).tiny)
-        return centre / self._gamma_scale(), value
+        return centre / self._gamma_scale(), centre + theta[self.is_gamma]
 
     def _gamma_penalty(self, theta: Float[np.ndarray, " calib"]) -> float:
         shape, value = self._gamma(theta)
+        # The density vanishes at or below zero: the engine shortens such a step.
+        if (value <= 0.0).any():
+            return np.inf
         centre, offset = self.centre[self.is_gamma], theta[self.is_gamma]
         logarithm = (shape - 1.0) * np.log(value / centre)
         return float(2.0 * np.sum(offset / self._gamma_scale() - logarithm))

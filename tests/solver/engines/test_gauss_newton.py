@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from solver.data.instrument import MINI_MOCK
+from solver.data.parameters import BY_NAME
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import find_mode
@@ -71,10 +72,32 @@ def test_far_start_converges(sign):
     assert mode.trace[-1].chi2 < 2.0 * len(orbit.pixels)
 
 
+def test_start_ten_prior_widths_away_leads_to_the_same_mode(solution):
+    problem, rng = solution.problem, np.random.default_rng(5)
+    width = problem.priors.width
+    theta = rng.uniform(-10.0, 10.0, len(width)) * np.where(
+        np.isfinite(width), width, 180.0 * 360.0
+    )
+    covariance = np.linalg.inv(problem.priors.precision)
+    spread = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    sources = rng.uniform(-10.0, 10.0, spread.shape) * spread
+    start = solution.mode._replace(theta=theta, sources=sources)
+    mode = find_mode(problem, FitSettings(), start=start)
+    assert mode.status is FitStatus.CONVERGED
+    turn = 1_296_000.0
+    moved = mode.theta - solution.mode.theta
+    columns = problem.layout.columns(BY_NAME["position_angle"])
+    moved[columns] = np.remainder(moved[columns] + 0.5 * turn, turn) - 0.5 * turn
+    sigma = np.sqrt(np.diag(solution.covariance.theta))
+    assert np.abs(moved / sigma).max() < 1e-3
+    sigma = np.sqrt(np.diagonal(solution.marginal, axis1=1, axis2=2))
+    assert np.abs((mode.sources - solution.mode.sources) / sigma).max() < 1e-3
+
+
 def test_overshooting_step_is_damped_and_the_fit_converges(monkeypatch):
-    """An error of 75 deg in roll makes the full step too long, unless the start is turned."""
+    """An error of 75 deg in roll makes the full step too long, unless the attitude is solved."""
     monkeypatch.setattr(
-        "solver.engines.gauss_newton.turned_start", lambda problem, _: np.zeros(problem.layout.size)
+        "solver.engines.gauss_newton.attitude_start", lambda problem, theta, *_: theta
     )
     orbit = make_orbit()
     exposures = orbit.data.exposures.assign(pa_est=orbit.data.exposures["pa_est"] + 75.0)

@@ -1,0 +1,132 @@
+"""A start for fits whose estimated pointings or position angles are far off.
+
+The steps of Gauss-Newton find the mode from pointings that are arcminutes off and from position
+angles up to some 90 deg off. Two programs that define a sign or a zero point in different ways
+differ by more. Each measurement names its source, so that the attitude of an exposure follows in
+closed form: it is the rotation that best aligns the directions in which the measured pixels look
+with the directions to their sources (Wahba 1965, by the singular value decomposition of Markley
+1988).
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from solver.data.parameters import BY_NAME
+from solver.model.astrometry import sky_position
+from solver.model.directions import tangent_frame
+from solver.problem.problem import Problem
+from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
+
+# Chi2 per coordinate above which the attitudes are suspected: residuals of a thousand sigmas.
+# Below, nothing is computed.
+_SUSPICIOUS = 1e6
+# Weight of the attitude at the start relative to a measurement. It decides what the measurements
+# leave open, such as the position angle of an exposure of a single source.
+_WEIGHT_OF_START = 1e-12
+# Smallest cosine of the angle between two pointings that their tangent plane can express well.
+_NEAREST_TO_HORIZON = 0.1
+_TURN = 2.0 * np.pi
+_ATTITUDE = ("pointing_ra", "pointing_dec", "position_angle")
+
+
+def attitude_start(
+    problem: Problem,
+    theta: Float[np.ndarray, " calib"],
+    sources: Float[np.ndarray, "src 2"],
+    chi2: float,
+) -> Float[np.ndarray, " calib"]:
+    """Return the calibration with the attitude of each exposure that its measurements imply.
+
+    Aberration and distortion are neglected, and the focal length and the detectors are those of
+    `theta`. Their errors of up to a minute of arc are small enough for Gauss-Newton.
+
+    Parameters
+    ----------
+    chi2 : of the data at `theta` and `sources`
+
+    Returns
+    -------
+    `theta` itself unless its residuals are very large
+    """
+    if not chi2 > _SUSPICIOUS * 2 * problem.n_obs:
+        return theta
+    axes = _axes(problem, theta)
+    exposure, frame = problem.measurements.index.exposure, problem.geometry.source_frame
+    seen = _displaced(frame[: problem.n_src], RAD_PER_MAS * sources)
+    seen = seen[problem.measurements.index.source]
+    looking = _looking(problem, theta)
+    aligned = np.zeros_like(axes)
+    for i, j in np.ndindex(3, 3):
+        products = looking[:, i] * seen[:, j]
+        aligned[:, i, j] = np.bincount(exposure, products, minlength=len(axes))
+    left, _, right = np.linalg.svd(aligned + _WEIGHT_OF_START * axes)
+    # The focal plane is seen from behind: its axes are left-handed.
+    left[:, :, 2] *= -(np.linalg.det(left) * np.linalg.det(right))[:, None]
+    return _with_axes(problem, theta, left @ right)
+
+
+def _values(
+    problem: Problem, theta: Float[np.ndarray, " calib"]
+) -> dict[str, Float[np.ndarray, " _"]]:
+    """Return origin plus offset of each group, in its unit; of the pointing the offset alone."""
+    offsets = problem.layout.scatter(theta)
+    origin = problem.geometry.origin
+    return {
+        name: values + origin[name][: len(values)] if name in origin else values
+        for name, values in offsets.items()
+    }
+
+
+def _displaced(
+    frame: Float[np.ndarray, "n 3 3"], offset: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, "n 3"]:
+    """Return unit vectors displaced in the tangent plane of their frames, rad."""
+    moved = frame[:, 0] + np.einsum("ni,nij->nj", offset, frame[:, 1:])
+    return moved / np.linalg.norm(moved, axis=-1, keepdims=True)
+
+
+def _axes(problem: Problem, theta: Float[np.ndarray, " calib"]) -> Float[np.ndarray, "exp 3 3"]:
+    """Return the axes of the focal plane of each exposure, as `projection.focal_axes`."""
+    values = _values(problem, theta)
+    offset = RAD_PER_ARCSEC * np.stack([values["pointing_ra"], values["pointing_dec"]], axis=-1)
+    centre = _displaced(problem.geometry.pointing_frame[: len(offset)], offset)
+    _, east, north = tangent_frame(*sky_position(centre)).swapaxes(0, 1)
+    angle = RAD_PER_ARCSEC * values["position_angle"][:, None]
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([-c * east + s * north, s * east + c * north, centre], axis=1)
+
+
+def _looking(problem: Problem, theta: Float[np.ndarray, " calib"]) -> Float[np.ndarray, "obs 3"]:
+    """Return the direction of each measured pixel along the axes of its exposure."""
+    values, index = _values(problem, theta), problem.measurements.index
+    n = index.detector
+    angle = RAD_PER_ARCSEC * values["detector_rotation"][n]
+    along, across = (
+        values[f"pitch_{axis}"][n] * problem.measurements.measured[:, column]
+        for column, axis in enumerate("xy")
+    )
+    c, s = np.cos(angle), np.sin(angle)
+    x = values["detector_x"][n] + c * along + s * across
+    y = values["detector_y"][n] - s * along + c * across
+    looking = np.stack([x, y, values["focal_length"][index.exposure]], axis=-1)
+    return looking / np.linalg.norm(looking, axis=-1, keepdims=True)
+
+
+def _with_axes(
+    problem: Problem, theta: Float[np.ndarray, " calib"], axes: Float[np.ndarray, "exp 3 3"]
+) -> Float[np.ndarray, " calib"]:
+    """Return the calibration with the attitude of each exposure that its tangent plane holds."""
+    origin = problem.geometry.pointing_frame[: len(axes)]
+    along = np.einsum("nij,nj->ni", origin, axes[:, 2])
+    chosen = along[:, 0] > _NEAREST_TO_HORIZON
+    _, east, north = tangent_frame(*sky_position(axes[:, 2])).swapaxes(0, 1)
+    sine, cosine = (np.einsum("nj,nj->n", axes[:, 0], axis) for axis in (north, -east))
+    angle = np.arctan2(sine, cosine)
+    before = RAD_PER_ARCSEC * _values(problem, theta)["position_angle"]
+    turned = np.remainder(angle - before + 0.5 * _TURN, _TURN) - 0.5 * _TURN
+    moved = theta.copy()
+    columns = {name: problem.layout.columns(BY_NAME[name])[chosen] for name in _ATTITUDE}
+    moved[columns["pointing_ra"]] = (along[:, 1] / along[:, 0])[chosen] / RAD_PER_ARCSEC
+    moved[columns["pointing_dec"]] = (along[:, 2] / along[:, 0])[chosen] / RAD_PER_ARCSEC
+    moved[columns["position_angle"]] += turned[chosen] / RAD_PER_ARCSEC
+    return moved

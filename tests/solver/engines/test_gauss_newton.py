@@ -119,6 +119,16 @@ def test_number_of_iterations_is_limited(small_orbit, limit):
     assert mode.reduced is not None
 
 
+@pytest.mark.parametrize("seed", [2, 6])
+def test_exact_jacobians_confirm_the_mode(seed):
+    """A last step with reused Jacobians left both orbits half a tolerance off."""
+    settings = FitSettings()
+    problem = problem_of(make_orbit(seed=seed), settings)
+    mode = find_mode(problem, settings)
+    again = find_mode(problem, settings, start=mode)
+    assert again.trace[1].largest_step < 0.1 * settings.tolerance
+
+
 def test_tolerance_determines_when_to_stop(small_orbit, solution):
     settings = FitSettings(tolerance=50.0)
     loose = find_mode(problem_of(small_orbit, settings), settings)

@@ -3,7 +3,7 @@
     python tests/campaigns/calibration.py [--few 200] [--many 50] [--records FILE]
 
 Each orbit has all its parameters drawn from the priors of the fit (`prior_draws.py`) and is fitted
-with the default settings: 10 to 60 reference stars in the orbits with few, 300 to 1,500 in those
+with the default settings: 9 to 60 reference stars in the orbits with few, 300 to 1,500 in those
 with many. The pulls of the sources and of every calibration group are compared with a normal
 distribution (`coverage.py`): rms, coverage, and ranks of the truth in the posterior
 (simulation-based calibration).

@@ -1,8 +1,8 @@
 """Pulls, coverage and ranks of a fit against the truth, summed by group, and their errors.
 
-The parameters of one orbit share errors, so that their pulls are correlated. The standard error of
-every figure is therefore taken across orbits (delete-one jackknife), and the ranks are tested for
-uniformity by the scatter of the orbits' histograms (Hotelling's T squared).
+The parameters of one orbit share errors, so that their pulls are correlated. Standard errors are
+therefore taken across orbits (delete-one jackknife), and the ranks are tested for uniformity by the
+scatter of the orbits' histograms (Hotelling's T squared).
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ Sums = dict[str, Any]
 
 
 class Figure(NamedTuple):
-    """A figure of all orbits, its standard error across orbits, and what is expected."""
+    """A figure of all orbits, what is expected, and the standard error of that across orbits."""
 
     value: float
     error: float
@@ -113,11 +113,18 @@ def figures(orbits: Sequence[Sums], kind: str) -> list[Figure]:
     number = np.array([sums["n"] for sums in orbits], dtype=np.float64)
     squares = np.array([sums[kind]["squares"] for sums in orbits])
     inside = np.array([sums[kind]["inside"] for sums in orbits], dtype=np.float64)
-    rms = _jackknife(squares, number)
-    value = np.sqrt(rms[0])
-    found = [Figure(float(value), float(rms[1] / (2.0 * value)), 1.0)]
-    for column, share in enumerate(INTERVALS.values()):
-        found.append(Figure(*_jackknife(inside[:, column], number), share))
+    mean, error = _jackknife(squares, number)
+    rms = float(np.sqrt(mean))
+    covered = [_jackknife(inside[:, column], number) for column in range(len(INTERVALS))]
+    # Orbits whose pulls happen to be small scatter little. All errors are therefore those of what
+    # is expected: the relative error of the mean square, and the error of the expected coverage of
+    # as many independent parameters as the scatter in the narrowest interval implies.
+    found = [Figure(rms, error / (2.0 * mean), 1.0)]
+    first, its_error = covered[0]
+    per_variance = its_error**2 / max(first * (1.0 - first), np.finfo(float).tiny)
+    for share, (value, jackknife) in zip(INTERVALS.values(), covered, strict=True):
+        expected = float(np.sqrt(share * (1.0 - share) * per_variance))
+        found.append(Figure(value, expected or jackknife, share))
     return found
 
 

@@ -13,6 +13,13 @@ class InputError(ValueError):
         return [f"{type(self).__name__}: {self}"]
 
 
+class DiskError(InputError):
+    """A disk or a folder that takes no file: full, read-only, without permission.
+
+    It is not about one orbit: what it stops does not go on with the next one.
+    """
+
+
 class CancelledError(RuntimeError):
     """The user cancelled the work; nothing was changed."""
 

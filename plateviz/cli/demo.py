@@ -12,13 +12,13 @@ from pathlib import Path
 import typer
 
 from plateviz.cache import cache_directory
-from plateviz.runs.lock import locked
 from plateviz.runs.run import DEFAULT_RUN, PACKAGES, Run, begin_run
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.progress import Reporter, reporting
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_queue import SolverQueue
 from solver.data.settings import FitSettings
+from solver.io.lock import locked
 from solver.io.survey import HEADER
 from solver.runtime.threads import count_cores
 from solver.runtime.versions import versions_of
@@ -48,7 +48,8 @@ def make_survey(directory: Path, solver: SolverQueue, reporter: Reporter) -> Run
     Of two processes that do so at once, the second waits and finds them.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    with locked(directory, wait=True):
+    # Simulating locks the directory itself.
+    with locked(directory.parent, wait=True):
         if not (directory / HEADER).is_file():
             request = {"do": "simulate", "directory": str(directory), "settings": DEMO.to_dict()}
             _finish(solver.submit(Job(request)), reporter)

@@ -3,13 +3,14 @@
 A user's mistake ends with exit code 2 and one message; a fit that has no solution, or has not
 converged, with exit code 1; one whose solution should not be trusted with exit code 3. Each
 command imports the slow modules that it needs, so that `--help` and error messages appear at once.
+SIGTERM ends a command as Ctrl-C does, with exit code 143.
 """
 
 import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -23,6 +24,8 @@ from plateviz.cli.serve import open_endpoint, run_server, serve
 from plateviz.runs.run import DEFAULT_RUN
 from solver.data.settings import ENGINES
 from solver.errors import DistrustError, FitError, InputError
+from solver.io.disk import FULL, disk_error
+from solver.runtime.termination import ending_on_sigterm
 
 app = typer.Typer(
     help="Solve the astrometry of satellite orbits by Plate Analysis, and judge the solutions.",
@@ -205,10 +208,21 @@ app.command()(reproduce)
 def main() -> None:
     """Run the command line; what goes wrong ends with one message and an exit code."""
     try:
-        app()
+        with ending_on_sigterm():
+            app()
     except (InputError, FitError) as error:
-        typer.echo(f"plateviz: {error}", err=True)
-        sys.exit(_exit_code(error))
+        _fail(error)
+    except OSError as error:
+        # Such as standard output redirected to a full disk; any other one is a defect.
+        told = disk_error(error, Path(error.filename or "standard output"))
+        if told is None or error.errno not in FULL:
+            raise
+        _fail(told)
+
+
+def _fail(error: InputError | FitError) -> NoReturn:
+    typer.echo(f"plateviz: {error}", err=True)
+    sys.exit(_exit_code(error))
 
 
 def _exit_code(error: InputError | FitError) -> int:

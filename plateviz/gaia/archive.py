@@ -17,6 +17,7 @@ from plateviz.gaia.tap_query import answer_to, service_name
 from solver.data import columns
 from solver.errors import InputError
 from solver.io.atomic import require_writable, write_atomically
+from solver.io.disk import writing
 from solver.io.outputs import check_output
 from solver.io.read_orbit import find_catalogue
 from solver.io.table_check import conform
@@ -148,10 +149,8 @@ def fetch_stars(chosen: StarQuery, url: str | None = None, refresh: bool = False
     kept = cached_file(chosen, url)
     if kept.is_file() and not refresh and (table := _read(kept)) is not None:
         return Stars(table, from_cache=True)
-    try:
+    with writing(kept.parent, "to create the folder"):
         kept.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{kept.parent}: expected to create the folder, found: {error}") from error
     require_writable(kept)
     table = _fetch(chosen.query, url)
     write_stars(table, kept, overwrite=True)

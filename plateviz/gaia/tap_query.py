@@ -7,7 +7,6 @@ therefore it is imported only for a query.
 import importlib
 import io
 import socket
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from http.client import HTTPException
@@ -19,6 +18,7 @@ from astropy.table import Table
 
 from solver.errors import InputError
 from solver.io.failures import reading
+from solver.io.scratch import ScratchFolder, temporary_folder
 
 _PACKAGE = "astroquery"
 # Timeout of each connection; the state of a queued job is polled in short requests.
@@ -49,8 +49,8 @@ def answer_to(query: str, url: str | None) -> Table:
         or the answer is not a whole table.
     """
     name = service_name(url)
-    with tempfile.TemporaryDirectory(prefix="plateviz-") as folder:
-        path = Path(folder) / "answer.vot"
+    with ScratchFolder(temporary_folder(), "plateviz-gaia") as scratch:
+        path = scratch.path / "answer.vot"
         # astroquery prints notices and errors; plateviz prints one result or one message only.
         with _timeout(), redirect_stdout(io.StringIO()):
             try:

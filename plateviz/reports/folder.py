@@ -2,18 +2,24 @@
 
 import json
 import os
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import replace
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 
 from plateviz.reports.page import page_of
 from plateviz.reports.report import Facts, Link, Report
 from plateviz.reports.survey import survey_orbit_report, survey_report
 from plateviz.runs.queries import SurveyRun, open_run
-from solver.errors import InputError
+from solver.errors import FitError, InputError
 from solver.io.atomic import sha256_of, write_atomically
+from solver.io.disk import writing
+from solver.io.scratch import is_scratch, remove_abandoned
 from solver.runtime.versions import versions_of
 
 _INDEX = "index.html"
@@ -43,6 +49,8 @@ def write_folder(
 
     Raises
     ------
+    FitError
+        If a process that writes pages is killed.
     InputError
         If orbits of the run are missing, or the folder cannot be written or has other content.
     """
@@ -53,9 +61,8 @@ def write_folder(
     done = len(orbits) - len(missing)
     progress(done, len(orbits))
     if missing:
-        # Spawned, because a forked copy of a process with threads may deadlock.
         count = min(workers or os.cpu_count() or 1, len(missing))
-        with ProcessPoolExecutor(count, get_context("spawn")) as pool:
+        with _workers(count, folder) as pool:
             tasks = [
                 pool.submit(
                     _write, run.survey, run.name, orbit, folder, facts, _around(orbits, orbit)
@@ -69,20 +76,54 @@ def write_folder(
     return len(missing), done
 
 
+@contextmanager
+def _workers(count: int, folder: Path) -> Iterator[ProcessPoolExecutor]:
+    """Yield a pool of processes; they end, and their scratch is removed, if the block raises."""
+    others = set(active_children())
+    # Spawned, because a forked copy of a process with threads may deadlock.
+    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_end_with_parent)
+    try:
+        yield pool
+        pool.shutdown()
+    except BrokenProcessPool as error:
+        raise FitError(
+            f"{folder}: expected processes that write the pages, found that one was killed; most "
+            "often the memory does not suffice for so many --workers; finished pages are kept, and "
+            "the same command goes on"
+        ) from error
+    finally:
+        for process in set(active_children()) - others:
+            process.terminate()
+        pool.shutdown(cancel_futures=True)
+        remove_abandoned(folder)
+
+
+def _end_with_parent() -> None:
+    """End this process when its parent ends, even if the parent is killed."""
+    # The process that writes the pages decides what a Ctrl-C ends.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_wait_for_parent, daemon=True).start()
+
+
+def _wait_for_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
 def _begin(run: SurveyRun, folder: Path) -> None:
     """Create the folder, or check that its pages are of the same run."""
     head = {"run": sha256_of(run.directory / "run.toml"), "versions": versions_of(_PACKAGES)}
     path = folder / _HEAD
+    remove_abandoned(folder)
     if path.is_file():
         if json.loads(path.read_text(encoding="utf-8")) != head:
             raise InputError(f"{folder}: expected pages of this run and version, found others")
         return
-    try:
+    with writing(folder, "to write a folder"):
         folder.mkdir(parents=True, exist_ok=True)
-        is_empty = not any(folder.iterdir())
-    except OSError as error:
-        raise InputError(f"{folder}: expected to write a folder, found: {error}") from error
-    if not is_empty:
+    if not all(is_scratch(path.name) for path in folder.iterdir()):
         raise InputError(
             f"{folder}: expected an empty folder or a folder of reports, found other files"
         )

@@ -4,10 +4,10 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from solver.errors import InputError
 from solver.io.atomic import write_atomically
+from solver.io.scratch import ScratchFolder, temporary_folder
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 # Limit of Chromium's virtual time, which advances as fast as the figures are drawn.
@@ -39,8 +39,8 @@ def print_pdf(page: Path, target: Path, overwrite: bool = False) -> None:
         If there is no Chromium, it fails, or `target` cannot be written.
     """
     chromium = find_chromium()
-    profile_folder = TemporaryDirectory(prefix="plateviz-")
-    with write_atomically(target, overwrite) as temporary, profile_folder as profile:
+    profile_folder = ScratchFolder(temporary_folder(), "plateviz-chromium")
+    with write_atomically(target, overwrite) as temporary, profile_folder as scratch:
         # As root, as in many containers, Chromium starts only without its sandbox.
         as_root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
         command = [
@@ -50,7 +50,7 @@ def print_pdf(page: Path, target: Path, overwrite: bool = False) -> None:
             "--disable-gpu",
             "--no-first-run",
             "--disable-background-networking",
-            f"--user-data-dir={profile}",
+            f"--user-data-dir={scratch.path}",
             f"--virtual-time-budget={_BUDGET_MS}",
             "--no-pdf-header-footer",
             f"--print-to-pdf={temporary.resolve()}",

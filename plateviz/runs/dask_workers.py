@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 import dask.config
-from distributed import Client, Future, LocalCluster, as_completed
+from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
+from distributed.client import FutureCancelledError
 
 from plateviz.cache import keep_compilations
 from plateviz.runs.run import Run
 from plateviz.tables.verdict import with_verdict
 from solver.data.instrument import parse_instrument
-from solver.errors import FitError, InputError
+from solver.errors import DiskError, FitError, InputError
+from solver.io.disk import disk_error
+from solver.io.scratch import temporary_folder
 from solver.io.survey import HEADER, read_header, read_survey_orbit
 from solver.runtime.memory import keep_memory
 from solver.runtime.threads import use_one_thread
@@ -41,7 +44,8 @@ class Outcome(NamedTuple):
 def fit_survey_orbit(survey: str, name: str, orbit: int) -> Outcome:
     """Fit one orbit of a run whose directory exists, and write it into the run.
 
-    An orbit without a solution is recorded as failed; every other error is raised.
+    An orbit without a solution is recorded as failed; every other error is raised, and so is
+    that of a full disk, which all orbits share.
     """
     start = time.perf_counter()
     run, message = Run(Path(survey), name), ""
@@ -50,6 +54,8 @@ def fit_survey_orbit(survey: str, name: str, orbit: int) -> Outcome:
     use_one_thread()
     try:
         _fit(run, orbit)
+    except DiskError:
+        raise
     except (InputError, FitError) as error:
         message = str(error)
         run.keep_failure(orbit, message)
@@ -92,6 +98,7 @@ def dask_client(workers: int, scheduler: str | None) -> Iterator[Client]:
         return
     with (
         dask.config.set(_LESS_MONITORING),
+        dask.config.set({"temporary-directory": str(temporary_folder())}),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
@@ -110,7 +117,15 @@ def dask_client(workers: int, scheduler: str | None) -> Iterator[Client]:
 
 
 def fit_on_workers(client: Client, run: Run, orbits: list[int]) -> Iterator[Outcome]:
-    """Fit orbits, and yield the outcome of each when it is done."""
+    """Fit orbits, and yield the outcome of each when it is done.
+
+    Raises
+    ------
+    DiskError
+        If an orbit cannot be written because the disk is full or read-only.
+    FitError
+        If the scheduler is lost.
+    """
     where = str(run.survey.resolve())
     futures: dict[Future, int] = {
         client.submit(fit_survey_orbit, where, run.name, orbit, pure=False): orbit
@@ -121,7 +136,28 @@ def fit_on_workers(client: Client, run: Run, orbits: list[int]) -> Iterator[Outc
         if error is None:
             yield future.result()
             continue
-        # An unexpected error must not stop the other orbits.
-        message = f"{type(error).__name__}: {error}"
-        run.keep_failure(futures[future], message)
-        yield Outcome(futures[future], float("nan"), message)
+        orbit = futures[future]
+        message = _reason(error, run, orbit)
+        run.keep_failure(orbit, message)
+        yield Outcome(orbit, float("nan"), message)
+
+
+def _reason(error: BaseException, run: Run, orbit: int) -> str:
+    """Return why an orbit failed; raise the errors that all orbits share."""
+    if isinstance(error, DiskError):
+        raise error
+    if (full := disk_error(error, run.orbit_directory(orbit))) is not None:
+        raise full from error
+    if isinstance(error, FutureCancelledError):
+        raise FitError(
+            f"{run.directory}: expected the Dask scheduler until all orbits are fitted, found that "
+            "the connection to it was lost; finished orbits are kept, and the same command goes on"
+        ) from error
+    if isinstance(error, KilledWorker):
+        return (
+            f"orbit {orbit}: expected a worker process that fits it, found that each of the "
+            f"{error.allowed_failures + 1} that tried was killed; most often the memory does not "
+            "suffice for so many --workers"
+        )
+    # An unexpected error must not stop the other orbits.
+    return f"{type(error).__name__}: {error}"

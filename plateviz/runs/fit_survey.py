@@ -16,14 +16,15 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
-from plateviz.runs.fitted_orbit import read_summary, remove_unfinished
-from plateviz.runs.lock import locked
+from plateviz.runs.fitted_orbit import read_summary
 from plateviz.runs.queries import gather_history
 from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run, begin_run
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, MOTIONS
-from solver.errors import InputError
+from solver.errors import DiskError, InputError
 from solver.io.atomic import write_atomically
+from solver.io.disk import size_text
+from solver.io.lock import locked
 from solver.io.parquet import write_parquet
 from solver.io.survey import survey_changes, survey_orbits
 from solver.io.table_check import refuse
@@ -87,6 +88,8 @@ def fit_survey(
 
     Raises
     ------
+    DiskError
+        If the disk is full or read-only; the orbits written before are kept.
     InputError
         If the survey, the run or an orbit is not there as asked for, a file of the run is
         damaged, no scheduler answers, or another process is fitting the run.
@@ -99,6 +102,8 @@ def fit_survey(
                 f"{run.directory}: expected a run that no other process is fitting, found one that "
                 "another process is fitting; wait for it, or give another --run NAME"
             )
+        # Another process may have begun a run of that name at the same time.
+        begin_run(survey, name, settings)
         if repair:
             # An orbit that could not be fitted again is not removed.
             refuse(survey_changes(survey))
@@ -116,18 +121,24 @@ def _fit_missing(
     progress: Callable[[Progress], None],
 ) -> Report:
     start = time.perf_counter()
-    remove_unfinished(run.directory)
+    run.remove_abandoned()
     there = set(run.complete_orbits())
     missing = [orbit for orbit in wanted if orbit not in there]
     failed: dict[int, str] = {}
     progress(Progress(0, len(missing), None))
-    if missing:
-        with dask_client(min(workers or count_cores(), len(missing)), scheduler) as client:
-            for done, outcome in enumerate(fit_on_workers(client, run, missing), start=1):
-                if outcome.message:
-                    failed[outcome.orbit] = outcome.message
-                progress(Progress(done, len(missing), outcome))
-    _gather(run)
+    try:
+        if missing:
+            with dask_client(min(workers or count_cores(), len(missing)), scheduler) as client:
+                for done, outcome in enumerate(fit_on_workers(client, run, missing), start=1):
+                    if outcome.message:
+                        failed[outcome.orbit] = outcome.message
+                    progress(Progress(done, len(missing), outcome))
+        _gather(run)
+    except DiskError as error:
+        raise DiskError(f"{error}{_needed(run, missing)}") from error
+    finally:
+        # Of workers that were ended.
+        run.remove_abandoned()
     fitted = [orbit for orbit in missing if orbit not in failed]
     kept = [orbit for orbit in wanted if orbit in there]
     distrusted = _distrusted(run, sorted([*fitted, *kept]))
@@ -142,6 +153,17 @@ def _distrusted(run: Run, orbits: list[int]) -> dict[int, list[str]]:
         if verdict is not None and verdict["state"] == "bad":
             found[orbit] = [str(reason) for reason in verdict["reasons"]]
     return found
+
+
+def _needed(run: Run, missing: list[int]) -> str:
+    """Return how much room the orbits that are still missing need, as text."""
+    complete = run.complete_orbits()
+    left = sorted(set(missing) - set(complete))
+    if not complete or not left:
+        return ""
+    files = [path for one in complete for path in run.orbit_directory(one).iterdir()]
+    size = sum(path.stat().st_size for path in files) / len(complete) * len(left)
+    return f"; {len(left)} orbits are left, which need about {size_text(size)}"
 
 
 def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:

@@ -1,16 +1,13 @@
 """Fitted orbits on disk: one directory each, with Parquet files, either complete or absent.
 
-No user interface and no JAX. A directory is written under a temporary name, with the file
-`COMPLETE` last, and then renamed; it is never changed afterwards. `COMPLETE` is a manifest of the
+No user interface and no JAX. A directory is written in a scratch folder, with the file
+`COMPLETE` last, and then moved; it is never changed afterwards. `COMPLETE` is a manifest of the
 other files, and a file that is not the one it lists is not read. The times, which differ between
 repeated fits of the same bytes, are not in it; their file has a SHA-256 of its own.
 """
 
 import hashlib
 import json
-import os
-import secrets
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +20,8 @@ from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES, TRACE
 from solver.data.settings import FitSettings
 from solver.errors import InputError
+from solver.io.atomic import flush
+from solver.io.disk import writing
 from solver.io.failures import reading
 from solver.io.manifest import (
     changes,
@@ -32,6 +31,7 @@ from solver.io.manifest import (
     require_unchanged,
 )
 from solver.io.parquet import read_frame, write_parquet
+from solver.io.scratch import scratch_beside
 
 FORMAT = 1
 _COMPLETE = "COMPLETE"
@@ -50,39 +50,36 @@ def write_fitted_orbit(
     ----------
     directory : to write; its parent is created if needed
     beside : additional tables to store with it, by name
+
+    Raises
+    ------
+    DiskError
+        If the disk is full or takes no file for another reason.
+    InputError
+        If writing fails otherwise.
     """
-    directory.parent.mkdir(parents=True, exist_ok=True)
-    staging = directory.with_name(f".{directory.name}-{secrets.token_hex(6)}")
-    staging.mkdir()
-    try:
-        _write_tables(staging, result, beside or {})
-        _write_head(staging, result)
-        for path in staging.iterdir():
-            _flush(path)
-        names = {path.name for path in staging.iterdir()} - {_TIMINGS}
-        manifest = manifest_of(staging, names)
-        (staging / _COMPLETE).write_text(manifest, encoding="utf-8")
-        _flush(staging / _COMPLETE)
-        _flush(staging)
-        if not directory.exists():
-            staging.rename(directory)
-            _flush(directory.parent)
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
-
-
-def remove_unfinished(folder: Path) -> None:
-    """Remove temporary directories that interrupted writes left in a folder."""
-    for staging in folder.glob(".*-*"):
-        if staging.is_dir():
-            shutil.rmtree(staging, ignore_errors=True)
+    with writing(directory, "to write the fitted orbit"):
+        directory.parent.mkdir(parents=True, exist_ok=True)
+        with scratch_beside(directory) as staging:
+            staging.mkdir()
+            _write_tables(staging, result, beside or {})
+            _write_head(staging, result)
+            for path in staging.iterdir():
+                flush(path)
+            names = {path.name for path in staging.iterdir()} - {_TIMINGS}
+            manifest = manifest_of(staging, names)
+            (staging / _COMPLETE).write_text(manifest, encoding="utf-8")
+            flush(staging / _COMPLETE)
+            flush(staging)
+            if not directory.exists():
+                _move(staging, directory)
+                flush(directory.parent)
 
 
 def remove_fitted_orbit(directory: Path) -> None:
     """Remove a fitted orbit, which is absent for readers from the first moment on."""
-    doomed = directory.with_name(f".{directory.name}-{secrets.token_hex(6)}")
-    directory.rename(doomed)
-    shutil.rmtree(doomed, ignore_errors=True)
+    with writing(directory, "to remove the fitted orbit"), scratch_beside(directory) as doomed:
+        directory.rename(doomed)
 
 
 def read_fitted_orbit(directory: Path) -> FitResult:
@@ -207,9 +204,10 @@ def _read_json(path: Path) -> Any:  # noqa: ANN401 whatever the file holds
         return json.loads(path.read_text(encoding="utf-8"))
 
 
-def _flush(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
+def _move(staging: Path, directory: Path) -> None:
+    """Rename a directory; one that another process has written in the meantime is kept."""
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        staging.rename(directory)
+    except OSError:
+        if not is_complete(directory):
+            raise

@@ -243,6 +243,8 @@ def gather_history(run: Run) -> Path:
     group = rows_of_a_group(sum(map(count_rows, parts)))
     # With one thread the written bytes are reproducible.
     with write_atomically(target) as temporary, duckdb.connect(config={"threads": 1}) as connection:
+        # Where memory does not suffice; by default it is a folder in the working directory.
+        connection.execute("SET temp_directory = ?", [str(temporary.parent / "sorting")])
         ordered = connection.sql(
             "SELECT * FROM read_parquet(?, hive_partitioning = false) ORDER BY source_id, epoch",
             params=[parts],

@@ -31,8 +31,10 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
+from solver.io.disk import writing
 from solver.io.failures import reading
 from solver.io.manifest import changes, manifest_of, read_manifest, require_unchanged
+from solver.io.scratch import is_scratch, remove_abandoned
 from solver.io.survey import (
     EXPOSURES,
     HEADER,
@@ -156,10 +158,18 @@ class Run:
     def keep_failure(self, orbit: int, message: str) -> None:
         """Write the reason why an orbit has no solution."""
         path = self._failure_path(orbit)
-        path.parent.mkdir(exist_ok=True)
+        with writing(path):
+            path.parent.mkdir(exist_ok=True)
         with write_atomically(path) as temporary:
             content = json.dumps({"orbit": orbit, "message": message})
             temporary.write_text(content, encoding="utf-8")
+
+    def remove_abandoned(self) -> None:
+        """Remove what killed processes left: scratch folders, failures of orbits fitted since."""
+        for folder in (self.directory, self.directory / _FAILED):
+            remove_abandoned(folder)
+        for orbit in self.complete_orbits():
+            self._failure_path(orbit).unlink(missing_ok=True)
 
     def gathered_orbits(self) -> list[int]:
         """Return the orbits that the tables over all orbits contain."""
@@ -220,12 +230,10 @@ def begin_run(survey: Path, name: str, settings: FitSettings) -> Run:
     if path.is_file():
         _check_same(path, read_header(run.directory, _HEADER), content)
         return run
-    if run.directory.is_dir() and any(run.directory.iterdir()):
+    if run.directory.is_dir() and not all(is_scratch(p.name) for p in run.directory.iterdir()):
         raise InputError(f"{run.directory}: expected a run, found a folder without {_HEADER}")
-    try:
+    with writing(run.directory, "to create the folder"):
         run.directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{run.directory}: expected to create a folder, found: {error}") from error
     write_header(run.directory, content, _HEADER)
     return run
 

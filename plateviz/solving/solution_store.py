@@ -1,13 +1,12 @@
 """SolutionStore: one origin, one solver process, and all solutions made so far.
 
 It belongs to the server and is shared by all its sessions. Solutions are files in a scratch
-folder, named after the orbit and the settings.
+folder, named after the orbit and the settings. The folder of a killed server is removed by the
+next one.
 """
 
 import hashlib
 import json
-import shutil
-import tempfile
 import threading
 from functools import lru_cache
 from pathlib import Path
@@ -20,6 +19,8 @@ from plateviz.solving.solver_queue import SolverQueue
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
+from solver.io.disk import writing
+from solver.io.scratch import ScratchFolder, temporary_folder
 
 
 class SolutionStore:
@@ -33,7 +34,10 @@ class SolutionStore:
         self._solver = solver
         self._lock = threading.Lock()
         self._jobs: dict[Path, Job] = {}
-        self._scratch = Path(tempfile.mkdtemp(prefix="plateviz-"))
+        temporary = temporary_folder()
+        with writing(temporary, "to make a folder for the solutions"):
+            self._folder = ScratchFolder(temporary, "plateviz")
+        self._scratch = self._folder.path
         self._read = lru_cache(maxsize=16)(read_fitted_orbit)
 
     @property
@@ -75,7 +79,7 @@ class SolutionStore:
     def close(self) -> None:
         """End the solver process and remove the scratch folder."""
         self._solver.close()
-        shutil.rmtree(self._scratch, ignore_errors=True)
+        self._folder.close()
 
     def _request(
         self, orbit: int | None, settings: FitSettings, what_if: bool, directory: Path

@@ -1,9 +1,9 @@
 """The solver process: reads requests from standard input, writes events to standard output.
 
 Each line is one JSON object, in both directions. This is the only process of a plateviz server
-that imports JAX. It keeps its compilations between fits, and ends when its standard input ends. An
-unexpected exception ends it with a traceback on standard error;
-`plateviz.solving.solver_queue` reports that and starts another process.
+that imports JAX. It keeps its compilations between fits, and ends when its standard input ends or
+by SIGTERM; what it has not finished is removed. An unexpected exception ends it with a traceback
+on standard error; `plateviz.solving.solver_queue` reports that and starts another process.
 
 Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory"},
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
@@ -14,8 +14,10 @@ Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cance
 import json
 import os
 import queue
+import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -29,6 +31,7 @@ from solver.engines.gauss_newton import Iteration
 from solver.errors import CancelledError, FitError, InputError
 from solver.fit import OrbitFitter
 from solver.runtime.memory import keep_memory
+from solver.runtime.termination import EXIT_CODE, ending_on_sigterm
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 
@@ -38,6 +41,8 @@ Send = Callable[[dict], None]
 Speculative = Iterator[None]
 # Idle seconds before speculative work starts.
 _IDLE_S = 0.3
+# Time in which the process removes what it has not finished, once its server has ended.
+_END_S = 3.0
 
 
 class _Cancellations:
@@ -56,6 +61,15 @@ class _Cancellations:
 
 def main() -> None:
     """Serve requests until standard input ends."""
+    try:
+        with ending_on_sigterm():
+            _serve_all()
+    except SystemExit:
+        # The interpreter would wait for the thread that reads standard input.
+        os._exit(EXIT_CODE)
+
+
+def _serve_all() -> None:
     keep_memory()
     send = _sender()
     requests: queue.Queue[Request | None] = queue.Queue()
@@ -105,8 +119,10 @@ def _read(
             cancellations.add(request["job"])
         else:
             requests.put(request)
-    # The server has ended: stop at once, even during a fit.
-    os._exit(0)
+    # The server has ended: stop, even during a fit.
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(_END_S)
+    os._exit(EXIT_CODE)
 
 
 def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Speculative:

@@ -9,16 +9,19 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 import threading
 from collections import deque
+from tempfile import TemporaryFile
 from typing import IO
 
 from plateviz.cache import keep_compilations
 from plateviz.solving.job import Job
+from solver.io.scratch import temporary_folder
 
 # A fit checks for a cancellation between iterations, which take well under a second.
 _GRACE_SECONDS = 3.0
+# Time in which the process removes what it has not finished.
+_END_SECONDS = 5.0
 
 
 class SolverQueue:
@@ -68,12 +71,17 @@ class SolverQueue:
             self._jobs.clear()
             process = self._process
             if process is not None:
-                process.kill()
+                process.terminate()
         if process is not None:
-            process.wait()
+            try:
+                process.wait(_END_SECONDS)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
     def _start(self) -> subprocess.Popen[str]:
-        errors = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 read when it ends
+        folder = temporary_folder()
+        errors = TemporaryFile("w+", encoding="utf-8", dir=folder)  # noqa: SIM115 read at its end
         process = subprocess.Popen(
             [sys.executable, "-m", "plateviz.solving.solver_process"],
             stdin=subprocess.PIPE,

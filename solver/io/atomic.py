@@ -3,12 +3,13 @@
 import errno
 import hashlib
 import os
-import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from solver.errors import InputError
+from solver.errors import DiskError, InputError
+from solver.io.disk import writing
+from solver.io.scratch import scratch_beside
 
 
 @contextmanager
@@ -22,31 +23,29 @@ def write_atomically(path: Path, overwrite: bool = True) -> Iterator[Path]:
 
     Yields
     ------
-    Path of an empty file in the same folder and with the same suffix. When the block ends,
-    the file is flushed to disk and renamed to `path`. If the block raises, the file is
-    removed and `path` is unchanged.
+    Path of an empty file of the same name in a scratch folder beside `path`. When the block
+    ends, the file is flushed to disk and renamed to `path`. If the block raises, the file is
+    removed and `path` is unchanged; if the process is killed, the next one that writes `path`
+    removes it.
 
     Raises
     ------
+    DiskError
+        If the disk is full or takes no file for another reason.
     InputError
-        Before the block if `path` cannot be written; after it if writing to disk fails, or
-        another process has written `path` and it must not be overwritten.
+        Before the block if `path` cannot be written; after it if writing fails, or another
+        process has written `path` and it must not be overwritten.
     """
     target = require_writable(path)
-    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(6)}{target.suffix}")
-    try:
+    with writing(path), scratch_beside(target) as temporary:
         temporary.touch(exist_ok=False)
         yield temporary
-        _flush(temporary)
+        flush(temporary)
         if overwrite:
             os.replace(temporary, target)
         else:
             _move_to_new(temporary, target)
-        _flush(target.parent)
-    except OSError as error:
-        raise InputError(f"{path}: expected to write the file, found: {error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+        flush(target.parent)
 
 
 def require_writable(path: Path) -> Path:
@@ -54,16 +53,17 @@ def require_writable(path: Path) -> Path:
 
     Raises
     ------
+    DiskError
+        If the folder is read-only.
     InputError
-        If the folder is missing or read-only, or `path` exists and is not a file that can
-        be replaced.
+        If the folder is missing, or `path` exists and is not a file that can be replaced.
     """
     target = Path(path).resolve()
     folder = target.parent
     if not folder.is_dir():
         raise InputError(f"{path}: expected to write into a folder, found no folder {folder}")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: expected a folder that can be written, found {folder} read-only")
+        raise DiskError(f"{path}: expected a folder that can be written, found {folder} read-only")
     # A device such as /dev/null exists, but must not be replaced.
     if target.exists() and not target.is_file():
         raise InputError(f"{path}: expected a file to write, found something that is not a file")
@@ -100,7 +100,8 @@ def _move_to_new(temporary: Path, target: Path) -> None:
         os.replace(temporary, target)
 
 
-def _flush(path: Path) -> None:
+def flush(path: Path) -> None:
+    """Make the system write a file, or the names in a folder, to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -8,8 +8,11 @@ import pandas as pd
 from solver.data.instrument import MINI_MOCK, Instrument, write_instrument
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
 from solver.errors import InputError
-from solver.io.atomic import sha256_of
+from solver.io.atomic import flush, sha256_of
+from solver.io.disk import writing
+from solver.io.lock import locked
 from solver.io.read_orbit import find_catalogue
+from solver.io.scratch import is_scratch, remove_abandoned
 from solver.io.survey import (
     EXPOSURES,
     HEADER,
@@ -49,7 +52,7 @@ def simulate_survey(
     """Simulate a survey into `directory`, or resume one that was interrupted.
 
     Files of orbits are written atomically, and existing ones are kept when the simulation is
-    resumed with the same settings. `survey.toml`, written last, marks a complete survey.
+    resumed with the same settings. `survey.toml`, which appears last, marks a complete survey.
 
     Parameters
     ----------
@@ -62,14 +65,40 @@ def simulate_survey(
 
     Raises
     ------
+    DiskError
+        If the disk is full or read-only; what was written before is kept.
     InputError
-        If the directory contains anything except the same survey unfinished, the catalogue is
-        invalid, an orbit has no reference star, or JAX has no device.
+        If the directory contains anything except the same survey unfinished, another process is
+        simulating it, the catalogue is invalid, an orbit has no reference star, or JAX has no
+        device.
     """
     require_device()
     directory, settings = Path(directory), settings or SurveySettings()
     header = _header(settings, instrument, catalogue)
-    _claim(directory, header)
+    _make(directory)
+    with locked(directory) as is_ours:
+        if not is_ours:
+            raise InputError(
+                f"{directory}: expected a directory that no other process is simulating into, "
+                "found one that another process is simulating into; wait for it, or give another "
+                "directory"
+            )
+        _claim(directory, header)
+        _simulate(directory, settings, instrument, catalogue, progress)
+        write_manifest(directory, header)
+        # One step, so that a survey is never both, or neither.
+        (directory / UNFINISHED).replace(directory / HEADER)
+        flush(directory)
+
+
+def _simulate(
+    directory: Path,
+    settings: SurveySettings,
+    instrument: Instrument,
+    catalogue: Path | None,
+    progress: Callable[[int, int], None] | None,
+) -> None:
+    """Write the tables of a survey that are not there yet."""
     truth = _truth(settings, catalogue)
     attitudes = [
         orbit_attitude(orbit_id, settings, instrument.focal_length_um)
@@ -88,9 +117,6 @@ def simulate_survey(
             write_survey_table(measurements, MEASUREMENT, path)
         if progress is not None:
             progress(orbit_id + 1, settings.orbits)
-    write_manifest(directory, header)
-    write_header(directory, header, HEADER)
-    (directory / UNFINISHED).unlink(missing_ok=True)
 
 
 def _header(
@@ -102,24 +128,29 @@ def _header(
     return {**content, "instrument": write_instrument(instrument)}
 
 
-def _claim(directory: Path, header: Mapping[str, object]) -> None:
-    """Mark `directory` as this survey, unfinished; reject it if it contains anything else."""
+def _make(directory: Path) -> None:
     if directory.exists() and not directory.is_dir():
         raise InputError(f"{directory}: expected a directory for the survey, found a file")
+    with writing(directory, "to make the directory"):
+        directory.mkdir(parents=True, exist_ok=True)
+
+
+def _claim(directory: Path, header: Mapping[str, object]) -> None:
+    """Mark `directory` as this survey, unfinished; reject it if it contains anything else."""
+    for folder in (directory, directory / MEASUREMENTS):
+        remove_abandoned(folder)
+    names = [path.name for path in directory.iterdir() if not is_scratch(path.name)]
     if (directory / HEADER).exists():
         raise InputError(f"{directory}: expected no survey there yet, found a finished one")
     if (directory / UNFINISHED).exists():
         _check_same(directory, header)
-    elif directory.is_dir() and any(directory.iterdir()):
+    elif names:
         raise InputError(
-            f"{directory}: expected an empty directory or an unfinished survey, "
-            f"found {min(path.name for path in directory.iterdir())}"
+            f"{directory}: expected an empty directory or an unfinished survey, found {min(names)}"
         )
-    try:
-        (directory / MEASUREMENTS).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{directory}: expected to make the directory, found: {error}") from error
     write_header(directory, header, UNFINISHED)
+    with writing(directory / MEASUREMENTS, "to make the directory"):
+        (directory / MEASUREMENTS).mkdir(exist_ok=True)
 
 
 def _check_same(directory: Path, header: Mapping[str, object]) -> None:

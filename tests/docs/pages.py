@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from plateviz.runs.lock import locked
+from solver.io.lock import locked
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DOCS = REPOSITORY / "assets" / "docs"

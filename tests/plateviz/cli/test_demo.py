@@ -12,7 +12,6 @@ import pytest
 
 from plateviz.cli import demo
 from plateviz.cli.demo import BackgroundFit, demo_directory, make_survey, request_first_orbit
-from plateviz.runs.lock import locked
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run import DEFAULT_RUN, Run
 from plateviz.solving.job import Job
@@ -22,6 +21,7 @@ from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_queue import SolverQueue
 from solver.data.settings import FitSettings
 from solver.errors import FitError
+from solver.io.lock import locked
 from solver.simulate.schedule import schedule
 from solver.simulate.seasons import SEASONS
 from solver.simulate.settings import SurveySettings

@@ -1,5 +1,6 @@
 """Fitted orbits on disk: complete or absent, and unchanged when read back."""
 
+import errno
 import json
 
 import pandas as pd
@@ -7,7 +8,7 @@ import pytest
 
 from plateviz.runs.fitted_orbit import FORMAT, is_complete, read_fitted_orbit, write_fitted_orbit
 from solver.data.schema import RESULT_TABLES
-from solver.errors import InputError
+from solver.errors import DiskError, InputError
 
 
 def test_fitted_orbit_is_unchanged_when_read_back(fit_result, tmp_path):
@@ -41,10 +42,10 @@ def test_existing_fitted_orbit_is_not_changed(fit_result, make_fit_result, tmp_p
 
 def test_interrupted_write_leaves_no_file(fit_result, tmp_path, monkeypatch):
     def stop(*_, **__):
-        raise OSError("no space left")
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("plateviz.runs.fitted_orbit._flush", stop)
-    with pytest.raises(OSError, match="no space"):
+    monkeypatch.setattr("plateviz.runs.fitted_orbit.flush", stop)
+    with pytest.raises(DiskError, match="expected to write the fitted orbit, found a full disk"):
         write_fitted_orbit(tmp_path / "run", fit_result)
     assert list(tmp_path.iterdir()) == []
 

@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from solver.errors import InputError
+from solver.errors import DiskError, InputError
 from solver.io.atomic import require_writable, sha256_of, write_atomically
 
 
@@ -20,7 +20,7 @@ def test_write_atomically_puts_the_file_in_place(tmp_path):
 
 def test_temporary_lies_beside_the_target_with_its_suffix(tmp_path):
     with write_atomically(tmp_path / "out.parquet") as temporary:
-        assert temporary.parent == tmp_path
+        assert temporary.parent.parent == tmp_path
         assert temporary.suffix == ".parquet"
 
 
@@ -46,7 +46,7 @@ def test_interrupted_write_keeps_the_old_file(tmp_path):
 
 
 def test_full_disk_is_an_input_error_and_leaves_no_file(tmp_path):
-    with pytest.raises(InputError, match=r"out\.txt: expected to write.*No space left"):
+    with pytest.raises(DiskError, match=r"out\.txt: expected to write.*full disk .* free"):
         _write_half(tmp_path / "out.txt", OSError(28, "No space left on device"))
     assert os.listdir(tmp_path) == []
 

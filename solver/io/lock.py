@@ -27,12 +27,21 @@ def locked(path: Path, wait: bool = False) -> Iterator[bool]:
         return
     descriptor = os.open(path, os.O_RDONLY)
     try:
-        yield _lock(descriptor, wait)
+        # A network file system without locks must not keep a person from fitting.
+        yield lock(descriptor, wait) is not False
     finally:
         os.close(descriptor)
 
 
-def _lock(descriptor: int, wait: bool) -> bool:
+def lock(descriptor: int, wait: bool = False) -> bool | None:
+    """Lock an open file until it is closed.
+
+    Returns
+    -------
+    False if another process holds the lock, None if the system or the file system has no locks.
+    """
+    if sys.platform == "win32":
+        return None
     import fcntl
 
     try:
@@ -40,6 +49,5 @@ def _lock(descriptor: int, wait: bool) -> bool:
     except BlockingIOError:
         return False
     except OSError:
-        # A network file system without locks must not keep a person from fitting.
-        return True
+        return None
     return True

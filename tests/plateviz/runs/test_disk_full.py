@@ -1,0 +1,232 @@
+"""A disk that is full or read-only, lost workers: told once and in words, and resumed."""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from distributed import KilledWorker, LocalCluster
+from distributed.client import FutureCancelledError
+
+from plateviz.runs import dask_workers, fit_survey
+from plateviz.runs.run import Run, begin_run
+from solver.data.settings import FitSettings
+from solver.errors import DiskError, FitError, InputError
+from solver.io.lock import locked
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
+
+SETTINGS = FitSettings()
+FULL = OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.fixture
+def in_threads(monkeypatch):
+    """Let the worker be a thread of this process, in which a test may replace functions."""
+
+    def cluster(**options):
+        return LocalCluster(**{**options, "processes": False})
+
+    monkeypatch.setattr(dask_workers, "LocalCluster", cluster)
+    monkeypatch.setattr(dask_workers, "use_one_thread", lambda: None)
+
+
+@pytest.fixture
+def fit_as(monkeypatch, fit_result):
+    """Return the function that replaces the fit of an orbit, given the run and the orbit."""
+
+    def replace(fit):
+        monkeypatch.setattr(dask_workers, "_fit", fit)
+        monkeypatch.setattr(fit_survey, "_gather", lambda run: None)
+
+    return replace
+
+
+def names(folder):
+    return sorted(path.name for path in folder.rglob("*"))
+
+
+@pytest.mark.usefixtures("in_threads")
+def test_full_disk_stops_the_survey_with_one_message(survey_folder, fit_as, fit_result):
+    tried = []
+
+    def fit(run, orbit):
+        tried.append(orbit)
+        if len(tried) == 2:
+            fit_as(fails)
+        run.keep(orbit, fit_result, fit_result.sources)
+
+    def fails(run, orbit):
+        tried.append(orbit)
+        from plateviz.runs import fitted_orbit
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(fitted_orbit, "flush", full)
+            run.keep(orbit, fit_result, fit_result.sources)
+
+    def full(_):
+        raise FULL
+
+    fit_as(fails)
+    with pytest.raises(DiskError, match=r"orbit=000\d: expected to write .* a full disk"):
+        fit_survey.fit_survey(survey_folder, "full", SETTINGS, workers=1)
+    assert len(tried) < 3
+    run = Run(survey_folder, "full")
+    assert names(run.directory) == ["run.toml"]
+    tried.clear()
+    fit_as(fit)
+    with pytest.raises(DiskError, match=r"1 orbits are left, which need about .* [kM]B$"):
+        fit_survey.fit_survey(survey_folder, "full", SETTINGS, workers=1)
+    assert len(run.complete_orbits()) == 2
+    assert run.failures() == {}
+    tried.clear()
+    fit_as(lambda run, orbit: run.keep(orbit, fit_result, fit_result.sources))
+    report = fit_survey.fit_survey(survey_folder, "full", SETTINGS, workers=1)
+    assert (len(report.fitted), len(report.kept)) == (1, 2)
+
+
+@pytest.mark.usefixtures("in_threads")
+def test_error_of_a_disk_that_a_library_raises_stops_the_survey(survey_folder, fit_as):
+    def fit(run, orbit):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    fit_as(fit)
+    with pytest.raises(DiskError, match="found a read-only disk"):
+        fit_survey.fit_survey(survey_folder, "read-only", SETTINGS, workers=1)
+
+
+def test_read_only_survey_is_told(survey_folder, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr("pathlib.Path.mkdir", refuse)
+    with pytest.raises(DiskError, match="expected to create the folder, found a read-only disk"):
+        begin_run(survey_folder, "new", SETTINGS)
+
+
+def test_full_disk_during_a_simulation_keeps_what_is_whole(tmp_path, monkeypatch):
+    settings = SurveySettings(orbits=2, seed=3).scaled(1500)
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    simulate_survey(whole, settings)
+    replace, count = os.replace, []
+
+    def full(*paths):
+        count.append(paths)
+        if len(count) == 6:
+            raise FULL
+        replace(*paths)
+
+    monkeypatch.setattr("os.replace", full)
+    with pytest.raises(DiskError, match=r"orbit=0001\.parquet: expected to write .* a full disk"):
+        simulate_survey(cut, settings)
+    assert not [name for name in names(cut) if name.endswith(".part")]
+    simulate_survey(cut, settings)
+    assert names(cut) == names(whole)
+    for path in whole.rglob("*.*"):
+        assert (cut / path.relative_to(whole)).read_bytes() == path.read_bytes()
+
+
+def test_second_process_that_simulates_is_refused(tmp_path):
+    with locked(tmp_path), pytest.raises(InputError, match="another process is simulating into"):
+        simulate_survey(tmp_path, SurveySettings(orbits=1))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_second_repair_at_once_is_refused(survey_folder):
+    run = begin_run(survey_folder, "one", SETTINGS)
+    with locked(run.directory), pytest.raises(InputError, match="another process is fitting"):
+        fit_survey.fit_survey(survey_folder, "one", SETTINGS, repair=True)
+
+
+@pytest.mark.usefixtures("in_threads")
+def test_clock_that_went_back_changes_nothing(survey_folder, fit_as, fit_result):
+    fit_as(lambda run, orbit: run.keep(orbit, fit_result, fit_result.sources))
+    fit_survey.fit_survey(survey_folder, "clock", SETTINGS, [0, 1], workers=1)
+    run = Run(survey_folder, "clock")
+    future = time.time() + 10 * 365 * 86400
+    for path in survey_folder.rglob("*"):
+        os.utime(path, (future, future))
+    before = {path: path.stat().st_mtime_ns for path in run.orbit_directory(1).iterdir()}
+    report = fit_survey.fit_survey(survey_folder, "clock", SETTINGS, workers=1)
+    assert (report.fitted, report.kept) == ([2], [0, 1])
+    assert {path: path.stat().st_mtime_ns for path in run.orbit_directory(1).iterdir()} == before
+    assert run.changes() == []
+
+
+def test_orbit_that_kills_its_workers_is_told_in_words(tmp_path):
+    error = KilledWorker("task", None, 3)
+    message = dask_workers._reason(error, Run(tmp_path, "r"), 7)
+    assert "orbit 7: expected a worker process that fits it, found that each of the 4" in message
+    assert "--workers" in message
+
+
+def test_lost_scheduler_is_told_in_words(tmp_path):
+    error = FutureCancelledError("fit-7", "scheduler-connection-lost", None)
+    with pytest.raises(FitError, match="connection to it was lost; finished orbits are kept"):
+        dask_workers._reason(error, Run(tmp_path, "r"), 7)
+
+
+@pytest.mark.full
+@pytest.mark.slow
+def test_scheduler_that_is_lost_during_a_run_ends_it_in_words(survey_folder):
+    code = (
+        "from distributed import LocalCluster\n"
+        "if __name__ == '__main__':\n"
+        "    cluster = LocalCluster(n_workers=1, dashboard_address='127.0.0.1:0')\n"
+        "    print(cluster.scheduler_address, flush=True)\n"
+        "    input()\n"
+    )
+    script = survey_folder.parent / "cluster.py"
+    script.write_text(code)
+    command = [sys.executable, str(script)]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        address = process.stdout.readline().strip()
+        timer = threading.Timer(5.0, os.killpg, (process.pid, signal.SIGKILL))
+        timer.start()
+        with pytest.raises(FitError, match="connection to it was lost"):
+            fit_survey.fit_survey(survey_folder, "lost", SETTINGS, scheduler=address)
+        timer.join()
+
+
+@pytest.mark.full
+@pytest.mark.slow
+@pytest.mark.skipif(
+    sys.platform != "linux" or os.geteuid() != 0, reason="only root may mount a small disk"
+)
+@pytest.mark.parametrize("size", ["200k", "700k", "1200k"])
+def test_small_disk_stops_each_command_and_is_resumed(survey_folder, tmp_path, run, size):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(disk)])
+    if mounted.returncode:
+        pytest.skip("no disk may be mounted here")
+    try:
+        code, _, err = run("simulate", disk / "survey", "--orbits", 3, "--stars", 6000)
+        assert code == 2
+        assert err.count("a full disk") == 1
+        assert "Errno" not in err
+        assert not [name for name in names(disk) if name.endswith(".part")]
+        subprocess.run(["mount", "-o", "remount,size=100m", str(disk)], check=True)
+        assert run("simulate", disk / "survey", "--orbits", 3, "--stars", 6000)[0] == 0
+        used = sum(path.stat().st_size for path in disk.rglob("*") if path.is_file())
+        small = f"remount,size={used // 1024 + int(size[:-1]) + 200}k"
+        subprocess.run(["mount", "-o", small, str(disk)], check=True)
+        code, _, err = run("survey", disk / "survey", "--workers", 1)
+        assert code == 2
+        assert err.count("a full disk") == 1
+        assert "Errno" not in err
+        assert not [name for name in names(disk) if name.endswith(".part")]
+        subprocess.run(["mount", "-o", "remount,size=100m", str(disk)], check=True)
+        assert run("survey", disk / "survey", "--workers", 1)[0] == 0
+        subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
+        code, _, err = run("survey", disk / "survey", "--run", "other")
+        assert code == 2
+        assert "a read-only disk" in err or "read-only" in err
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)

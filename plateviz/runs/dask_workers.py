@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import dask.config
 from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
-from distributed.client import FutureCancelledError
 
 from plateviz.cache import keep_compilations
 from plateviz.runs.run import Run
@@ -87,6 +86,8 @@ def dask_client(workers: int, scheduler: str | None) -> Iterator[Client]:
         If no scheduler answers at that address.
     """
     if scheduler is not None:
+        # A scheduler that is lost is told in words, not by a traceback of each attempt.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         try:
             client = Client(scheduler, timeout=_TIMEOUT)
         except (OSError, ValueError) as error:
@@ -132,6 +133,12 @@ def fit_on_workers(client: Client, run: Run, orbits: list[int]) -> Iterator[Outc
         for orbit in orbits
     }
     for future in as_completed(futures):
+        if future.cancelled():
+            raise FitError(
+                f"{run.directory}: expected the Dask scheduler until all orbits are fitted, found "
+                "that the connection to it was lost; finished orbits are kept, and the same "
+                "command goes on"
+            )
         error = future.exception()
         if error is None:
             yield future.result()
@@ -148,11 +155,6 @@ def _reason(error: BaseException, run: Run, orbit: int) -> str:
         raise error
     if (full := disk_error(error, run.orbit_directory(orbit))) is not None:
         raise full from error
-    if isinstance(error, FutureCancelledError):
-        raise FitError(
-            f"{run.directory}: expected the Dask scheduler until all orbits are fitted, found that "
-            "the connection to it was lost; finished orbits are kept, and the same command goes on"
-        ) from error
     if isinstance(error, KilledWorker):
         return (
             f"orbit {orbit}: expected a worker process that fits it, found that each of the "

@@ -10,7 +10,6 @@ import time
 
 import pytest
 from distributed import KilledWorker, LocalCluster
-from distributed.client import FutureCancelledError
 
 from plateviz.runs import dask_workers, fit_survey
 from plateviz.runs.run import Run, begin_run
@@ -162,12 +161,6 @@ def test_orbit_that_kills_its_workers_is_told_in_words(tmp_path):
     message = dask_workers._reason(error, Run(tmp_path, "r"), 7)
     assert "orbit 7: expected a worker process that fits it, found that each of the 4" in message
     assert "--workers" in message
-
-
-def test_lost_scheduler_is_told_in_words(tmp_path):
-    error = FutureCancelledError("fit-7", "scheduler-connection-lost", None)
-    with pytest.raises(FitError, match="connection to it was lost; finished orbits are kept"):
-        dask_workers._reason(error, Run(tmp_path, "r"), 7)
 
 
 @pytest.mark.full

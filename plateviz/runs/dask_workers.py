@@ -16,7 +16,7 @@ from plateviz.tables.verdict import with_verdict
 from solver.data.instrument import parse_instrument
 from solver.errors import DiskError, FitError, InputError
 from solver.io.disk import disk_error
-from solver.io.scratch import temporary_folder
+from solver.io.scratch import ScratchFolder, remove_abandoned, temporary_folder
 from solver.io.survey import HEADER, read_header, read_survey_orbit
 from solver.runtime.memory import keep_memory
 from solver.runtime.threads import use_one_thread
@@ -30,6 +30,7 @@ _LESS_MONITORING = {
 }
 # Timeout of the connection to a scheduler.
 _TIMEOUT = "20s"
+_SCRATCH = "plateviz-workers"
 
 
 class Outcome(NamedTuple):
@@ -71,6 +72,11 @@ def _fit(run: Run, orbit: int) -> None:
     run.keep(orbit, result, fitter.history(result))
 
 
+def remove_scratch() -> None:
+    """Remove what the workers of a killed survey left in the folder for temporary files."""
+    remove_abandoned(temporary_folder(), _SCRATCH)
+
+
 @contextmanager
 def dask_client(workers: int, scheduler: str | None) -> Iterator[Client]:
     """Give a client of a scheduler, or of workers that are started here and ended afterwards.
@@ -98,8 +104,8 @@ def dask_client(workers: int, scheduler: str | None) -> Iterator[Client]:
             yield client
         return
     with (
-        dask.config.set(_LESS_MONITORING),
-        dask.config.set({"temporary-directory": str(temporary_folder())}),
+        ScratchFolder(temporary_folder(), _SCRATCH) as scratch,
+        dask.config.set({**_LESS_MONITORING, "temporary-directory": str(scratch.path)}),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,

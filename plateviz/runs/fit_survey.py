@@ -15,7 +15,7 @@ import pandas as pd
 import pyarrow as pa
 from pyarrow import parquet
 
-from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
+from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers, remove_scratch
 from plateviz.runs.fitted_orbit import read_summary
 from plateviz.runs.queries import gather_history
 from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run, begin_run
@@ -122,6 +122,7 @@ def _fit_missing(
 ) -> Report:
     start = time.perf_counter()
     run.remove_abandoned()
+    remove_scratch()
     there = set(run.complete_orbits())
     missing = [orbit for orbit in wanted if orbit not in there]
     failed: dict[int, str] = {}

@@ -5,8 +5,9 @@
 A trial starts a command, kills it or one of its processes at a random moment, checks what is left,
 and runs the command again to its end. Faults are: a finished file that changed; a run or a survey
 with a wrong manifest; a result that differs from that of an undisturbed command; a process that
-outlives the command by ten seconds; a scratch folder that is left after the second command. With
-`--signal TERM` the command must clean up itself, too, and print no traceback.
+outlives the command by ten seconds and the time that a process takes to start, before which it
+cannot notice anything; a scratch folder that is left after the second command. With `--signal TERM`
+the command must clean up itself, too, and print no traceback.
 
 The number of a trial is its seed. A stopped campaign goes on where it was stopped.
 """
@@ -127,13 +128,15 @@ def tried(base: Path, number: signal.Signals, trial: int) -> Record:
     """Run a trial and return its record."""
     random_numbers = random.Random(trial)
     victim = list(VICTIMS.values())[trial % len(VICTIMS)]
-    undisturbed = json.loads((base / "undisturbed.json").read_text("utf-8"))[victim.name]
+    measured = json.loads((base / "undisturbed.json").read_text("utf-8"))
+    undisturbed = measured[victim.name]
     way = random_numbers.choice(victim.ways)
     is_copy = victim.is_costly or trial // len(VICTIMS) % _COMMANDS != 0
     started = "copy" if is_copy else "command"
     times = undisturbed[started]
     moment = random_numbers.uniform(_TOO_EARLY * times["begin"], times["seconds"])
-    place = Place(base / "trial", base, is_copy)
+    start_up = measured["survey, 2 workers"]["command"]["begin"]
+    place = Place(base / "trial", base, is_copy, ORPHAN_SECONDS + start_up)
     victim.prepare(place)
     start = time.monotonic()
     process = victim.start(place)
@@ -177,8 +180,8 @@ def after_kill(
         code = process.wait(_PATIENCE_SECONDS)
         before = {**before, **victim.finished(place)}
         faults += ended_by_sigterm(place, code) if number == signal.SIGTERM else []
-    if not wait_until(lambda: not place.processes(), ORPHAN_SECONDS):
-        faults.append(f"{len(place.processes())} processes outlive the command")
+    if not wait_until(lambda: not place.processes(), place.orphan_seconds):
+        faults.append(f"outlive the command: {place.outliving()}")
         end(place)
     return faults + victim.faults(place), before
 
@@ -213,8 +216,8 @@ def after_resuming(victim: Victim, place: Place, before: Files, wanted: Files) -
         if wanted.get(name) != result.get(name)
     ][:5]
     faults += [f"left: {name}" for name in place.leftovers()]
-    if not wait_until(lambda: not place.processes(), ORPHAN_SECONDS):
-        faults.append("a process outlives the second command")
+    if not wait_until(lambda: not place.processes(), place.orphan_seconds):
+        faults.append(f"outlive the second command: {place.outliving()}")
     return faults + victim.faults(place)
 
 

@@ -57,6 +57,7 @@ class Place:
     folder: Path
     base: Path
     is_forked: bool = True
+    orphan_seconds: float = ORPHAN_SECONDS
 
     def __post_init__(self) -> None:
         end(self)
@@ -118,6 +119,10 @@ class Place:
     def processes(self) -> list[int]:
         """Return the ids of all processes that run in this place."""
         return [pid for pid in _all_processes() if _runs_in(pid, self.folder)]
+
+    def outliving(self) -> list[str]:
+        """Return the commands of all processes that run in this place."""
+        return [_command(pid)[:200] for pid in self.processes()]
 
     def leftovers(self) -> list[str]:
         """Return all scratch folders, and those of Dask's workers, that are there."""

@@ -22,6 +22,7 @@ from plateviz.solving.solver_queue import SolverQueue
 from solver.data.settings import FitSettings
 from solver.errors import FitError
 from solver.io.lock import locked
+from solver.io.scratch import is_scratch
 from solver.simulate.schedule import schedule
 from solver.simulate.seasons import SEASONS
 from solver.simulate.settings import SurveySettings
@@ -171,20 +172,23 @@ def test_second_process_does_not_fit_the_same_run(made, capsys):
 @pytest.mark.parametrize(
     "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.full)]
 )
-def test_solver_processes_end_with_the_server(made, number):
-    """Whatever ends the server, none of the processes that it started goes on."""
+def test_processes_and_scratch_folders_end_with_the_server(made, number, tmp_path):
+    """Whatever ends the server, nothing that it started goes on, and nothing is left."""
+    scratch, errors = tmp_path / "scratch", tmp_path / "errors"
+    scratch.mkdir()
     code = (
         "from plateviz.cli import demo, main\n"
         "from solver.simulate.settings import SurveySettings\n"
         "demo.DEMO = SurveySettings(orbits=2, seed=3).scaled(4_000)\n"
         "main.main()"
     )
-    server = subprocess.Popen(
-        [sys.executable, "-c", code, "demo", "--port", "0", "--no-open"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    )
+    with errors.open("wb") as printed:
+        server = subprocess.Popen(
+            [sys.executable, "-c", code, "demo", "--port", "0", "--no-open"],
+            stdout=subprocess.DEVNULL,
+            stderr=printed,
+            env={**os.environ, "PYTHONUNBUFFERED": "1", "TMPDIR": str(scratch)},
+        )
     try:
         wait_until(lambda: len(descendants(server.pid)) >= 3)
         started = descendants(server.pid)
@@ -193,6 +197,9 @@ def test_solver_processes_end_with_the_server(made, number):
         wait_until(lambda: not any(map(is_running, started)), seconds=30)
     finally:
         server.kill()
+    assert server.returncode == (143 if number == signal.SIGTERM else 0)
+    assert "Traceback" not in errors.read_text()
+    assert not [path for path in tmp_path.rglob("*") if is_scratch(path.name)]
     assert made.settings() == FitSettings()
 
 

@@ -7,13 +7,13 @@ Eq. (exp:model:nxny), which is minus the angle at which the detector is mounted.
 
 import json
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from solver.data.toml import parse_toml
 from solver.errors import InputError
 
 
@@ -131,20 +131,18 @@ def parse_instrument(text: str, path: Path) -> Instrument:
     InputError
         As `read_instrument`.
     """
-    try:
-        content = tomllib.loads(text)
-    # Deep nesting, and integers of thousands of digits.
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: expected an instrument in TOML, found: {error}") from error
+    content = parse_toml(text, path, "an instrument in TOML")
     tables = content.pop("detector", [])
     _expect_keys(path, "the file", content, {"name", "focal_length_um", "distortion_scale_um"})
     if not isinstance(tables, list) or not tables or not all(isinstance(t, dict) for t in tables):
         raise InputError(f"{path}: expected at least one [[detector]] table, found none")
+    if not isinstance(content["name"], str):
+        raise InputError(f"{path}: expected name to be a text, found {content['name']!r}")
     detectors = tuple(_detector(path, number, table) for number, table in enumerate(tables))
     if len({d.detector_id for d in detectors}) < len(detectors):
         raise InputError(f"{path}: expected each detector id once, found one repeated")
     return Instrument(
-        str(content["name"]),
+        content["name"],
         _positive(path, "focal_length_um", content["focal_length_um"]),
         _positive(path, "distortion_scale_um", content["distortion_scale_um"]),
         detectors,

@@ -88,6 +88,7 @@ def test_integer_lengths_are_accepted(read_text):
         ("id = 1\n", "id = 0\n", "each detector id once"),
         ("id = 1\n", "id = 1.5\n", "1.5"),
         ("name = ", "name = = ", "line 1"),
+        ('name = "JASMINE mini-mock"', "name = 3", "name to be a text, found 3"),
     ],
 )
 def test_invalid_value_is_refused_with_the_file_name(read_text, old, new, complaint):
@@ -121,9 +122,11 @@ def test_binary_file_is_refused(tmp_path):
     [
         "a = " + "[" * 5_000 + "]" * 5_000,
         "a = " + "9" * 5_000,
+        "a = 0x" + "f" * 5_000,
+        "a = [{ b = " + "9" * 20 + " }]",
         "a = " + "{ b = " * 3_000 + "1" + " }" * 3_000,
     ],
-    ids=["nested", "digits", "tables"],
+    ids=["nested", "digits", "hexadecimal", "64-bits", "tables"],
 )
 def test_hostile_toml_is_refused_in_words(tmp_path, text):
     (tmp_path / "i.toml").write_text(text)
@@ -133,5 +136,5 @@ def test_hostile_toml_is_refused_in_words(tmp_path, text):
 
 def test_integer_beyond_every_float_is_refused_in_words(tmp_path):
     text = write_instrument(MINI_MOCK).replace("4860000.0", "9" * 400)
-    with pytest.raises(InputError, match="expected focal_length_um to be a positive number"):
+    with pytest.raises(InputError, match="an integer that does not fit into 64 bits"):
         parse_instrument(text, tmp_path / "i.toml")

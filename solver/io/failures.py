@@ -1,6 +1,7 @@
 """Conversion of library exceptions on damaged files to `InputError`."""
 
 import csv
+import re
 import struct
 import warnings
 import zipfile
@@ -39,6 +40,11 @@ _RAISED_ON_DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,
 )
+# Raised by code that did not foresee the damage: a message such as "'NoneType' object is not
+# subscriptable" does not describe the file.
+_UNFORESEEN = (ArithmeticError, AssertionError, AttributeError, LookupError, NameError, TypeError)
+# The name of an exception in the message of another one.
+_EXCEPTION = re.compile(r"\b\w*(?:Error|Exception): ")
 _MAX_REASON_LENGTH = 300
 
 
@@ -57,7 +63,7 @@ def reading(where: str, expected: str) -> Iterator[None]:
     Raises
     ------
     InputError
-        With `where`, `expected` and the message of the library.
+        With `where`, `expected` and what the library found, in words.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -66,7 +72,15 @@ def reading(where: str, expected: str) -> Iterator[None]:
         except InputError:
             raise
         except _RAISED_ON_DAMAGE as error:
-            reason = " ".join(str(error).split())[:_MAX_REASON_LENGTH]
-            raise InputError(
-                f"{where}: expected {expected}, found {type(error).__name__}: {reason}"
-            ) from error
+            raise InputError(f"{where}: expected {expected}, found {in_words(error)}") from error
+
+
+def in_words(error: Exception) -> str:
+    """Return what a library found, in one line, without names of exceptions."""
+    if isinstance(error, MemoryError):
+        return "a size that does not fit into the memory"
+    first_paragraph = str(error).strip().partition("\n\n")[0]
+    reason = " ".join(_EXCEPTION.sub("", first_paragraph).split())[:_MAX_REASON_LENGTH]
+    if isinstance(error, _UNFORESEEN) or not reason:
+        return f"damaged contents ({reason})" if reason else "damaged contents"
+    return reason

@@ -1,5 +1,6 @@
 """Raw tables: all formats give the same values, and damaged files raise InputError."""
 
+import re
 import zlib
 
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from pyarrow import parquet
 
 from solver.errors import InputError
+from solver.io.failures import reading
 from solver.io.formats import read_tables
 from solver.io.limits import MAX_ROWS
 from tests.solver.io_samples import catalogue, measurement, write_fits, write_orbit, write_table
@@ -111,8 +113,27 @@ def test_fits_null_integer_is_masked(tmp_path):
 def test_not_a_table_file(tmp_path, suffix, content):
     path = tmp_path / f"a{suffix}"
     path.write_bytes(content)
-    with pytest.raises(InputError, match=rf"a\{suffix}\b.*: expected .*found"):
+    with pytest.raises(InputError, match=rf"a\{suffix}\b.*: expected .*found") as refused:
         read_tables(path)
+    assert not re.search(r"\w(Error|Exception|Invalid)\b", str(refused.value))
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (KeyError("x"), r"damaged contents \('x'\)$"),
+        (EOFError(), "damaged contents$"),
+        (MemoryError(), "a size that does not fit into the memory$"),
+        (OSError("Bad. TProtocolException: Invalid data"), "Bad. Invalid data$"),
+    ],
+    ids=repr,
+)
+def test_error_of_a_library_is_put_in_words(error, words):
+    with (
+        pytest.raises(InputError, match=rf"a\.xml: expected a table, found {words}"),
+        reading("a.xml", "a table"),
+    ):
+        raise error
 
 
 def test_empty_csv(tmp_path):

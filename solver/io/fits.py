@@ -68,7 +68,24 @@ def read_fits(path: Path) -> FitsFile:
                         f"{path}, HDU {index}: expected each HDU name once, found {name} again"
                     )
                 tables[name] = _read_table(_where(path, index, hdu), hdu)
-        return FitsFile(hdus[0].header, tables)
+        return FitsFile(_parsed(hdus[0].header), tables)
+
+
+def read_primary_header(path: Path) -> fits.Header:
+    """Read the primary header of a FITS file; raises as `read_fits`."""
+    extents(Path(path))
+    with (
+        reading(str(path), "a FITS file"),
+        fits.open(path, memmap=False, disable_image_compression=True) as hdus,
+    ):
+        _check_checksums(path, 0, hdus[0])
+        return _parsed(hdus[0].header)
+
+
+def _parsed(header: fits.Header) -> fits.Header:
+    """Return a header, after parsing its cards: astropy parses each when it is first used."""
+    list(header.values())
+    return header
 
 
 def _where(path: Path, index: int, hdu: fits.PrimaryHDU) -> str:

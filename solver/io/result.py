@@ -11,17 +11,18 @@ from astropy.table import Table as RawTable
 
 from solver.data import schema
 from solver.data.result import FitResult
-from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io import published_layout as layout
 from solver.io.atomic import sha256_of, write_atomically
 from solver.io.failures import reading
-from solver.io.fits import FitsFile, read_fits
+from solver.io.fits import FitsFile, read_fits, read_primary_header
 from solver.io.header import FORMAT, ORIGIN, primary_header, result_header, versions_in
 from solver.io.outputs import FITS_SUFFIXES, check_output
 from solver.io.published_layout import Derived, PublishedTable
+from solver.io.settings import parse_settings
 
 _SUMMARY = "SUMMARY"
+_N_TABLES = "NTABLES"
 _SECTIONS = ("summary", "settings", "provenance")
 # Tables that a result may lack.
 _OPTIONAL = {
@@ -81,6 +82,7 @@ def write_result(result: FitResult, path: Path, overwrite: bool = False) -> None
             frame = getattr(result, name)
             if frame is not None:
                 hdus.append(_table_hdu(hdu_layout, frame))
+        hdus[0].header[_N_TABLES] = (len(hdus) - 1, "number of tables in this file")
         hdus.writeto(temporary, overwrite=True, checksum=True)
 
 
@@ -100,8 +102,7 @@ def read_result(path: Path) -> FitResult:
 
 def read_versions(path: Path) -> dict[str, str]:
     """Return the versions of the packages used for a result; raises as `read_result`."""
-    with reading(str(path), "a FITS file"):
-        primary = fits.getheader(path)
+    primary = read_primary_header(path)
     _check_format(path, primary)
     return versions_in(primary)
 
@@ -110,9 +111,8 @@ def to_result(path: Path, file: FitsFile) -> FitResult:
     """Convert the contents of the file `path` to a fitted orbit; raises as `read_result`."""
     _check_format(path, file.primary)
     sections = _read_summary(path, _table(path, file, _SUMMARY))
-    with reading(f"{path}, HDU {_SUMMARY}", "the settings of a fit"):
-        settings = FitSettings.from_dict(sections["settings"])
-    return FitResult(
+    settings = parse_settings(sections["settings"], f"{path}, HDU {_SUMMARY}")
+    result = FitResult(
         sources=_frame(path, file, layout.RESULT),
         residuals=_frame(path, file, layout.SAMPLE),
         calibration=_frame(path, file, layout.CALIBRATION),
@@ -126,6 +126,8 @@ def to_result(path: Path, file: FitsFile) -> FitResult:
             for name, hdu_layout in _OPTIONAL.items()
         },
     )
+    _check_count(path, file)
+    return result
 
 
 def is_result(primary: fits.Header) -> bool:
@@ -144,6 +146,16 @@ def _check_format(path: Path, primary: fits.Header) -> None:
             f"{path}: expected a result of format {FORMAT} or older, found format "
             f"{primary['FORMAT']}: it was written by a newer version "
             f"({primary.get('PLATEVIZ', 'unknown')})"
+        )
+
+
+def _check_count(path: Path, file: FitsFile) -> None:
+    # Checksums do not tell that a whole HDU is missing. Older versions did not count them.
+    expected = file.primary.get(_N_TABLES, 0)
+    if not isinstance(expected, int) or len(file.tables) < expected:
+        raise InputError(
+            f"{path}: expected {expected} tables, as its primary header says, "
+            f"found {len(file.tables)}: {', '.join(file.tables)}"
         )
 
 

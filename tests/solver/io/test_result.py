@@ -13,7 +13,7 @@ from solver.data import schema
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io import header
-from solver.io.result import read_result, write_result
+from solver.io.result import read_result, read_versions, write_result
 from tests.solver.io_samples import (
     random_table,
     small_result,
@@ -299,6 +299,20 @@ def test_incomplete_file_is_refused(written, hdu):
         read_result(path)
 
 
+def test_missing_optional_table_is_refused(written):
+    path = _edited(written, lambda hdus: hdus.pop("TRUE_PLACES"))
+    with pytest.raises(InputError, match=r"edited\.fits: expected 10 tables, .* found 9"):
+        read_result(path)
+
+
+def test_result_of_an_older_version_has_no_number_of_tables(written):
+    def change(hdus):
+        del hdus[0].header["NTABLES"]
+        hdus.pop("TRUE_PLACES")
+
+    assert read_result(_edited(written, change)).true_places is None
+
+
 def test_missing_column_is_refused(written):
     path = _edited(written, lambda hdus: hdus["RESULT"].columns.del_col("src_a_loc"))
     with pytest.raises(InputError, match="HDU RESULT: .*found none called src_a_loc"):
@@ -341,6 +355,30 @@ def test_flipped_byte_is_refused(tmp_path, written, hdu):
     path.write_bytes(content)
     with pytest.raises(InputError, match=r"flipped\.fits, HDU \w+: expected"):
         read_result(path)
+
+
+@pytest.mark.parametrize("read", [read_result, read_versions])
+def test_flipped_byte_of_the_primary_header_is_refused(tmp_path, written, read):
+    content = bytearray(written.read_bytes())
+    content[content.index(b"NUMPY   = '") + 11] ^= 1
+    path = tmp_path / "flipped.fits"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"flipped\.fits, HDU PRIMARY: expected .* corrupt"):
+        read(path)
+
+
+@pytest.mark.parametrize("read", [read_result, read_versions])
+def test_card_that_cannot_be_parsed_is_refused(tmp_path, written, read):
+    path = tmp_path / "card.fits"
+    with fits.open(written) as hdus:
+        for card in ("CHECKSUM", "DATASUM"):
+            hdus[0].header.remove(card)
+        hdus.writeto(path)
+    content = path.read_bytes()
+    start = content.index(b"NUMPY   = '")
+    path.write_bytes(content[:start] + b"NUMPY   = 'no end".ljust(80) + content[start + 80 :])
+    with pytest.raises(InputError, match=r"card\.fits: expected a FITS file, found Unparsable"):
+        read(path)
 
 
 def test_observation_is_refused_as_a_result(tmp_path):

@@ -158,7 +158,10 @@ class Navigation(param.Parameterized):
     def _look(self) -> None:
         found, message = None, ""
         if self.run is not None and self._source_text:
-            found, message = _find(self.run, self._source_text)
+            try:
+                found, message = _find(self.run, self._source_text)
+            except InputError as error:
+                message = str(error)
         self.param.update(found=found, message=message)
 
 

@@ -23,6 +23,7 @@ from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from plateviz.tables.verdict import run_verdict, source_verdict
 from solver.data.result import FitResult
 from solver.errors import InputError
+from solver.io.survey import section
 
 
 def survey_report(run: SurveyRun, facts: Facts) -> Report:
@@ -113,7 +114,7 @@ def _of_run(run: SurveyRun) -> Facts:
     """Return versions, settings and inputs of the run."""
     header = run.header()
     titles = {SOLVED: "versions", "Settings": "settings", "Inputs (SHA-256)": "inputs"}
-    return {title: plain(header[name]) for title, name in titles.items()}  # type: ignore[arg-type]
+    return {title: plain(section(header, name)) for title, name in titles.items()}
 
 
 def _figure(

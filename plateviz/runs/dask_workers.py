@@ -13,11 +13,10 @@ from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 from plateviz.cache import keep_compilations
 from plateviz.runs.run import Run
 from plateviz.tables.verdict import with_verdict
-from solver.data.instrument import parse_instrument
 from solver.errors import DiskError, FitError, InputError
 from solver.io.disk import disk_error
 from solver.io.scratch import ScratchFolder, remove_abandoned, temporary_folder
-from solver.io.survey import HEADER, read_header, read_survey_orbit
+from solver.io.survey import read_survey_instrument, read_survey_orbit
 from solver.runtime.memory import keep_memory
 from solver.runtime.threads import use_one_thread
 
@@ -66,7 +65,7 @@ def _fit(run: Run, orbit: int) -> None:
     # Imported here, because JAX sets its number of threads when it is imported.
     from solver.fit import OrbitFitter
 
-    instrument = parse_instrument(str(read_header(run.survey)["instrument"]), run.survey / HEADER)
+    instrument = read_survey_instrument(run.survey)
     fitter = OrbitFitter(read_survey_orbit(run.survey, orbit), instrument)
     result = with_verdict(fitter.fit(run.settings()))
     run.keep(orbit, result, fitter.history(result))

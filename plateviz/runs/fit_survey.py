@@ -186,6 +186,7 @@ def _gather(run: Run) -> None:
     if run.is_complete or not complete:
         return
     if run.gathered_orbits() != complete:
+        run.begin_gathering()
         _write_tables(run)
         run.mark_gathered(complete)
     if complete == survey_orbits(run.survey):

@@ -14,16 +14,15 @@ from typing import Any
 
 import pandas as pd
 import pyarrow as pa
-from pyarrow.compute import Expression
 
 from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES, TRACE
-from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import flush
 from solver.io.disk import writing
 from solver.io.failures import reading
 from solver.io.manifest import (
+    UnchangedFiles,
     changes,
     manifest_of,
     read_manifest,
@@ -32,6 +31,7 @@ from solver.io.manifest import (
 )
 from solver.io.parquet import read_frame, write_parquet
 from solver.io.scratch import scratch_beside
+from solver.io.settings import parse_settings
 
 FORMAT = 1
 _COMPLETE = "COMPLETE"
@@ -111,7 +111,7 @@ def read_fitted_orbit(directory: Path) -> FitResult:
         return FitResult(
             **tables,  # type: ignore[arg-type]
             summary={**head["summary"], "seconds": timings["seconds"]},
-            settings=FitSettings.from_dict(head["settings"]),
+            settings=parse_settings(head["settings"], str(directory / _HEAD)),
             provenance=head["provenance"],
         )
 
@@ -131,15 +131,21 @@ def read_summary(directory: Path) -> dict[str, Any]:
         return {**head["summary"], "seconds": timings["seconds"]}
 
 
-def read_kept_table(directory: Path, name: str, rows: Expression | None = None) -> pd.DataFrame:
-    """Return the rows of one table of a fitted orbit that fulfil a condition; all by default.
+def kept_table(directory: Path, name: str, unchanged: UnchangedFiles) -> Path:
+    """Return the file of one table of a fitted orbit, after checking that it is unchanged.
+
+    Parameters
+    ----------
+    unchanged : files that need not be checked again
 
     Raises
     ------
     InputError
-        If the table is missing or damaged. Only the pages that are read are checked.
+        If the table is missing or damaged.
     """
-    return read_frame(directory / f"{name}.parquet", rows=rows)
+    path = directory / f"{name}.parquet"
+    unchanged.require(path, read_manifest(directory / _COMPLETE).get(path.name), _REMEDY)
+    return path
 
 
 def orbit_changes(directory: Path) -> list[str]:

@@ -1,9 +1,23 @@
 """Input tables of the figures of a fitted survey, read from its files."""
 
+import math
+from pathlib import Path
+
+import pandas as pd
+
 from plateviz.runs.queries import SurveyRun
 from plateviz.tables.survey_tables import SurveyTables
 from solver.data.schema import CATALOGUE, TRUTH
-from solver.io.survey import REFERENCE, TRUTH_FILE, read_header, read_survey_table
+from solver.errors import InputError
+from solver.io.survey import (
+    HEADER,
+    REFERENCE,
+    TRUTH_FILE,
+    has_survey_table,
+    read_header,
+    read_survey_table,
+    section,
+)
 
 
 def survey_tables(run: SurveyRun) -> SurveyTables:
@@ -14,16 +28,31 @@ def survey_tables(run: SurveyRun) -> SurveyTables:
     InputError
         If a file of the survey cannot be read.
     """
-    truth = run.survey / TRUTH_FILE
-    settings = read_header(run.survey).get("settings")
-    where = settings if isinstance(settings, dict) else {}
-    sides = where.get("field_l_deg"), where.get("field_b_deg")
+    sides = (_pair(run.survey, "field_l_deg"), _pair(run.survey, "field_b_deg"))
     return SurveyTables(
         orbits=run.orbits(),
         motions=run.motions(),
         catalogue=read_survey_table(run.survey / REFERENCE, CATALOGUE),
-        truth=read_survey_table(truth, TRUTH) if truth.is_file() else None,
+        truth=_truth(run.survey),
         errors_by_count=run.errors_by_count(),
-        area=tuple(map(tuple, sides)) if all(sides) else None,  # type: ignore[arg-type]
-        target=tuple(where["target_deg"]) if "target_deg" in where else None,  # type: ignore[arg-type]
+        area=None if None in sides else sides,  # type: ignore[arg-type]
+        target=_pair(run.survey, "target_deg"),
     )
+
+
+def _pair(survey: Path, name: str) -> tuple[float, float] | None:
+    """Return two numbers of the settings of a survey, or None."""
+    found = section(read_header(survey), "settings").get(name)
+    if found is None:
+        return None
+    numbers = found if isinstance(found, list) else []
+    finite = [isinstance(one, int | float) and math.isfinite(one) for one in numbers]
+    if finite != [True, True]:
+        raise InputError(f"{survey / HEADER}: expected {name} to be two numbers, found {found!r}")
+    return numbers[0], numbers[1]
+
+
+def _truth(survey: Path) -> pd.DataFrame | None:
+    if not has_survey_table(survey, TRUTH_FILE):
+        return None
+    return read_survey_table(survey / TRUTH_FILE, TRUTH)

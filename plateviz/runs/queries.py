@@ -14,12 +14,14 @@ import pandas as pd
 from pyarrow.compute import Expression
 from pyarrow.compute import field as col
 
-from plateviz.runs.fitted_orbit import read_fitted_orbit, read_kept_table, read_summary
+from plateviz.runs.fitted_orbit import kept_table, read_fitted_orbit, read_summary
 from plateviz.runs.run import ERRORS_FILE, HISTORY_FILE, MOTIONS_FILE, Run, runs_of
 from solver.data.result import FitResult
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from solver.errors import InputError
 from solver.io.atomic import write_atomically
+from solver.io.failures import in_words, reading
+from solver.io.manifest import UnchangedFiles
 from solver.io.parquet import count_rows, read_frame, write_batches
 from solver.io.survey import survey_orbits
 
@@ -52,6 +54,7 @@ class SurveyRun:
     def __init__(self, run: Run) -> None:
         """Open a run, complete or not."""
         self._run = run
+        self._unchanged = UnchangedFiles()
 
     @property
     def name(self) -> str:
@@ -76,7 +79,7 @@ class SurveyRun:
     @property
     def is_gathered(self) -> bool:
         """Whether the tables over all orbits are there: of all orbits or of those not failed."""
-        return (self.directory / MOTIONS_FILE).is_file()
+        return self.is_complete or (self.directory / MOTIONS_FILE).is_file()
 
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""
@@ -120,6 +123,7 @@ class SurveyRun:
     def errors_by_count(self) -> pd.DataFrame | None:
         """Return `survey_schema.ERRORS_BY_COUNT` of the artificial sources, or None."""
         if not (self.directory / ERRORS_FILE).is_file():
+            self._run.require_unchanged(ERRORS_FILE)
             return None
         return self._table(ERRORS_FILE, ERRORS_BY_COUNT.names)
 
@@ -128,13 +132,8 @@ class SurveyRun:
         if not self._has_history:
             return pd.DataFrame(columns=HISTORY.names)
         rows = col("source_id") == int(source_id)
-        if (self.directory / HISTORY_FILE).is_file():
-            # Not the whole file, which may be large: its pages have checksums of their own.
-            found = read_frame(self.directory / HISTORY_FILE, HISTORY.names, rows)
-        else:
-            orbits = map(self._run.orbit_directory, self._run.complete_orbits())
-            parts = [read_frame(orbit / HISTORY_FILE, HISTORY.names, rows) for orbit in orbits]
-            found = pd.concat(parts, ignore_index=True)
+        parts = [read_frame(Path(file), HISTORY.names, rows) for file in self._history_files()]
+        found = pd.concat(parts, ignore_index=True)
         return found.sort_values("epoch", ignore_index=True, kind="stable")
 
     def counts(self) -> pd.DataFrame:
@@ -150,7 +149,7 @@ class SurveyRun:
             "any_value(is_artificial) AS is_artificial, count(*) AS n_orbits, "
             "sum(n_obs)::BIGINT AS n_obs FROM read_parquet(?) "
             "GROUP BY source_id ORDER BY source_id",
-            self._history_files,
+            self._history_files(),
         )
 
     def classes(self, often: int) -> pd.DataFrame:
@@ -166,13 +165,13 @@ class SurveyRun:
         (rms conditional sigma times sqrt(n_obs)) and `sigma_often` (median marginal sigma in
         RA of sources measured often), mas
         """
-        self._run.require_unchanged(HISTORY_FILE)
-        return self._ask(_CLASSES, self._history_files, often).set_index("source_class")
+        return self._ask(_CLASSES, self._history_files(), often).set_index("source_class")
 
     def exposure_residuals(self, orbit: int, field: int, plate: int) -> pd.DataFrame:
         """Return `schema.RESIDUALS` of one exposure."""
         rows = (col("field_id") == field) & (col("plate_id") == plate)
-        return read_kept_table(self._run.orbit_directory(orbit), "residuals", rows)
+        path = kept_table(self._run.orbit_directory(orbit), "residuals", self._unchanged)
+        return read_frame(path, rows=rows)
 
     def result(self, orbit: int) -> FitResult:
         """Return one fitted orbit; InputError if it does not exist."""
@@ -182,16 +181,26 @@ class SurveyRun:
     def _has_history(self) -> bool:
         return (self.directory / HISTORY_FILE).is_file() or bool(self._run.complete_orbits())
 
-    @property
-    def _history_files(self) -> str:
+    def _history_files(self) -> list[str]:
+        """Return the gathered history, or its parts; InputError if a file is damaged.
+
+        Each is read as a whole once: the checksums of its pages do not protect the names of the
+        columns.
+        """
         gathered = self.directory / HISTORY_FILE
-        return str(gathered if gathered.is_file() else self.directory / "orbit=*" / HISTORY_FILE)
+        if self.is_complete or gathered.is_file():
+            self._run.require_unchanged(HISTORY_FILE, self._unchanged.require)
+            return [str(gathered)]
+        orbits = map(self._run.orbit_directory, self._run.complete_orbits())
+        return [str(kept_table(orbit, "history", self._unchanged)) for orbit in orbits]
 
     def _figures(self, orbit: int) -> dict[str, object]:
-        summary = read_summary(self._run.orbit_directory(orbit))
-        figures = {name: summary.get(name) for name in RUN_ORBITS.names if name in summary}
-        seconds = sum(float(value) for value in summary["seconds"].values())
-        return {**figures, "epoch": summary["epoch_mjd"], "seconds": seconds}
+        directory = self._run.orbit_directory(orbit)
+        summary = read_summary(directory)
+        with reading(str(directory), "the summary of a fitted orbit"):
+            figures = {name: summary.get(name) for name in RUN_ORBITS.names if name in summary}
+            seconds = sum(float(value) for value in summary["seconds"].values())
+            return {**figures, "epoch": summary["epoch_mjd"], "seconds": seconds}
 
     def _table(
         self, name: str, columns: list[str] | None = None, rows: Expression | None = None
@@ -205,7 +214,7 @@ class SurveyRun:
             with duckdb.connect() as connection:
                 return connection.execute(question, list(values)).df()
         except duckdb.Error as error:
-            message = f"{self.directory}: expected the tables of a run, found: {error}"
+            message = f"{self.directory}: expected the tables of a run, found {in_words(error)}"
             raise InputError(message) from error
 
 

@@ -5,7 +5,8 @@
     runs/NAME/failed/orbit=0000.json      why an orbit has no solution
     runs/NAME/history.parquet             all orbits sorted by source (`plateviz.runs.queries`)
     runs/NAME/motions.parquet, ...        tables computed from it
-    runs/NAME/gathered.json               the orbits in these tables; written after them
+    runs/NAME/gathered.json               the orbits in these tables, and the tables' SHA-256;
+                                          removed before they are written, and written after them
     runs/NAME/COMPLETE                    written last, when every orbit of the survey is fitted: a
                                           manifest of the files that belong to no orbit
 
@@ -15,9 +16,10 @@ continued with the missing orbits, and only with the settings with which it was 
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -35,6 +37,7 @@ from solver.io.disk import writing
 from solver.io.failures import reading
 from solver.io.manifest import changes, manifest_of, read_manifest, require_unchanged
 from solver.io.scratch import is_scratch, remove_abandoned
+from solver.io.settings import parse_settings
 from solver.io.survey import (
     EXPOSURES,
     HEADER,
@@ -58,12 +61,16 @@ HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE = (
     "motions.parquet",
     "errors_by_count.parquet",
 )
+_TABLES = (HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE)
 _REMEDY = "`plateviz survey` with --repair writes the run's tables again"
 _HEADER_REMEDY = "restore it from a copy, or fit the survey with another --run"
 # Their versions belong to a run: results may differ between versions.
 PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _ORBIT = re.compile(r"orbit=(\d{4,})")
+
+# Given a file, its SHA-256 if that is known, and a remedy; InputError if the file is another one.
+Check = Callable[[Path, str | None, str], None]
 
 
 @dataclass(frozen=True)
@@ -110,19 +117,17 @@ class Run:
 
     def settings(self) -> FitSettings:
         """Return the settings of all its fits."""
-        return FitSettings.from_dict(section(self.header(), "settings"))
+        return parse_settings(self.header().get("settings"), str(self.directory / _HEADER))
 
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""
         self.require_unchanged(_HEADER)
         return read_header(self.directory, _HEADER)
 
-    def require_unchanged(self, name: str) -> None:
-        """Refuse a file of a complete run that is not as it was written; InputError."""
-        if self.is_complete:
-            wanted = read_manifest(self.directory / _COMPLETE).get(name)
-            remedy = _HEADER_REMEDY if name == _HEADER else _REMEDY
-            require_unchanged(self.directory / name, wanted, remedy)
+    def require_unchanged(self, name: str, check: Check = require_unchanged) -> None:
+        """Refuse a file that belongs to no orbit, and is not as it was written; InputError."""
+        remedy = _HEADER_REMEDY if name == _HEADER else _REMEDY
+        check(self.directory / name, self._listed().get(name), remedy)
 
     def changes(self) -> list[str]:
         """Return a message for each file of the run that is not as it was written."""
@@ -174,34 +179,71 @@ class Run:
     def gathered_orbits(self) -> list[int]:
         """Return the orbits that the tables over all orbits contain."""
         path = self.directory / _GATHERED
+        self.require_unchanged(_GATHERED)
         if not path.is_file():
             return []
-        with reading(str(path), "the orbits in the tables of a run"):
-            return [int(orbit) for orbit in json.loads(path.read_text(encoding="utf-8"))]
+        return _gathered(path).orbits
+
+    def begin_gathering(self) -> None:
+        """Remove the record of gathered orbits, before the tables over all orbits are written."""
+        (self.directory / _GATHERED).unlink(missing_ok=True)
 
     def mark_gathered(self, orbits: list[int]) -> None:
         """Record the gathered orbits; call after the tables over all orbits are written."""
+        tables = {
+            name: sha256_of(self.directory / name)
+            for name in _TABLES
+            if (self.directory / name).is_file()
+        }
         with write_atomically(self.directory / _GATHERED) as temporary:
-            temporary.write_text(json.dumps(orbits), encoding="utf-8")
+            content = json.dumps({"orbits": orbits, "sha256": tables})
+            temporary.write_text(content, encoding="utf-8")
 
     def mark_complete(self) -> None:
         """Mark the run as complete; it is not changed afterwards."""
         names = [
-            name
-            for name in (_HEADER, _GATHERED, HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE)
-            if (self.directory / name).is_file()
+            name for name in (_HEADER, _GATHERED, *_TABLES) if (self.directory / name).is_file()
         ]
         manifest = manifest_of(self.directory, names)
         with write_atomically(self.directory / _COMPLETE) as temporary:
             temporary.write_text(manifest, encoding="utf-8")
 
+    def _listed(self) -> Mapping[str, str]:
+        """Return name -> SHA-256 of the files that belong to no orbit, as far as recorded."""
+        if self.is_complete:
+            return read_manifest(self.directory / _COMPLETE)
+        path = self.directory / _GATHERED
+        return _gathered(path).digests if path.is_file() else {}
+
     def _table_changes(self) -> list[str]:
-        if not self.is_complete:
-            return []
-        return list(changes(self.directory, self.directory / _COMPLETE, _REMEDY))
+        if self.is_complete:
+            return list(changes(self.directory, self.directory / _COMPLETE, _REMEDY))
+        found = []
+        for name in _TABLES:
+            try:
+                self.require_unchanged(name)
+            except InputError as error:
+                found.append(str(error))
+        return found
 
     def _failure_path(self, orbit: int) -> Path:
         return self.directory / _FAILED / f"orbit={orbit:04d}.json"
+
+
+class _Gathered(NamedTuple):
+    """The gathered orbits, and name -> SHA-256 of the tables over them."""
+
+    orbits: list[int]
+    digests: dict[str, str]
+
+
+def _gathered(path: Path) -> _Gathered:
+    with reading(str(path), "the orbits in the tables of a run"):
+        content = json.loads(path.read_text(encoding="utf-8"))
+        # Older versions wrote the orbits only.
+        found = {"orbits": content, "sha256": {}} if isinstance(content, list) else content
+        digests = {str(name): str(digest) for name, digest in found["sha256"].items()}
+        return _Gathered([int(orbit) for orbit in found["orbits"]], digests)
 
 
 def runs_of(survey: Path) -> list[Run]:

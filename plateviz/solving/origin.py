@@ -7,10 +7,10 @@ send it to the solver process, which does.
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from solver.data.instrument import MINI_MOCK, Instrument, parse_instrument, read_instrument
+from solver.data.instrument import MINI_MOCK, Instrument, read_instrument
 from solver.data.orbit import OrbitData
 from solver.io.read_orbit import observation_files, read_orbit
-from solver.io.survey import HEADER, read_header, read_survey_orbit, survey_orbits
+from solver.io.survey import read_survey_instrument, read_survey_orbit, survey_orbits
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,7 @@ class SurveyFolder:
 
     def read_instrument(self) -> Instrument:
         """Return the instrument that took the orbits."""
-        directory = Path(self.directory)
-        return parse_instrument(str(read_header(directory)["instrument"]), directory / HEADER)
+        return read_survey_instrument(Path(self.directory))
 
 
 Origin = OrbitFiles | SurveyFolder

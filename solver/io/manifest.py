@@ -1,12 +1,15 @@
 """Manifests: the SHA-256 of every file of a folder, as `sha256sum --check` reads them too."""
 
 import re
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
 
+# A file may be written again within the resolution of the times of files.
+_SETTLED_NANOSECONDS = 2 * 10**9
 _LINE = re.compile(r"([0-9a-f]{64})  (\S.*)")
 
 
@@ -61,6 +64,26 @@ def require_unchanged(path: Path, wanted: str | None, remedy: str) -> None:
     if not path.is_file():
         raise InputError(f"{path}: expected the file that was written, found none; {remedy}")
     require_digest(path, sha256_of(path), wanted, remedy)
+
+
+class UnchangedFiles:
+    """Files that were found unchanged: each is read as a whole once, and again if it is written."""
+
+    def __init__(self) -> None:
+        """Begin without any."""
+        self._found: set[tuple[Path, str, int, int]] = set()
+
+    def require(self, path: Path, wanted: str | None, remedy: str) -> None:
+        """Refuse a file that is not the one that was written, as `require_unchanged` does."""
+        if wanted is None or not path.is_file():
+            require_unchanged(path, wanted, remedy)
+            return
+        state = path.stat()
+        found = (path, wanted, state.st_size, state.st_mtime_ns)
+        if found not in self._found:
+            require_unchanged(path, wanted, remedy)
+            if time.time_ns() - state.st_mtime_ns > _SETTLED_NANOSECONDS:
+                self._found.add(found)
 
 
 def require_digest(path: Path, found: str, wanted: str | None, remedy: str) -> None:

@@ -11,10 +11,7 @@ A directory without `survey.toml` is not read: it is unfinished or not a survey.
 """
 
 import hashlib
-import json
-import math
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -22,12 +19,20 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from solver.data.instrument import Instrument, parse_instrument
 from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
+from solver.data.toml import parse_toml, toml_text
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
 from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
-from solver.io.manifest import changes, manifest_of, read_manifest, require_digest
+from solver.io.manifest import (
+    changes,
+    manifest_of,
+    read_manifest,
+    require_digest,
+    require_unchanged,
+)
 from solver.io.parquet import write_parquet
 from solver.io.read_orbit import find_catalogue
 from solver.io.table_check import conform, refuse
@@ -44,7 +49,6 @@ REMEDY = (
     f"{MANIFEST}"
 )
 
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _ORBIT_FILE = re.compile(r"orbit=(\d{4,})\.parquet")
 
 
@@ -54,7 +58,7 @@ def measurement_path(directory: Path, orbit_id: int) -> Path:
 
 
 def survey_orbits(directory: Path) -> list[int]:
-    """Return the ids of a survey's orbits, in order.
+    """Return the ids of a survey's orbits, in order; those of missing files are among them.
 
     Raises
     ------
@@ -63,8 +67,15 @@ def survey_orbits(directory: Path) -> list[int]:
     """
     read_header(directory)
     folder = Path(directory) / MEASUREMENTS
-    names = [path.name for path in folder.iterdir()] if folder.is_dir() else []
+    names = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    listed = (name.partition("/") for name in _listed(Path(directory)))
+    names |= {name for parent, _, name in listed if parent == MEASUREMENTS}
     return sorted(int(found[1]) for name in names if (found := _ORBIT_FILE.fullmatch(name)))
+
+
+def has_survey_table(directory: Path, name: str) -> bool:
+    """Return whether a survey has a table, be its file missing or not."""
+    return (directory / name).is_file() or name in _listed(directory)
 
 
 def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
@@ -88,11 +99,11 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
             f"{directory}: expected an orbit out of {_ranges(orbits)}, found {orbit_id}"
         )
     paths = [measurement_path(directory, orbit_id), directory / REFERENCE, directory / EXPOSURES]
-    if (directory / TRUTH_FILE).is_file():
+    if has_survey_table(directory, TRUTH_FILE):
         paths.append(directory / TRUTH_FILE)
     provenance = _require_unchanged(directory, paths)
     measurements, catalogue, exposures = (
-        read_survey_table(path, schema)
+        _read_table(path, schema)
         for path, schema in zip(paths, (MEASUREMENT, CATALOGUE, ENVIRONMENT), strict=False)
     )
     _check_orbit(measurements, orbit_id, paths[0])
@@ -101,7 +112,7 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
     found += catalogue_problems(measurements, catalogue, where, where_catalogue)
     truth = None
     if (path := directory / TRUTH_FILE) in paths:
-        truth = read_survey_table(path, TRUTH)
+        truth = _read_table(path, TRUTH)
         found += truth_problems(measurements, truth, where, str(path))
     refuse(found)
     key = list(ENVIRONMENT.key)
@@ -137,12 +148,20 @@ def survey_changes(directory: Path) -> list[str]:
 
 def _require_unchanged(directory: Path, paths: list[Path]) -> dict[str, str]:
     """Return name -> SHA-256 of files; InputError if a manifest has others."""
-    found = {path.relative_to(directory).as_posix(): sha256_of(path) for path in paths}
-    manifest = directory / MANIFEST
-    wanted = read_manifest(manifest) if manifest.is_file() else {}
-    for name, digest in found.items():
-        require_digest(directory / name, digest, wanted.get(name), REMEDY)
+    wanted, found = _listed(directory), {}
+    for path in paths:
+        name = path.relative_to(directory).as_posix()
+        if not path.is_file():
+            require_unchanged(path, wanted.get(name), REMEDY)
+        found[name] = sha256_of(path)
+        require_digest(path, found[name], wanted.get(name), REMEDY)
     return found
+
+
+def _listed(directory: Path) -> dict[str, str]:
+    """Return name -> SHA-256 of the files that the manifest lists; none without a manifest."""
+    manifest = directory / MANIFEST
+    return read_manifest(manifest) if manifest.is_file() else {}
 
 
 def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
@@ -161,14 +180,14 @@ def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
     if name == HEADER and path.is_file():
         _require_unchanged(Path(directory), [path])
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
         raise InputError(
             f"{directory}: expected a survey with a file {name}, found none"
         ) from error
-    # A ValueError is wrong TOML or not UTF-8; the other one is deep nesting.
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: expected the header of a survey, found: {error}") from error
+    content = parse_toml(text, path, "the header of a survey")
     if content.get("format") != FORMAT:
         raise InputError(
             f"{path}: expected format = {FORMAT}, found {content.get('format', 'no format')!r}"
@@ -195,12 +214,16 @@ def write_header(directory: Path, content: Mapping[str, object], name: str = HEA
 
 
 def _header_text(content: Mapping[str, object]) -> str:
-    values = {"format": FORMAT, **content}
-    lines = [f"{k} = {_toml(v)}" for k, v in values.items() if not isinstance(v, Mapping)]
-    for key, table in values.items():
-        if isinstance(table, Mapping):
-            lines += ["", f"[{key}]", *(f"{_key(k)} = {_toml(v)}" for k, v in table.items())]
-    return "\n".join(lines) + "\n"
+    return toml_text({"format": FORMAT, **content})
+
+
+def read_survey_instrument(directory: Path) -> Instrument:
+    """Return the instrument that took the orbits of a survey; raises as `read_header`."""
+    path = Path(directory) / HEADER
+    text = read_header(directory).get("instrument")
+    if not isinstance(text, str):
+        raise InputError(f"{path}: expected the text of an instrument, found {text!r}")
+    return parse_instrument(text, path)
 
 
 def read_survey_table(path: Path, schema: Table) -> pd.DataFrame:
@@ -209,8 +232,15 @@ def read_survey_table(path: Path, schema: Table) -> pd.DataFrame:
     Raises
     ------
     InputError
-        If the file is missing or its table does not conform to the schema.
+        If the file is missing or not as it was written, or its table does not conform to the
+        schema.
     """
+    path = Path(path)
+    _require_unchanged(path.parents[path.parent.name == MEASUREMENTS], [path])
+    return _read_table(path, schema)
+
+
+def _read_table(path: Path, schema: Table) -> pd.DataFrame:
     return conform(find_catalogue(path).table, schema, str(path))
 
 
@@ -249,22 +279,3 @@ def _ranges(orbits: list[int]) -> str:
         return "none, since there are no measurements"
     consecutive = orbits == list(range(orbits[0], orbits[-1] + 1))
     return f"{orbits[0]} to {orbits[-1]}" if consecutive else ", ".join(map(str, orbits))
-
-
-def _key(name: str) -> str:
-    return name if _BARE_KEY.fullmatch(name) else json.dumps(name)
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(k)} = {_toml(item)}" for k, item in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    if isinstance(value, str) and "\n" in value:
-        text = value.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
-        return f'"""\n{text}"""'
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    # Text, numbers and booleans have the same form in JSON and TOML, except for the one control
-    # character that JSON does not escape.
-    return json.dumps(value).replace("\x7f", "\\u007f")

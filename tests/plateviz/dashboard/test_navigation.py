@@ -242,3 +242,13 @@ def test_run_that_is_still_being_fitted_begins_with_the_orbit(survey, fit_result
     begun = FakeRun("default", survey, fit_result, is_complete=False)
     navigation = Navigation(Session(SurveyStore(fit_result, [begun])))
     assert (navigation.view, navigation.run_name) == (View.ORBIT, "default")
+
+
+def test_source_of_a_damaged_run_is_reported(navigation, run):
+    def fail(source_id):
+        raise InputError("history.parquet: expected the file that was written")
+
+    run.history = fail
+    navigation.begin({"source": "17"})
+    assert navigation.found is None
+    assert navigation.message == "history.parquet: expected the file that was written"

@@ -1,7 +1,9 @@
 """Texts of files, folders and clients that pretend to be HTML: shown, and never run."""
 
+import shutil
 import subprocess
 import sys
+from urllib.parse import quote
 
 import pytest
 
@@ -23,13 +25,15 @@ FOUND = """() => {
 
 @pytest.fixture(scope="module")
 def survey(tmp_path_factory, chromium_path):
-    """A survey in a hostile folder, with a run of which one orbit cannot be read."""
+    """A survey in a hostile folder, with two runs of which one orbit cannot be read."""
     directory = tmp_path_factory.mktemp("surveys") / HOSTILE
     simulate_survey(directory, SurveySettings(orbits=2, seed=5).scaled(3_000))
     measurement_path(directory, 1).write_bytes(b"PAR1")
     command = [sys.executable, "-m", "plateviz.cli.main", "survey", str(directory)]
     run = subprocess.run([*command, "--workers", "1"], capture_output=True, text=True)
     assert "orbits failed" in run.stderr
+    # The command refuses such a name, and a folder may be copied to it.
+    shutil.copytree(directory / "runs" / "default", directory / "runs" / HOSTILE)
     return directory
 
 
@@ -51,10 +55,14 @@ def test_dashboard_shows_hostile_names_as_text(survey, open_page):
         failed = open_page(f"{address}?orbit=1")
         failed.get_by_text("orbit=0001.parquet").first.wait_for()
         assert_harmless(failed)
+        copied = open_page(f"{address}?view=survey&run={quote(HOSTILE)}")
+        see(copied, "orbit-health")
+        copied.get_by_text(HOSTILE).first.wait_for(state="attached")
+        assert_harmless(copied)
         client = open_page(f"{address}?view=source&source={HOSTILE}&run={HOSTILE}&orbit={HOSTILE}")
         client.get_by_text("plateviz").first.wait_for()
         assert_harmless(client)
-        for one in (page, failed, client):
+        for one in (page, failed, copied, client):
             one.context.close()
 
 

@@ -115,7 +115,6 @@ def test_every_figure_is_drawn_when_near_and_in_both_themes(page):
     turn_dark(page, diagnostics())
 
 
-@pytest.mark.newest
 def test_a_change_is_tried_at_once_kept_and_fitted(page):
     see(page, "convergence")
     canvas = page.locator(".figure-convergence canvas").first

@@ -93,6 +93,7 @@ def test_run_in_parts_and_with_a_failed_orbit_ends_as_the_same_run(report, fitte
     assert contents(rest.run) == contents(report.run)
 
 
+@pytest.mark.full
 def test_killed_run_continues_with_the_missing_orbits(report, fitted_survey):
     command = [sys.executable, "-m", "plateviz.cli.main", "survey", str(fitted_survey)]
     process = subprocess.Popen([*command, "--run", "killed"], start_new_session=True)

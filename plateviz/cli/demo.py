@@ -12,7 +12,8 @@ from pathlib import Path
 import typer
 
 from plateviz.cache import cache_directory
-from plateviz.runs.run import DEFAULT_RUN, PACKAGES, Run, begin_run
+from plateviz.runs.new_run import PACKAGES, begin_run
+from plateviz.runs.run import DEFAULT_RUN, Run
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.progress import Reporter, reporting
 from plateviz.solving.solution_store import SolutionStore

@@ -17,8 +17,9 @@ from pyarrow import parquet
 
 from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers, remove_scratch
 from plateviz.runs.fitted_orbit import read_summary
+from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import gather_history
-from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run, begin_run
+from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, MOTIONS
 from solver.errors import DiskError, InputError

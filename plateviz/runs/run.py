@@ -36,22 +36,14 @@ from solver.io.atomic import sha256_of, write_atomically
 from solver.io.disk import writing
 from solver.io.failures import reading
 from solver.io.manifest import changes, manifest_of, read_manifest, require_unchanged
-from solver.io.scratch import is_scratch, remove_abandoned
+from solver.io.scratch import remove_abandoned
 from solver.io.settings import parse_settings
 from solver.io.survey import (
-    EXPOSURES,
-    HEADER,
-    REFERENCE,
-    TRUTH_FILE,
     read_header,
-    section,
-    survey_orbits,
-    write_header,
 )
-from solver.runtime.versions import versions_of
 
 DEFAULT_RUN = "default"
-_HEADER = "run.toml"
+RUN_FILE = "run.toml"
 _COMPLETE = "COMPLETE"
 _GATHERED = "gathered.json"
 _FAILED = "failed"
@@ -64,9 +56,6 @@ HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE = (
 _TABLES = (HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE)
 _REMEDY = "`plateviz survey` with --repair writes the run's tables again"
 _HEADER_REMEDY = "restore it from a copy, or fit the survey with another --run"
-# Their versions belong to a run: results may differ between versions.
-PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _ORBIT = re.compile(r"orbit=(\d{4,})")
 
 # Given a file, its SHA-256 if that is known, and a remedy; InputError if the file is another one.
@@ -117,16 +106,16 @@ class Run:
 
     def settings(self) -> FitSettings:
         """Return the settings of all its fits."""
-        return parse_settings(self.header().get("settings"), str(self.directory / _HEADER))
+        return parse_settings(self.header().get("settings"), str(self.directory / RUN_FILE))
 
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""
-        self.require_unchanged(_HEADER)
-        return read_header(self.directory, _HEADER)
+        self.require_unchanged(RUN_FILE)
+        return read_header(self.directory, RUN_FILE)
 
     def require_unchanged(self, name: str, check: Check = require_unchanged) -> None:
         """Refuse a file that belongs to no orbit, and is not as it was written; InputError."""
-        remedy = _HEADER_REMEDY if name == _HEADER else _REMEDY
+        remedy = _HEADER_REMEDY if name == RUN_FILE else _REMEDY
         check(self.directory / name, self._listed().get(name), remedy)
 
     def changes(self) -> list[str]:
@@ -202,7 +191,7 @@ class Run:
     def mark_complete(self) -> None:
         """Mark the run as complete; it is not changed afterwards."""
         names = [
-            name for name in (_HEADER, _GATHERED, *_TABLES) if (self.directory / name).is_file()
+            name for name in (RUN_FILE, _GATHERED, *_TABLES) if (self.directory / name).is_file()
         ]
         manifest = manifest_of(self.directory, names)
         with write_atomically(self.directory / _COMPLETE) as temporary:
@@ -249,55 +238,5 @@ def _gathered(path: Path) -> _Gathered:
 def runs_of(survey: Path) -> list[Run]:
     """Return the runs of a survey, by name."""
     folder = Path(survey) / "runs"
-    names = sorted(path.parent.name for path in folder.glob(f"*/{_HEADER}"))
+    names = sorted(path.parent.name for path in folder.glob(f"*/{RUN_FILE}"))
     return [Run(Path(survey), name) for name in names]
-
-
-def begin_run(survey: Path, name: str, settings: FitSettings) -> Run:
-    """Create a run, or return an existing one with the same settings.
-
-    Raises
-    ------
-    InputError
-        If the directory is not a survey, the name is not a valid folder name, or a run of that
-        name exists with other settings, versions or inputs.
-    """
-    survey_orbits(survey)
-    if not _NAME.fullmatch(name):
-        raise InputError(
-            f"--run: expected a name of letters, digits, '.', '-' and '_', found {name!r}"
-        )
-    run, content = Run(Path(survey), name), _content(Path(survey), settings)
-    path = run.directory / _HEADER
-    if path.is_file():
-        _check_same(path, read_header(run.directory, _HEADER), content)
-        return run
-    if run.directory.is_dir() and not all(is_scratch(p.name) for p in run.directory.iterdir()):
-        raise InputError(f"{run.directory}: expected a run, found a folder without {_HEADER}")
-    with writing(run.directory, "to create the folder"):
-        run.directory.mkdir(parents=True, exist_ok=True)
-    write_header(run.directory, content, _HEADER)
-    return run
-
-
-def _content(survey: Path, settings: FitSettings) -> dict[str, object]:
-    inputs = [survey / name for name in (HEADER, REFERENCE, TRUTH_FILE, EXPOSURES)]
-    return {
-        "versions": versions_of(PACKAGES),
-        "inputs": {path.name: sha256_of(path) for path in inputs if path.is_file()},
-        "settings": settings.to_dict(),
-    }
-
-
-def _check_same(path: Path, found: Mapping[str, object], wanted: Mapping[str, object]) -> None:
-    different = [
-        f"{title} ({name})"
-        for title in wanted
-        for name in sorted({**section(wanted, title), **section(found, title)})
-        if section(wanted, title).get(name) != section(found, title).get(name)
-    ]
-    if different:
-        raise InputError(
-            f"{path}: expected the settings with which this run was created, found other "
-            f"{', '.join(different)}; use another --run NAME to keep both"
-        )

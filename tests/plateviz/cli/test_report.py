@@ -6,7 +6,8 @@ import shutil
 import pytest
 
 from plateviz.runs.fitted_orbit import write_fitted_orbit
-from plateviz.runs.run import Run, begin_run
+from plateviz.runs.new_run import begin_run
+from plateviz.runs.run import Run
 from solver.data.settings import FitSettings
 from solver.io.result import write_result
 

@@ -12,7 +12,8 @@ import pytest
 from distributed import KilledWorker, LocalCluster
 
 from plateviz.runs import dask_workers, fit_survey
-from plateviz.runs.run import Run, begin_run
+from plateviz.runs.new_run import begin_run
+from plateviz.runs.run import Run
 from solver.data.settings import FitSettings
 from solver.errors import DiskError, FitError, InputError
 from solver.io.lock import locked

@@ -14,8 +14,9 @@ from distributed import LocalCluster
 
 from plateviz.cli.survey import parse_orbits
 from plateviz.runs.fit_survey import fit_survey
+from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
-from plateviz.runs.run import Run, begin_run
+from plateviz.runs.run import Run
 from plateviz.solving.reproduction import reproduced
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS

@@ -2,8 +2,9 @@
 
 import pytest
 
+from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run import begin_run, runs_of
+from plateviz.runs.run import runs_of
 from plateviz.tables import source_list
 from solver.data.settings import FitSettings
 from solver.errors import InputError

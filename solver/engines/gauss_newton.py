@@ -30,8 +30,9 @@ _MIN_STEP_FRACTION = 1e-6
 # amplified by the uncertainty.
 _REUSE_BELOW = 1.0
 _REUSE_RATIO = 0.1
-# Tolerance of a step with reused Jacobians, as a fraction of that with exact ones. For the same
-# reason a small remainder elsewhere becomes a step along these directions that has to be undone.
+# Tolerance of a last step with reused Jacobians, as a fraction of that with exact ones. For the
+# same reason a small remainder elsewhere becomes a step along these directions that exact ones do
+# not confirm.
 _REUSED_TOLERANCE = 0.1
 # Fits of more sources than this start from a fit of about this many of them, to a tolerance
 # of this many sigmas, which replaces a step of the full fit at a fraction of its cost.
@@ -159,18 +160,18 @@ def _iterate(
             return end(point, None, FitStatus.SINGULAR)
         step = reduced.solve(*downhill(problem, *point[:3]))
         largest, parameter = largest_step(problem, step, reduced)
-        if largest > limit:
+        is_doubtful = _REUSED_TOLERANCE < largest / settings.tolerance < 1.0 and limit < np.inf
+        if largest > limit or is_doubtful:
             # Freed first, because they are large and reusing memory is faster than allocating it.
             del equations, reduced
             equations = accumulate(problem, point.theta, point.sources)
             reduced, limit = eliminate_sources(equations, problem.priors), np.inf
             continue
-        is_over, is_exact = len(trace) > settings.max_iterations, limit == np.inf
-        if largest < settings.tolerance * (1.0 if is_exact or is_over else _REUSED_TOLERANCE):
+        if largest < settings.tolerance:
             point = point._replace(theta=point.theta + step[0], sources=point.sources + step[1])
             report(point, largest, parameter, 0.0)
             return end(point, reduced, FitStatus.CONVERGED)
-        if is_over:
+        if len(trace) > settings.max_iterations:
             return end(point, reduced, FitStatus.MAX_ITERATIONS)
         moved, damping = _descend(problem, point, step)
         if moved is None:

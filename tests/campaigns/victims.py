@@ -30,6 +30,7 @@ from plateviz.reports import folder
 from plateviz.reports import orbit as orbit_pages
 from plateviz.reports import survey as survey_pages
 from plateviz.runs.run import Run, runs_of
+from plateviz.solving.job import JobStatus
 from plateviz.solving.origin import SurveyFolder
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_queue import SolverQueue
@@ -315,18 +316,17 @@ class Server(Victim):
 
 
 def _serve_without_pages() -> None:
-    """Keep a store as the server does, and ask for two fits; again at SIGUSR1."""
+    """Keep a store as the server does, and ask for two fits; after SIGUSR1 again if they fail."""
     with ending_on_sigterm(), closing(SolutionStore(SurveyFolder("work"), SolverQueue())) as store:
         sys.stdout.write("serves on http://nowhere\n")
         sys.stdout.flush()
-        wanted = threading.Event()
-        signal.signal(signal.SIGUSR1, lambda *_: wanted.set())
-        wanted.set()
+        again: list[int] = []
+        signal.signal(signal.SIGUSR1, lambda number, _: again.append(number))
+        jobs = [store.request(orbit, FitSettings()) for orbit in range(2)]
         while True:
-            if wanted.wait(0.05):
-                wanted.clear()
-                for orbit in range(2):
-                    store.request(orbit, FitSettings())
+            time.sleep(0.05)
+            if again and any(job.status is JobStatus.FAILED for job in jobs):
+                jobs = [store.request(orbit, FitSettings()) for orbit in range(2)]
 
 
 def _run_command(arguments: list[str]) -> None:

@@ -19,6 +19,7 @@ from plateviz.solving.progress import Reporter, reporting
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_queue import SolverQueue
 from solver.data.settings import FitSettings
+from solver.io.disk import writing
 from solver.io.lock import locked
 from solver.io.survey import HEADER
 from solver.runtime.threads import count_cores
@@ -48,7 +49,8 @@ def make_survey(directory: Path, solver: SolverQueue, reporter: Reporter) -> Run
 
     Of two processes that do so at once, the second waits and finds them.
     """
-    directory.mkdir(parents=True, exist_ok=True)
+    with writing(directory, "to make the folder"):
+        directory.mkdir(parents=True, exist_ok=True)
     # Simulating locks the directory itself.
     with locked(directory.parent, wait=True):
         if not (directory / HEADER).is_file():

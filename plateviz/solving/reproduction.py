@@ -13,6 +13,7 @@ from plateviz.solving.survey_progress import fit_and_report, require_all
 from plateviz.tables.reproduction import OFTEN, SurveyFigures, reproduction
 from solver.data.settings import FitSettings
 from solver.errors import InputError
+from solver.io.disk import writing
 from solver.io.survey import HEADER
 from solver.simulate.settings import SurveySettings
 from solver.units import RAD_PER_MAS
@@ -50,6 +51,7 @@ def _simulate(survey: Path) -> None:
     keep_compilations()
     from solver.simulate.survey import simulate_survey
 
-    survey.parent.mkdir(parents=True, exist_ok=True)
+    with writing(survey.parent, "to make the folder"):
+        survey.parent.mkdir(parents=True, exist_ok=True)
     with reporting("simulating the paper's survey") as reporter:
         simulate_survey(survey, SurveySettings(), progress=reporter.step)

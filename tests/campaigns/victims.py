@@ -293,7 +293,9 @@ class Server(Victim):
 
     def is_done(self, process: Process, place: Place) -> bool:
         marks = list(place.scratch.glob("plateviz-*.part/orbit=*/COMPLETE"))
-        return len(marks) >= 2 or process.poll() is not None
+        # Before it has begun, they are those of the server that was killed.
+        is_served = self.has_begun(place) and len(marks) >= 2
+        return is_served or process.poll() is not None
 
     def stop(self, process: Process) -> int:
         if process.poll() is None:

@@ -2,9 +2,12 @@
 
 import json
 import shutil
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 
 import pytest
 
+from plateviz.reports.folder import _workers
 from plateviz.runs.fitted_orbit import write_fitted_orbit
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.run import Run
@@ -141,6 +144,23 @@ def test_folder_has_a_page_per_orbit_and_keeps_written_pages(run, whole_run, tmp
     _, out, _ = run("report", whole_run, "--pages", "-o", folder, "--workers", 1)
     assert "1 orbit pages written, 2 already there" in out
     assert (folder / pages[2]).read_bytes() == before
+
+
+def test_folder_that_was_killed_while_it_began_is_begun(run, whole_run, tmp_path, monkeypatch):
+    monkeypatch.setattr("plateviz.reports.folder._workers", killed_pool)
+    folder = tmp_path / "pages"
+    (folder / ".report.json-0123456789ab.part").mkdir(parents=True)
+    code, _, err = run("report", whole_run, "--pages", "-o", folder)
+    assert code == 1
+    assert "found that one was killed" in err
+    assert [path.name for path in folder.iterdir()] == ["report.json"]
+
+
+@contextmanager
+def killed_pool(count, folder):
+    with _workers(count, folder):
+        raise BrokenProcessPool("A process in the process pool was terminated abruptly")
+    yield
 
 
 def test_folder_with_other_files_is_left_unchanged(run, whole_run, tmp_path):

@@ -130,6 +130,23 @@ def test_full_disk_during_a_simulation_keeps_what_is_whole(tmp_path, monkeypatch
         assert (cut / path.relative_to(whole)).read_bytes() == path.read_bytes()
 
 
+def test_run_that_was_killed_while_it_began_is_begun(survey_folder):
+    directory = survey_folder / "runs" / "killed"
+    (directory / ".run.toml-0123456789ab.part").mkdir(parents=True)
+    run = begin_run(survey_folder, "killed", SETTINGS)
+    assert run.settings() == SETTINGS
+    run.remove_abandoned()
+    assert names(directory) == ["run.toml"]
+
+
+def test_failure_of_an_orbit_that_was_fitted_since_is_removed(survey_folder, fit_result):
+    run = begin_run(survey_folder, "failed", SETTINGS)
+    run.keep(1, fit_result, fit_result.sources)
+    run.keep_failure(1, "killed before this was removed")
+    run.remove_abandoned()
+    assert run.failures() == {}
+
+
 def test_second_process_that_simulates_is_refused(tmp_path):
     with locked(tmp_path), pytest.raises(InputError, match="another process is simulating into"):
         simulate_survey(tmp_path, SurveySettings(orbits=1))

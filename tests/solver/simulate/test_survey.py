@@ -1,5 +1,6 @@
 """Survey directories: written completely or resumed, and refused if invalid."""
 
+import shutil
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -109,6 +110,25 @@ def test_interrupted_survey_is_not_read_and_resumes_to_the_same_bytes(
     for path in survey.rglob("*.*"):
         assert (tmp_path / path.relative_to(survey)).read_bytes() == path.read_bytes()
     assert not (tmp_path / "unfinished.toml").exists()
+
+
+@pytest.mark.parametrize("at", ["begin", "orbit", "end"])
+def test_survey_resumes_whenever_it_was_killed(survey: Path, tmp_path: Path, at: str) -> None:
+    if at != "begin":
+        shutil.copytree(survey, tmp_path, dirs_exist_ok=True)
+        (tmp_path / "survey.toml").rename(tmp_path / "unfinished.toml")
+    if at == "orbit":
+        (tmp_path / "manifest.sha256").unlink()
+        (tmp_path / "measurements" / "orbit=0002.parquet").unlink()
+    folder = tmp_path / "measurements" if at == "orbit" else tmp_path
+    half = folder / ".orbit=0002.parquet-0123456789ab.part"
+    half.mkdir()
+    (half / "orbit=0002.parquet").write_bytes(b"PAR1")
+    simulate_survey(tmp_path, SETTINGS)
+    paths = {path.relative_to(tmp_path) for path in tmp_path.rglob("*")}
+    assert paths == {path.relative_to(survey) for path in survey.rglob("*")}
+    for path in survey.rglob("*.*"):
+        assert (tmp_path / path.relative_to(survey)).read_bytes() == path.read_bytes()
 
 
 @pytest.mark.parametrize(

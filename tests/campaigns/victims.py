@@ -92,6 +92,7 @@ class Place:
 
     def fork(self, work: Callable[[], None]) -> "Forked":
         """Start work in a copy of this process, which has imported what it needs."""
+        (self.folder / "printed").unlink(missing_ok=True)
         pid = os.fork()
         if pid:
             return Forked(pid)

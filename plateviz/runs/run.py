@@ -163,7 +163,9 @@ class Run:
         for folder in (self.directory, self.directory / _FAILED):
             remove_abandoned(folder)
         for orbit in self.complete_orbits():
-            self._failure_path(orbit).unlink(missing_ok=True)
+            # A read-only disk refuses to remove even a file that is not there.
+            if self._failure_path(orbit).is_file():
+                self._failure_path(orbit).unlink(missing_ok=True)
 
     def gathered_orbits(self) -> list[int]:
         """Return the orbits that the tables over all orbits contain."""

@@ -23,6 +23,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TextIO
 
+from plateviz.cache import keep_compilations
 from plateviz.runs.fitted_orbit import write_fitted_orbit
 from plateviz.solving.origin import origin_from_dict
 from plateviz.tables.verdict import with_verdict
@@ -71,6 +72,7 @@ def main() -> None:
 
 def _serve_all() -> None:
     keep_memory()
+    keep_compilations()
     send = _sender()
     requests: queue.Queue[Request | None] = queue.Queue()
     cancellations = _Cancellations()

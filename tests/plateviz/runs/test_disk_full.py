@@ -17,6 +17,7 @@ from plateviz.runs.run import Run
 from solver.data.settings import FitSettings
 from solver.errors import DiskError, FitError, InputError
 from solver.io.lock import locked
+from solver.io.result import write_result
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 
@@ -205,39 +206,94 @@ def test_scheduler_that_is_lost_during_a_run_ends_it_in_words(survey_folder):
         timer.join()
 
 
+@pytest.fixture
+def disk(tmp_path):
+    """A small disk, and the function that changes its size or its other options."""
+    if sys.platform != "linux" or os.geteuid() != 0:
+        pytest.skip("only root may mount a disk")
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=40k", "none", str(folder)]
+    if subprocess.run(mount, check=False).returncode:
+        pytest.skip("no disk may be mounted here")
+
+    def change(options):
+        subprocess.run(["mount", "-o", f"remount,{options}", str(folder)], check=True)
+
+    yield folder, change
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def told_once(outcome, folder):
+    """Check that a command told of a full disk, once, and left nothing half-written."""
+    code, _, err = outcome
+    assert code == 2
+    assert err.count("a full disk") == 1
+    assert "Errno" not in err
+    assert not [name for name in names(folder) if name.endswith(".part")]
+
+
 @pytest.mark.full
 @pytest.mark.slow
-@pytest.mark.skipif(
-    sys.platform != "linux" or os.geteuid() != 0, reason="only root may mount a small disk"
-)
-@pytest.mark.parametrize("size", ["200k", "700k", "1200k"])
-def test_small_disk_stops_each_command_and_is_resumed(survey_folder, tmp_path, run, size):
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(disk)])
-    if mounted.returncode:
-        pytest.skip("no disk may be mounted here")
-    try:
-        code, _, err = run("simulate", disk / "survey", "--orbits", 3, "--stars", 6000)
-        assert code == 2
-        assert err.count("a full disk") == 1
-        assert "Errno" not in err
-        assert not [name for name in names(disk) if name.endswith(".part")]
-        subprocess.run(["mount", "-o", "remount,size=100m", str(disk)], check=True)
-        assert run("simulate", disk / "survey", "--orbits", 3, "--stars", 6000)[0] == 0
-        used = sum(path.stat().st_size for path in disk.rglob("*") if path.is_file())
-        small = f"remount,size={used // 1024 + int(size[:-1]) + 200}k"
-        subprocess.run(["mount", "-o", small, str(disk)], check=True)
-        code, _, err = run("survey", disk / "survey", "--workers", 1)
-        assert code == 2
-        assert err.count("a full disk") == 1
-        assert "Errno" not in err
-        assert not [name for name in names(disk) if name.endswith(".part")]
-        subprocess.run(["mount", "-o", "remount,size=100m", str(disk)], check=True)
-        assert run("survey", disk / "survey", "--workers", 1)[0] == 0
-        subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
-        code, _, err = run("survey", disk / "survey", "--run", "other")
-        assert code == 2
-        assert "a read-only disk" in err or "read-only" in err
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)
+@pytest.mark.parametrize("size", [200, 700, 1200])
+def test_small_disk_stops_a_simulation_and_a_survey_which_go_on(disk, run, size):
+    folder, change = disk
+    simulate = "simulate", folder / "survey", "--orbits", 3, "--stars", 6000
+    fit = "survey", folder / "survey", "--workers", 1
+    change(f"size={size}k")
+    told_once(run(*simulate), folder)
+    change("size=100m")
+    assert run(*simulate)[0] == 0
+    used = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    change(f"size={used // 1024 + size + 200}k")
+    told_once(run(*fit), folder)
+    change("size=100m")
+    assert run(*fit)[0] == 0
+    change("ro")
+    assert run(*fit)[0] == 0
+    code, _, err = run(*fit, "--run", "other")
+    assert code == 2
+    assert "a read-only disk" in err
+
+
+@pytest.mark.full
+@pytest.mark.slow
+def test_small_disk_stops_a_fit_and_a_report(disk, run, sample_orbit_dir, fit_result, tmp_path):
+    folder, change = disk
+    orbit = (sample_orbit_dir / f"sample_{name}.fits" for name in ("obs", "ref"))
+    told_once(run("fit", *orbit, "-o", folder / "r.fits"), folder)
+    write_result(fit_result, tmp_path / "r.fits")
+    told_once(run("report", tmp_path / "r.fits", "-o", folder / "r.html"), folder)
+    assert names(folder) == []
+    change("ro")
+    code, _, err = run("report", tmp_path / "r.fits", "-o", folder / "r.html")
+    assert code == 2
+    assert "read-only" in err
+
+
+@pytest.mark.full
+@pytest.mark.slow
+def test_compilations_that_a_full_disk_does_not_keep_are_not_reported(disk, tmp_path):
+    folder, _ = disk
+    # An entry that cannot be written is left cut off, and cannot be read the next time.
+    for name in ("one", "two"):
+        done = subprocess.run(
+            [sys.executable, "-m", "plateviz.cli.main", "simulate", name, "--orbits", "1"],
+            cwd=tmp_path,
+            env={**os.environ, "JAX_COMPILATION_CACHE_DIR": str(folder)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0
+        assert "Error" not in done.stderr
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such device on this system")
+def test_result_that_is_printed_to_a_full_disk_is_told(sample_orbit_dir):
+    command = [sys.executable, "-m", "plateviz.cli.main", "inspect", str(sample_orbit_dir)]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert "standard output: expected to write the file, found a full disk" in done.stderr
+    assert "Traceback" not in done.stderr

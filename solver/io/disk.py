@@ -1,6 +1,7 @@
 """A disk that takes no file, in words: full, over a quota or a limit, read-only, failing."""
 
 import errno
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,6 +26,8 @@ _REASONS = {
     ),
     errno.EIO: ("a disk that fails", "check the disk, and use another one"),
 }
+# NumPy does not tell why a file was cut off.
+_CUT = re.compile(r"\d+ requested and \d+ written")
 _OF_SPACE = (errno.ENOSPC, errno.EDQUOT)
 FULL = (*_OF_SPACE, errno.EFBIG)
 
@@ -59,7 +62,7 @@ def disk_error(
     """Return an error in words if a disk is the reason of `error`, otherwise None."""
     reason: BaseException | None = error
     while reason is not None:
-        number = reason.errno if isinstance(reason, OSError) else None
+        number = _number(reason)
         if number in _REASONS:
             found, remedy = _REASONS[number]
             free = _free(path) if number in _OF_SPACE else ""
@@ -67,6 +70,13 @@ def disk_error(
         # Libraries raise errors of their own in its place.
         reason = reason.__cause__ or reason.__context__
     return None
+
+
+def _number(error: BaseException) -> int | None:
+    """Return the system's number of an error, None if it has none."""
+    if not isinstance(error, OSError):
+        return None
+    return errno.ENOSPC if error.errno is None and _CUT.search(str(error)) else error.errno
 
 
 def _free(path: Path) -> str:

@@ -36,6 +36,11 @@ def test_reason_is_found_behind_the_error_of_a_library(tmp_path):
     assert disk_error(OSError("astropy's words"), tmp_path) is None
 
 
+def test_full_disk_is_found_where_numpy_does_not_name_it(tmp_path):
+    error = OSError("Not enough space. 65504 requested and 26560 written")
+    assert "a full disk" in str(disk_error(error, tmp_path))
+
+
 def test_other_errors_are_no_errors_of_the_disk(tmp_path):
     with pytest.raises(InputError, match="found: .*exists") as raised:
         fail(tmp_path, FileExistsError(errno.EEXIST, "File exists"))

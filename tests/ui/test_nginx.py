@@ -21,6 +21,7 @@ from tests.ui.conftest import see, serving
 pytestmark = [
     pytest.mark.ui,
     pytest.mark.full,
+    pytest.mark.slow,
     pytest.mark.skipif(not shutil.which("nginx"), reason="there is no nginx on this machine"),
 ]
 

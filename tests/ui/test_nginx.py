@@ -1,6 +1,7 @@
 """The dashboard behind nginx, configured by the very text of the serving page."""
 
 import asyncio
+import getpass
 import re
 import shutil
 import socket
@@ -28,7 +29,7 @@ pytestmark = [
 USER, PASSWORD = "alma", "seven red plates"
 # What nginx needs around the text of the page, and nothing that changes it.
 FRAME = """
-daemon off; pid {folder}/pid; error_log {folder}/error.log;
+daemon off; user {user}; pid {folder}/pid; error_log {folder}/error.log;
 events {{}}
 http {{
     access_log off; client_body_temp_path {folder}/body; proxy_temp_path {folder}/proxy;
@@ -61,14 +62,12 @@ def site(tmp_path_factory):
         ["openssl", "passwd", "-apr1", PASSWORD], check=True, capture_output=True, text=True
     )
     (folder / "plateviz.htpasswd").write_text(f"{USER}:{hashed.stdout}")
-    # The worker processes may have another user than this one.
-    folder.chmod(0o755)
-    for parent in folder.parents[:2]:
-        parent.chmod(0o755)
     (text,) = (block.text for block in blocks_of(DOCS / "serving.md", "nginx"))
     text = text.replace("443 ssl", f"127.0.0.1:{outer} ssl").replace(":5006", f":{inner}")
     text = text.replace("/etc/nginx/", f"{folder}/").replace("astro.example.org", "localhost")
-    (folder / "nginx.conf").write_text(FRAME.format(folder=folder, text=text))
+    (folder / "nginx.conf").write_text(
+        FRAME.format(folder=folder, user=getpass.getuser(), text=text)
+    )
     nginx = subprocess.Popen(["nginx", "-c", str(folder / "nginx.conf")])
     try:
         deadline = time.monotonic() + 20.0

@@ -47,7 +47,8 @@ def likely_cause(problem: Problem, mode: Mode) -> str:
             "sy, or narrow the priors that were widened."
         )
     return (
-        f"{_references(problem)} were measured. Narrow a prior that holds what they leave open "
+        f"Reference sources measured: {problem.sources['is_reference'].sum()}. Narrow a prior that "
+        "holds what they leave open "
         "(focal_length, the detectors' places), lower the order, or add reference sources."
     )
 
@@ -66,8 +67,3 @@ def _tight_priors_hold_it(problem: Problem, mode: Mode) -> bool:
         width=priors.width / np.sqrt(_TIGHTENED), precision=priors.precision * _TIGHTENED
     )
     return eliminate_sources(mode.equations, tight) is not None
-
-
-def _references(problem: Problem) -> str:
-    count = int(problem.sources["is_reference"].sum())
-    return f"{count} reference source" + ("" if count == 1 else "s")

@@ -117,15 +117,16 @@ def wait_for_kernel(page, address):
 
 
 def save(page, file):
-    """Save the notebook from the menu, and wait until it lies there with its outputs."""
-    without_outputs = file.read_text("utf-8")
+    """Save the notebook from the menu, and wait until it lies there with its last output."""
     page.get_by_role("menuitem", name="File", exact=True).click()
     page.locator('li[data-command="docmanager:save"]').click()
     for _ in range(300):
         text = file.read_text("utf-8")
-        # Jupyter writes into the file itself.
-        if text != without_outputs and text.endswith("}\n"):
-            return nbformat.reads(text, as_version=4)
+        # Jupyter writes into the file itself, and every two minutes without being asked.
+        if text.endswith("}\n"):
+            notebook = nbformat.reads(text, as_version=4)
+            if notebook.cells[-1].outputs:
+                return notebook
         page.wait_for_timeout(100)
     pytest.fail("the notebook was not saved")
 

@@ -30,6 +30,7 @@ FOLDERS = {
     ),
     "plateviz": (
         "cache",
+        "figures",
         "tables",
         "plots",
         "runs",
@@ -50,7 +51,9 @@ NEVER = {
     "plateviz.tables": USER_INTERFACE,
     "plateviz.runs": USER_INTERFACE,
     "plateviz.solving": USER_INTERFACE,
-    "plateviz.plots": ("panel", "param", "plateviz.runs", "plateviz.solving"),
+    "plateviz.figures": ("panel", "param"),
+    "plateviz.figures.figure": ("pandas", *USER_INTERFACE),
+    "plateviz.plots": ("panel", "param", "holoviews", "bokeh"),
     "plateviz.dashboard.state": ("panel",),
     "plateviz.dashboard.session": ("panel", "holoviews", "bokeh", "datashader"),
     "plateviz.dashboard.navigation": ("panel", "holoviews", "bokeh", "datashader"),

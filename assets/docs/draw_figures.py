@@ -16,7 +16,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import holoviews as hv
 from bokeh.embed import file_html
 from bokeh.resources import INLINE
 from figure_orbits import ORBITS
@@ -24,6 +23,8 @@ from figure_surveys import SOURCES, SURVEYS, Surveys, surveys
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
+from plateviz.figures.bokeh_figure import BokehFigure
+from plateviz.figures.figure import Figure
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 
 FOLDER = Path(__file__).resolve().parent / "figures"
@@ -37,18 +38,18 @@ _WIDTHS = (1000, 800, 600)
 _COLOURS = (128, 64, 32)
 
 
-Figure = Callable[[], hv.core.Dimensioned]
+Draw = Callable[[], Figure]
 
 
-def figures_drawn(made: Surveys) -> Iterator[tuple[str, str, Figure]]:
-    """Yield name, kind ("good" or "bad") and drawing function of every figure."""
+def figures_drawn(made: Surveys) -> Iterator[tuple[str, str, Draw]]:
+    """Yield name, kind ("good" or "bad") and plot function of every figure."""
     for found, cases in ((survey_figures(), SURVEYS), (source_figures(), SOURCES)):
         for figure in found:
             for kind, case in zip(KINDS, cases[figure.name], strict=True):
-                yield figure.name, kind, lambda f=figure, c=case: f.draw(c(made), "light")  # type: ignore[arg-type]
+                yield figure.name, kind, lambda f=figure, c=case: f.plot(c(made))  # type: ignore[arg-type]
     for figure in diagnostics():
         for kind, chosen in zip(KINDS, ORBITS[figure.name], strict=True):
-            yield figure.name, kind, lambda f=figure, c=chosen: f.draw(c(), "light")
+            yield figure.name, kind, lambda f=figure, c=chosen: f.plot(c())
 
 
 def main() -> None:
@@ -71,9 +72,9 @@ def _chromium() -> Iterator[Page]:
         browser.close()
 
 
-def _shot(page: Page, figure: hv.core.Dimensioned, folder: Path) -> bytes:
+def _shot(page: Page, figure: Figure, folder: Path) -> bytes:
     """Return a figure as a PNG of at most `MOST_BYTES`."""
-    html = file_html(hv.render(figure, backend="bokeh"), INLINE, "figure")
+    html = file_html(BokehFigure(figure, "light").model, INLINE, "figure")
     path = folder / "figure.html"
     path.write_text(html.replace("</head>", f"{_STYLE}</head>"), encoding="utf-8")
     page.goto(path.as_uri())

@@ -6,8 +6,8 @@ one. What Bokeh and Panel do not allow:
 
 - Style sheets and `style` attributes written into a page are allowed, since both libraries write
   them at every change.
-- Scripts may make a function of a text (`unsafe-eval`), since both libraries, and HoloViews, send
-  callbacks as text.
+- Scripts may make a function of a text (`unsafe-eval`), since both libraries send callbacks
+  as text.
 - Scripts may come from `blob:` addresses, which only scripts of the page can make: Panel compiles
   its components in the browser.
 - A `<script>` that got into the page on the server would bear the number too. What comes from

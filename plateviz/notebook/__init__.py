@@ -18,5 +18,5 @@
 | dashboard.py       | the dashboard in a cell                                           |
 
 Imports `plateviz.dashboard` and below. This process never imports JAX: fits run in the solver
-process. Panel and HoloViews are imported when the first figure is drawn.
+process. Panel and Bokeh are imported when the first figure is drawn.
 """

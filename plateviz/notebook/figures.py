@@ -1,6 +1,6 @@
 """Figures that display themselves in a notebook and under `panel serve`.
 
-Panel and HoloViews take seconds to import; they are imported when the first figure is drawn.
+Panel and Bokeh take seconds to import; they are imported when the first figure is drawn.
 """
 
 from abc import ABC, abstractmethod
@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     import holoviews as hv
     import panel as pn
 
-DrawFigure = Callable[[str], "hv.core.Dimensioned"]
-"""Draws a figure in a theme, "light" or "dark"."""
+    from plateviz.figures.figure import Figure
+
+PlotFigure = Callable[[], "Figure"]
+"""Returns a figure."""
 
 _THEMES = ("light", "dark")
 # Width of most figures, screen pixels.
@@ -52,21 +54,25 @@ class NotebookFigure(Displayed):
     title, caption : title, and how to read the figure
     """
 
-    def __init__(self, name: str, title: str, caption: str, draw: DrawFigure, theme: str) -> None:
-        """Describe the figure; `draw` is called when it is displayed."""
+    def __init__(self, name: str, title: str, caption: str, plot: PlotFigure, theme: str) -> None:
+        """Describe the figure; `plot` is called when it is displayed."""
         self.name, self.title, self.caption = name, title, caption
-        self._draw, self._theme = draw, theme
+        self._plot, self._theme = plot, theme
 
     @property
-    def element(self) -> "hv.core.Dimensioned":
-        """The HoloViews element of the figure, to change or combine it."""
-        return self._draw(self._theme)
+    def element(self) -> "hv.Overlay | hv.Layout":
+        """The figure as a HoloViews object, to change it or combine it with others."""
+        from plateviz.figures.holoviews_figure import to_holoviews
+
+        return to_holoviews(self._plot(), self._theme)
 
     def __panel__(self) -> "pn.viewable.Viewable":
         """Return the caption and the figure below it."""
         import panel as pn
 
-        figure = pn.pane.HoloViews(self.element, backend="bokeh", linked_axes=False, margin=0)
+        from plateviz.figures.bokeh_figure import BokehFigure
+
+        figure = pn.pane.Bokeh(BokehFigure(self._plot(), self._theme).model, margin=0)
         return pn.Column(
             markup(
                 f"<p class='caption'>{escape(self.caption)}</p>", self._theme, width=_CAPTION_WIDTH
@@ -148,12 +154,12 @@ class HasFigures(ABC):
 
 
 class FigureSpec(NamedTuple):
-    """Name, title, caption and drawing function of a figure, without importing HoloViews."""
+    """Name, title, caption and plot function of a figure, without importing what draws it."""
 
     name: str
     title: str
     caption: str
-    draw: DrawFigure
+    plot: PlotFigure
 
 
 def figure_collection(specs: Sequence[FigureSpec], theme: str) -> LazyCollection[NotebookFigure]:
@@ -179,7 +185,7 @@ def markup(html: str, theme: str, **size: Any) -> "pn.pane.HTML":  # noqa: ANN40
 
 def _background(theme: str) -> dict[str, str]:
     """Return the CSS of a theme's background; the notebook may have the other theme."""
-    from plateviz.plots.theme import theme_of
+    from plateviz.figures.theme import theme_of
 
     return {"background": theme_of(theme).background, "padding": "0 6px 6px"}
 

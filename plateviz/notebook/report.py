@@ -38,7 +38,7 @@ def write_report(
         If the file cannot be written, it exists and is not to be overwritten, or the object
         cannot be reported.
     """
-    # These import HoloViews, which takes seconds.
+    # These import Bokeh, which takes seconds.
     from plateviz.reports.facts import facts_of
     from plateviz.reports.page import page_of
 

@@ -1,6 +1,6 @@
 """OpenSolution: a fitted orbit, with its tables, figures and report.
 
-The plots are imported on first use, since HoloViews takes seconds to import.
+The plots are imported on first use, since Bokeh takes seconds to import.
 """
 
 from collections.abc import Iterable, Mapping
@@ -263,8 +263,8 @@ def _frame(table: OpenTable) -> pd.DataFrame:
 
 
 def _spec(diagnostic: "Diagnostic", chosen: "Chosen") -> FigureSpec:
-    draw = partial(diagnostic.draw, chosen)
-    return FigureSpec(diagnostic.name, diagnostic.title, diagnostic.caption, draw)
+    plot = partial(diagnostic.plot, chosen)
+    return FigureSpec(diagnostic.name, diagnostic.title, diagnostic.caption, plot)
 
 
 def _pairs(exposures: object) -> list[tuple[int, int]]:

@@ -118,7 +118,7 @@ class OpenSource(HasFigures):
 
         tables = SourceTables(self._history, self._motion)
         figures = [
-            FigureSpec(one.name, one.title, one.caption, partial(one.draw, tables))
+            FigureSpec(one.name, one.title, one.caption, partial(one.plot, tables))
             for one in source_figures()
         ]
         return figure_collection(figures, theme)

@@ -242,7 +242,7 @@ class OpenSurvey(HasSolver, HasFigures):
 
         tables = survey_tables(self._run())
         figures = [
-            FigureSpec(one.name, one.title, one.caption, partial(one.draw, tables))
+            FigureSpec(one.name, one.title, one.caption, partial(one.plot, tables))
             for one in survey_figures()
         ]
         return figure_collection(figures, theme)

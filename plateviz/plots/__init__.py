@@ -1,8 +1,8 @@
-"""Figures: pure functions from the tables of `plateviz.tables` to HoloViews objects.
+"""Plots: pure functions from the tables of `plateviz.tables` to figures as plain values.
 
-Imports `plateviz.tables`. Every `plot_<noun>(table, *, options)` of a module in this folder is
-exported here. It returns an object for the Bokeh backend; for an empty table, an empty figure with
-a title. Dashboard, notebooks and reports share them.
+Imports `plateviz.tables` and `plateviz.figures`. Every `plot_<noun>(table, *, options)` of a module
+in this folder is exported here. It returns a `plateviz.figures.figure.Figure`; for an empty table,
+one with a message. Dashboard, notebooks and reports share them.
 """
 
 import importlib

@@ -1,18 +1,13 @@
-"""Vectors drawn to a stated scale: shafts, heads, and a key arrow.
-
-Segments are used, because `hv.VectorField` normalises lengths by default.
-"""
+"""Vectors drawn to a stated scale: shafts, heads, and a key arrow."""
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
-from plateviz.plots.style import TICK_SIZE, drawn
-from plateviz.plots.theme import theme_of
+from plateviz.figures.figure import Glyphs, Look, Tooltips
+from plateviz.figures.glyphs import points, segments, texts
 
 # Length of the root-mean-square arrow as a share of the frame's width.
 _RMS_SHARE = 0.04
@@ -69,48 +64,33 @@ def automatic_scale(table: pd.DataFrame, field: Field) -> float:
 
 
 def arrows(
-    table: pd.DataFrame,
-    *,
-    scale: float,
-    field: Field,
-    colour: str,
-    hover: Sequence[tuple[str, str]],
-    extra: list[str],
-) -> list[hv.Element]:
+    table: pd.DataFrame, *, scale: float, field: Field, colour: Look, hover: Tooltips
+) -> list[Glyphs]:
     """Return the vectors as strokes, and their tails as points with hover text.
 
     Parameters
     ----------
-    table : tails `x`, `y` and vectors `u`, `v` in the units of the axes, columns `extra`
+    table : tails `x`, `y` and vectors `u`, `v` in the units of the axes, columns of the hover
     scale : drawn length over true length
     field : the area drawn on; limits the size of the heads
     colour : of the arrows
     hover : label and format of each line of the hover
-    extra : columns that the hover needs
 
     Returns
     -------
-    Segments (the shafts, a row per row of `table`, then two rows for each head), points
+    Segments "arrows" (the shafts, a row per row of `table`, then two rows for each head), and
+    points "tails"
     """
-    ends = table.assign(
-        x_end=table["x"] + scale * table["u"], y_end=table["y"] + scale * table["v"]
-    )
-    tails = hv.Points(table, ["x", "y"], extra, label="tails")
+    x, y = (table[name].to_numpy(dtype=float) for name in "xy")
+    u, v = (scale * table[name].to_numpy(dtype=float) for name in "uv")
+    strokes = _strokes(x, y, x + u, y + v, field)
     return [
-        drawn(_strokes(ends, field, "arrows"), color=colour, line_width=1.2),
-        drawn(
-            tails,
-            color=colour,
-            size=3.5,
-            alpha=0.6,
-            nonselection_alpha=0.15,
-            tools=["hover"],
-            hover_tooltips=list(hover),
-        ),
+        segments(*strokes, name="arrows", color=colour),
+        points(table, "x", "y", name="tails", color=colour, size=3.5, alpha=0.6, hover=hover),
     ]
 
 
-def key(length: float, text: str, *, scale: float, field: Field, theme: str) -> list[hv.Element]:
+def key(length: float, text: str, *, scale: float, field: Field) -> list[Glyphs]:
     """Return a key arrow of true length `length`, with text beside it.
 
     Parameters
@@ -119,35 +99,29 @@ def key(length: float, text: str, *, scale: float, field: Field, theme: str) -> 
     text : the length with its unit
     scale : drawn length over true length, the same as of the other arrows
     field : the area drawn on; the key is in the strip below it
-    theme : "light" or "dark"
     """
-    colours = theme_of(theme)
     direction = math.copysign(1.0, field.x[1] - field.x[0])
     x = field.x[0] + direction * 0.03 * field.width
     y = field.y[0] - 0.5 * _KEY_STRIP * field.width
-    arrow = pd.DataFrame(
-        {"x": [x], "y": [y], "x_end": [x + direction * scale * length], "y_end": [y]}
-    )
-    label = hv.Text(x + direction * (scale * length + 0.015 * field.width), y, text, halign="left")
+    tip = x + direction * scale * length
+    tail_x, at_y, tip_x = (np.array([value]) for value in (x, y, tip))
+    strokes = _strokes(tail_x, at_y, tip_x, at_y, field)
     return [
-        drawn(_strokes(arrow, field, "key"), color=colours.text, line_width=2),
-        drawn(label, text_color=colours.text, text_font_size=TICK_SIZE),
+        segments(*strokes, name="key", color="text", width=2.0),
+        texts([tip + direction * 0.015 * field.width], [y], [text], name="key text", align="left"),
     ]
 
 
-def _strokes(ends: pd.DataFrame, field: Field, label: str) -> hv.Segments:
-    # Shafts and heads are one element, because drawing time grows with the number of elements.
-    x, y, tip_x, tip_y = (
-        ends[column].to_numpy(dtype=float) for column in ("x", "y", "x_end", "y_end")
-    )
+def _strokes(
+    x: np.ndarray, y: np.ndarray, tip_x: np.ndarray, tip_y: np.ndarray, field: Field
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the ends of shafts and heads, which are one glyph table."""
     length = np.hypot(tip_x - x, tip_y - y)
     length = np.minimum(_HEAD_SHARE * length, _LARGEST_HEAD * field.width)[:, None]
     angle = np.arctan2(tip_y - y, tip_x - x)[:, None] + np.pi + np.array([-1, 1]) * _HEAD_ANGLE
-    heads = (
-        np.repeat(tip_x, 2),
-        np.repeat(tip_y, 2),
-        (tip_x[:, None] + length * np.cos(angle)).ravel(),
-        (tip_y[:, None] + length * np.sin(angle)).ravel(),
+    return (
+        np.concatenate([x, np.repeat(tip_x, 2)]),
+        np.concatenate([y, np.repeat(tip_y, 2)]),
+        np.concatenate([tip_x, (tip_x[:, None] + length * np.cos(angle)).ravel()]),
+        np.concatenate([tip_y, (tip_y[:, None] + length * np.sin(angle)).ravel()]),
     )
-    columns = map(np.concatenate, zip((x, y, tip_x, tip_y), heads, strict=True))
-    return hv.Segments(tuple(columns), ["x", "y", "x_end", "y_end"], label=label)

@@ -1,33 +1,22 @@
 """Differences between two fits of the same sources, on the sky and over their uncertainty."""
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message, side_by_side
 from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import steps
-from plateviz.plots.style import (
-    ARROW_LIMIT,
-    FRAME_WIDTH,
-    SERIES_COLOURS,
-    AxisLabels,
-    framed,
-    message,
-    side_by_side,
-)
-from plateviz.plots.theme import theme_of
+from plateviz.plots.style import ARROW_LIMIT, SERIES_COLOURS
 from plateviz.plots.units import angle_text
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.residuals import binned_vectors
 
 _MAP = "Difference of positions, B minus A"
-_MAP_LABELS: AxisLabels = {"xlabel": "Δα cos δ (arcmin, East to the left)", "ylabel": "Δδ (arcmin)"}
+_MAP_X, _MAP_Y = "Δα cos δ (arcmin, East to the left)", "Δδ (arcmin)"
 _HISTOGRAM = "Difference over uncertainty"
-_HISTOGRAM_LABELS: AxisLabels = {
-    "xlabel": "(B minus A) / marginal σ of A",
-    "ylabel": "sources per bin",
-}
+_HISTOGRAM_X, _HISTOGRAM_Y = "(B minus A) / marginal σ of A", "sources per bin"
+_NONE = "No source in both fits"
 _MAS_PER_ARCMIN = 60_000.0
 _MARGIN = 1.14
 _LEAST_SHARE = 0.25
@@ -39,52 +28,36 @@ _HOVER_VALUES = [
     ("over σ", "@{pull_ra}{0.000}, @{pull_dec}{0.000}"),
     ("σ of B / σ of A", "@{sigma_ratio_ra}{0.000}, @{sigma_ratio_dec}{0.000}"),
 ]
-_VALUES = [
-    "difference_ra_mas",
-    "difference_dec_mas",
-    "pull_ra",
-    "pull_dec",
-    "sigma_ratio_ra",
-    "sigma_ratio_dec",
-]
 
 
-def plot_comparison(
-    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
-) -> hv.Layout:
+def plot_comparison(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
     """Draw the differences on the sky and their histogram side by side.
 
     Parameters
     ----------
     table : `tables.comparison`
-    theme : "light" or "dark"
     width : of each frame, screen pixels
     """
     panels = [
-        plot_comparison_map(table, theme=theme, width=width),
-        plot_comparison_histogram(table, theme=theme, width=width),
+        plot_comparison_map(table, width=width),
+        plot_comparison_histogram(table, width=width),
     ]
     return side_by_side(panels, columns=2)
 
 
 def plot_comparison_map(
-    table: pd.DataFrame,
-    *,
-    arrow_scale: float | None = None,
-    theme: str = "light",
-    width: int = FRAME_WIDTH,
-) -> hv.Overlay:
+    table: pd.DataFrame, *, arrow_scale: float | None = None, width: int = FRAME_WIDTH
+) -> Figure:
     """Draw the differences as arrows to a stated scale; above 2,000, their means in bins.
 
     Parameters
     ----------
     table : `tables.comparison`
     arrow_scale : drawn length over true length; None for a round number
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(_MAP, "No source in both fits", theme=theme, width=width, **_MAP_LABELS)
+        return message(_MAP, _NONE, width=width, xlabel=_MAP_X, ylabel=_MAP_Y)
     half = _MARGIN * (float(np.abs(table[["x_arcmin", "y_arcmin"]].to_numpy()).max()) or 1.0)
     field = Field((half, -half), (-half, half))
     shown, what = _thinned(_vectors(table), half)
@@ -99,37 +72,29 @@ def plot_comparison_map(
                 shown,
                 scale=scale,
                 field=field,
-                colour=theme_of(theme).mark,
+                colour="mark",
                 hover=[*hover, *_HOVER_VALUES],
-                extra=[c for c in ("id", "source_class", "n") if c in shown] + _VALUES,
             ),
-            *key(mas / _MAS_PER_ARCMIN, length, scale=scale, field=field, theme=theme),
+            *key(mas / _MAS_PER_ARCMIN, length, scale=scale, field=field),
         ],
         title=_MAP,
         subtitle=f"{what}\nArrows enlarged {scale:,g} times; key: {length}",
-        theme=theme,
+        x=Axis(_MAP_X, field.x),
+        y=Axis(_MAP_Y, field.ylim),
         width=width,
-        xlim=field.x,
-        ylim=field.ylim,
-        **_MAP_LABELS,
     )
 
 
-def plot_comparison_histogram(
-    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
-) -> hv.Overlay:
+def plot_comparison_histogram(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
     """Draw the histogram of the differences over the marginal uncertainty of A.
 
     Parameters
     ----------
     table : `tables.comparison`
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(
-            _HISTOGRAM, "No source in both fits", theme=theme, width=width, **_HISTOGRAM_LABELS
-        )
+        return message(_HISTOGRAM, _NONE, width=width, xlabel=_HISTOGRAM_X, ylabel=_HISTOGRAM_Y)
     histogram = difference_histogram(table)
     limit = float(histogram["right"].max())
     ratios = table[["sigma_ratio_ra", "sigma_ratio_dec"]].median()
@@ -141,13 +106,11 @@ def plot_comparison_histogram(
         title=_HISTOGRAM,
         subtitle=f"{len(table):,} sources\nmedian σ of B over σ of A: "
         f"{ratios.iloc[0]:.3f} (α), {ratios.iloc[1]:.3f} (δ)",
-        theme=theme,
+        x=Axis(_HISTOGRAM_X, (-limit, limit)),
+        y=Axis(_HISTOGRAM_Y, (0.0, 1.1 * float(histogram["count"].max()))),
         width=width,
         height=round(0.75 * width),
-        xlim=(-limit, limit),
-        ylim=(0.0, 1.1 * float(histogram["count"].max())),
         legend_columns=2,
-        **_HISTOGRAM_LABELS,
     )
 
 
@@ -172,10 +135,10 @@ def _thinned(vectors: pd.DataFrame, half: float) -> tuple[pd.DataFrame, str]:
     )
 
 
-def _draw(chosen: Chosen, theme: str) -> hv.Layout | hv.Overlay:
+def _plot(chosen: Chosen) -> Figure:
     if chosen.other is None:
-        return message(_MAP, "Fit with other settings to compare two solutions.", theme=theme)
-    return plot_comparison(comparison(chosen.other, chosen.result), theme=theme)
+        return message(_MAP, "Fit with other settings to compare two solutions.")
+    return plot_comparison(comparison(chosen.other, chosen.result))
 
 
 DIAGNOSTICS = (
@@ -186,7 +149,7 @@ DIAGNOSTICS = (
         "differences over their uncertainty. Good: differences well below the uncertainty, so "
         "that the change of settings does not matter.",
         86,
-        _draw,
+        _plot,
         is_wide=True,
         has_data=lambda chosen: chosen.other is not None,
     ),

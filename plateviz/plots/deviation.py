@@ -2,14 +2,14 @@
 
 import math
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
+from plateviz.figures.figure import Axis, Figure, framed, message, side_by_side
+from plateviz.figures.glyphs import ellipse, horizontal, vertical
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import class_points
-from plateviz.plots.style import PANEL_WIDTH, drawn, framed, message, side_by_side
-from plateviz.plots.theme import theme_of
+from plateviz.plots.style import PANEL_WIDTH
 from plateviz.plots.units import angle_unit
 from plateviz.tables.sources import CLASSES, deviation, deviation_statistics
 
@@ -20,73 +20,56 @@ _HOVER = [
     ("Δα cos δ", "@{deviation_ra_mas}{0.0000} ± @{sigma_ra_mas}{0.0000} mas"),
     ("Δδ", "@{deviation_dec_mas}{0.0000} ± @{sigma_dec_mas}{0.0000} mas"),
 ]
-_EXTRA = [
-    "n_obs",
-    "deviation_ra_mas",
-    "deviation_dec_mas",
-    "sigma_ra_mas",
-    "sigma_dec_mas",
-]
 _LEAST_SIGMAS = 3.0
 _MOST_RMS = 6.0
 
 
-def plot_deviation(
-    table: pd.DataFrame, *, theme: str = "light", width: int = PANEL_WIDTH
-) -> hv.Layout | hv.Overlay:
+def plot_deviation(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figure:
     """Draw estimated minus true position, a panel per class of source.
 
     Parameters
     ----------
     table : `tables.deviation`
-    theme : "light" or "dark"
     width : of each panel's frame, screen pixels
 
     Returns
     -------
-    A layout of the classes in the table; without a truth, a figure with a message
+    A frame per class in the table; without a truth, a figure with a message
     """
     if table.empty:
         return message(
             _TITLE,
             "No truth for this orbit",
-            theme=theme,
             width=width,
             xlabel="Δα cos δ (mas)",
             ylabel="Δδ (mas)",
         )
     statistics = deviation_statistics(table).set_index("source_class")
     panels = [
-        _panel(table[table["source_class"] == name], statistics.loc[name], theme, width)
+        _panel(table[table["source_class"] == name], statistics.loc[name], width)
         for name in reversed(CLASSES)
         if name in statistics.index
     ]
     return side_by_side(panels, columns=3)
 
 
-def _panel(rows: pd.DataFrame, statistics: pd.Series, theme: str, width: int) -> hv.Overlay:
+def _panel(rows: pd.DataFrame, statistics: pd.Series, width: int) -> Figure:
     unit, factor = angle_unit(max(statistics["rms_ra"], statistics["rms_dec"]))
-    x = hv.Dimension("x", label=f"Δα cos δ ({unit}, East to the left)")
-    y = hv.Dimension("y", label=f"Δδ ({unit})")
     scaled = rows.assign(x=rows["deviation_ra_mas"] * factor, y=rows["deviation_dec_mas"] * factor)
     half = factor * _half_width(rows, statistics)
     hidden = int((np.abs(scaled[["x", "y"]]).max(axis=1) > half).sum())
-    line = theme_of(theme).line
-    zero = [hv.HLine(0), hv.VLine(0)]
     return framed(
         [
-            *(drawn(z, color=line, line_width=1, alpha=0.6) for z in zero),
-            class_points(scaled, x, y, hover=_HOVER, extra=_EXTRA),
-            drawn(_ellipse(statistics, factor), color=line, line_width=1.8),
+            horizontal(0.0, width=1.0, dash="solid", alpha=0.6),
+            vertical(0.0, width=1.0, dash="solid", alpha=0.6),
+            class_points(scaled, "x", "y", hover=_HOVER),
+            ellipse(_covariance(statistics), scale=factor, name="mean covariance"),
         ],
         title=f"{rows['source_class'].iloc[0].capitalize()} sources",
         subtitle=_subtitle(statistics, unit, factor, hidden),
-        theme=theme,
+        x=Axis(f"Δα cos δ ({unit}, East to the left)", (half, -half)),
+        y=Axis(f"Δδ ({unit})", (-half, half)),
         width=width,
-        xlim=(half, -half),
-        ylim=(-half, half),
-        xlabel=x.label,
-        ylabel=y.label,
     )
 
 
@@ -98,21 +81,17 @@ def _half_width(rows: pd.DataFrame, statistics: pd.Series) -> float:
     return 1.05 * (max(least, min(largest, _MOST_RMS * typical)) or 1.0)
 
 
-def _ellipse(statistics: pd.Series, factor: float) -> hv.Ellipse:
-    covariance = np.array(
+def _covariance(statistics: pd.Series) -> np.ndarray:
+    return np.array(
         [
             (statistics["var_ra"], statistics["cov"]),
             (statistics["cov"], statistics["var_dec"]),
         ]
     )
-    values, vectors = np.linalg.eigh(covariance)
-    axes = 2.0 * factor * np.sqrt(np.clip(values[::-1], 0.0, None))
-    major = vectors[:, 1]
-    return hv.Ellipse(0, 0, tuple(axes), orientation=float(np.arctan2(major[1], major[0])))
 
 
 def _subtitle(statistics: pd.Series, unit: str, factor: float, hidden: int) -> str:
-    """Return three lines that fit a narrow panel, because panels of unequal height are clipped."""
+    """Return three lines that fit a narrow frame."""
     rms = factor * max(statistics["rms_ra"], statistics["rms_dec"])
     decimals = min(3, max(0, 2 - math.floor(math.log10(rms)))) if rms > 0 else 0
     mean, spread = (
@@ -131,10 +110,9 @@ def _subtitle(statistics: pd.Series, unit: str, factor: float, hidden: int) -> s
 _PAGE_WIDTH = 270
 
 
-def _draw(chosen: Chosen, theme: str) -> hv.Layout | hv.Overlay:
-    return plot_deviation(
-        deviation(chosen.result, chosen.result.true_places), theme=theme, width=_PAGE_WIDTH
-    )
+def _plot(chosen: Chosen) -> Figure:
+    table = deviation(chosen.result, chosen.result.true_places)
+    return plot_deviation(table, width=_PAGE_WIDTH)
 
 
 DIAGNOSTICS = (
@@ -145,7 +123,7 @@ DIAGNOSTICS = (
         "orbits. Good: an rms of deviation / σ of one. A common shift is the mean error of the "
         "reference sources.",
         50,
-        _draw,
+        _plot,
         is_wide=True,
         has_data=lambda chosen: chosen.result.true_places is not None,
     ),

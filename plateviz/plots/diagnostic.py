@@ -8,8 +8,7 @@ Orbit page and every report show its figures. A new diagnostic needs a table in
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import holoviews as hv
-
+from plateviz.figures.figure import Figure
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 
@@ -48,7 +47,7 @@ class Diagnostic:
     title : displayed title
     caption : what it shows and what a good solution looks like, in a few sentences
     order : sort key on the page
-    draw : function of a `Chosen` and a theme's name that returns the figure
+    plot : function of a `Chosen` that returns the figure
     follows_selection : whether the figure depends on the selected exposures and detector
     is_wide : whether it takes the whole width of the page
     has_data : whether there is anything to draw, such as a truth or another solution
@@ -58,7 +57,7 @@ class Diagnostic:
     title: str
     caption: str
     order: int
-    draw: Callable[[Chosen, str], hv.core.Dimensioned]
+    plot: Callable[[Chosen], Figure]
     follows_selection: bool = False
     is_wide: bool = False
     has_data: Callable[[Chosen], bool] = _always

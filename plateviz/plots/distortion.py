@@ -2,20 +2,19 @@
 
 from collections.abc import Sequence
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Glyphs, framed, message
+from plateviz.figures.glyphs import paths
 from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
 from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.style import FRAME_WIDTH, AxisLabels, drawn, framed, message
-from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_text
 from plateviz.tables.calibration import distortion
 from solver.data.instrument import Detector
 
 _TITLE = "Fitted distortion, distorted minus ideal position"
-_LABELS: AxisLabels = {"xlabel": "focal-plane x (mm)", "ylabel": "focal-plane y (mm)"}
+_XLABEL, _YLABEL = "focal-plane x (mm)", "focal-plane y (mm)"
 _HOVER = [
     ("at", "@{x}{0.00}, @{y}{0.00} mm"),
     ("x", "@{dx_um}{0.000} µm = @{dx_mas}{0.00} mas"),
@@ -29,9 +28,8 @@ def plot_distortion(
     *,
     detectors: Sequence[Detector] = (),
     arrow_scale: float | None = None,
-    theme: str = "light",
     width: int = FRAME_WIDTH,
-) -> hv.Overlay:
+) -> Figure:
     """Draw the displacement by the distortion to a stated scale.
 
     Parameters
@@ -40,11 +38,10 @@ def plot_distortion(
     detectors : detectors to outline
     arrow_scale : drawn length over true length; None for a round number that makes the
         rms arrow about 4 % of the width
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(_TITLE, "No distortion fitted", theme=theme, width=width, **_LABELS)
+        return message(_TITLE, "No distortion fitted", width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     half = _MARGIN * float(np.abs(table[["x", "y"]].to_numpy()).max())
     field = Field((-half, half), (-half, half))
     scale = arrow_scale or automatic_scale(table, field)
@@ -54,37 +51,27 @@ def plot_distortion(
     length = f"{length_um:g} µm = {angle_text(mas)}"
     return framed(
         [
-            _outlines(detectors, theme),
-            *arrows(
-                table,
-                scale=scale,
-                field=field,
-                colour=theme_of(theme).mark,
-                hover=_HOVER,
-                extra=["dx_um", "dy_um", "dx_mas", "dy_mas"],
-            ),
-            *key(length_um / 1000.0, length, scale=scale, field=field, theme=theme),
+            _outlines(detectors),
+            *arrows(table, scale=scale, field=field, colour="mark", hover=_HOVER),
+            *key(length_um / 1000.0, length, scale=scale, field=field),
         ],
         title=_TITLE,
         subtitle=f"Zero at the optical centre; rms {rms_um:.3g} µm.\n"
         f"Arrows enlarged {scale:,g} times; key: {length}",
-        theme=theme,
+        x=Axis(_XLABEL, field.x),
+        y=Axis(_YLABEL, field.ylim),
         width=width,
-        xlim=field.x,
-        ylim=field.ylim,
-        **_LABELS,
     )
 
 
-def _outlines(detectors: Sequence[Detector], theme: str) -> hv.Path:
-    paths = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detectors]
-    colour = theme_of(theme).muted
-    return drawn(hv.Path(paths, ["x", "y"]), color=colour, line_width=1)
+def _outlines(detectors: Sequence[Detector]) -> Glyphs:
+    corners = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detectors]
+    return paths(corners, name="outlines", color="muted")
 
 
-def _draw(chosen: Chosen, theme: str) -> hv.Overlay:
+def _plot(chosen: Chosen) -> Figure:
     table = distortion(chosen.result, chosen.instrument)
-    return plot_distortion(table, detectors=chosen.instrument.detectors, theme=theme)
+    return plot_distortion(table, detectors=chosen.instrument.detectors)
 
 
 DIAGNOSTICS = (
@@ -94,6 +81,6 @@ DIAGNOSTICS = (
         "Displacement on the focal plane by the fitted Legendre terms, zero at the optical centre. "
         "Good: a smooth pattern without strong growth towards the edges.",
         80,
-        _draw,
+        _plot,
     ),
 )

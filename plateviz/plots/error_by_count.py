@@ -1,31 +1,20 @@
 """Errors of the artificial sources against orbits (paper, figure "discussion:test:rms")."""
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
-from plateviz.plots.style import (
-    CLASS_COLOURS,
-    FRAME_WIDTH,
-    AxisLabels,
-    Limits,
-    drawn,
-    framed,
-    message,
-)
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Glyphs, Limits, framed, message
+from plateviz.figures.glyphs import line, points, segments
+from plateviz.plots.style import CLASS_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
-from plateviz.plots.theme import theme_of
 from plateviz.plots.ticks import log_ticks
 from plateviz.plots.units import angle_text
 from plateviz.tables.sources import ARTIFICIAL, REFERENCE
 from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Positional error of the artificial sources"
-_LABELS: AxisLabels = {
-    "xlabel": "number of orbits N",
-    "ylabel": "rms error of the mean, one coordinate (mas)",
-}
-_X, _Y = hv.Dimension("n_orbits"), hv.Dimension("error_mas")
+_XLABEL = "number of orbits N"
+_YLABEL = "rms error of the mean, one coordinate (mas)"
 _HOVER = [
     ("orbits", "@{n_orbits}"),
     ("sources", "@{n_sources}"),
@@ -42,9 +31,8 @@ def plot_error_by_count(
     *,
     measurement_mas: float = _MEASUREMENT_MAS,
     per_orbit: int = _PER_ORBIT,
-    theme: str = "light",
     width: int = FRAME_WIDTH,
-) -> hv.Overlay:
+) -> Figure:
     """Draw the error of the mean position against the number of orbits, with two predictions.
 
     Parameters
@@ -53,68 +41,87 @@ def plot_error_by_count(
     measurement_mas : uncertainty of one measurement, for the paper's law
         sigma / sqrt(36 N), section "Discussion"
     per_orbit : measurements of a source in one orbit, 36 in that law
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(_TITLE, "No artificial sources", theme=theme, width=width, **_LABELS)
+        text = "No artificial sources"
+        return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     rows = table.sort_values("n_orbits", kind="stable")
-    colours = theme_of(theme)
-    law_label = f"{measurement_mas:g} mas / √({per_orbit} N)"
     xlim, ylim = _limits(rows)
-    span = np.array(xlim)
-    law = measurement_mas / np.sqrt(per_orbit * span)
-    n = rows["n_orbits"]
     return framed(
-        [
-            _curve(span, law, law_label, colours.muted, "dotted"),
-            _curve(n, rows["floor_mas"], "floor: references", CLASS_COLOURS[REFERENCE], "dashed"),
-            _curve(n, rows["expected_mas"], "√(noise² / N + floor²)", colours.line, "solid"),
-            *_errors(rows),
-        ],
+        [_law(measurement_mas, per_orbit, xlim), *_predictions(rows), *_errors(rows)],
         title=_TITLE,
         subtitle=_subtitle(rows),
-        theme=theme,
+        x=Axis(_XLABEL, xlim, is_log=True, ticks=log_ticks(xlim, whole=True)),
+        y=Axis(_YLABEL, ylim, is_log=True, ticks=log_ticks(ylim)),
         width=width,
         height=round(0.8 * width),
-        xlim=xlim,
-        ylim=ylim,
-        logx=True,
-        logy=True,
-        xticks=log_ticks(xlim, whole=True),
-        yticks=log_ticks(ylim),
         legend_columns=2,
-        **_LABELS,
     )
 
 
-def _curve(
-    n: np.ndarray | pd.Series, values: np.ndarray | pd.Series, label: str, colour: str, dash: str
-) -> hv.Curve:
-    curve = hv.Curve(
-        (np.asarray(n, dtype=float), np.asarray(values, dtype=float)), _X, _Y, label=label
+def _law(measurement_mas: float, per_orbit: int, xlim: Limits) -> Glyphs:
+    n = np.array(xlim)
+    return line(
+        n,
+        measurement_mas / np.sqrt(per_orbit * n),
+        name="law",
+        color="muted",
+        width=1.8,
+        dash="dotted",
+        label=f"{measurement_mas:g} mas / √({per_orbit} N)",
     )
-    return drawn(curve, color=colour, line_width=1.8, line_dash=dash)
 
 
-def _errors(rows: pd.DataFrame) -> list[hv.Element]:
-    colour = CLASS_COLOURS[ARTIFICIAL]
-    ends = rows.assign(n_orbits_end=rows["n_orbits"])
-    bars = hv.Segments(ends, ["n_orbits", "error_low_mas", "n_orbits_end", "error_high_mas"])
-    extra = ["n_sources", "error_low_mas", "error_high_mas", "expected_mas"]
-    points = hv.Points(rows, [_X, _Y], extra, label="measured ± 1σ")
+def _predictions(rows: pd.DataFrame) -> list[Glyphs]:
+    n, floor, expected = rows["n_orbits"], rows["floor_mas"], rows["expected_mas"]
     return [
-        drawn(bars, color=colour, alpha=0.6, line_width=1.4, show_legend=False),
-        drawn(
-            points,
-            color=colour,
-            marker="triangle",
-            size=7,
-            line_color=None,
-            tools=["hover"],
-            hover_tooltips=_HOVER,
+        line(
+            n,
+            floor,
+            name="floor",
+            color=CLASS_COLOURS[REFERENCE],
+            width=1.8,
+            dash="dashed",
+            label="floor: references",
+        ),
+        line(
+            n,
+            expected,
+            name="prediction",
+            color="line",
+            width=1.8,
+            label="√(noise² / N + floor²)",
         ),
     ]
+
+
+def _errors(rows: pd.DataFrame) -> list[Glyphs]:
+    colour = CLASS_COLOURS[ARTIFICIAL]
+    n = rows["n_orbits"]
+    bars = segments(
+        n,
+        rows["error_low_mas"],
+        n,
+        rows["error_high_mas"],
+        name="error bars",
+        color=colour,
+        alpha=0.6,
+        width=1.4,
+    )
+    errors = points(
+        rows,
+        "n_orbits",
+        "error_mas",
+        name="errors",
+        color=colour,
+        marker="triangle",
+        size=7.0,
+        line_width=0.0,
+        hover=_HOVER,
+        label="measured ± 1σ",
+    )
+    return [bars, errors]
 
 
 def _limits(rows: pd.DataFrame) -> tuple[Limits, Limits]:
@@ -138,11 +145,12 @@ def _subtitle(rows: pd.DataFrame) -> str:
     )
 
 
-def _draw(tables: SurveyTables, theme: str) -> hv.Overlay:
+def _plot(tables: SurveyTables) -> Figure:
     table = tables.errors_by_count
     if table is None:
-        return message(_TITLE, "No artificial sources with a truth", theme=theme, **_LABELS)
-    return plot_error_by_count(table, theme=theme)
+        text = "No artificial sources with a truth"
+        return message(_TITLE, text, xlabel=_XLABEL, ylabel=_YLABEL)
+    return plot_error_by_count(table)
 
 
 SURVEY_FIGURES = (
@@ -153,6 +161,6 @@ SURVEY_FIGURES = (
         "The paper's square-root law has no floor; the errors of the reference sources are the "
         "same in every orbit and do not average out.",
         40,
-        _draw,
+        _plot,
     ),
 )

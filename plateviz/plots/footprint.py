@@ -1,20 +1,16 @@
 """The footprint: sources and fields on the sky (paper, figure "footprint")."""
 
-from collections.abc import Iterator
-
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
+from plateviz.figures.figure import FRAME_WIDTH, Axis, By, Figure, Glyphs, framed, message
+from plateviz.figures.glyphs import paths, texts
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import class_points
-from plateviz.plots.style import FRAME_WIDTH, LABEL_SIZE, drawn, framed, message
-from plateviz.plots.theme import theme_of
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 
 _TITLE = "Footprint of the orbit"
-_X = hv.Dimension("x_arcmin", label="Δα cos δ (arcmin, East to the left)")
-_Y = hv.Dimension("y_arcmin", label="Δδ (arcmin)")
+_XLABEL, _YLABEL = "Δα cos δ (arcmin, East to the left)", "Δδ (arcmin)"
 _HOVER = [
     ("source", "@{id}"),
     ("class", "@{source_class}"),
@@ -28,34 +24,28 @@ _MARGIN_X, _MARGIN_Y = 1.3, 1.12
 
 
 def plot_footprint(
-    sources: pd.DataFrame, fields: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
-) -> hv.Overlay:
+    sources: pd.DataFrame, fields: pd.DataFrame, *, width: int = FRAME_WIDTH
+) -> Figure:
     """Draw the sources on the sky with the outline of every field, East to the left.
 
     Parameters
     ----------
     sources : `tables.footprint_sources`
     fields : `tables.footprint_fields`
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     if sources.empty and fields.empty:
-        return message(
-            _TITLE, "No sources", theme=theme, width=width, xlabel=_X.label, ylabel=_Y.label
-        )
+        return message(_TITLE, "No sources", width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     half_x = _MARGIN_X * _largest(sources["x_arcmin"], fields["x_arcmin"])
     half_y = _MARGIN_Y * _largest(sources["y_arcmin"], fields["y_arcmin"])
-    points = class_points(sources, _X, _Y, hover=_HOVER, extra=["n_obs", "ra", "dec"])
+    points = class_points(sources, "x_arcmin", "y_arcmin", hover=_HOVER)
     return framed(
-        [*_outlines(fields, theme), points, *_names(fields, theme)],
+        [_outlines(fields), points, _names(fields)],
         title=_TITLE,
         subtitle=_subtitle(sources, fields),
-        theme=theme,
+        x=Axis(_XLABEL, (half_x, -half_x)),
+        y=Axis(_YLABEL, (-half_y, half_y)),
         width=width,
-        xlim=(half_x, -half_x),
-        ylim=(-half_y, half_y),
-        xlabel=_X.label,
-        ylabel=_Y.label,
         legend_columns=3,
     )
 
@@ -71,44 +61,42 @@ def _subtitle(sources: pd.DataFrame, fields: pd.DataFrame) -> str:
     return f"{', '.join(parts)} sources; {fields['field_id'].nunique()} fields"
 
 
-def _outlines(fields: pd.DataFrame, theme: str) -> Iterator[hv.Path]:
-    """Yield the detector outlines of each field, with dashes that differ between fields."""
+def _outlines(fields: pd.DataFrame) -> Glyphs:
+    """Return the detector outlines of each field, with dashes that differ between fields."""
+    outlines, dashes = [], []
     for number, (_, field) in enumerate(fields.groupby("field_id")):
-        paths = [
-            detector[["x_arcmin", "y_arcmin"]].to_numpy(dtype=float)
-            for _, detector in field.groupby("detector_id")
-        ]
-        yield drawn(
-            hv.Path(paths, [_X, _Y]),
-            color=theme_of(theme).line,
-            line_width=1.2,
-            line_dash=_DASHES[number % len(_DASHES)],
-        )
+        for _, detector in field.groupby("detector_id"):
+            outlines.append(detector[["x_arcmin", "y_arcmin"]].to_numpy(dtype=float))
+            dashes.append(_DASHES[number % len(_DASHES)])
+    return paths(outlines, name="outlines", color="line", width=1.2, dashes=dashes)
 
 
-def _names(fields: pd.DataFrame, theme: str) -> Iterator[hv.Text]:
-    """Yield the name of each field, outside its corner farthest from the centre."""
-    for field_id, group in fields.groupby("field_id"):
-        x, y = group["x_arcmin"].to_numpy(dtype=float), group["y_arcmin"].to_numpy(dtype=float)
-        corner = int(np.argmax(np.hypot(x, y)))
-        text = hv.Text(
-            1.03 * x[corner],
-            1.03 * y[corner],
-            f"field {field_id}",
-            halign="right" if x[corner] > 0 else "left",
-            valign="bottom" if y[corner] > 0 else "top",
-        )
-        yield drawn(
-            text,
-            text_color=theme_of(theme).text,
-            text_font_size=LABEL_SIZE,
-            text_font_style="bold",
-        )
+def _names(fields: pd.DataFrame) -> Glyphs:
+    """Return the name of each field, outside its corner farthest from the centre."""
+    corners = [
+        field.loc[np.hypot(field["x_arcmin"], field["y_arcmin"]).idxmax()]
+        for _, field in fields.groupby("field_id")
+    ]
+    x, y = (np.array([float(corner[c]) for corner in corners]) for c in ("x_arcmin", "y_arcmin"))
+    return texts(
+        1.03 * x,
+        1.03 * y,
+        [f"field {corner['field_id']:.0f}" for corner in corners],
+        name="field names",
+        size="12px",
+        is_bold=True,
+        align=By("side", {"left": "right", "right": "left"}),
+        baseline=By("end", {"top": "bottom", "bottom": "top"}),
+        keep={
+            "side": np.where(x > 0, "left", "right").astype(object),
+            "end": np.where(y > 0, "top", "bottom").astype(object),
+        },
+    )
 
 
-def _draw(chosen: Chosen, theme: str) -> hv.Overlay:
+def _plot(chosen: Chosen) -> Figure:
     sources = footprint_sources(chosen.result)
-    return plot_footprint(sources, footprint_fields(chosen.result, chosen.instrument), theme=theme)
+    return plot_footprint(sources, footprint_fields(chosen.result, chosen.instrument))
 
 
 DIAGNOSTICS = (
@@ -119,6 +107,6 @@ DIAGNOSTICS = (
         "field. They tie the solution to the sky; a field with few of them depends on the other "
         "fields.",
         10,
-        _draw,
+        _plot,
     ),
 )

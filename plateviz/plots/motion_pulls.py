@@ -1,10 +1,10 @@
 """Pulls of the fitted motions, a panel per parameter."""
 
-import holoviews as hv
 import pandas as pd
 
+from plateviz.figures.figure import Axis, Figure, framed, message, side_by_side
 from plateviz.plots.points import steps, unit_normal
-from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS, framed, message, side_by_side
+from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.tables.motion_pulls import CHI2, LEAST_ORBITS, motion_pulls
 from plateviz.tables.survey_tables import SurveyTables
@@ -20,51 +20,39 @@ _NAMES = {
 }
 _PULL = "(fitted minus true) / σ"
 _DEPARTURE = "(χ² − dof) / √(2 dof)"
+_YLABEL = "sources per bin"
 
 
-def plot_motion_pulls(
-    table: pd.DataFrame, *, theme: str = "light", width: int = PANEL_WIDTH
-) -> hv.Layout | hv.Overlay:
+def plot_motion_pulls(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figure:
     """Draw the histogram of the pulls of each motion parameter with the unit normal.
 
     Parameters
     ----------
     table : `tables.motion_pulls`
-    theme : "light" or "dark"
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        return message(
-            _TITLE,
-            "No source with enough orbits",
-            theme=theme,
-            width=width,
-            xlabel=_PULL,
-            ylabel="sources per bin",
-        )
+        text = "No source with enough orbits"
+        return message(_TITLE, text, width=width, xlabel=_PULL, ylabel=_YLABEL)
     panels = [
-        _panel(rows, str(name), theme, width)
-        for name, rows in table.groupby("parameter", sort=False)
+        _panel(rows, str(name), width) for name, rows in table.groupby("parameter", sort=False)
     ]
     return side_by_side(panels, columns=3)
 
 
-def _panel(rows: pd.DataFrame, name: str, theme: str, width: int) -> hv.Overlay:
+def _panel(rows: pd.DataFrame, name: str, width: int) -> Figure:
     first = rows.iloc[0]
     limit = float(rows["right"].max())
-    normal = unit_normal(float(first["n"] * (first["right"] - first["left"])), limit, theme)
-    top = 1.1 * max(float(rows["count"].max()), float(normal.range("count")[1]))
+    normal = unit_normal(float(first["n"] * (first["right"] - first["left"])), limit)
+    top = 1.1 * max(float(rows["count"].max()), float(normal.values("y").max()))
     return framed(
         [steps(rows, "sources", SERIES_COLOURS[0]), normal],
         title=_NAMES[name],
         subtitle=_subtitle(first, limit),
-        theme=theme,
+        x=Axis(_DEPARTURE if name == CHI2 else _PULL, (-limit, limit)),
+        y=Axis(_YLABEL, (0.0, top)),
         width=width,
         height=round(0.62 * width),
-        xlim=(-limit, limit),
-        ylim=(0.0, top),
-        xlabel=_DEPARTURE if name == CHI2 else _PULL,
-        ylabel="sources per bin",
         legend_columns=2,
     )
 
@@ -80,8 +68,8 @@ def _subtitle(first: pd.Series, limit: float) -> str:
 _PAGE_WIDTH = 270
 
 
-def _draw(tables: SurveyTables, theme: str) -> hv.Layout | hv.Overlay:
-    return plot_motion_pulls(motion_pulls(tables.motions), theme=theme, width=_PAGE_WIDTH)
+def _plot(tables: SurveyTables) -> Figure:
+    return plot_motion_pulls(motion_pulls(tables.motions), width=_PAGE_WIDTH)
 
 
 SURVEY_FIGURES = (
@@ -93,7 +81,7 @@ SURVEY_FIGURES = (
         "of one region share the reference sources' errors, so that the mean may differ from "
         "zero; the width should be one.",
         60,
-        _draw,
+        _plot,
         is_wide=True,
     ),
 )

@@ -1,37 +1,37 @@
 """Number of orbits that measured each source (paper, figure "result:ts:orbit")."""
 
-import holoviews as hv
 import pandas as pd
 
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message
 from plateviz.plots.points import steps
-from plateviz.plots.style import CLASS_COLOURS, FRAME_WIDTH, AxisLabels, framed, message
+from plateviz.plots.style import CLASS_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.ticks import log_ticks
 from plateviz.tables.orbit_counts import orbit_counts
 from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Orbits of each source"
+_YLABEL = "sources per bin"
 # Drawn count of an empty bin, below the frame: zero has no logarithm.
 _NONE = 0.1
 _LOWEST = 0.7
 _ALL_TICKS_UP_TO = 200.0
 
 
-def plot_orbit_counts(
-    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
-) -> hv.Overlay:
+def plot_orbit_counts(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
     """Draw the histogram of the number of orbits per source for each class, with log counts.
 
     Parameters
     ----------
     table : `tables.orbit_counts`
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(_TITLE, "No sources", theme=theme, width=width, **_labels(1))
+        return message(_TITLE, "No sources", width=width, xlabel=_xlabel(1), ylabel=_YLABEL)
     last = float(table["right"].max())
     top = 1.8 * float(table["count"].max())
+    ticks = log_ticks((_LOWEST, top), whole=True, powers_only=top > _ALL_TICKS_UP_TO)
+    step = round(float(table["right"].iloc[0] - table["left"].iloc[0]))
     return framed(
         [
             steps(_closed(rows), str(name), CLASS_COLOURS[str(name)])
@@ -39,21 +39,17 @@ def plot_orbit_counts(
         ],
         title=_TITLE,
         subtitle=_subtitle(table),
-        theme=theme,
+        x=Axis(_xlabel(step), (-0.01 * last, 1.02 * last)),
+        y=Axis(_YLABEL, (_LOWEST, top), is_log=True, ticks=ticks),
         width=width,
         height=round(0.62 * width),
-        xlim=(-0.01 * last, 1.02 * last),
-        ylim=(_LOWEST, top),
-        logy=True,
-        yticks=log_ticks((_LOWEST, top), whole=True, powers_only=top > _ALL_TICKS_UP_TO),
         legend_columns=3,
-        **_labels(round(float(table["right"].iloc[0] - table["left"].iloc[0]))),
     )
 
 
-def _labels(step: int) -> AxisLabels:
+def _xlabel(step: int) -> str:
     bins = "" if step == 1 else f", in bins of {step}"
-    return {"xlabel": f"number of orbits N{bins}", "ylabel": "sources per bin"}
+    return f"number of orbits N{bins}"
 
 
 def _closed(rows: pd.DataFrame) -> pd.DataFrame:
@@ -76,8 +72,8 @@ def _subtitle(table: pd.DataFrame) -> str:
     return "\n".join(parts)
 
 
-def _draw(tables: SurveyTables, theme: str) -> hv.Overlay:
-    return plot_orbit_counts(orbit_counts(tables.motions), theme=theme)
+def _plot(tables: SurveyTables) -> Figure:
+    return plot_orbit_counts(orbit_counts(tables.motions))
 
 
 SURVEY_FIGURES = (
@@ -87,6 +83,6 @@ SURVEY_FIGURES = (
         "Number of orbits that measured each source, by class. Sources near the target are "
         "measured most often. Good: similar histograms for classes in the same part of the sky.",
         30,
-        _draw,
+        _plot,
     ),
 )

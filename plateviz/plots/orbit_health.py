@@ -1,26 +1,25 @@
 """Quality of fit against time: chi2 and the reference sources' deviations of each orbit."""
 
-import holoviews as hv
 import pandas as pd
 
-from plateviz.plots.style import (
+from plateviz.figures.figure import (
     FRAME_WIDTH,
-    SERIES_COLOURS,
-    AxisLabels,
+    Axis,
+    Figure,
+    Glyphs,
     Limits,
-    drawn,
     framed,
     message,
     side_by_side,
 )
+from plateviz.figures.glyphs import band, horizontal, line, points
+from plateviz.plots.style import SERIES_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
-from plateviz.plots.theme import theme_of
 from plateviz.tables.orbit_health import orbit_health
 from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "χ² over its expected value, by orbit"
-_X = hv.Dimension("year", label="epoch (Julian year, TCB)")
-_LABELS: AxisLabels = {"xlabel": _X.label, "ylabel": "χ² / dof"}
+_XLABEL, _YLABEL = "epoch (Julian year, TCB)", "χ² / dof"
 _HOVER_CHI2 = [
     ("orbit", "@{orbit_id}"),
     ("epoch", "@{year}{0.000}"),
@@ -28,13 +27,17 @@ _HOVER_CHI2 = [
     ("departure", "@{z}{0.0} σ"),
 ]
 _HOVER_FAILED = [("orbit", "@{orbit_id}"), ("state", "@{state}"), ("reason", "@{message}")]
+_HOVER_DEVIATION = [
+    ("orbit", "@{orbit_id}"),
+    ("epoch", "@{year}{0.000}"),
+    ("deviation", "@{normalised}{0.000}"),
+    ("expected", "@{expected}{0.000}"),
+]
 _NAMES = {"ra": "α cos δ", "dec": "δ"}
 _MARKERS = {"ra": "circle", "dec": "triangle"}
 
 
-def plot_orbit_health(
-    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
-) -> hv.Layout | hv.Overlay:
+def plot_orbit_health(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
     """Draw chi2 over its degrees of freedom and the normalised deviations of each orbit.
 
     Orbits that failed or did not converge are marked at the bottom of the first panel.
@@ -42,40 +45,41 @@ def plot_orbit_health(
     Parameters
     ----------
     table : `tables.orbit_health`
-    theme : "light" or "dark"
     width : of each panel's frame, screen pixels
     """
     if not table["chi2_per_dof"].notna().any():
-        return message(_TITLE, "No orbit fitted yet", theme=theme, width=width, **_LABELS)
+        text = "No orbit fitted yet"
+        return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     years = table["year"]
     margin = max(0.04 * float(years.max() - years.min()), 0.1)
     xlim = (float(years.min()) - margin, float(years.max()) + margin)
-    panels = [_chi2(table, xlim, theme, width), _deviations(table, xlim, theme, width)]
-    return side_by_side(panels, columns=2, linked=True)
+    panels = [_chi2(table, xlim, width), _deviations(table, xlim, width)]
+    return side_by_side(panels, columns=2, linked="x")
 
 
-def _chi2(table: pd.DataFrame, xlim: Limits, theme: str, width: int) -> hv.Overlay:
+def _chi2(table: pd.DataFrame, xlim: Limits, width: int) -> Figure:
     fitted = table[table["chi2_per_dof"].notna()].sort_values("year", kind="stable")
     reach = 1.35 * max(
         float(fitted["expected_sd"].max()), float((fitted["chi2_per_dof"] - 1.0).abs().max())
     )
+    # Symmetric about 1, but chi2 is not negative.
+    low, high = max(0.0, 1.0 - reach), 1.0 + reach
     outside = int((fitted["z"].abs() > 1.0).sum())
     return framed(
         [
-            *_band(_to_edges(fitted, xlim), theme),
-            _orbits(fitted, theme),
-            *_marked(table, 1.0 - 0.9 * reach),
+            _band(_to_edges(fitted, xlim)),
+            horizontal(1.0, name="one"),
+            _orbits(fitted),
+            _marked(table, low + 0.05 * (high - low)),
         ],
         title=_TITLE,
         subtitle=f"{_states(table)}\n{outside} of {len(fitted)} beyond ± 1σ = √(2/dof), "
         f"{0.317 * len(fitted):.1f} expected",
-        theme=theme,
+        x=Axis(_XLABEL, xlim),
+        y=Axis(_YLABEL, (low, high)),
         width=width,
         height=round(0.6 * width),
-        xlim=xlim,
-        ylim=(1.0 - reach, 1.0 + reach),
         legend_columns=3,
-        **_LABELS,
     )
 
 
@@ -85,57 +89,42 @@ def _to_edges(fitted: pd.DataFrame, xlim: Limits) -> pd.DataFrame:
     return pd.concat([ends[0], fitted, ends[1]], ignore_index=True)
 
 
-def _band(fitted: pd.DataFrame, theme: str) -> list[hv.Element]:
-    colours = theme_of(theme)
+def _band(fitted: pd.DataFrame) -> Glyphs:
     low, high = 1.0 - fitted["expected_sd"], 1.0 + fitted["expected_sd"]
-    area = hv.Area(
-        (fitted["year"], low, high), _X, ["chi2_per_dof", "chi2_high"], label="expected ± 1σ"
-    )
-    return [
-        drawn(area, color=colours.muted, alpha=0.22, line_alpha=0.0),
-        drawn(hv.HLine(1.0), color=colours.line, line_width=1.2, line_dash="dashed"),
-    ]
+    return band(fitted["year"], low, high, name="band", label="expected ± 1σ")
 
 
-def _orbits(fitted: pd.DataFrame, theme: str) -> hv.Points:
-    extra = ["orbit_id", "expected_sd", "z"]
-    points = hv.Points(fitted, [_X, "chi2_per_dof"], extra, label="orbit")
-    return drawn(
-        points,
-        color=theme_of(theme).mark,
-        size=6,
-        line_color=None,
-        nonselection_alpha=0.2,
-        tools=["hover"],
-        hover_tooltips=_HOVER_CHI2,
+def _orbits(fitted: pd.DataFrame) -> Glyphs:
+    return points(
+        fitted,
+        "year",
+        "chi2_per_dof",
+        name="orbits",
+        color="mark",
+        size=6.0,
+        line_width=0.0,
+        hover=_HOVER_CHI2,
+        label="orbit",
     )
 
 
-def _marked(table: pd.DataFrame, height: float) -> list[hv.Points]:
+def _marked(table: pd.DataFrame, height: float) -> Glyphs:
     rows = table[table["state"].isin(["failed", "not converged"])]
-    if rows.empty:
-        return []
-    data = rows[["year", "orbit_id", "state", "message"]].assign(chi2_per_dof=height)
-    points = hv.Points(
-        data,
-        [_X, "chi2_per_dof"],
-        ["orbit_id", "state", "message"],
+    return points(
+        rows.assign(chi2_per_dof=height),
+        "year",
+        "chi2_per_dof",
+        name="failed",
+        color=SERIES_COLOURS[1],
+        marker="x",
+        size=9.0,
+        line_width=2.0,
+        hover=_HOVER_FAILED,
         label="failed or not converged",
     )
-    return [
-        drawn(
-            points,
-            color=SERIES_COLOURS[1],
-            marker="x",
-            size=9,
-            line_width=2.0,
-            tools=["hover"],
-            hover_tooltips=_HOVER_FAILED,
-        )
-    ]
 
 
-def _deviations(table: pd.DataFrame, xlim: Limits, theme: str, width: int) -> hv.Overlay:
+def _deviations(table: pd.DataFrame, xlim: Limits, width: int) -> Figure:
     fitted = table[table["chi2_per_dof"].notna()].sort_values("year", kind="stable")
     columns = [f"{kind}_{axis}" for kind in ("deviation", "expected") for axis in _NAMES]
     top = 1.15 * float(fitted[columns].max().max())
@@ -153,43 +142,40 @@ def _deviations(table: pd.DataFrame, xlim: Limits, theme: str, width: int) -> hv
             f"expected {fitted[f'expected_{axis}'].mean():.3f}"
             for axis, name in _NAMES.items()
         ),
-        theme=theme,
+        x=Axis(_XLABEL, xlim),
+        y=Axis("normalised deviation (σ of the prior)", (0.0, top)),
         width=width,
         height=round(0.6 * width),
-        xlim=xlim,
-        ylim=(0.0, top),
-        xlabel=_X.label,
-        ylabel="normalised deviation (σ of the prior)",
         legend_columns=4,
     )
 
 
-def _expected(fitted: pd.DataFrame, axis: str, number: int) -> hv.Curve:
-    data = (fitted["year"], fitted[f"expected_{axis}"])
-    curve = hv.Curve(data, _X, "normalised", label=f"expected, {_NAMES[axis]}")
-    return drawn(curve, color=SERIES_COLOURS[number], line_width=1.4, line_dash="dashed")
-
-
-def _measured(fitted: pd.DataFrame, axis: str, number: int) -> hv.Points:
-    data = fitted[["year", "orbit_id"]].assign(
-        normalised=fitted[f"deviation_{axis}"], expected=fitted[f"expected_{axis}"]
+def _expected(fitted: pd.DataFrame, axis: str, number: int) -> Glyphs:
+    return line(
+        fitted["year"],
+        fitted[f"expected_{axis}"],
+        name=f"expected {axis}",
+        color=SERIES_COLOURS[number],
+        width=1.4,
+        dash="dashed",
+        label=f"expected, {_NAMES[axis]}",
     )
-    points = hv.Points(data, [_X, "normalised"], ["orbit_id", "expected"], label=_NAMES[axis])
-    return drawn(
-        points,
+
+
+def _measured(fitted: pd.DataFrame, axis: str, number: int) -> Glyphs:
+    named = {"normalised": fitted[f"deviation_{axis}"], "expected": fitted[f"expected_{axis}"]}
+    return points(
+        fitted.assign(**named),
+        "year",
+        "normalised",
+        name=f"orbits {axis}",
         color=SERIES_COLOURS[number],
         marker=_MARKERS[axis],
-        size=6,
+        size=6.0,
         alpha=0.85,
-        line_color=None,
-        nonselection_alpha=0.2,
-        tools=["hover"],
-        hover_tooltips=[
-            ("orbit", "@{orbit_id}"),
-            ("epoch", "@{year}{0.000}"),
-            ("deviation", "@{normalised}{0.000}"),
-            ("expected", "@{expected}{0.000}"),
-        ],
+        line_width=0.0,
+        hover=_HOVER_DEVIATION,
+        label=_NAMES[axis],
     )
 
 
@@ -199,8 +185,8 @@ def _states(table: pd.DataFrame) -> str:
     return ", ".join(f"{counts[state]} {state}" for state in states if state in counts)
 
 
-def _draw(tables: SurveyTables, theme: str) -> hv.Layout | hv.Overlay:
-    return plot_orbit_health(orbit_health(tables.orbits), theme=theme)
+def _plot(tables: SurveyTables) -> Figure:
+    return plot_orbit_health(orbit_health(tables.orbits))
 
 
 SURVEY_FIGURES = (
@@ -211,7 +197,7 @@ SURVEY_FIGURES = (
         "sources from their priors. Good: two thirds of the orbits within the band, and "
         "deviations near their expected value, which is below 1 for a point estimate.",
         5,
-        _draw,
+        _plot,
         is_wide=True,
     ),
 )

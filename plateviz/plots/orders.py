@@ -2,21 +2,23 @@
 
 from collections.abc import Iterable
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
-from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.style import (
-    PANEL_WIDTH,
-    SERIES_COLOURS,
-    AxisLabels,
-    drawn,
+from plateviz.figures.figure import (
+    Axis,
+    Figure,
+    Glyphs,
+    Limits,
+    Ticks,
+    Tooltips,
     framed,
     message,
     side_by_side,
 )
-from plateviz.plots.theme import theme_of
+from plateviz.figures.glyphs import band, horizontal, line, points, vertical
+from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS
 from plateviz.tables.orders import order_comparison, preferred_order
 from solver.data.settings import MAX_ORDER
 
@@ -24,8 +26,7 @@ _TITLE = "Orders of the distortion"
 _DIFFERENCE = "Evidence and prediction, against the best order"
 _HELD_OUT = "χ² of the reserved sources, by order"
 _XLABEL = "order of the distortion"
-_LABELS: AxisLabels = {"xlabel": _XLABEL, "ylabel": "log probability minus the best (nat)"}
-_HELD_OUT_LABELS: AxisLabels = {"xlabel": _XLABEL, "ylabel": "χ² / dof"}
+_DIFFERENCE_Y, _HELD_OUT_Y = "log probability minus the best (nat)", "χ² / dof"
 _SERIES = (
     ("evidence_below_best", "log evidence", "circle"),
     ("log_density_below_best", "log density of the reserved sources", "triangle"),
@@ -52,9 +53,7 @@ _RATIOS = (
 _APART = 0.08
 
 
-def plot_orders(
-    table: pd.DataFrame, *, theme: str = "light", width: int = PANEL_WIDTH
-) -> hv.Layout | hv.Overlay:
+def plot_orders(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figure:
     """Draw the evidence of each order, and its prediction of the reserved sources.
 
     Both axes are linear near their best value and logarithmic far from it.
@@ -62,18 +61,16 @@ def plot_orders(
     Parameters
     ----------
     table : `tables.order_comparison`
-    theme : "light" or "dark"
     width : of each panel's frame, screen pixels
     """
     if table.empty:
         text = "No orders compared: switch it on under Refit, then fit"
-        return message(_TITLE, text, theme=theme, width=width, **_LABELS)
-    panels = [_differences(table, theme, width), _held_out(table, theme, width)]
-    return side_by_side(panels, columns=2)
+        return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_DIFFERENCE_Y)
+    return side_by_side([_differences(table, width), _held_out(table, width)], columns=2)
 
 
-def _differences(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
-    elements = [*_fitted(table, theme)]
+def _differences(table: pd.DataFrame, width: int) -> Figure:
+    glyphs = [_fitted(table)]
     values = [np.zeros(1)]
     for (column, name, marker), colour in zip(_SERIES, SERIES_COLOURS, strict=False):
         rows = table.dropna(subset=[column])
@@ -82,69 +79,62 @@ def _differences(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
         height = -np.arcsinh(rows[column].to_numpy())
         rows = rows.assign(height=height, below=rows[column], series=name)
         values.append(height)
-        elements += _line(rows, "height", ["n_terms", "below", "series"], name, colour, marker)
+        glyphs += _series(rows, name, colour, marker, _HOVER)
     low = 1.12 * min(float(np.concatenate(values).min()), -1.5)
     ticks = _ticks(-np.arcsinh(_LOSSES), [f"−{loss:,.0f}" for loss in _LOSSES], low, 0.0)
     return framed(
-        elements,
+        glyphs,
         title=_DIFFERENCE,
         subtitle=_subtitle(table),
-        theme=theme,
+        x=_x_axis(table),
+        y=Axis(
+            _DIFFERENCE_Y,
+            (low, -0.1 * low),
+            ticks=[(place, label.replace("−0", "0")) for place, label in ticks],
+        ),
         width=width,
         height=round(0.75 * width),
-        xlim=_limits(table),
-        ylim=(low, -0.1 * low),
-        xticks=table["order"].tolist(),
-        yticks=[(place, label.replace("−0", "0")) for place, label in ticks],
         legend_columns=1,
-        **_LABELS,
     )
 
 
-def _held_out(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
+def _held_out(table: pd.DataFrame, width: int) -> Figure:
     rows = table.dropna(subset=["held_out_chi2_per_dof"])
     if rows.empty:
         text = "No reserved sources"
-        return message(_HELD_OUT, text, theme=theme, width=width, **_HELD_OUT_LABELS)
-    colours, spread = theme_of(theme), float(rows["held_out_sd"].max())
+        return message(_HELD_OUT, text, width=width, xlabel=_XLABEL, ylabel=_HELD_OUT_Y)
+    spread = float(rows["held_out_sd"].max())
     scale = _BAND_SIGMAS * spread
     rows = rows.assign(height=np.arcsinh((rows["held_out_chi2_per_dof"] - 1.0) / scale))
     edge = float(np.arcsinh(1.0))
     low = min(float(rows["height"].min()), -edge) - 0.6
     high = max(float(rows["height"].max()), edge) * 1.1 + 0.3
     places = np.arcsinh((np.array(_RATIOS) - 1.0) / scale)
-    first, last = _limits(table)
-    band = hv.Area(
-        ([first, last], [-edge] * 2, [edge] * 2),
-        "order",
-        ["low", "high"],
-        label=f"expected ± {_BAND_SIGMAS:g}σ",
-    )
-    extra = ["n_reserved", "held_out_chi2_per_dof", "held_out_sd", "chi2_per_dof"]
+    expected = f"expected ± {_BAND_SIGMAS:g}σ"
     return framed(
         [
-            drawn(band, color=colours.muted, alpha=0.22, line_alpha=0.0),
-            drawn(hv.HLine(0.0), color=colours.line, line_width=1.2, line_dash="dashed"),
-            *_fitted(table, theme),
-            *_line(rows, "height", extra, "reserved sources", colours.mark, "triangle"),
+            band(_limits(table), [-edge] * 2, [edge] * 2, name="band", label=expected),
+            horizontal(0.0, name="expected"),
+            _fitted(table),
+            *_series(rows, "reserved sources", "mark", "triangle", _HELD_OUT_HOVER),
         ],
         title=_HELD_OUT,
         subtitle=f"{rows['n_reserved'].iloc[0]:,} sources, with the calibration fitted to the "
         f"others\nexpected: 1 ± {spread:.3f} for a sufficient order",
-        theme=theme,
+        x=_x_axis(table),
+        y=Axis(
+            _HELD_OUT_Y,
+            (low, high),
+            ticks=_ticks(places, [f"{ratio:,g}" for ratio in _RATIOS], low, high),
+        ),
         width=width,
         height=round(0.75 * width),
-        xlim=(first, last),
-        ylim=(low, high),
-        xticks=table["order"].tolist(),
-        yticks=_ticks(places, [f"{ratio:,g}" for ratio in _RATIOS], low, high),
         legend_columns=1,
-        **_HELD_OUT_LABELS,
     )
 
 
 def _subtitle(table: pd.DataFrame) -> str:
-    """Return two lines, as in the other panel, because panels of unequal height are clipped."""
+    """Return two lines, as in the other panel."""
     names = {"evidence": "evidence_below_best", "prediction": "log_density_below_best"}
     found = {name: preferred_order(table, column) for name, column in names.items()}
     best = [f"best {name}: order {order}" for name, order in found.items() if order is not None]
@@ -157,32 +147,42 @@ def _subtitle(table: pd.DataFrame) -> str:
     return f"{'; '.join(best)}\n{'; '.join(second)}"
 
 
-def _line(
-    rows: pd.DataFrame, y: str, extra: list[str], name: str, colour: str, marker: str
-) -> list[hv.Element]:
-    curve = hv.Curve(rows, "order", y, label=name)
-    points = hv.Points(rows, ["order", y], extra, label=name)
-    hover = _HOVER if "below" in extra else _HELD_OUT_HOVER
+def _series(
+    rows: pd.DataFrame, name: str, colour: str, marker: str, hover: Tooltips
+) -> list[Glyphs]:
+    """Return a line and a mark at the `height` of each order, with one entry in the legend."""
     return [
-        drawn(curve, color=colour, line_width=1.8),
-        drawn(points, color=colour, marker=marker, size=8, tools=["hover"], hover_tooltips=hover),
+        line(rows["order"], rows["height"], name=name, color=colour, width=1.8, label=name),
+        points(
+            rows,
+            "order",
+            "height",
+            name=f"{name}, marks",
+            color=colour,
+            marker=marker,
+            size=8.0,
+            hover=hover,
+            label=name,
+        ),
     ]
 
 
-def _fitted(table: pd.DataFrame, theme: str) -> list[hv.Element]:
+def _fitted(table: pd.DataFrame) -> Glyphs:
     """Return a vertical line at the fitted order."""
-    colour = theme_of(theme).line
     orders = table.loc[table["is_fitted"], "order"]
-    return [drawn(hv.VLine(x), color=colour, line_width=1.2, line_dash="dotted") for x in orders]
+    return vertical(orders.to_numpy(), name="fitted", dash="dotted")
 
 
-def _limits(table: pd.DataFrame) -> tuple[float, float]:
+def _x_axis(table: pd.DataFrame) -> Axis:
+    ticks = [(float(order), str(order)) for order in table["order"]]
+    return Axis(_XLABEL, _limits(table), ticks=ticks)
+
+
+def _limits(table: pd.DataFrame) -> Limits:
     return float(table["order"].min()) - 0.5, float(table["order"].max()) + 0.5
 
 
-def _ticks(
-    places: Iterable[float], labels: Iterable[str], low: float, high: float
-) -> list[tuple[float, str]]:
+def _ticks(places: Iterable[float], labels: Iterable[str], low: float, high: float) -> Ticks:
     """Return ticks within the axis that do not overlap; those near zero take precedence."""
     chosen: list[tuple[float, str]] = []
     for place, label in sorted(zip(places, labels, strict=True), key=lambda tick: abs(tick[0])):
@@ -195,8 +195,8 @@ def _ticks(
 _PAGE_WIDTH = 400
 
 
-def _draw(chosen: Chosen, theme: str) -> hv.Layout | hv.Overlay:
-    return plot_orders(order_comparison(chosen.result), theme=theme, width=_PAGE_WIDTH)
+def _plot(chosen: Chosen) -> Figure:
+    return plot_orders(order_comparison(chosen.result), width=_PAGE_WIDTH)
 
 
 DIAGNOSTICS = (
@@ -208,7 +208,7 @@ DIAGNOSTICS = (
         "Good: it has the highest evidence (5 less is odds of 1 to 150), and from it upwards "
         "the chi2 of the reserved sources is inside the band.",
         82,
-        _draw,
+        _plot,
         is_wide=True,
         has_data=lambda chosen: chosen.result.orders is not None,
     ),

@@ -1,29 +1,19 @@
 """Goodness of fit: standardised residuals, and chi2 of each exposure."""
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message
+from plateviz.figures.glyphs import band, horizontal, points
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import steps, unit_normal
-from plateviz.plots.style import (
-    FRAME_WIDTH,
-    SERIES_COLOURS,
-    AxisLabels,
-    drawn,
-    framed,
-    message,
-)
-from plateviz.plots.theme import theme_of
+from plateviz.plots.style import SERIES_COLOURS
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
 
 _PULLS = "Standardised residuals"
-_PULL_LABELS: AxisLabels = {
-    "xlabel": "residual over its expected scatter",
-    "ylabel": "measurements per bin",
-}
+_PULLS_X, _PULLS_Y = "residual over its expected scatter", "measurements per bin"
 _CHI2 = "χ² over its expected value, by exposure"
-_CHI2_LABELS: AxisLabels = {"xlabel": "exposure, in order", "ylabel": "χ² / dof"}
+_CHI2_X, _CHI2_Y = "exposure, in order", "χ² / dof"
 _CHI2_HOVER = [
     ("exposure", "@{exposure}"),
     ("measurements", "@{n_obs}"),
@@ -33,24 +23,21 @@ _CHI2_HOVER = [
 _BAND_SIGMAS = 2.0
 
 
-def plot_pulls(
-    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
-) -> hv.Overlay:
+def plot_pulls(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
     """Draw the histogram of standardised residuals in both axes with the unit normal.
 
     Parameters
     ----------
     table : `tables.pull_histogram`
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     if table.empty or not table["n"].any():
-        return message(_PULLS, "No residuals", theme=theme, width=width, **_PULL_LABELS)
+        return message(_PULLS, "No residuals", width=width, xlabel=_PULLS_X, ylabel=_PULLS_Y)
     one = table[table["axis"] == table["axis"].iloc[0]]
     limit = float(one["right"].max())
     area = float((one["n"] * (one["right"] - one["left"])).iloc[0])
-    normal = unit_normal(area, limit, theme)
-    top = 1.1 * float(max(table["count"].max(), normal.range("count")[1]))
+    normal = unit_normal(area, limit)
+    top = 1.1 * float(max(table["count"].max(), normal.values("y").max()))
     return framed(
         [
             *(
@@ -61,60 +48,52 @@ def plot_pulls(
         ],
         title=_PULLS,
         subtitle=_pull_subtitle(table, limit),
-        theme=theme,
+        x=Axis(_PULLS_X, (-limit, limit)),
+        y=Axis(_PULLS_Y, (0.0, top)),
         width=width,
         height=round(0.62 * width),
-        xlim=(-limit, limit),
-        ylim=(0.0, top),
         legend_columns=3,
-        **_PULL_LABELS,
     )
 
 
-def plot_exposure_chi2(
-    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
-) -> hv.Overlay:
+def plot_exposure_chi2(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
     """Draw chi2 over its expected value for each exposure, with the expected 2 sigma band.
 
     Parameters
     ----------
     table : `tables.exposure_chi2`
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(_CHI2, "No exposures", theme=theme, width=width, **_CHI2_LABELS)
-    colours = theme_of(theme)
-    band = _BAND_SIGMAS * table["expected_sd"]
-    reach = max(float(band.max()), float((table["chi2_per_dof"] - 1.0).abs().max()))
+        return message(_CHI2, "No exposures", width=width, xlabel=_CHI2_X, ylabel=_CHI2_Y)
+    expected = _BAND_SIGMAS * table["expected_sd"].to_numpy(dtype=float)
+    reach = max(float(expected.max()), float((table["chi2_per_dof"] - 1.0).abs().max()))
     # A step per exposure, because the band differs between exposures.
     edges = np.repeat(table["index"].to_numpy(dtype=float), 2) + np.tile([-0.5, 0.5], len(table))
-    low, high = np.repeat(1.0 - band.to_numpy(), 2), np.repeat(1.0 + band.to_numpy(), 2)
-    area = hv.Area((edges, low, high), "index", ["low", "high"], label="expected ± 2σ")
-    points = hv.Points(table, ["index", "chi2_per_dof"], ["exposure", "n_obs", "expected_sd", "z"])
+    low, high = np.repeat(1.0 - expected, 2), np.repeat(1.0 + expected, 2)
     outside = int((table["z"].abs() > _BAND_SIGMAS).sum())
     return framed(
         [
-            drawn(area, color=colours.muted, alpha=0.22, line_alpha=0.0),
-            drawn(hv.HLine(1.0), color=colours.line, line_width=1.2, line_dash="dashed"),
-            drawn(
-                points,
-                color=colours.mark,
-                size=6,
-                tools=["hover"],
-                hover_tooltips=_CHI2_HOVER,
+            band(edges, low, high, name="band", label="expected ± 2σ"),
+            horizontal(1.0, name="expected"),
+            points(
+                table,
+                "index",
+                "chi2_per_dof",
+                name="exposures",
+                color="mark",
+                size=6.0,
+                hover=_CHI2_HOVER,
             ),
         ],
         title=_CHI2,
         subtitle=f"{outside} of {len(table)} beyond ± 2σ = 2 √(2/dof), "
         f"{0.0455 * len(table):.1f} expected",
-        theme=theme,
+        x=Axis(_CHI2_X, (-0.5, len(table) - 0.5)),
+        y=Axis(_CHI2_Y, (1.0 - 1.25 * reach, 1.0 + 1.25 * reach)),
         width=width,
         height=round(0.4 * width),
-        xlim=(-0.5, len(table) - 0.5),
-        ylim=(1.0 - 1.25 * reach, 1.0 + 1.25 * reach),
         legend_columns=3,
-        **_CHI2_LABELS,
     )
 
 
@@ -127,12 +106,12 @@ def _pull_subtitle(table: pd.DataFrame, limit: float) -> str:
     return "\n".join(parts)
 
 
-def _draw_pulls(chosen: Chosen, theme: str) -> hv.Overlay:
-    return plot_pulls(pull_histogram(chosen.result), theme=theme)
+def _plot_pulls(chosen: Chosen) -> Figure:
+    return plot_pulls(pull_histogram(chosen.result))
 
 
-def _draw_chi2(chosen: Chosen, theme: str) -> hv.Overlay:
-    return plot_exposure_chi2(exposure_chi2(chosen.result), theme=theme)
+def _plot_chi2(chosen: Chosen) -> Figure:
+    return plot_exposure_chi2(exposure_chi2(chosen.result))
 
 
 DIAGNOSTICS = (
@@ -143,7 +122,7 @@ DIAGNOSTICS = (
         "normal. A wider histogram means underestimated measurement errors, long tails mean "
         "outliers.",
         40,
-        _draw_pulls,
+        _plot_pulls,
     ),
     Diagnostic(
         "exposure-chi2",
@@ -151,6 +130,6 @@ DIAGNOSTICS = (
         "Chi2 of each exposure over its expected value. Good: points inside the band. A single "
         "exposure far above it was disturbed.",
         70,
-        _draw_chi2,
+        _plot_chi2,
     ),
 )

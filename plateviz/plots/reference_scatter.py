@@ -1,22 +1,22 @@
 """Scatter of the reference sources between orbits, and their deviations over sigma."""
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
-from plateviz.plots.points import steps, unit_normal
-from plateviz.plots.style import (
-    PANEL_WIDTH,
-    ROW_LIMIT,
-    SERIES_COLOURS,
+from plateviz.figures.figure import (
+    Axis,
+    Figure,
+    Glyphs,
     Limits,
-    drawn,
+    Ramp,
     framed,
     message,
     side_by_side,
 )
+from plateviz.figures.glyphs import line, points, rectangles
+from plateviz.plots.points import steps, unit_normal
+from plateviz.plots.style import PANEL_WIDTH, ROW_LIMIT, SERIES_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
-from plateviz.plots.theme import theme_of
 from plateviz.plots.ticks import log_ticks
 from plateviz.tables.histogram import pull_bins
 from plateviz.tables.reference_scatter import LEAST_ORBITS, reference_scatter, scatter_cells
@@ -24,7 +24,7 @@ from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Scatter of the reference sources"
 _NAMES = {"ra": "α cos δ", "dec": "δ"}
-_X = hv.Dimension("expected_mas", label="predicted scatter (mas)")
+_XLABEL, _YLABEL = "predicted scatter (mas)", "measured scatter (mas)"
 _HOVER = [
     ("source", "@{id}"),
     ("orbits", "@{n_orbits}"),
@@ -32,12 +32,9 @@ _HOVER = [
     ("predicted", "@{expected_mas}{0.0000} mas"),
     ("mean deviation", "@{deviation_mas}{0.0000} ± @{deviation_sigma_mas}{0.0000} mas"),
 ]
-_EXTRA = ["id", "n_orbits", "deviation_mas", "deviation_sigma_mas", "scatter_mas"]
 
 
-def plot_reference_scatter(
-    table: pd.DataFrame, *, theme: str = "light", width: int = PANEL_WIDTH
-) -> hv.Layout | hv.Overlay:
+def plot_reference_scatter(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figure:
     """Draw measured against predicted scatter for each coordinate, and the deviations' pulls.
 
     Above 20,000 sources the number in each cell is drawn. The panel of deviations requires a
@@ -46,91 +43,76 @@ def plot_reference_scatter(
     Parameters
     ----------
     table : `tables.reference_scatter`
-    theme : "light" or "dark"
     width : of each panel's frame, screen pixels
     """
     positive = table[(table["scatter_mas"] > 0) & (table["expected_mas"] > 0)]
     if positive.empty:
-        return message(
-            _TITLE,
-            f"No reference source in {LEAST_ORBITS} orbits",
-            theme=theme,
-            width=width,
-            xlabel=_X.label,
-            ylabel="measured scatter (mas)",
-        )
+        text = f"No reference source in {LEAST_ORBITS} orbits"
+        return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     limits = _limits(positive)
     panels = [
-        _scatter(positive[positive["coordinate"] == axis], axis, limits, theme, width)
-        for axis in _NAMES
+        _scatter(positive[positive["coordinate"] == axis], axis, limits, width) for axis in _NAMES
     ]
     if table["pull"].notna().any():
-        panels.append(_deviations(table, theme, width))
+        panels.append(_deviations(table, width))
     return side_by_side(panels, columns=3)
 
 
-def _scatter(rows: pd.DataFrame, axis: str, limits: Limits, theme: str, width: int) -> hv.Overlay:
-    line = hv.Curve((limits, limits), _X, f"scatter_{axis}", label="measured = predicted")
+def _scatter(rows: pd.DataFrame, axis: str, limits: Limits, width: int) -> Figure:
     is_dense = len(rows) > ROW_LIMIT
-    sources = _cells(rows, theme) if is_dense else _points(rows, axis)
+    sources = _cells(rows) if is_dense else _points(rows)
     counted = "; colour: number per cell" if is_dense else ""
     ratio = float(np.median(rows["scatter_mas"] / rows["expected_mas"]))
     return framed(
-        [sources, drawn(line, color=theme_of(theme).line, line_width=1.6, line_dash="dashed")],
+        [sources, _identity(limits)],
         title=f"Scatter between orbits, {_NAMES[axis]}",
         subtitle=f"{len(rows):,} reference sources{counted}\n"
         f"median of measured / predicted: {ratio:.3f}",
-        theme=theme,
+        x=Axis(_XLABEL, limits, is_log=True, ticks=log_ticks(limits)),
+        y=Axis(_YLABEL, limits, is_log=True, ticks=log_ticks(limits)),
         width=width,
         height=width,
-        xlim=limits,
-        ylim=limits,
-        logx=True,
-        logy=True,
-        xticks=log_ticks(limits),
-        yticks=log_ticks(limits),
-        xlabel=_X.label,
-        ylabel="measured scatter (mas)",
         legend_columns=1,
     )
 
 
-def _points(rows: pd.DataFrame, axis: str) -> hv.Points:
-    y = f"scatter_{axis}"
-    data = rows[[*_EXTRA, "expected_mas"]].assign(**{y: rows["scatter_mas"]})
-    return drawn(
-        hv.Points(data, [_X, hv.Dimension(y)], _EXTRA),
+def _identity(limits: Limits) -> Glyphs:
+    label = "measured = predicted"
+    return line(limits, limits, name="identity", color="line", dash="dashed", label=label)
+
+
+def _points(rows: pd.DataFrame) -> Glyphs:
+    return points(
+        rows,
+        "expected_mas",
+        "scatter_mas",
+        name="sources",
         color=SERIES_COLOURS[1],
-        size=4,
+        size=4.0,
         alpha=0.45,
-        line_color=None,
-        nonselection_alpha=0.1,
-        tools=["hover"],
-        hover_tooltips=_HOVER,
+        line_width=0.0,
+        hover=_HOVER,
     )
 
 
-def _cells(rows: pd.DataFrame, theme: str) -> hv.Rectangles:
-    cells = hv.Rectangles(scatter_cells(rows), ["left", "low", "right", "high"], ["n"])
-    return drawn(
+def _cells(rows: pd.DataFrame) -> Glyphs:
+    cells = scatter_cells(rows).rename(columns={"low": "bottom", "high": "top"})
+    limits = (float(cells["n"].min()), float(cells["n"].max()))
+    return rectangles(
         cells,
-        color="n",
-        cmap=theme_of(theme).count_palette,
-        cnorm="log",
-        line_color=None,
-        tools=["hover"],
-        hover_tooltips=[("sources", "@{n}")],
+        name="cells",
+        color=Ramp("n", "count", limits, is_log=True),
+        hover=[("sources", "@{n}")],
     )
 
 
-def _deviations(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
+def _deviations(table: pd.DataFrame, width: int) -> Figure:
     parts = {axis: pull_bins(table["pull"][table["coordinate"] == axis]) for axis in _NAMES}
     bins = parts["ra"]
     limit = float(bins["right"].max())
-    normal = unit_normal(
-        float(bins["n"].iloc[0] * (bins["right"] - bins["left"]).iloc[0]), limit, theme
-    )
-    counts = [*(float(part["count"].max()) for part in parts.values()), normal.range("count")[1]]
+    normal = unit_normal(float(bins["n"].iloc[0] * (bins["right"] - bins["left"]).iloc[0]), limit)
+    counts = [part["count"].max() for part in parts.values()]
+    top = 1.1 * max(*map(float, counts), float(normal.values("y").max()))
     subtitle = "\n".join(
         f"{_NAMES[axis]}: mean {part['mean'].iloc[0]:.2f}, sd {part['sd'].iloc[0]:.2f}, "
         f"{part['outside'].iloc[0]:,} beyond ± {limit:g}"
@@ -146,13 +128,10 @@ def _deviations(table: pd.DataFrame, theme: str, width: int) -> hv.Overlay:
         ],
         title="Mean deviation from the truth",
         subtitle=subtitle,
-        theme=theme,
+        x=Axis("mean deviation over its expected σ", (-limit, limit)),
+        y=Axis("sources per bin", (0.0, top)),
         width=width,
         height=width,
-        xlim=(-limit, limit),
-        ylim=(0.0, 1.1 * max(counts)),
-        xlabel="mean deviation over its expected σ",
-        ylabel="sources per bin",
         legend_columns=3,
     )
 
@@ -166,8 +145,8 @@ def _limits(rows: pd.DataFrame) -> Limits:
 _PAGE_WIDTH = 270
 
 
-def _draw(tables: SurveyTables, theme: str) -> hv.Layout | hv.Overlay:
-    return plot_reference_scatter(reference_scatter(tables.motions), theme=theme, width=_PAGE_WIDTH)
+def _plot(tables: SurveyTables) -> Figure:
+    return plot_reference_scatter(reference_scatter(tables.motions), width=_PAGE_WIDTH)
 
 
 SURVEY_FIGURES = (
@@ -179,7 +158,7 @@ SURVEY_FIGURES = (
         "points about the line, and a unit normal. The scatter is far below the reported sigma, "
         "because the error of a prior is the same in every orbit.",
         50,
-        _draw,
+        _plot,
         is_wide=True,
     ),
 )

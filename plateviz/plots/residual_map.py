@@ -1,20 +1,13 @@
 """Residual vectors on a detector or the whole focal plane (paper, "residual:detector")."""
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Glyphs, Tooltips, framed, message
+from plateviz.figures.glyphs import paths
 from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
 from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.style import (
-    ARROW_LIMIT,
-    FRAME_WIDTH,
-    AxisLabels,
-    drawn,
-    framed,
-    message,
-)
-from plateviz.plots.theme import theme_of
+from plateviz.plots.style import ARROW_LIMIT
 from plateviz.plots.units import angle_text
 from plateviz.tables.residuals import binned_vectors, residual_map
 from solver.data.instrument import Detector, Instrument
@@ -22,7 +15,6 @@ from solver.data.instrument import Detector, Instrument
 _BINS_ON_DETECTOR, _BINS_ON_FOCAL_PLANE = 16, 24
 _LEAST_SHARE = 0.25
 _MARGIN = 1.08
-_VALUES = ["residual_x_mpix", "residual_y_mpix", "residual_x_mas", "residual_y_mas"]
 _HOVER_VALUES = [
     ("residual x", "@{residual_x_mpix}{0.00} mpix = @{residual_x_mas}{0.000} mas"),
     ("residual y", "@{residual_y_mpix}{0.00} mpix = @{residual_y_mas}{0.000} mas"),
@@ -34,9 +26,8 @@ def plot_residual_map(
     detector: Detector | Instrument,
     *,
     arrow_scale: float | None = None,
-    theme: str = "light",
     width: int = FRAME_WIDTH,
-) -> hv.Overlay:
+) -> Figure:
     """Draw residual vectors to a stated scale; above 2,000, their means in bins.
 
     Parameters
@@ -45,41 +36,29 @@ def plot_residual_map(
     detector : the detector of the table, or the instrument for all detectors
     arrow_scale : drawn length over true length; None for a round number that makes the
         rms arrow about 4 % of the width
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     unit = "mm" if isinstance(detector, Instrument) else "pix"
-    labels: AxisLabels = {
-        "xlabel": _axis_label(detector, "x"),
-        "ylabel": _axis_label(detector, "y"),
-    }
+    xlabel, ylabel = _axis_label(detector, "x"), _axis_label(detector, "y")
     if table.empty:
-        return message(_title(detector), "No measurements", theme=theme, width=width, **labels)
+        text = "No measurements"
+        return message(_title(detector), text, width=width, xlabel=xlabel, ylabel=ylabel)
     field = _field(detector)
     shown, binning = _thinned(table, detector, field)
     scale = arrow_scale or automatic_scale(shown, field)
     length, length_text = _key(shown, unit)
     return framed(
         [
-            _outlines(detector, theme),
-            *arrows(
-                shown,
-                scale=scale,
-                field=field,
-                colour=theme_of(theme).mark,
-                hover=_hover(shown),
-                extra=[c for c in ("id", "exposure", "detector_id", "n") if c in shown] + _VALUES,
-            ),
-            *key(length, length_text, scale=scale, field=field, theme=theme),
+            _outlines(detector),
+            *arrows(shown, scale=scale, field=field, colour="mark", hover=_hover(shown)),
+            *key(length, length_text, scale=scale, field=field),
         ],
         title=_title(detector),
         subtitle=f"{_shown_exposures(table)}. {binning}\n"
         f"Arrows enlarged {scale:,g} times; key: {length_text}",
-        theme=theme,
+        x=Axis(xlabel, field.x),
+        y=Axis(ylabel, field.ylim),
         width=width,
-        xlim=field.x,
-        ylim=field.ylim,
-        **labels,
     )
 
 
@@ -104,14 +83,13 @@ def _field(detector: Detector | Instrument) -> Field:
     return Field((-_MARGIN * x, _MARGIN * x), (-_MARGIN * y, _MARGIN * y))
 
 
-def _outlines(detector: Detector | Instrument, theme: str) -> hv.Path:
+def _outlines(detector: Detector | Instrument) -> Glyphs:
     if isinstance(detector, Instrument):
-        paths = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detector.detectors]
+        outlines = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detector.detectors]
     else:
         corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
-        paths = [0.5 * corners * (detector.n_x, detector.n_y)]
-    colour = theme_of(theme).line
-    return drawn(hv.Path(paths, ["x", "y"]), color=colour, line_width=1)
+        outlines = [0.5 * corners * (detector.n_x, detector.n_y)]
+    return paths(outlines, name="outlines", color="line")
 
 
 def _thinned(
@@ -139,7 +117,7 @@ def _key(shown: pd.DataFrame, unit: str) -> tuple[float, str]:
     return length, f"{text} = {angle_text(length * mas_per_unit)}"
 
 
-def _hover(shown: pd.DataFrame) -> list[tuple[str, str]]:
+def _hover(shown: pd.DataFrame) -> Tooltips:
     if "id" in shown:
         return [("source", "@{id}"), ("exposure", "@{exposure}"), *_HOVER_VALUES]
     return [("measurements in the bin", "@{n}"), *_HOVER_VALUES]
@@ -150,7 +128,7 @@ def _shown_exposures(table: pd.DataFrame) -> str:
     return str(names[0]).capitalize() if len(names) == 1 else f"{len(names)} exposures"
 
 
-def _draw(chosen: Chosen, theme: str) -> hv.Overlay:
+def _plot(chosen: Chosen) -> Figure:
     table = residual_map(
         chosen.result,
         chosen.instrument,
@@ -159,7 +137,7 @@ def _draw(chosen: Chosen, theme: str) -> hv.Overlay:
     )
     detectors = {d.detector_id: d for d in chosen.instrument.detectors}
     shown = chosen.instrument if chosen.detector is None else detectors[chosen.detector]
-    return plot_residual_map(table, shown, theme=theme)
+    return plot_residual_map(table, shown)
 
 
 DIAGNOSTICS = (
@@ -170,7 +148,7 @@ DIAGNOSTICS = (
         "detector. Good: directions without a pattern. Neighbouring arrows with a common "
         "direction mean distortion that the order does not describe.",
         20,
-        _draw,
+        _plot,
         follows_selection=True,
     ),
 )

@@ -1,29 +1,34 @@
 """Sources of the catalogue in Galactic coordinates (paper, figure "exp:source")."""
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
-from plateviz.plots.points import class_points
-from plateviz.plots.style import (
-    PANEL_WIDTH,
-    AxisLabels,
+from plateviz.figures.figure import (
+    Axis,
+    Figure,
+    Glyphs,
     Limits,
-    drawn,
+    Ramp,
     framed,
     message,
     side_by_side,
 )
+from plateviz.figures.glyphs import image, paths, points
+from plateviz.plots.points import class_points
+from plateviz.plots.style import PANEL_WIDTH
 from plateviz.plots.survey_figure import SurveyFigure
-from plateviz.plots.theme import theme_of
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sources import CLASSES
 from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Sources in the sky"
-_LABELS: AxisLabels = {"xlabel": "l (deg)", "ylabel": "b (deg)"}
-_X, _Y = hv.Dimension("l_deg"), hv.Dimension("b_deg")
+_XLABEL, _YLABEL = "l (deg)", "b (deg)"
 _HOVER = [("source", "@{id}"), ("l", "@{l_deg}{0.0000}°"), ("b", "@{b_deg}{0.0000}°")]
+_HOVER_DENSITY = [
+    ("l", "$x{0.00}°"),
+    ("b", "$y{0.00}°"),
+    ("density", "@{density}{0.00} per arcmin²"),
+]
 _MARGIN = 0.04
 # Number of points above which the density is drawn, because points would overlap.
 _POINT_LIMIT = 500
@@ -34,9 +39,8 @@ def plot_sky_distribution(
     *,
     area: tuple[Limits, Limits] | None = None,
     target: tuple[float, float] | None = None,
-    theme: str = "light",
     width: int = PANEL_WIDTH,
-) -> hv.Layout | hv.Overlay:
+) -> Figure:
     """Draw the sources in Galactic coordinates, l increasing to the left, a panel per class.
 
     A class with more than 500 sources is drawn as its number per square arcmin.
@@ -46,74 +50,67 @@ def plot_sky_distribution(
     table : `tables.sky_distribution`
     area : Galactic longitudes and latitudes between which the fields lie, deg
     target : Galactic longitude and latitude of the survey's target, deg
-    theme : "light" or "dark"
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        return message(_TITLE, "No sources", theme=theme, width=width, **_LABELS)
+        return message(_TITLE, "No sources", width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     xlim, ylim = _limits(table, area)
     panels = []
     for name in (name for name in reversed(CLASSES) if (table["source_class"] == name).any()):
         rows = table[table["source_class"] == name]
         is_dense = len(rows) > _POINT_LIMIT
-        sources = _density(rows, theme) if is_dense else _points(rows)
+        sources = _density(rows) if is_dense else _points(rows)
         panels.append(
             framed(
-                [sources, *_outline(area, theme), *_cross(target, theme)],
+                [sources, *_outline(area), *_cross(target)],
                 title=f"{name.capitalize()} sources",
                 subtitle=_subtitle(rows, is_dense, area, target),
-                theme=theme,
+                x=Axis(_XLABEL, (xlim[1], xlim[0])),
+                y=Axis(_YLABEL, ylim),
                 width=width,
-                xlim=xlim,
-                ylim=ylim,
-                # Linked panels sort their limits, so reversed limits would have no effect.
-                invert_xaxis=True,
-                **_LABELS,
             )
         )
-    return side_by_side(panels, columns=3, linked=True)
+    return side_by_side(panels, columns=3, linked="xy")
 
 
-def _points(rows: pd.DataFrame) -> hv.Points:
-    return class_points(rows, _X, _Y, hover=_HOVER, extra=[])
+def _points(rows: pd.DataFrame) -> Glyphs:
+    return class_points(rows, "l_deg", "b_deg", hover=_HOVER)
 
 
-def _density(rows: pd.DataFrame, theme: str) -> hv.Image:
+def _density(rows: pd.DataFrame) -> Glyphs:
     cells = sky_density(rows).pivot(index="b_deg", columns="l_deg", values="density")
-    l_deg, b_deg = cells.columns.to_numpy(dtype=float), cells.index.to_numpy(dtype=float)
-    image = hv.Image((l_deg, b_deg, cells.to_numpy()), [_X, _Y], "density")
-    return drawn(
-        image,
-        cmap=theme_of(theme).count_palette,
-        clim=(0.0, float(np.nanmax(cells.to_numpy()))),
-        clipping_colors={"NaN": "transparent"},
-        colorbar=True,
-        clabel=" ",
-        colorbar_opts={"width": 8},
-        tools=["hover"],
-        hover_tooltips=[
-            ("l", "@{l_deg}{0.00}°"),
-            ("b", "@{b_deg}{0.00}°"),
-            ("density", "@{density}{0.00} per arcmin²"),
-        ],
+    most = float(np.nanmax(cells.to_numpy()))
+    return image(
+        cells.to_numpy(),
+        _edges(cells.columns, rows["l_deg"]),
+        _edges(cells.index, rows["b_deg"]),
+        name="density",
+        ramp=Ramp("density", "count", (0.0, most), label=""),
+        hover=_HOVER_DENSITY,
     )
 
 
-def _outline(area: tuple[Limits, Limits] | None, theme: str) -> list[hv.Path]:
+def _edges(centres: pd.Index, values: pd.Series) -> Limits:
+    """Return the outer edges of the cells, which begin at the lowest value."""
+    low = float(values.min())
+    return low, float(centres[-1]) + (float(centres[0]) - low)
+
+
+def _outline(area: tuple[Limits, Limits] | None) -> list[Glyphs]:
     if area is None:
         return []
     (left, right), (low, high) = area
     corners = [(left, low), (right, low), (right, high), (left, high), (left, low)]
-    line = theme_of(theme).text
-    return [drawn(hv.Path([corners], [_X, _Y]), color=line, line_width=1.4, line_dash="dashed")]
+    return [paths([np.array(corners)], name="area", color="text", width=1.4, dashes="dashed")]
 
 
-def _cross(target: tuple[float, float] | None, theme: str) -> list[hv.Points]:
+def _cross(target: tuple[float, float] | None) -> list[Glyphs]:
     if target is None:
         return []
-    points = hv.Points([target], [_X, _Y])
-    line = theme_of(theme).text
-    return [drawn(points, marker="cross", size=16, color=line, line_width=2.0)]
+    at = {"x": target[:1], "y": target[1:]}
+    return [
+        points(at, "x", "y", name="target", color="text", marker="cross", size=16.0, line_width=2.0)
+    ]
 
 
 def _limits(table: pd.DataFrame, area: tuple[Limits, Limits] | None) -> tuple[Limits, Limits]:
@@ -146,12 +143,11 @@ def _subtitle(
 _PAGE_WIDTH = 250
 
 
-def _draw(tables: SurveyTables, theme: str) -> hv.Layout | hv.Overlay:
+def _plot(tables: SurveyTables) -> Figure:
     return plot_sky_distribution(
         sky_distribution(tables.catalogue, tables.truth),
         area=tables.area,
         target=tables.target,
-        theme=theme,
         width=_PAGE_WIDTH,
     )
 
@@ -164,7 +160,7 @@ SURVEY_FIGURES = (
         "over the whole area, because the solution of an orbit is tied to the sky by those in "
         "its fields. Artificial sources lie about the target.",
         10,
-        _draw,
+        _plot,
         is_wide=True,
     ),
 )

@@ -1,28 +1,19 @@
 """One source's motion on the sky (paper, figures "result:ts:ref", "nonref" and "test")."""
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Glyphs, Limits, framed, message
+from plateviz.figures.glyphs import line, points
 from plateviz.plots.points import error_bars
-from plateviz.plots.style import (
-    FRAME_WIDTH,
-    SERIES_COLOURS,
-    AxisLabels,
-    Limits,
-    drawn,
-    framed,
-    message,
-)
+from plateviz.plots.style import SERIES_COLOURS
 from plateviz.plots.survey_figure import SourceFigure
-from plateviz.plots.theme import theme_of
 from plateviz.plots.units import angle_text, orbits_text
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
 from plateviz.tables.survey_tables import SourceTables
 
 _TITLE = "Motion on the sky"
-_LABELS: AxisLabels = {"xlabel": "Δα cos δ (mas, East to the left)", "ylabel": "Δδ (mas)"}
-_X, _Y = hv.Dimension("ra_mas"), hv.Dimension("dec_mas")
+_XLABEL, _YLABEL = "Δα cos δ (mas, East to the left)", "Δδ (mas)"
 _HOVER = [
     ("source", "@{id}"),
     ("orbit", "@{orbit_id}"),
@@ -31,98 +22,113 @@ _HOVER = [
     ("Δα cos δ", "@{ra_mas}{0.000} ± @{sigma_ra_mas}{0.000} mas"),
     ("Δδ", "@{dec_mas}{0.000} ± @{sigma_dec_mas}{0.000} mas"),
 ]
-_EXTRA = ["id", "orbit_id", "year", "n_obs", "sigma_ra_mas", "sigma_dec_mas"]
 _ZEROS = {
     "catalogue": "catalogue position",
     "true": "true position",
     "fit": "fitted position",
     "mean": "mean of the estimates",
 }
+_CURVE_COLOURS = {"catalogue": "muted", "true": SERIES_COLOURS[1], "fit": "line"}
 _MARGIN = 1.12
 
 
-def plot_sky_track(
-    table: pd.DataFrame, *, theme: str = "light", width: int = FRAME_WIDTH
-) -> hv.Overlay:
+def plot_sky_track(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
     """Draw the position of one source in each orbit, with truth, catalogue and fitted motion.
 
     Parameters
     ----------
     table : `tables.sky_track`; the catalogue is not drawn if the table leaves it out
-    theme : "light" or "dark"
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(_TITLE, "No orbits of this source", theme=theme, width=width, **_LABELS)
-    orbits, curve = table[table["kind"] == "orbit"], table[table["kind"] == "curve"]
+        text = "No orbits of this source"
+        return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_YLABEL)
+    orbits, curve = _orbits(table), table[table["kind"] == "curve"]
     xlim, ylim = _limits(table)
-    colours = theme_of(theme)
-    line = {"catalogue": colours.muted, "true": SERIES_COLOURS[1], "fit": colours.line}
     first = table.iloc[0]
     return framed(
         [
-            *(_curve(curve, name, line[name]) for name in line if _has(curve, name)),
-            *(_catalogue(orbits, theme) if _has(orbits, "catalogue") else []),
+            *(_curve(curve, name) for name in _CURVE_COLOURS if _has(curve, name)),
+            *([_catalogue(orbits)] if _has(orbits, "catalogue") else []),
             *_estimates(orbits),
-            *(_truth(orbits) if _has(orbits, "true") else []),
+            *([_truth(orbits)] if _has(orbits, "true") else []),
         ],
         title=f"Source {first['id']}, {first['source_class']}",
         subtitle=_subtitle(first, track_statistics(table)),
-        theme=theme,
+        x=Axis(_XLABEL, xlim),
+        y=Axis(_YLABEL, ylim),
         width=width,
-        xlim=xlim,
-        ylim=ylim,
         legend_columns=4,
-        **_LABELS,
     )
+
+
+def _orbits(rows: pd.DataFrame) -> pd.DataFrame:
+    # Rows of curves have no orbit, which makes the numbers of all rows floats.
+    return rows[rows["kind"] == "orbit"].astype({"orbit_id": "int64"})
 
 
 def _has(rows: pd.DataFrame, name: str) -> bool:
     return bool(len(rows)) and bool(rows[f"{name}_ra_mas"].notna().any())
 
 
-def _curve(rows: pd.DataFrame, name: str, colour: str) -> hv.Curve:
-    label = "fitted motion" if name == "fit" else ""
-    data = (rows[f"{name}_ra_mas"], rows[f"{name}_dec_mas"])
-    dash = "dashed" if name == "fit" else "solid"
-    return drawn(
-        hv.Curve(data, _X, _Y, label=label),
-        color=colour,
-        line_width=1.6 if name == "fit" else 1.0,
-        line_dash=dash,
-        alpha=0.9 if name == "fit" else 0.6,
-        show_legend=name == "fit",
+def _curve(rows: pd.DataFrame, name: str) -> Glyphs:
+    is_fit = name == "fit"
+    return line(
+        rows[f"{name}_ra_mas"],
+        rows[f"{name}_dec_mas"],
+        name=f"{name} curve",
+        color=_CURVE_COLOURS[name],
+        width=1.6 if is_fit else 1.0,
+        dash="dashed" if is_fit else "solid",
+        alpha=0.9 if is_fit else 0.6,
+        label="fitted motion" if is_fit else "",
     )
 
 
-def _catalogue(rows: pd.DataFrame, theme: str) -> list[hv.Points]:
-    data = (rows["catalogue_ra_mas"], rows["catalogue_dec_mas"])
-    points = hv.Points(data, [_X, _Y], label="catalogue")
-    line = theme_of(theme).muted
-    return [drawn(points, marker="square", size=9, fill_alpha=0.0, line_color=line)]
+def _catalogue(rows: pd.DataFrame) -> Glyphs:
+    return points(
+        rows,
+        "catalogue_ra_mas",
+        "catalogue_dec_mas",
+        name="catalogue",
+        color="muted",
+        marker="square",
+        size=9.0,
+        fill_alpha=0.0,
+        label="catalogue",
+    )
 
 
-def _truth(rows: pd.DataFrame) -> list[hv.Points]:
+def _truth(rows: pd.DataFrame) -> Glyphs:
     # Drawn above the estimates, which would hide the true position of a source without motion.
-    points = hv.Points((rows["true_ra_mas"], rows["true_dec_mas"]), [_X, _Y], label="truth")
-    return [drawn(points, color=SERIES_COLOURS[1], marker="diamond", size=7, line_color=None)]
+    return points(
+        rows,
+        "true_ra_mas",
+        "true_dec_mas",
+        name="truth",
+        color=SERIES_COLOURS[1],
+        marker="diamond",
+        size=7.0,
+        line_width=0.0,
+        label="truth",
+    )
 
 
-def _estimates(rows: pd.DataFrame) -> list[hv.Element]:
+def _estimates(rows: pd.DataFrame) -> list[Glyphs]:
     colour = SERIES_COLOURS[0]
-    points = hv.Points(rows, [_X, _Y], _EXTRA, label="estimate ± 1σ")
     return [
         error_bars(rows, "ra_mas", "dec_mas", "sigma_ra_mas", colour, along="x"),
         error_bars(rows, "ra_mas", "dec_mas", "sigma_dec_mas", colour, along="y"),
-        drawn(
-            points,
+        points(
+            rows,
+            "ra_mas",
+            "dec_mas",
+            name="estimates",
             color=colour,
-            size=5,
             alpha=0.9,
-            line_color=None,
-            nonselection_alpha=0.2,
-            tools=["hover"],
-            hover_tooltips=_HOVER,
+            line_width=0.0,
+            hover=_HOVER,
+            label="estimate ± 1σ",
         ),
     ]
 
@@ -154,8 +160,8 @@ def _subtitle(first: pd.Series, statistics: TrackStatistics) -> str:
     return "\n".join(lines)
 
 
-def _draw(tables: SourceTables, theme: str) -> hv.Overlay:
-    return plot_sky_track(sky_track(tables.history, tables.motion), theme=theme)
+def _plot(tables: SourceTables) -> Figure:
+    return plot_sky_track(sky_track(tables.history, tables.motion))
 
 
 SOURCE_FIGURES = (
@@ -166,6 +172,6 @@ SOURCE_FIGURES = (
         "catalogue and true positions. Good: the estimates follow the truth. A common offset of "
         "a reference source is the error of its catalogue entry.",
         10,
-        _draw,
+        _plot,
     ),
 )

@@ -7,8 +7,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import holoviews as hv
-
+from plateviz.figures.figure import Figure
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 
 
@@ -22,7 +21,7 @@ class SurveyFigure:
     title : displayed title
     caption : what it shows and what a good solution looks like, in a few sentences
     order : sort key on the page
-    draw : function of the tables and a theme's name that returns the figure
+    plot : function of the tables that returns the figure
     is_wide : whether it takes the whole width of the page
     """
 
@@ -30,7 +29,7 @@ class SurveyFigure:
     title: str
     caption: str
     order: int
-    draw: Callable[[SurveyTables, str], hv.core.Dimensioned]
+    plot: Callable[[SurveyTables], Figure]
     is_wide: bool = False
 
 
@@ -42,5 +41,5 @@ class SourceFigure:
     title: str
     caption: str
     order: int
-    draw: Callable[[SourceTables, str], hv.core.Dimensioned]
+    plot: Callable[[SourceTables], Figure]
     is_wide: bool = False

@@ -2,23 +2,23 @@
 
 from typing import Literal
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
-from holoviews import dim
 
-from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.style import (
-    CLASS_COLOURS,
-    PANEL_WIDTH,
-    ROW_LIMIT,
+from plateviz.figures.figure import (
+    Axis,
+    By,
+    Figure,
+    Glyphs,
     Limits,
-    drawn,
+    Tooltips,
     framed,
     message,
     side_by_side,
 )
-from plateviz.plots.theme import theme_of
+from plateviz.figures.glyphs import line, points, segments
+from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.style import CLASS_COLOURS, PANEL_WIDTH, ROW_LIMIT
 from plateviz.plots.ticks import log_ticks
 from plateviz.tables.sources import CLASSES, KINDS, uncertainty, uncertainty_by_count
 
@@ -26,8 +26,7 @@ Coordinate = Literal["ra", "dec", "both"]
 
 _TITLE = "Uncertainty against number of measurements"
 _NAMES = {"ra": "α cos δ", "dec": "δ"}
-_MARKERS = {"marginal": "circle", "conditional": "inverted_triangle"}
-_X = hv.Dimension("n_obs", label="number of measurements N")
+_XLABEL = "number of measurements N"
 _HOVER = [
     ("source", "@{id}"),
     ("series", "@{series}"),
@@ -43,12 +42,8 @@ _HOVER_MEDIAN = [
 
 
 def plot_uncertainty(
-    table: pd.DataFrame,
-    *,
-    coordinate: Coordinate = "both",
-    theme: str = "light",
-    width: int = PANEL_WIDTH,
-) -> hv.Layout | hv.Overlay:
+    table: pd.DataFrame, *, coordinate: Coordinate = "both", width: int = PANEL_WIDTH
+) -> Figure:
     """Draw conditional and marginal uncertainties against N, with the square-root law.
 
     Above 20,000 points in a panel, the median at each N is drawn with the range from the 16th
@@ -58,25 +53,20 @@ def plot_uncertainty(
     ----------
     table : `tables.uncertainty`
     coordinate : "ra", "dec", or "both" for a panel each
-    theme : "light" or "dark"
     width : of each panel's frame, screen pixels
     """
     wanted = ("ra", "dec") if coordinate == "both" else (coordinate,)
     shown = table[(table["n_obs"] > 0) & (table["sigma_mas"] > 0)] if len(table) else table
     if shown.empty:
-        return message(
-            _TITLE, "No sources", theme=theme, width=width, xlabel=_X.label, ylabel="σ (mas)"
-        )
+        return message(_TITLE, "No sources", width=width, xlabel=_XLABEL, ylabel="σ (mas)")
     limits = _limits(shown)
-    panels = [
-        _panel(shown[shown["coordinate"] == name], name, limits, theme, width) for name in wanted
-    ]
-    return panels[0] if len(panels) == 1 else side_by_side(panels, columns=2, linked=True)
+    panels = [_panel(shown[shown["coordinate"] == name], name, limits, width) for name in wanted]
+    return side_by_side(panels, columns=2, linked="xy")
 
 
 def _panel(
-    rows: pd.DataFrame, coordinate: str, limits: tuple[Limits, Limits], theme: str, width: int
-) -> hv.Overlay:
+    rows: pd.DataFrame, coordinate: str, limits: tuple[Limits, Limits], width: int
+) -> Figure:
     label = f"σ of {_NAMES[coordinate]} (mas)"
     reduced = len(rows) > ROW_LIMIT
     drawn_rows = uncertainty_by_count(rows) if reduced else rows
@@ -84,20 +74,13 @@ def _panel(
     single = float(rows["sigma_single_mas"].iloc[0])
     what = "median and 16–84 % range at each N" if reduced else "one point per source"
     return framed(
-        [_law(single, limits[0], theme), *marks],
+        [_law(single, limits[0]), *marks],
         title=f"Uncertainty of {_NAMES[coordinate]} against N",
         subtitle=f"{rows['id'].nunique():,} sources, {what}",
-        theme=theme,
+        x=Axis(_XLABEL, limits[0], is_log=True, ticks=log_ticks(limits[0], whole=True)),
+        y=Axis(label, limits[1], is_log=True, ticks=log_ticks(limits[1])),
         width=width,
-        xlim=limits[0],
-        ylim=limits[1],
         height=width,
-        xticks=log_ticks(limits[0], whole=True),
-        yticks=log_ticks(limits[1]),
-        logx=True,
-        logy=True,
-        xlabel=_X.label,
-        ylabel=label,
         legend_columns=2,
     )
 
@@ -115,49 +98,52 @@ def _with_series(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(series=names)
 
 
-def _colours() -> dict[str, str]:
-    return {f"{name}, {kind}": CLASS_COLOURS[name] for name in CLASSES for kind in KINDS}
+_COLOUR = By(
+    "series", {f"{name}, {kind}": CLASS_COLOURS[name] for name in CLASSES for kind in KINDS}
+)
+_MARKER = By("kind", {"marginal": "circle", "conditional": "inverted_triangle"})
+_FILL_ALPHA = By("kind", {"marginal": 0.75, "conditional": 0.0})
 
 
-def _points(rows: pd.DataFrame) -> hv.Points:
-    points = hv.Points(
-        _with_series(rows), [_X, hv.Dimension("sigma_mas")], ["series", "id", "kind"]
+def _points(rows: pd.DataFrame, size: float = 5.0, hover: Tooltips = _HOVER) -> Glyphs:
+    return points(
+        _with_series(rows),
+        "n_obs",
+        "sigma_mas",
+        name="sources",
+        color=_COLOUR,
+        marker=_MARKER,
+        size=size,
+        alpha=0.8,
+        fill_alpha=_FILL_ALPHA,
+        hover=hover,
+        label="@series",
     )
-    return drawn(points, size=5, **_look(), hover_tooltips=_HOVER)
 
 
-def _medians(rows: pd.DataFrame) -> list[hv.Element]:
-    data = _with_series(rows)
-    points = hv.Points(data, [_X, hv.Dimension("sigma_mas")], ["series", "n", "kind"])
-    bars = hv.Segments(
-        data.assign(n_obs_end=data["n_obs"]), ["n_obs", "low", "n_obs_end", "high"], ["series"]
+def _medians(rows: pd.DataFrame) -> list[Glyphs]:
+    n, series = rows["n_obs"], _with_series(rows)["series"]
+    bars = segments(
+        n,
+        rows["low"],
+        n,
+        rows["high"],
+        name="ranges",
+        color=_COLOUR,
+        alpha=0.5,
+        keep={"series": series},
     )
-    return [
-        drawn(bars, color="series", cmap=_colours(), alpha=0.5, show_legend=False),
-        drawn(points, size=6, **_look(), hover_tooltips=_HOVER_MEDIAN),
-    ]
+    return [bars, _points(rows, 6.0, _HOVER_MEDIAN)]
 
 
-def _look() -> dict[str, object]:
-    return {
-        "color": "series",
-        "cmap": _colours(),
-        "marker": dim("kind").categorize(_MARKERS, default="circle"),
-        "fill_alpha": dim("kind").categorize({"marginal": 0.75, "conditional": 0.0}, default=0.5),
-        "line_alpha": 0.8,
-        "nonselection_alpha": 0.1,
-        "tools": ["hover"],
-    }
-
-
-def _law(single: float, xlim: tuple[float, float], theme: str) -> hv.Curve:
+def _law(single: float, xlim: Limits) -> Glyphs:
     n = np.geomspace(*xlim, 32)
-    curve = hv.Curve((n, single / np.sqrt(n)), "n_obs", "sigma_mas", label=f"{single:.2f} mas / √N")
-    return drawn(curve, color=theme_of(theme).line, line_dash="dashed", line_width=1.6)
+    label = f"{single:.2f} mas / √N"
+    return line(n, single / np.sqrt(n), name="law", color="line", dash="dashed", label=label)
 
 
-def _draw(chosen: Chosen, theme: str) -> hv.Layout | hv.Overlay:
-    return plot_uncertainty(uncertainty(chosen.result, chosen.instrument), theme=theme)
+def _plot(chosen: Chosen) -> Figure:
+    return plot_uncertainty(uncertainty(chosen.result, chosen.instrument))
 
 
 DIAGNOSTICS = (
@@ -169,7 +155,7 @@ DIAGNOSTICS = (
         "Good: marginal values close above the conditional ones; the difference is the "
         "uncertainty that the calibration adds.",
         60,
-        _draw,
+        _plot,
         is_wide=True,
     ),
 )

@@ -5,7 +5,7 @@ import platform
 from plateviz.reports.report import Facts
 from solver.runtime.versions import versions_of
 
-_PACKAGES = ("plateviz", "jax", "numpy", "scipy", "holoviews", "bokeh")
+_PACKAGES = ("plateviz", "jax", "numpy", "scipy", "bokeh")
 
 
 def facts_of(command: str, run: str | None = None) -> Facts:

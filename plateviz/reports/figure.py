@@ -4,10 +4,11 @@ import gzip
 import json
 from base64 import b64encode
 
-import holoviews as hv
 from bokeh.document import Document
 
-from plateviz.plots.theme import theme_of
+from plateviz.figures.bokeh_figure import BokehFigure
+from plateviz.figures.figure import Figure
+from plateviz.figures.theme import theme_of
 
 _WITH_BACKGROUND = ("Figure", "Plot")
 _BACKGROUNDS = ("background_fill_color", "border_fill_color")
@@ -15,10 +16,10 @@ _BACKGROUNDS = ("background_fill_color", "border_fill_color")
 THEME = "light"
 
 
-def packed_document(element: hv.core.Dimensioned) -> str:
+def packed_document(figure: Figure, theme: str = THEME) -> str:
     """Return the Bokeh document of a figure as text: base64 of compressed JSON."""
     document = Document()
-    document.add_root(hv.render(element, backend="bokeh"))
+    document.add_root(BokehFigure(figure, theme).model)
     content = _normalised(document.to_json(deferred=False))
     text = json.dumps(content, separators=(",", ":"))
     return b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode()

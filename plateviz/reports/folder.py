@@ -25,7 +25,7 @@ from solver.runtime.versions import versions_of
 _INDEX = "index.html"
 # Identifies the run of the pages, so that pages of different runs are not mixed.
 _HEAD = "report.json"
-_PACKAGES = ("plateviz", "holoviews", "bokeh")
+_PACKAGES = ("plateviz", "bokeh")
 
 
 def write_folder(

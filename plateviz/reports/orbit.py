@@ -93,7 +93,7 @@ def _figure(diagnostic: Diagnostic, whole: Chosen, has_choices: bool) -> ReportF
         diagnostic.name,
         diagnostic.title,
         diagnostic.caption,
-        {label: partial(diagnostic.draw, chosen) for label, chosen in selections.items()},
+        {label: partial(diagnostic.plot, chosen) for label, chosen in selections.items()},
         diagnostic.is_wide,
     )
 

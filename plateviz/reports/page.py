@@ -15,7 +15,6 @@ from plateviz.reports.figure import dark_colours, packed_document
 from plateviz.reports.report import Link, Report, ReportFigure
 from plateviz.reports.summary_strip import STYLE, strip
 
-_DRAWN_IN = "light"
 _FOLDER = files("plateviz.reports")
 
 
@@ -54,7 +53,7 @@ def page_of(
 
 
 def _drawn(figure: ReportFigure) -> dict[str, object]:
-    documents = {label: packed_document(draw(_DRAWN_IN)) for label, draw in figure.choices.items()}
+    documents = {label: packed_document(plot()) for label, plot in figure.choices.items()}
     return {"figure": figure, "documents": documents}
 
 

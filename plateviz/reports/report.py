@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import holoviews as hv
 import pandas as pd
 
+from plateviz.figures.figure import Figure
 from plateviz.tables import SummaryItem
 from plateviz.tables.verdict import Verdict
 
@@ -17,8 +17,8 @@ Facts = dict[str, dict[str, str]]
 SOLVED = "Versions that solved it"
 """Title of the facts with the versions that made the solution."""
 
-Draw = Callable[[str], hv.core.Dimensioned]
-"""Function that draws a figure in a theme."""
+Plot = Callable[[], Figure]
+"""Function that returns a figure."""
 
 
 class Link(NamedTuple):
@@ -36,14 +36,14 @@ class ReportFigure:
     ----------
     name : short and unique in the report
     title, caption : displayed text
-    choices : label -> function that draws; a reader selects one if there are several
+    choices : label -> function that returns the figure; a reader selects one if there are several
     is_wide : whether it takes the whole width of the page
     """
 
     name: str
     title: str
     caption: str
-    choices: dict[str, Draw]
+    choices: dict[str, Plot]
     is_wide: bool = False
 
 

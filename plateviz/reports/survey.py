@@ -120,5 +120,5 @@ def _of_run(run: SurveyRun) -> Facts:
 def _figure(
     figure: SurveyFigure | SourceFigure, tables: SurveyTables | SourceTables
 ) -> ReportFigure:
-    draw = partial(figure.draw, tables)  # type: ignore[arg-type]
-    return ReportFigure(figure.name, figure.title, figure.caption, {"All": draw}, figure.is_wide)
+    plot = partial(figure.plot, tables)  # type: ignore[arg-type]
+    return ReportFigure(figure.name, figure.title, figure.caption, {"All": plot}, figure.is_wide)

@@ -22,10 +22,10 @@ PAGE = DOCS / "contributing.md"
 PACKAGES = ("plateviz", "solver")
 # Prints the number of points that Bokeh draws of a column of the example's figure.
 COUNTED = """
-import holoviews as hv
 from bokeh.models import GlyphRenderer
+from plateviz.figures.bokeh_figure import BokehFigure
 
-drawn = hv.render(figure, backend="bokeh").select(type=GlyphRenderer)
+drawn = BokehFigure(figure, "light").model.select({"type": GlyphRenderer})
 print(max(len(one.data_source.data.get("rms", ())) for one in drawn), "points")
 """
 _PATH = re.compile(r"`((?:plateviz|solver)/[\w/]+\.py|[\w.]+\.toml)`")

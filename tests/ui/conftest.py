@@ -32,7 +32,7 @@ VIEWS = """
     for (let e = view.el; e; e = e.parentElement ?? e.getRootNode().host)
       for (const name of e.classList ?? []) if (name.startsWith('figure-')) return name.slice(7);
   };
-  const figures = views.filter(view => view.model.type === 'Figure');
+  const figures = views.filter(view => view.model.type === 'Plot');
   const column = (source, name) => source.data[name] ?? source.data.get?.(name);
 """
 # Colour behind each figure that is drawn, by its name.

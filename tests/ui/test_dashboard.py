@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.ui, pytest.mark.slow]
 # Rows of the longest data source of each figure on the page, by the figure's title.
 ROWS = """() => Object.fromEntries(
   Bokeh.documents.flatMap(d => [...d._all_models.values()])
-    .filter(m => m.type === 'Figure')
+    .filter(m => m.type === 'Plot')
     .map(f => [f.above.concat(f.title ? [f.title] : []).map(t => t.text ?? '').join(' | '),
                Math.max(0, ...f.renderers.map(r => r.data_source?.get_length() ?? 0))]))"""
 
@@ -51,7 +51,7 @@ def set_order(page, order):
 def residual_arrows(page):
     return page.evaluate(
         """() => Bokeh.documents.flatMap(d => [...d._all_models.values()])
-          .filter(m => m.type === 'Figure' && JSON.stringify(
+          .filter(m => m.type === 'Plot' && JSON.stringify(
              m.above.concat([m.title]).map(t => t?.text ?? '')).includes('Residuals on detector'))
           .flatMap(f => f.renderers.filter(r => r.glyph?.type === 'Segment'))
           .map(r => JSON.stringify(Object.values(r.data_source.data).map(c => Array.from(c))))

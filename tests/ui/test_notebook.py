@@ -144,7 +144,7 @@ def assert_cells_show_what_they_are_to_show(notebook):
     assert shown.keys() == CARDS | TABLES | FIGURES | {"pulls", "report", "dashboard"}
     for name in FIGURES:
         assert OF_PANEL in shown[name], name
-        assert "Figure" in shown[name]["text/html"], name
+        assert "Plot" in shown[name]["text/html"], name
     for name in CARDS:
         assert "class='strip'" in shown[name]["text/html"], name
     for name in TABLES:

@@ -39,7 +39,7 @@ def survey_page(survey, tmp_path_factory):
     tables = SurveyTables(survey.orbits, survey.motions, survey.catalogue, survey.truth)
     source = SourceTables(*survey.source("other"))
     drawn = [
-        ReportFigure(f.name, f.title, f.caption, {"All": lambda theme, f=f, t=t: f.draw(t, theme)})
+        ReportFigure(f.name, f.title, f.caption, {"All": lambda f=f, t=t: f.plot(t)})
         for figures, t in ((survey_figures(), tables), (source_figures(), source))
         for f in figures
     ]

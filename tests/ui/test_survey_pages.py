@@ -21,10 +21,11 @@ EMPTY = {"reference-scatter", "motion-pulls"}
 # Rows of the longest data source of each figure that is drawn, words apart, by its name.
 ROWS = f"""() => {{ {VIEWS}
   const rows = {{}};
-  for (const figure of figures)
-    for (const renderer of figure.model.renderers.filter(r => r.glyph?.type !== 'Text'))
-      rows[card(figure)] = Math.max(rows[card(figure)] ?? 0,
-                                    renderer.data_source?.get_length() ?? 0);
+  for (const figure of figures) {{
+    const shown = figure.model.renderers.filter(r => r.visible && r.glyph?.type !== 'Text');
+    rows[card(figure)] = Math.max(rows[card(figure)] ?? 0,
+                                  ...shown.map(r => r.data_source?.get_length() ?? 0));
+  }}
   return rows; }}"""
 # Where the first point of a figure that links somewhere is on the screen, and its value.
 POINT = f"""([name, key]) => {{ {VIEWS}

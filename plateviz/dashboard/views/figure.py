@@ -5,13 +5,14 @@ from collections.abc import Callable, Sequence
 from types import MappingProxyType
 from typing import Protocol
 
-import holoviews as hv
 import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.views.markup import markup_pane, paragraph
-from plateviz.dashboard.views.tap_links import Links, follow_taps, rendered
+from plateviz.dashboard.views.tap_links import Links, TapLinks
 from plateviz.dashboard.views.visibility import Visibility
+from plateviz.figures.bokeh_figure import BokehFigure
+from plateviz.figures.figure import Figure
 from solver.errors import InputError
 
 _BATCH = 2
@@ -20,8 +21,8 @@ _EMPTY_HEIGHT = 420
 _NO_LINKS: Links = MappingProxyType({})
 _LOG = logging.getLogger(__name__)
 
-DrawFigure = Callable[[str], hv.core.Dimensioned | None]
-"""Draws a figure in a theme; returns None while there are no data."""
+PlotFigure = Callable[[], Figure | None]
+"""Returns a figure, or None while there are no data."""
 
 
 class FigureText(Protocol):
@@ -46,19 +47,19 @@ class FigureText(Protocol):
 class FigureView(pn.viewable.Viewer):
     """A card with one figure, which is due to be drawn when its data change.
 
-    Until it is drawn again, the figure is faded.
+    The figure is drawn once; after that, it follows its data in place. Until then it is faded.
     """
 
     def __init__(
         self,
         figure: FigureText,
-        draw_figure: DrawFigure,
+        plot_figure: PlotFigure,
         *,
         waiting: str = "",
         links: Links = _NO_LINKS,
         **params: object,
     ) -> None:
-        """Show `figure` as `draw_figure` draws it.
+        """Show `figure` as `plot_figure` draws it.
 
         Parameters
         ----------
@@ -66,7 +67,10 @@ class FigureView(pn.viewable.Viewer):
         links : actions for a tap on a point
         """
         super().__init__(**params)
-        self._figure, self._draw_figure, self._links = figure, draw_figure, links
+        self._figure, self._plot_figure = figure, plot_figure
+        self._links = TapLinks(links)
+        self._drawn: BokehFigure | None = None
+        self._pane: pn.pane.Bokeh | None = None
         self._waiting, self._theme = waiting, "light"
         self._is_changed = self._is_stale = False
         self.visibility = Visibility()
@@ -104,6 +108,11 @@ class FigureView(pn.viewable.Viewer):
         """Whether the figure is to be drawn: it has changed, and is on or near the screen."""
         return self._is_changed and self.visibility.is_near
 
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the figure has been drawn, so that it follows its data in place."""
+        return self._drawn is not None
+
     def change(self, theme: str) -> None:
         """Mark the figure as changed, and set the theme for the next drawing."""
         self._theme, self._is_changed = theme, True
@@ -114,11 +123,11 @@ class FigureView(pn.viewable.Viewer):
         """Draw the figure from the current data."""
         self._is_changed = False
         try:
-            element = self._draw_figure(self._theme)
-            if element is None:
+            figure = self._plot_figure()
+            if figure is None:
                 self._show_text(self._waiting)
             else:
-                self._show(element)
+                self._show(figure)
         except (InputError, ValueError, KeyError, TypeError, ArithmeticError) as error:
             # One figure that cannot be drawn must not break the page.
             _LOG.exception("%s cannot be drawn", self._figure.name)
@@ -129,12 +138,15 @@ class FigureView(pn.viewable.Viewer):
         self._is_stale = is_stale
         self._fade()
 
-    def _show(self, element: hv.core.Dimensioned) -> None:
-        plot = rendered(element)
-        follow_taps(plot, self._links)
-        self._put(
-            pn.pane.HoloViews(plot, backend="bokeh", linked_axes=False, align="center", margin=0)
-        )
+    def _show(self, figure: Figure) -> None:
+        if self._drawn is None:
+            self._drawn = BokehFigure(figure, self._theme)
+        else:
+            self._drawn.follow(figure, self._theme)
+        if self._pane is None or self._pane.object is not self._drawn.model:
+            self._pane = pn.pane.Bokeh(self._drawn.model, align="center", margin=0)
+        self._links.follow(self._drawn)
+        self._put(self._pane)
 
     def _show_text(self, text: str) -> None:
         pane = markup_pane()
@@ -142,7 +154,8 @@ class FigureView(pn.viewable.Viewer):
         self._put(pane)
 
     def _put(self, body: pn.viewable.Viewable) -> None:
-        self._body[:] = [body]
+        if list(self._body) != [body]:
+            self._body[:] = [body]
         self._fade()
 
     def _fade(self) -> None:
@@ -185,12 +198,13 @@ class FigureGrid(pn.viewable.Viewer):
             view.mark_stale(is_stale)
 
     def draw_due(self) -> None:
-        """Draw the first few figures that are due.
+        """Let all due figures follow that are drawn, and draw the first few of the others.
 
-        A drawing takes tenths of a second, and so does each change of the page. With batches, the
-        page opens at once, fills from the top, and remains responsive.
+        A first drawing changes the page, which takes a while. With batches, the page opens at
+        once, fills from the top, and remains responsive.
         """
         due = [view for view in self._views if view.is_due]
+        new = [view for view in due if not view.is_drawn]
         with pn.io.hold():
-            for view in due[:_BATCH]:
+            for view in [view for view in due if view.is_drawn] + new[:_BATCH]:
                 view.draw()

@@ -2,7 +2,6 @@
 
 from functools import partial
 
-import holoviews as hv
 import panel as pn
 import panel_material_ui as pmui
 
@@ -14,6 +13,7 @@ from plateviz.dashboard.views.markup import heading
 from plateviz.dashboard.views.refit import RefitView
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.dashboard.views.summary import SummaryView
+from plateviz.figures.figure import Figure
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
 
@@ -55,12 +55,12 @@ class OrbitPage(pn.viewable.Viewer):
     def _figure_view(self, diagnostic: Diagnostic, navigation: Navigation) -> FigureView:
         return FigureView(
             diagnostic,
-            partial(self._draw, diagnostic),
+            partial(self._plot, diagnostic),
             waiting="The first solution is being computed.",
             links={"id": navigation.open_source} if navigation.run else {},
         )
 
-    def _draw(self, diagnostic: Diagnostic, theme: str) -> hv.core.Dimensioned | None:
+    def _plot(self, diagnostic: Diagnostic) -> Figure | None:
         session, shown = self._session, self._session.shown
         if shown is None:
             return None
@@ -71,7 +71,7 @@ class OrbitPage(pn.viewable.Viewer):
             detector=session.selection.detector_id,
             other=session.other.result if session.other else None,
         )
-        return diagnostic.draw(chosen, theme)
+        return diagnostic.plot(chosen)
 
     def _change(self, *_: object) -> None:
         self.figures.change(self._session.theme)

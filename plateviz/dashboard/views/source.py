@@ -2,7 +2,6 @@
 
 from functools import partial
 
-import holoviews as hv
 import pandas as pd
 import panel as pn
 import panel_material_ui as pmui
@@ -21,6 +20,7 @@ from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.table import DataTable
 from plateviz.plots.gallery import source_figures
+from plateviz.figures.figure import Figure
 from plateviz.plots.survey_figure import SourceFigure
 from plateviz.reports.summary_strip import strip
 from plateviz.tables import (
@@ -94,13 +94,11 @@ class SourcePage(pn.viewable.Viewer):
 
     def _figure_view(self, figure: SourceFigure) -> FigureView:
         links = {"orbit_id": self._open_orbit}
-        return FigureView(figure, partial(self._draw, figure), links=links)
+        return FigureView(figure, partial(self._plot, figure), links=links)
 
-    def _draw(self, figure: SourceFigure, theme: str) -> hv.core.Dimensioned | None:
+    def _plot(self, figure: SourceFigure) -> Figure | None:
         found = self._navigation.found
-        return (
-            None if found is None else figure.draw(SourceTables(found.history, found.motion), theme)
-        )
+        return None if found is None else figure.plot(SourceTables(found.history, found.motion))
 
     def _list_sources(self, *_: object) -> None:
         run = self._navigation.run

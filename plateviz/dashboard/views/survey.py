@@ -2,7 +2,6 @@
 
 from functools import partial
 
-import holoviews as hv
 import pandas as pd
 import panel as pn
 import panel_material_ui as pmui
@@ -20,6 +19,7 @@ from plateviz.runs.load_tables import survey_tables
 from plateviz.tables import orbit_list, orbit_states, run_strip
 from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.tables.run_health import MISSING
+from plateviz.figures.figure import Figure
 from plateviz.tables.survey_tables import SurveyTables
 
 _INCOMPLETE = (
@@ -61,15 +61,15 @@ class SurveyPage(pn.viewable.Viewer):
 
     def _figure_view(self, figure: SurveyFigure) -> FigureView:
         links = {"id": self._navigation.open_source, "orbit_id": self._open_orbit}
-        return FigureView(figure, partial(self._draw, figure), links=links)
+        return FigureView(figure, partial(self._plot, figure), links=links)
 
-    def _draw(self, figure: SurveyFigure, theme: str) -> hv.core.Dimensioned | None:
+    def _plot(self, figure: SurveyFigure) -> Figure | None:
         run = self._navigation.run
         if run is None:
             return None
         if self._tables is None:
             self._tables = survey_tables(run)
-        return figure.draw(self._tables, theme)
+        return figure.plot(self._tables)
 
     def _read(self, *_: object) -> None:
         # The tables of the figures take longer, and are read when the first figure is drawn.

@@ -1,53 +1,48 @@
-"""Links: a tap on the point of a source or an orbit opens it."""
+"""TapLinks: a tap on the point of a source or an orbit opens it."""
 
 from collections.abc import Callable, Mapping
-from functools import partial
 
-import holoviews as hv
-import panel as pn
 from bokeh.models import ColumnDataSource, DataRenderer, TapTool
-from bokeh.plotting import figure as Figure  # noqa: N812  a class by another name
-from holoviews.plotting.bokeh.element import ElementPlot
+
+from plateviz.figures.bokeh_figure import BokehFigure
+from plateviz.figures.bokeh_frame import BokehFrame
 
 Links = Mapping[str, Callable[[str], object]]
 """Column of a point's data -> function that is called with its value as text."""
 
 
-def rendered(element: hv.core.Dimensioned) -> hv.plotting.Plot:
-    """Return the plot of an element, with its Bokeh models, for the page of this session."""
-    renderer = hv.renderer("bokeh").instance(mode="server")
-    return renderer.get_plot(element, doc=pn.state.curdoc)
+class TapLinks:
+    """The links of one drawn figure; the first one whose column is in a point's data is used."""
 
+    def __init__(self, links: Links) -> None:
+        """Begin without a figure."""
+        self._links = links
+        self._followed: set[str] = set()
+        self._tools: dict[str, TapTool] = {}
 
-def follow_taps(plot: hv.plotting.Plot, links: Links) -> None:
-    """Call the function of a link when its point is tapped.
+    def follow(self, drawn: BokehFigure) -> None:
+        """Make the points of a figure answer taps, those among them that are new."""
+        for frame in drawn.frames:
+            for glyphs in frame.glyphs():
+                column = next((name for name in self._links if name in glyphs.source.data), None)
+                if column is not None and glyphs.source.id not in self._followed:
+                    self._followed.add(glyphs.source.id)
+                    self._open_on_tap(glyphs.source, column)
+                    self._make_tappable(frame, glyphs.renderer)
 
-    Parameters
-    ----------
-    links : the first one whose column is in the data of the point is used
-    """
-    found: dict[Figure, list[DataRenderer]] = {}
-    for part in plot.traverse(specs=[ElementPlot]):
-        source, glyphs = part.handles.get("cds"), part.handles.get("glyph_renderer")
-        if source is None or glyphs is None:
-            continue
-        column = next((name for name in links if name in source.data), None)
-        if column is not None:
-            source.selected.on_change("indices", partial(_open_link, source, column, links[column]))
-            found.setdefault(part.handles["plot"], []).append(glyphs)
-    for figure, renderers in found.items():
-        figure.add_tools(TapTool(renderers=renderers))
+    def _open_on_tap(self, source: ColumnDataSource, column: str) -> None:
+        def open_link(name: str, old: list[int], new: list[int]) -> None:
+            if new:
+                # A tap is not a selection: the other points must not stay faded.
+                source.selected.indices = []
+                self._links[column](str(source.data[column][new[0]]))
 
+        source.selected.on_change("indices", open_link)
 
-def _open_link(
-    source: ColumnDataSource,
-    column: str,
-    call: Callable[[str], object],
-    name: str,
-    old: list[int],
-    new: list[int],
-) -> None:
-    if new:
-        # A tap is not a selection: the other points must not stay faded.
-        source.selected.indices = []
-        call(str(source.data[column][new[0]]))
+    def _make_tappable(self, frame: BokehFrame, renderer: DataRenderer) -> None:
+        tool = self._tools.get(frame.plot.id)
+        if tool is None:
+            tool = self._tools[frame.plot.id] = TapTool(renderers=[])
+            frame.plot.add_tools(tool)
+        before = [one for one in tool.renderers if isinstance(one, DataRenderer)]
+        tool.renderers = [*before, renderer]

@@ -101,7 +101,9 @@ def test_figure_has_the_detector_and_the_theme(solution):
 def test_figure_has_the_selected_exposures_and_detector(solution):
     one = solution.figure("residual-map", exposures=[(0, 1)], detector=1)
     options = one.element.opts.get("plot").kwargs
-    assert options["title"] == "Residuals on detector 1, measured minus predicted"
+    title, subtitle, _ = options["title"].split("\n")
+    assert title == "Residuals on detector 1, measured minus predicted"
+    assert subtitle.startswith("Field 0, exposure 1.")
 
 
 def test_overview_has_every_figure(solution):

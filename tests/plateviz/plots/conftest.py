@@ -1,4 +1,4 @@
-"""Every plot with an example table, and its Bokeh figures."""
+"""Every plot with an example table, its frames, and its drawn figures."""
 
 import functools
 
@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 from plateviz import plots, tables
-from tests.plateviz.plots.drawn import figures_of
+from plateviz.figures.bokeh_figure import BokehFigure
 
 
 @pytest.fixture(scope="module")
 def orbit_drawings(fit_result, compared, make_fit_result, truth, instrument):
-    """Return name -> (draw, table): the plot as a function of table and theme."""
+    """Return name -> (draw, table): the plot as a function of the table."""
     residuals = tables.residual_map(fit_result, instrument, detector_id=0)
     fields = tables.footprint_fields(fit_result, instrument)
     detector = instrument.detectors[0]
@@ -68,7 +68,7 @@ def errors_by_count():
 
 @pytest.fixture(scope="module")
 def survey_drawings(survey, errors_by_count):
-    """Return name -> (draw, table): the plot as a function of table and theme."""
+    """Return name -> (draw, table): the plot as a function of the table."""
     return {
         "sky_distribution": (
             functools.partial(
@@ -101,11 +101,23 @@ def drawings(orbit_drawings, survey_drawings):
 
 @pytest.fixture(scope="module")
 def figures(drawings):
-    """Return (name, theme) -> Bokeh figures of the plot; each is rendered once."""
+    """Return name -> frames of the plot, sorted by title; each is made once."""
 
     @functools.cache
-    def rendered(name, theme):
+    def made(name):
         draw, table = drawings[name]
-        return figures_of(draw(table, theme=theme))
+        return sorted(draw(table), key=lambda frame: frame.title)
 
-    return lambda name, theme="light": rendered(name, theme)
+    return made
+
+
+@pytest.fixture(scope="module")
+def drawn_figures(drawings):
+    """Return (name, theme) -> the plot as drawn by Bokeh; each is drawn once."""
+
+    @functools.cache
+    def drawn(name, theme):
+        draw, table = drawings[name]
+        return BokehFigure(draw(table), theme)
+
+    return drawn

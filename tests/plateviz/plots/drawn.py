@@ -1,35 +1,43 @@
-"""The Bokeh figures, titles, sources and texts of a HoloViews object."""
+"""The words and arrows of a frame, the Bokeh plots of a figure, and what they show."""
 
-import holoviews as hv
-from bokeh.models import GlyphRenderer, Plot, Title
+import numpy as np
+import pandas as pd
+from bokeh.models import GlyphRenderer
 
-
-def figures_of(drawing):
-    """Return its Bokeh figures, sorted by title."""
-    found = hv.render(drawing, backend="bokeh").select({"type": Plot})
-    return sorted(found, key=lambda figure: figure.title.text)
+from plateviz.figures.bokeh_figure import BokehFigure
 
 
-def titles_of(figure):
-    """Return the titles below the main title."""
-    return [title for title in figure.above if isinstance(title, Title)]
+def subtitle_of(frame):
+    """Return its subtitle in one line."""
+    return " ".join(frame.subtitle.split())
 
 
-def subtitle_of(figure):
-    return " ".join(title.text for title in titles_of(figure))
+def texts_of(frame):
+    """Return the texts inside it."""
+    return [text for one in frame.glyphs if one.kind == "texts" for text in one.values("text")]
 
 
-def sources_of(figure):
-    """Return the data sources of its glyphs."""
-    return [r.data_source for r in figure.renderers if isinstance(r, GlyphRenderer)]
-
-
-def texts_of(figure):
-    """Return the texts inside its frame."""
-    return [s.data["text"][0] for s in sources_of(figure) if "text" in s.data]
-
-
-def shafts_of(overlay):
-    """Return the shafts of its arrows; the two strokes of each head follow them."""
-    strokes = next(e for e in overlay if e.label == "arrows").dframe()
+def shafts_of(frame):
+    """Return x0, y0, x1, y1 of the shafts of its arrows; two strokes of each head follow them."""
+    strokes = pd.DataFrame(dict(frame["arrows"].columns))
     return strokes[: len(strokes) // 3]
+
+
+def plots_of(figure, theme="light"):
+    """Return its Bokeh plots, in the order of its frames."""
+    return [frame.plot for frame in BokehFigure(figure, theme).frames]
+
+
+def renderers_of(plot):
+    """Return the glyphs that it shows."""
+    return [r for r in plot.renderers if isinstance(r, GlyphRenderer) and r.visible]
+
+
+def contrast(one, other):
+    """Return the contrast ratio of WCAG 2 between two colours."""
+    levels = []
+    for colour in (one, other):
+        rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
+        linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        levels.append(float(linear @ (0.2126, 0.7152, 0.0722)))
+    return (max(levels) + 0.05) / (min(levels) + 0.05)

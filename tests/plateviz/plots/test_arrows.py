@@ -16,14 +16,18 @@ def vectors():
 
 def _drawn(vectors, scale):
     strokes, tails = arrows(
-        vectors, scale=scale, field=FIELD, colour="#000000", hover=[("u", "@{u}")], extra=["u"]
+        vectors, scale=scale, field=FIELD, colour="#000000", hover=[("u", "@{u}")]
     )
-    strokes = strokes.dframe()
-    return strokes[: len(vectors)], strokes[len(vectors) :], tails.dframe()
+    strokes = _table(strokes)
+    return strokes[: len(vectors)], strokes[len(vectors) :], _table(tails)
+
+
+def _table(glyphs):
+    return pd.DataFrame(dict(glyphs.columns))
 
 
 def _lengths(segments):
-    return np.hypot(segments["x_end"] - segments["x"], segments["y_end"] - segments["y"])
+    return np.hypot(segments["x1"] - segments["x0"], segments["y1"] - segments["y0"])
 
 
 @pytest.mark.parametrize(
@@ -47,8 +51,8 @@ def test_shafts_have_the_length_of_the_vectors_times_the_scale(vectors):
 def test_heads_start_at_the_tips(vectors):
     shafts, heads, _ = _drawn(vectors, 1000.0)
     assert len(heads) == 2 * len(shafts)
-    assert np.allclose(heads["x"].to_numpy()[::2], shafts["x_end"])
-    assert np.allclose(heads["y"].to_numpy()[1::2], shafts["y_end"])
+    assert np.allclose(heads["x0"].to_numpy()[::2], shafts["x1"])
+    assert np.allclose(heads["y0"].to_numpy()[1::2], shafts["y1"])
 
 
 def test_heads_are_smaller_than_their_arrow(vectors):
@@ -75,8 +79,8 @@ def test_automatic_scale_of_vectors_without_length_is_one(vectors):
 @pytest.mark.parametrize("x", [(-10.0, 10.0), (10.0, -10.0)], ids=["upwards", "East to the left"])
 def test_key_arrow_has_its_true_length_and_is_below_the_data(x):
     field = Field(x, FIELD.y)
-    strokes, label = key(2e-3, "2 milli", scale=1000.0, field=field, theme="dark")
-    segment = strokes.dframe()
+    strokes, label = key(2e-3, "2 milli", scale=1000.0, field=field)
+    segment = _table(strokes)
     assert _lengths(segment).iloc[0] == pytest.approx(2.0)
-    assert field.ylim[0] < segment["y"].iloc[0] < field.y[0]
-    assert label.data[2] == "2 milli"
+    assert field.ylim[0] < segment["y0"].iloc[0] < field.y[0]
+    assert label.values("text").tolist() == ["2 milli"]

@@ -2,15 +2,15 @@
 
 from dataclasses import replace
 
-import holoviews as hv
 import numpy as np
 import pytest
 
 from plateviz import plots, tables
+from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.eigenmode_groups import _amount
 from plateviz.plots.gallery import diagnostics
-from tests.plateviz.plots.drawn import shafts_of
+from tests.plateviz.plots.drawn import shafts_of, texts_of
 
 NAMES = [
     "eigenmode-spectrum",
@@ -22,52 +22,48 @@ NAMES = [
 MAS_PER_ARCMIN = 60_000.0
 
 
-def of_kind(drawing, kind):
-    return [element for element in drawing if isinstance(element, kind)]
-
-
-def labels_of(drawing):
-    return [str(w) for e in of_kind(drawing, hv.Labels) for w in e.dimension_values(2)]
+def of_kind(frame, kind):
+    return [glyphs for glyphs in frame.glyphs if glyphs.kind == kind]
 
 
 def test_weak_directions_are_marked_in_the_spectrum(fit_result):
-    panel = next(iter(plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result))))
-    rest, weak = of_kind(panel, hv.Points)
-    assert weak.dimension_values("mode").tolist() == [1, 2, 3]
+    frame = plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result))[0]
+    rest, weak = of_kind(frame, "points")
+    assert weak.columns["mode"].tolist() == [1, 2, 3]
     assert len(rest) + len(weak) == len(fit_result.modes)
 
 
 def test_both_panels_of_the_spectrum_have_all_eigenmodes(fit_result):
-    for panel in plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result)):
-        assert sum(map(len, of_kind(panel, hv.Points))) == len(fit_result.modes)
+    figure = plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result))
+    assert len(figure) == 2
+    for frame in figure:
+        assert sum(map(len, of_kind(frame, "points"))) == len(fit_result.modes)
 
 
 def test_every_weak_direction_is_named_beside_its_bar(fit_result):
-    labels = labels_of(plots.plot_eigenmode_deciders(tables.eigenmode_deciders(fit_result)))
+    labels = texts_of(plots.plot_eigenmode_deciders(tables.eigenmode_deciders(fit_result))[0])
     assert set(fit_result.modes["name"].head(3)) <= set(labels)
     assert "prior of detector x 25 %" not in labels
     assert "prior of detector x 100 %" in labels
 
 
 def test_legend_has_no_entry_without_a_share(fit_result):
-    drawing = plots.plot_eigenmode_deciders(tables.eigenmode_deciders(fit_result))
-    labels = {bars.label for bars in of_kind(drawing, hv.Rectangles)}
+    frame = plots.plot_eigenmode_deciders(tables.eigenmode_deciders(fit_result))[0]
+    labels = {glyphs.label for glyphs in frame.glyphs if glyphs.label}
+    assert frame.legend_columns
     assert labels == {"measurements", "reference sources", "priors of the calibration"}
 
 
 def test_bars_are_as_long_as_the_shares(fit_result):
     table = tables.eigenmode_deciders(fit_result)
-    drawing = plots.plot_eigenmode_deciders(table)
-    length = sum(
-        (bars.dimension_values("right") - bars.dimension_values("left")).sum()
-        for bars in of_kind(drawing, hv.Rectangles)
-    )
+    bars = of_kind(plots.plot_eigenmode_deciders(table)[0], "rectangles")
+    length = sum((one.values("right") - one.values("left")).sum() for one in bars)
     assert length == pytest.approx(table["share"].sum())
 
 
 def test_only_cells_with_a_large_share_have_labels(fit_result):
     table = tables.eigenmode_groups(fit_result)
-    labels = labels_of(plots.plot_eigenmode_groups(table))
+    labels = texts_of(plots.plot_eigenmode_groups(table)[0])
     labelled = int((table["share"] >= 0.005).sum())
     assert len(labels) == 2 * labelled + table["mode"].nunique()
 
@@ -90,49 +86,48 @@ def test_moves_are_given_in_a_suitable_unit(move, unit, text):
 def test_shifts_of_all_directions_have_one_scale(fit_result):
     table = tables.eigenmode_shifts(fit_result)
     stretches = []
-    for panel, mode in zip(plots.plot_eigenmode_shifts(table), (1, 2, 3), strict=True):
-        shafts = shafts_of(panel)
+    for frame, mode in zip(plots.plot_eigenmode_shifts(table), (1, 2, 3), strict=True):
+        shafts = shafts_of(frame)
         rows = table[table["mode"] == mode]
-        drawn = (shafts["x_end"] - shafts["x"]).mean()
+        drawn = (shafts["x1"] - shafts["x0"]).mean()
         stretches.append(drawn * MAS_PER_ARCMIN / rows["shift_ra_mas"].mean())
     assert np.allclose(stretches, stretches[0])
 
 
 def test_key_of_the_shifts_has_the_stated_length(fit_result):
-    panel = next(iter(plots.plot_eigenmode_shifts(tables.eigenmode_shifts(fit_result))))
-    key = next(e for e in panel if e.label == "key").dframe().iloc[0]
-    shafts = shafts_of(panel)
-    (text,) = (e.data[2] for e in panel if isinstance(e, hv.Text))
+    frame = plots.plot_eigenmode_shifts(tables.eigenmode_shifts(fit_result))[0]
+    shafts = shafts_of(frame)
+    (text,) = texts_of(frame)
     number, unit = text.split()
-    scale = (shafts["x_end"] - shafts["x"]).mean() / 1e-4
-    drawn = abs(key["x_end"] - key["x"]) / abs(scale)
+    scale = (shafts["x1"] - shafts["x0"]).mean() / 1e-4
+    drawn = abs(frame["key"].values("x1")[0] - frame["key"].values("x0")[0]) / abs(scale)
     assert drawn == pytest.approx(float(number) * {"µas": 1e-3, "mas": 1.0}[unit], rel=1e-3)
 
 
 def test_few_sources_have_an_arrow_each(fit_result):
     table = tables.eigenmode_shifts(fit_result).groupby("mode").head(50)
-    panel = next(iter(plots.plot_eigenmode_shifts(table)))
-    tails = next(e for e in panel if e.label == "tails")
-    assert tails.dimension_values("id").tolist() == table["id"].head(50).tolist()
+    tails = plots.plot_eigenmode_shifts(table)[0]["tails"]
+    assert tails.columns["id"].tolist() == table["id"].head(50).tolist()
 
 
 def test_every_parameter_has_a_point_at_its_prior_share(fit_result):
-    drawing = plots.plot_prior_shares(tables.prior_shares(fit_result))
-    (points,) = of_kind(drawing, hv.Points)
+    frame = plots.plot_prior_shares(tables.prior_shares(fit_result))[0]
+    (points,) = of_kind(frame, "points")
     assert len(points) == len(fit_result.calibration)
-    assert labels_of(drawing).count("flat") == 1
+    assert texts_of(frame).count("flat") == 1
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_diagnostics_are_in_the_gallery(fit_result, instrument, name, theme):
     (diagnostic,) = [d for d in diagnostics() if d.name == name]
-    assert hv.render(diagnostic.draw(Chosen(fit_result, instrument), theme), backend="bokeh")
+    figure = diagnostic.plot(Chosen(fit_result, instrument))
+    assert figure.message is None
+    assert len(BokehFigure(figure, theme).model.children) == len(figure)
 
 
 @pytest.mark.parametrize("name", NAMES[:-1])
 def test_result_without_eigenmodes_is_drawn_as_a_message(fit_result, instrument, name):
     old = replace(fit_result, modes=None, mode_parameters=None, mode_shifts=None)
     (diagnostic,) = [d for d in diagnostics() if d.name == name]
-    drawing = diagnostic.draw(Chosen(old, instrument), "light")
-    assert any(element.data[2].startswith("No ") for element in of_kind(drawing, hv.Text))
+    assert diagnostic.plot(Chosen(old, instrument)).message.startswith("No ")

@@ -2,47 +2,44 @@
 
 from dataclasses import replace
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 import pytest
 
 from plateviz import plots, tables
+from plateviz.figures.bokeh_figure import BokehFigure
+from plateviz.figures.theme import THEMES, theme_of
 from plateviz.plots.style import CLASS_COLOURS
-from plateviz.plots.theme import THEMES, theme_of
-from tests.plateviz.plots.drawn import shafts_of, titles_of
+from tests.plateviz.plots.drawn import contrast, plots_of, renderers_of, shafts_of
 
 
-def test_live_update_replaces_the_subtitle(drawings):
+def test_drawn_figure_follows_another_table_in_place(drawings):
     draw, table = drawings["residual_scatter"]
-    rows = hv.streams.Stream.define("Rows", rows=50)()
-    live = hv.DynamicMap(lambda rows: draw(table.head(rows)), streams=[rows])
-    plot = hv.renderer("bokeh").get_plot(live)
-    rows.event(rows=70)
-    (subtitle,) = titles_of(plot.state)
-    assert subtitle.text.startswith("n = 70 ")
+    drawn = BokehFigure(draw(table.head(70)), "light")
+    (plot,) = (frame.plot for frame in drawn.frames)
+    measurements = renderers_of(plot)[0]
+    drawn.follow(draw(table.head(50)), "dark")
+    assert [frame.plot for frame in drawn.frames] == [plot]
+    assert drawn.model.children == [(plot, 0, 0)]
+    assert renderers_of(plot)[0] is measurements
+    shown = measurements.data_source.data
+    assert list(shown["id"]) == table["id"].head(50).tolist()
+    assert np.array_equal(shown["residual_x_mpix"], table["residual_x_mpix"].head(50))
+    (subtitle,) = plot.above
+    assert subtitle.text.startswith("n = 50 ")
+    assert plot.background_fill_color == THEMES["dark"].background
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("colour", CLASS_COLOURS.values(), ids=CLASS_COLOURS.keys())
 def test_class_colours_stand_out_on_both_backgrounds(colour, theme):
-    assert _contrast(colour, THEMES[theme].background) >= 3.0
+    assert contrast(colour, THEMES[theme].background) >= 3.0
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("part", ["text", "muted"])
 def test_text_is_readable_on_both_backgrounds(part, theme):
-    assert _contrast(getattr(THEMES[theme], part), THEMES[theme].background) >= 4.5
-
-
-def _contrast(one, other):
-    """Return the contrast ratio of WCAG 2."""
-    levels = []
-    for colour in (one, other):
-        rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
-        linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-        levels.append(float(linear @ (0.2126, 0.7152, 0.0722)))
-    return (max(levels) + 0.05) / (min(levels) + 0.05)
+    assert contrast(getattr(THEMES[theme], part), THEMES[theme].background) >= 4.5
 
 
 def test_unknown_theme_is_refused():
@@ -50,63 +47,67 @@ def test_unknown_theme_is_refused():
         theme_of("sepia")
 
 
-def test_footprint_has_east_to_the_left_and_equal_aspect(figures):
-    (figure,) = figures("footprint")
-    assert figure.x_range.start > figure.x_range.end
-    scale = figure.frame_width / abs(figure.x_range.end - figure.x_range.start)
-    height = figure.frame_height / (figure.y_range.end - figure.y_range.start)
+def test_footprint_has_east_to_the_left_and_equal_aspect(drawings):
+    draw, table = drawings["footprint"]
+    (plot,) = plots_of(draw(table))
+    assert plot.x_range.start > plot.x_range.end
+    scale = plot.frame_width / abs(plot.x_range.end - plot.x_range.start)
+    height = plot.frame_height / (plot.y_range.end - plot.y_range.start)
     assert scale == pytest.approx(height, rel=5e-3)
 
 
 def test_footprint_rows_keep_the_order_of_the_table(drawings):
     draw, table = drawings["footprint"]
-    points = next(e for e in draw(table) if isinstance(e, hv.Points))
-    assert points.dimension_values("id", expanded=True).tolist() == table["id"].tolist()
+    assert draw(table)[0]["sources"].columns["id"].tolist() == table["id"].tolist()
 
 
-def test_footprint_outlines_and_names_every_field(drawings):
+def test_footprint_outlines_and_names_every_field(drawings, instrument):
     draw, table = drawings["footprint"]
-    overlay = draw(table)
-    assert sum(isinstance(element, hv.Path) for element in overlay) == 4
-    names = {e.data[2] for e in overlay if isinstance(e, hv.Text)}
-    assert names == {f"field {k}" for k in range(4)}
+    (frame,) = draw(table)
+    dashes, counts = np.unique(frame["outlines"].columns["dash"].astype(str), return_counts=True)
+    assert len(dashes) == 4
+    assert set(counts) == {len(instrument.detectors)}
+    assert set(frame["field names"].values("text")) == {f"field {k}" for k in range(4)}
 
 
 def test_distortion_arrows_are_drawn_to_the_stated_scale(drawings):
     draw, table = drawings["distortion"]
-    shafts = shafts_of(draw(table, arrow_scale=500.0))
-    drawn = np.hypot(shafts["x_end"] - shafts["x"], shafts["y_end"] - shafts["y"])
+    (frame,) = draw(table, arrow_scale=500.0)
+    shafts = shafts_of(frame)
+    drawn = np.hypot(shafts["x1"] - shafts["x0"], shafts["y1"] - shafts["y0"])
     assert np.allclose(drawn, 0.5 * np.hypot(table["dx_um"], table["dy_um"]))
 
 
 def test_comparison_arrows_are_drawn_to_the_stated_scale(drawings):
     _, table = drawings["comparison"]
-    overlay = plots.plot_comparison_map(table, arrow_scale=60_000.0)
-    shafts = shafts_of(overlay)
-    assert np.allclose(shafts["x_end"] - shafts["x"], table["difference_ra_mas"])
-    assert np.allclose(shafts["y_end"] - shafts["y"], table["difference_dec_mas"])
+    (frame,) = plots.plot_comparison_map(table, arrow_scale=60_000.0)
+    shafts = shafts_of(frame)
+    assert np.allclose(shafts["x1"] - shafts["x0"], table["difference_ra_mas"])
+    assert np.allclose(shafts["y1"] - shafts["y0"], table["difference_dec_mas"])
 
 
 def test_convergence_shows_the_tolerance(drawings):
     draw, table = drawings["convergence"]
-    steps = next(iter(draw(table)))
-    line = next(e for e in steps if isinstance(e, hv.HLine))
-    assert line.data == table["tolerance"].iloc[0]
+    line = draw(table)[0]["tolerance"]
+    assert line.kind == "horizontal"
+    assert line.values("y").tolist() == [table["tolerance"].iloc[0]]
 
 
 def test_convergence_shows_the_loss_of_svi(fit_result):
     loss = 1e6 * np.exp(-np.arange(300) / 20.0) - 500.0
     steps = pd.DataFrame({"step": np.arange(1, 301), "loss": loss})
     svi = replace(fit_result, losses=steps)
-    _, drawn = plots.plot_convergence(tables.convergence(svi), tables.loss_excess(svi))
-    curve = next(e for e in drawn if isinstance(e, hv.Curve)).dframe()
-    assert curve["excess"].iloc[0] == pytest.approx(1e6, rel=1e-3)
-    assert (np.diff(curve["excess"]) < 0).all()
+    _, frame = plots.plot_convergence(tables.convergence(svi), tables.loss_excess(svi))
+    excess = frame["loss"].values("y")
+    assert excess[0] == pytest.approx(1e6, rel=1e-3)
+    assert (np.diff(excess) < 0).all()
+    # The hover shows the loss itself.
+    assert np.array_equal(frame["loss"].columns["loss"], loss[: len(excess)])
 
 
 def test_pulls_are_drawn_against_a_unit_normal_of_the_same_area(drawings):
     draw, table = drawings["pulls"]
-    normal = next(e for e in draw(table) if e.label == "unit normal").dframe()
-    area = np.trapezoid(normal["count"], normal["x"])
+    normal = draw(table)[0]["unit normal"]
+    area = np.trapezoid(normal.values("y"), normal.values("x"))
     bins = table[table["axis"] == "x"]
     assert area == pytest.approx((bins["count"] * (bins["right"] - bins["left"])).sum(), rel=1e-3)

@@ -1,6 +1,5 @@
 """Contents of the plots of a survey and of its sources."""
 
-import holoviews as hv
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,65 +8,110 @@ from plateviz import plots, tables
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.style import ROW_LIMIT
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
-from tests.plateviz.plots.drawn import figures_of, sources_of, subtitle_of
+from tests.plateviz.plots.drawn import plots_of, subtitle_of
 
 
 @pytest.mark.parametrize("name", ["reference_scatter", "sky_track", "time_series"])
 def test_points_of_a_source_carry_its_id(figures, name):
-    marked = [s for figure in figures(name) for s in sources_of(figure) if "id" in s.data]
+    marked = [g for frame in figures(name) for g in frame.glyphs if "id" in g.columns]
     assert marked
+    assert all(glyphs.kind == "points" and len(glyphs) for glyphs in marked)
 
 
-def test_longitude_increases_to_the_left(figures):
-    for figure in figures("sky_distribution"):
-        assert figure.x_range.start > figure.x_range.end
+@pytest.mark.parametrize("name", ["sky_track", "time_series"])
+def test_points_of_an_orbit_carry_its_whole_number(figures, survey, name):
+    known = {str(orbit) for orbit in survey.orbits["orbit_id"]}
+    for frame in figures(name):
+        orbits = frame["estimates"].columns["orbit_id"]
+        assert len(orbits) > 0
+        assert {str(orbit) for orbit in orbits} <= known
+
+
+def test_longitude_increases_to_the_left(figures, drawings):
+    for frame in figures("sky_distribution"):
+        assert frame.x.limits[0] > frame.x.limits[1]
+    draw, table = drawings["sky_distribution"]
+    for plot in plots_of(draw(table)):
+        assert plot.x_range.start > plot.x_range.end
+
+
+def test_classes_share_one_view_of_the_sky(drawings):
+    draw, table = drawings["sky_distribution"]
+    panels = plots_of(draw(table))
+    assert len(panels) == 3
+    assert len({id(panel.x_range) for panel in panels}) == 1
+    assert len({id(panel.y_range) for panel in panels}) == 1
+
+
+def test_fields_and_target_are_drawn_above_the_sources(figures):
+    for frame in figures("sky_distribution"):
+        assert frame.names == ["sources", "area", "target"]
+        (x,), (y,) = frame["area"].values("xs"), frame["area"].values("ys")
+        assert (min(x), max(x), min(y), max(y)) == (-1.4, 0.7, -0.6, 0.6)
+        assert [*frame["target"].values("x"), *frame["target"].values("y")] == [-0.3, 0.1]
 
 
 def test_right_ascension_increases_to_the_left_in_a_square(figures):
-    (figure,) = figures("sky_track")
-    assert figure.x_range.start > figure.x_range.end
-    assert figure.frame_width == figure.frame_height
+    (frame,) = figures("sky_track")
+    assert frame.x.limits[0] > frame.x.limits[1]
+    assert frame.width == frame.frame_height
 
 
 def test_crowded_class_is_drawn_as_a_density(drawings):
     draw, table = drawings["sky_distribution"]
     crowd = pd.concat([table] * 20, ignore_index=True)
-    _, artificial, other = ({type(element) for element in panel} for panel in draw(crowd))
-    assert hv.Image in other
-    assert hv.Image not in artificial
+    _, artificial, other = ({g.kind for g in frame.glyphs} for frame in draw(crowd))
+    assert "image" in other
+    assert "image" not in artificial
+
+
+def test_density_covers_its_sources_with_cells_of_the_stated_values(drawings):
+    draw, table = drawings["sky_distribution"]
+    rows = pd.concat([table[table["source_class"] == "non-reference"]] * 20, ignore_index=True)
+    density = draw(rows)[0]["density"]
+    (x,), (y,), (dw,), (dh,) = (density.values(name) for name in ("x", "y", "dw", "dh"))
+    for start, length, column in ((x, dw, "l_deg"), (y, dh, "b_deg")):
+        ends = [rows[column].min(), rows[column].max()]
+        assert [start, start + length] == pytest.approx(ends)
+    (cells,) = density.values("image")
+    area = dw * dh * 60.0**2 / cells.size
+    # Cells are smaller by the cosine of the latitude, here within a degree of zero.
+    assert np.nansum(cells) * area == pytest.approx(len(rows), rel=1e-3)
+    assert density.looks["color"].limits == (0.0, np.nanmax(cells))
 
 
 def test_prior_separation_uses_a_suitable_unit(figures):
     other, reference = figures("prior_separation")
-    assert "(µas)" in reference.xaxis.axis_label
-    assert "(mas)" in other.xaxis.axis_label
+    assert "(µas)" in reference.x.label
+    assert "(mas)" in other.x.label
     assert "12 of them artificial" in subtitle_of(other)
 
 
 def test_orbit_counts_have_logarithmic_counts_from_below_one(figures):
-    (figure,) = figures("orbit_counts")
-    assert type(figure.y_scale).__name__ == "LogScale"
-    assert 0.1 < figure.y_range.start < 1.0
+    (frame,) = figures("orbit_counts")
+    assert frame.y.is_log
+    assert 0.1 < frame.y.limits[0] < 1.0
 
 
-def test_law_of_the_paper_falls_with_the_square_root_of_n(drawings):
-    draw, table = drawings["error_by_count"]
-    law = next(e for e in draw(table) if e.label == "4 mas / √(36 N)").dframe()
-    assert (law["error_mas"] * np.sqrt(36 * law["n_orbits"])).to_numpy() == pytest.approx(4.0)
+def test_law_of_the_paper_falls_with_the_square_root_of_n(figures):
+    (frame,) = figures("error_by_count")
+    law = frame["law"]
+    assert law.label == "4 mas / √(36 N)"
+    assert law.values("y") * np.sqrt(36 * law.values("x")) == pytest.approx(4.0)
 
 
-def test_prediction_is_drawn_with_its_floor(drawings):
-    draw, table = drawings["error_by_count"]
-    curves = {e.label: e.dframe() for e in draw(table) if isinstance(e, hv.Curve)}
-    prediction = curves["√(noise² / N + floor²)"]
-    expected = np.sqrt(0.66**2 / prediction["n_orbits"] + 0.055**2)
-    assert prediction["error_mas"].to_numpy() == pytest.approx(expected.to_numpy())
-    assert set(curves["floor: references"]["error_mas"]) == {0.055}
+def test_prediction_is_drawn_with_its_floor(figures):
+    (frame,) = figures("error_by_count")
+    prediction, floor = frame["prediction"], frame["floor"]
+    assert [prediction.label, floor.label] == ["√(noise² / N + floor²)", "floor: references"]
+    expected = np.sqrt(0.66**2 / prediction.values("x") + 0.055**2)
+    assert prediction.values("y") == pytest.approx(expected)
+    assert set(floor.values("y")) == {0.055}
 
 
 def test_labels_of_log_ticks_are_the_ticks(figures):
-    (figure,) = figures("error_by_count")
-    shown = {float(k): v for k, v in figure.xaxis[0].major_label_overrides.items()}
+    (frame,) = figures("error_by_count")
+    shown = dict(frame.x.ticks)
     assert shown[30.0] == "30"
     assert shown[60.0] == "60"
 
@@ -77,8 +121,8 @@ def test_labels_of_log_ticks_are_the_ticks(figures):
 )
 def test_many_reference_sources_are_counted_in_cells(drawings, copies, is_dense):
     draw, table = drawings["reference_scatter"]
-    panel = next(iter(draw(pd.concat([table] * copies, ignore_index=True))))
-    assert any(isinstance(element, hv.Rectangles) for element in panel) == is_dense
+    frame = draw(pd.concat([table] * copies, ignore_index=True))[0]
+    assert any(glyphs.kind == "rectangles" for glyphs in frame.glyphs) == is_dense
 
 
 def test_reference_scatter_without_truth_has_no_panel_of_deviations(drawings):
@@ -89,36 +133,53 @@ def test_reference_scatter_without_truth_has_no_panel_of_deviations(drawings):
 
 def test_pulls_are_drawn_against_a_unit_normal_of_the_same_area(drawings):
     draw, table = drawings["motion_pulls"]
-    normal = next(e for e in next(iter(draw(table))) if e.label == "unit normal").dframe()
+    normal = draw(table)[0]["unit normal"]
     first = table.iloc[0]
-    area = np.trapezoid(normal["count"], normal["x"])
+    area = np.trapezoid(normal.values("y"), normal.values("x"))
     assert area == pytest.approx(first["n"] * (first["right"] - first["left"]), rel=1e-3)
 
 
 def test_pulls_state_their_standard_deviation(figures, drawings):
     _, table = drawings["motion_pulls"]
-    stated = {subtitle_of(figure).split(",")[0] for figure in figures("motion_pulls")}
+    stated = {subtitle_of(frame).split(",")[0] for frame in figures("motion_pulls")}
     assert stated == {f"sd {sd:.3f}" for sd in table["sd"]}
 
 
 def test_failed_orbits_are_marked(drawings, survey):
     draw, table = drawings["orbit_health"]
-    panel = next(iter(draw(table)))
-    marked = next(e for e in panel if e.label.startswith("failed"))
+    frame = draw(table)[0]
+    marked = frame["failed"]
+    assert marked.label.startswith("failed")
     assert (
-        marked["orbit_id"].tolist()
+        marked.columns["orbit_id"].tolist()
         == survey.orbits.query("status == 'failed'")["orbit_id"].tolist()
     )
 
 
-def test_orbits_are_linked_in_time(figures):
-    first, second = figures("orbit_health")
+@pytest.mark.parametrize(("largest", "starts_at_zero"), [(1.4, False), (4.0, True)])
+def test_axis_of_chi2_is_not_negative_and_contains_failed_orbits(drawings, largest, starts_at_zero):
+    draw, table = drawings["orbit_health"]
+    chi2 = table["chi2_per_dof"]
+    frame = draw(table.assign(chi2_per_dof=chi2.where(chi2 < chi2.max(), largest)))[0]
+    low, high = frame.y.limits
+    assert (low == 0.0) == starts_at_zero
+    assert starts_at_zero or 1.0 - low == pytest.approx(high - 1.0)
+    for name in ("failed", "orbits"):
+        heights = frame[name].values("y")
+        assert len(heights) > 0
+        assert np.all((low < heights) & (heights < high))
+
+
+def test_orbits_are_linked_in_time(drawings):
+    draw, table = drawings["orbit_health"]
+    first, second = plots_of(draw(table))
     assert first.x_range is second.x_range
     assert first.y_range is not second.y_range
 
 
-def test_time_series_is_linked_in_time_only(figures):
-    panels = figures("time_series")
+def test_time_series_is_linked_in_time_only(drawings):
+    draw, table = drawings["time_series"]
+    panels = plots_of(draw(table))
     assert len(panels) == 4
     assert len({id(panel.x_range) for panel in panels}) == 1
     assert len({id(panel.y_range) for panel in panels}) == 4
@@ -132,21 +193,22 @@ def test_time_series_without_a_fit_has_no_residuals(survey):
 @pytest.mark.parametrize("kind", ["reference", "artificial", "other"])
 def test_sky_track_states_each_rms_by_name(survey, kind):
     history, motion = survey.source(kind)
-    (figure,) = figures_of(plots.plot_sky_track(tables.sky_track(history, motion)))
-    assert str(motion["source_id"]) in figure.title.text
-    assert f"{motion['n_orbits']} orbits" in subtitle_of(figure)
-    assert all(word in subtitle_of(figure) for word in ("(α)", "(δ)", "(2-D)"))
-    assert ("catalogue left out" in subtitle_of(figure)) == (kind != "reference")
+    (frame,) = plots.plot_sky_track(tables.sky_track(history, motion))
+    assert str(motion["source_id"]) in frame.title
+    assert f"{motion['n_orbits']} orbits" in subtitle_of(frame)
+    assert all(word in subtitle_of(frame) for word in ("(α)", "(δ)", "(2-D)"))
+    assert ("catalogue left out" in subtitle_of(frame)) == (kind != "reference")
 
 
 def test_sky_track_draws_error_bars_of_one_sigma(survey):
     table = tables.sky_track(*survey.source("artificial"))
-    across, along = (e.dframe() for e in plots.plot_sky_track(table) if isinstance(e, hv.Segments))
+    (frame,) = plots.plot_sky_track(table)
+    across, along = (glyphs for glyphs in frame.glyphs if glyphs.kind == "segments")
     orbits = table[table["kind"] == "orbit"]
-    assert 0.5 * (across["x1"] - across["x0"]).to_numpy() == pytest.approx(
+    assert 0.5 * (across.values("x1") - across.values("x0")) == pytest.approx(
         orbits["sigma_ra_mas"].to_numpy()
     )
-    assert 0.5 * (along["y1"] - along["y0"]).to_numpy() == pytest.approx(
+    assert 0.5 * (along.values("y1") - along.values("y0")) == pytest.approx(
         orbits["sigma_dec_mas"].to_numpy()
     )
 
@@ -155,7 +217,9 @@ def test_sky_track_draws_error_bars_of_one_sigma(survey):
 def test_source_of_few_orbits_is_drawn(survey, number):
     source = survey.source("other", number)
     for figure in source_figures():
-        assert figures_of(figure.draw(SourceTables(*source), "light"))
+        drawn = figure.plot(SourceTables(*source))
+        assert drawn.message is None
+        assert plots_of(drawn)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -165,8 +229,9 @@ def test_gallery_draws_every_figure_of_a_survey(survey, errors_by_count, theme):
     )
     bare = SurveyTables(survey.orbits, survey.motions.head(0), survey.catalogue)
     for figure in survey_figures():
-        assert figures_of(figure.draw(full, theme))
-        assert figures_of(figure.draw(bare, theme))
+        assert figure.plot(full).message is None
+        assert plots_of(figure.plot(full), theme)
+        assert plots_of(figure.plot(bare), theme)
 
 
 def test_gallery_separates_the_pages_and_sorts_their_figures():

@@ -6,7 +6,6 @@ import re
 from base64 import b64decode
 from types import SimpleNamespace
 
-import holoviews as hv
 import pytest
 
 from plateviz.plots.diagnostic import Chosen
@@ -20,25 +19,25 @@ OF_SOURCE = {f.name: f for f in source_figures()}
 
 
 @pytest.fixture(scope="module")
-def draw(compared, instrument, survey):
-    """Return the function that draws any figure in a theme, by its name."""
+def plotted(compared, instrument, survey):
+    """Return the function that returns any figure, by its name."""
     pairs = compared.exposures[["field_id", "plate_id"]].itertuples(index=False)
     whole = Chosen(compared, instrument, tuple(map(tuple, pairs)), other=compared)
     surveyed = SurveyTables(survey.orbits, survey.motions, survey.catalogue, survey.truth)
     source = SourceTables(*survey.source("other"))
 
-    def drawn(name, theme):
+    def figure(name):
         if name in DIAGNOSTICS:
-            return DIAGNOSTICS[name].draw(whole, theme)
+            return DIAGNOSTICS[name].plot(whole)
         if name in OF_SURVEY:
-            return OF_SURVEY[name].draw(surveyed, theme)
-        return OF_SOURCE[name].draw(source, theme)
+            return OF_SURVEY[name].plot(surveyed)
+        return OF_SOURCE[name].plot(source)
 
-    return drawn
+    return figure
 
 
-def unpacked(element):
-    return json.loads(gzip.decompress(b64decode(packed_document(element))))
+def unpacked(figure, theme="light"):
+    return json.loads(gzip.decompress(b64decode(packed_document(figure, theme))))
 
 
 def darkened(part, table):
@@ -54,23 +53,21 @@ def darkened(part, table):
 
 
 @pytest.mark.parametrize("name", [*DIAGNOSTICS, *OF_SURVEY, *OF_SOURCE])
-def test_light_figure_with_replaced_colours_is_the_dark_figure(draw, name):
+def test_light_figure_with_replaced_colours_is_the_dark_figure(plotted, name):
     table = SimpleNamespace(**dark_colours())
-    expected = unpacked(draw(name, "dark"))
-    assert darkened(unpacked(draw(name, "light")), table) == darkened(expected, table)
+    expected = unpacked(plotted(name), "dark")
+    assert darkened(unpacked(plotted(name)), table) == darkened(expected, table)
 
 
-def test_figure_drawn_twice_has_the_same_bytes(draw):
-    assert packed_document(draw("deviation", "light")) == packed_document(
-        draw("deviation", "light")
-    )
+def test_figure_drawn_twice_has_the_same_bytes(plotted):
+    assert packed_document(plotted("deviation")) == packed_document(plotted("deviation"))
 
 
-def test_model_ids_are_counted_from_one():
-    found = set(re.findall(r'"id": "(\w+)"', json.dumps(unpacked(hv.Points([(0.0, 1.0)])))))
+def test_model_ids_are_counted_from_one(plotted):
+    found = set(re.findall(r'"id": "(\w+)"', json.dumps(unpacked(plotted("pulls")))))
     assert found == {f"m{number + 1}" for number in range(len(found))}
 
 
-def test_white_background_is_explicit():
-    figure = unpacked(hv.Points([(0.0, 1.0)]))["roots"][0]
-    assert figure["attributes"]["border_fill_color"] == "#ffffff"
+def test_white_background_is_explicit(plotted):
+    (plot, _, _) = unpacked(plotted("pulls"))["roots"][0]["attributes"]["children"][0]
+    assert plot["attributes"]["border_fill_color"] == "#ffffff"

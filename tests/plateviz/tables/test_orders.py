@@ -3,11 +3,9 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import holoviews as hv
 import numpy as np
 import panel_material_ui as pmui
 import pytest
-from bokeh.models import Plot
 
 from plateviz import plots, tables
 from plateviz.cli.output import print_orders
@@ -28,17 +26,8 @@ def only(result, highest):
     return tables.order_comparison(replace(result, orders=kept))
 
 
-def figures(table):
-    found = hv.render(plots.plot_orders(table), backend="bokeh").select({"type": Plot})
-    return sorted(found, key=lambda figure: not figure.title.text.startswith("Evidence"))
-
-
-def subtitle(figure):
-    return " ".join(title.text for title in figure.above)
-
-
-def labels(figure):
-    return list(figure.yaxis[0].major_label_overrides.values())
+def labels(axis):
+    return [label for _, label in axis.ticks]
 
 
 def test_without_a_comparison_the_table_is_empty(fit_result):
@@ -121,54 +110,59 @@ def test_orders_that_the_data_cannot_constrain_are_named(compared, highest, expe
 
 
 def test_figure_names_the_best_orders_and_the_fitted_one(table):
-    worth, held_out = figures(table)
-    assert "best evidence: order 5; best prediction: order 6" in subtitle(worth)
-    assert "fitted: order 5, dotted" in subtitle(worth)
-    assert "too few data" not in subtitle(worth)
-    assert "24 sources" in subtitle(held_out)
-    assert "1 ± 0.017" in subtitle(held_out)
+    worth, held_out = plots.plot_orders(table)
+    assert "best evidence: order 5; best prediction: order 6" in worth.subtitle
+    assert "fitted: order 5, dotted" in worth.subtitle
+    assert "too few data" not in worth.subtitle
+    assert "24 sources" in held_out.subtitle
+    assert "1 ± 0.017" in held_out.subtitle
 
 
 def test_figure_names_the_highest_order_that_the_data_constrain(compared):
-    worth, _ = figures(only(compared, 6))
-    assert "above 6 too few data" in subtitle(worth)
+    worth, _ = plots.plot_orders(only(compared, 6))
+    assert "above 6 too few data" in worth.subtitle
 
 
 def test_ticks_resolve_both_large_and_small_differences(table):
-    worth, held_out = figures(table)
-    assert {"0", "−10", "−1,000", "−1,000,000"} <= set(labels(worth))
-    assert {"1", "1.05", "5", "100"} <= set(labels(held_out))
-    for figure in (worth, held_out):
-        places = np.array([float(tick) for tick in figure.yaxis[0].ticker.ticks])
-        assert np.diff(np.sort(places)).min() >= 0.08 * (figure.y_range.end - figure.y_range.start)
+    worth, held_out = plots.plot_orders(table)
+    assert {"0", "−10", "−1,000", "−1,000,000"} <= set(labels(worth.y))
+    assert {"1", "1.05", "5", "100"} <= set(labels(held_out.y))
+    for frame in (worth, held_out):
+        places = np.array([place for place, _ in frame.y.ticks])
+        assert np.diff(np.sort(places)).min() >= 0.08 * frame.y.length
+
+
+def test_every_order_has_a_tick(table):
+    for frame in plots.plot_orders(table):
+        assert labels(frame.x) == [str(order) for order in range(10)]
 
 
 def test_band_is_two_sigma_wide(table):
-    elements = list(list(plots.plot_orders(table))[1])
-    band = next(e for e in elements if isinstance(e, hv.Area)).dframe()
-    rows = next(e for e in elements if isinstance(e, hv.Points)).dframe()
+    _, frame = plots.plot_orders(table)
+    heights = frame["reserved sources, marks"].values("y")
     scale = 2.0 * np.sqrt(2.0 / 7000.0)
-    assert np.sinh(band["high"].iloc[0]) * scale == pytest.approx(scale)
-    np.testing.assert_allclose(
-        1.0 + np.sinh(rows["height"]) * scale, table["held_out_chi2_per_dof"]
-    )
+    assert np.sinh(frame["band"].values("y2")[0]) * scale == pytest.approx(scale)
+    assert np.sinh(frame["band"].values("y1")[0]) * scale == pytest.approx(-scale)
+    np.testing.assert_allclose(1.0 + np.sinh(heights) * scale, table["held_out_chi2_per_dof"])
 
 
 def test_fitted_order_is_a_line_in_both_panels(table):
-    for panel in plots.plot_orders(table):
-        assert [e.data for e in panel if isinstance(e, hv.VLine)] == [5]
+    for frame in plots.plot_orders(table):
+        assert frame["fitted"].kind == "vertical"
+        assert frame["fitted"].values("x").tolist() == [5]
 
 
 def test_no_evidence_leaves_one_curve(table):
-    worth = next(iter(plots.plot_orders(table.assign(evidence_below_best=np.nan))))
-    names = [e.label for e in worth if isinstance(e, hv.Curve)]
+    worth, _ = plots.plot_orders(table.assign(evidence_below_best=np.nan))
+    names = [glyphs.label for glyphs in worth.glyphs if glyphs.kind == "line"]
     assert names == ["log density of the reserved sources"]
 
 
 def test_panel_without_reserved_sources_has_a_message(table):
     columns = {c: np.nan for c in ("held_out_chi2_per_dof", "log_density_below_best")}
-    _, held_out = figures(table.assign(**columns))
-    assert any("No reserved" in str(r.data_source.data.get("text", "")) for r in held_out.renderers)
+    _, held_out = plots.plot_orders(table.assign(**columns))
+    (text,) = held_out["message"].values("text")
+    assert text == "No reserved sources"
 
 
 def test_command_line_prints_a_row_for_every_order_and_the_verdict(compared, capsys):

@@ -1,24 +1,37 @@
-"""FigureView: drawn when near the screen, and faded while out of date."""
+"""FigureView: drawn once when near the screen, then followed in place; faded while out of date."""
 
-import holoviews as hv
+import pandas as pd
 import pytest
 
 from plateviz.dashboard.views.figure import FigureGrid, FigureView
+from plateviz.figures.figure import Axis, framed
+from plateviz.figures.glyphs import points
 from plateviz.plots.gallery import diagnostics
 
 
+def figure_of(ids):
+    table = pd.DataFrame({"x": range(len(ids)), "y": 1.0, "id": ids})
+    marks = points(table, "x", "y", name="sources", color="mark", hover=[("source", "@{id}")])
+    axes = {"x": Axis("x (mm)", (0.0, 9.0)), "y": Axis("y (mm)", (0.0, 2.0))}
+    return framed([marks], title=f"{len(ids)} sources", width=200, height=100, **axes)
+
+
 @pytest.fixture
-def themes():
+def drawn():
     return []
 
 
 @pytest.fixture
-def view(themes):
-    def draw(theme):
-        themes.append(theme)
-        return hv.Curve([1, 2, 3])
+def view(drawn):
+    def draw():
+        drawn.append(figure_of(["7", "8", "9"][: 1 + len(drawn)]))
+        return drawn[-1]
 
     return FigureView(diagnostics()[0], draw, waiting="Nothing yet.")
+
+
+def plot(view):
+    return view._body[0].object.children[0][0]
 
 
 def opacity(view):
@@ -37,7 +50,7 @@ def test_figure_is_due_only_near_the_screen(view):
     assert not view.is_due
 
 
-def test_change_away_from_the_screen_waits_and_fades_the_figure(view, themes):
+def test_change_away_from_the_screen_waits_and_fades_the_figure(view, drawn):
     view.visibility.is_near = True
     view.draw()
     assert opacity(view) == "1"
@@ -48,7 +61,33 @@ def test_change_away_from_the_screen_waits_and_fades_the_figure(view, themes):
     view.visibility.is_near = True
     view.draw()
     assert opacity(view) == "1"
-    assert themes == ["light", "dark"]
+    assert len(drawn) == 2
+
+
+def test_drawn_figure_follows_in_place(view):
+    view.draw()
+    first = plot(view)
+    assert first.renderers[0].data_source.data["id"].tolist() == ["7"]
+    assert first.background_fill_color == "#ffffff"
+    view.change("dark")
+    view.draw()
+    assert plot(view) is first
+    assert first.title.text == "2 sources"
+    assert first.renderers[0].data_source.data["id"].tolist() == ["7", "8"]
+    assert first.background_fill_color == "#121212"
+
+
+def test_tapped_source_is_opened_once_and_not_selected(drawn):
+    opened = []
+    view = FigureView(diagnostics()[0], lambda: figure_of(["7", "8"]), links={"id": opened.append})
+    view.draw()
+    view.draw()
+    source = plot(view).renderers[0].data_source
+    source.selected.indices = [1]
+    assert opened == ["8"]
+    assert source.selected.indices == []
+    (tool,) = [tool for tool in plot(view).tools if type(tool).__name__ == "TapTool"]
+    assert tool.renderers == plot(view).renderers
 
 
 def test_stale_figure_is_faded(view):
@@ -60,14 +99,14 @@ def test_stale_figure_is_faded(view):
 
 
 def test_empty_card_has_the_waiting_text():
-    view = FigureView(diagnostics()[0], lambda theme: None, waiting="Nothing yet.")
+    view = FigureView(diagnostics()[0], lambda: None, waiting="Nothing yet.")
     assert "Being drawn." in text(view)
     view.draw()
     assert "Nothing yet." in text(view)
 
 
 def test_figure_that_fails_shows_the_reason_and_is_not_drawn_again():
-    def draw(theme):
+    def draw():
         raise ValueError("no sources")
 
     view = FigureView(diagnostics()[0], draw)
@@ -80,7 +119,7 @@ def test_figure_that_fails_shows_the_reason_and_is_not_drawn_again():
 def test_grid_draws_a_few_figures_near_the_screen_at_a_time():
     drawn = []
     views = [
-        FigureView(diagnostic, lambda theme, name=diagnostic.name: drawn.append(name))
+        FigureView(diagnostic, lambda name=diagnostic.name: drawn.append(name))
         for diagnostic in diagnostics()[:6]
     ]
     grid, calls = FigureGrid(views), []

@@ -1,10 +1,12 @@
-"""Colours of the light and the dark theme."""
+"""Colours of the light and the dark theme, and the font of both."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 from bokeh.palettes import interp_palette
+
+FONT = "Helvetica, Arial, sans-serif"
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,14 @@ class Theme:
     mark: str
     ramp: tuple[str, ...]
 
+    def colour(self, name: str | None) -> str | None:
+        """Return the colour that a figure names, such as "muted"; other colours as they are."""
+        return getattr(self, name) if name in _NAMED else name
+
+    def palette(self, name: str) -> list[str]:
+        """Return the palette that a figure names, "count" or "share"."""
+        return {"count": self.count_palette, "share": self.share_palette}[name]
+
     @property
     def count_palette(self) -> list[str]:
         """256 colours of increasing counts."""
@@ -38,6 +48,7 @@ class Theme:
         return list(interp_palette((self.background, *self.ramp[:4]), 256))
 
 
+_NAMED = frozenset({"background", "text", "muted", "grid", "line", "mark"})
 THEMES: Mapping[str, Theme] = MappingProxyType(
     {
         "light": Theme(

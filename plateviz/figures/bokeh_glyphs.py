@@ -1,0 +1,159 @@
+"""The Bokeh models of one glyph table: a renderer, its hover and its colour mapper."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from bokeh import models
+from bokeh.core.property.vectorization import Field, Value
+from bokeh.models.glyph import Glyph
+
+from plateviz.figures.figure import By, Glyphs, Look, Ramp
+from plateviz.figures.theme import FONT, Theme
+
+_GLYPHS: Mapping[str, Callable[..., Glyph]] = MappingProxyType(
+    {
+        "points": models.Scatter,
+        "line": models.Line,
+        "segments": models.Segment,
+        "rectangles": models.Quad,
+        "texts": models.Text,
+        "paths": models.MultiLine,
+        "band": models.VArea,
+        "image": models.Image,
+        "horizontal": models.HSpan,
+        "vertical": models.VSpan,
+        "strip": models.HStrip,
+    }
+)
+# A look of all rows; of each row, it would be a vector.
+_OF_ALL = {"line": {"line_color", "line_width", "line_dash", "line_alpha"}}
+_OF_ALL["band"] = {"fill_color", "fill_alpha"}
+# BokehJS reads the names of dashes of single glyphs otherwise than those of lines.
+_DASHES: Mapping[str, str] = MappingProxyType(
+    {"solid": "", "dashed": "6", "dotted": "2 4", "dotdash": "2 4 6 4"}
+)
+_TRANSPARENT = "rgba(0, 0, 0, 0)"
+# Maximum number of glyphs that one hover describes.
+_HOVER_LIMIT = 3
+
+
+class BokehGlyphs:
+    """A renderer that follows glyph tables of one kind."""
+
+    def __init__(self, glyphs: Glyphs) -> None:
+        """Make the models; `follow` gives them their values."""
+        self.kind = glyphs.kind
+        self._models = _models_for(glyphs)
+        self.source = models.ColumnDataSource()
+        self._glyph = _GLYPHS[glyphs.kind](**glyphs.at)
+        if glyphs.kind == "texts":
+            self._glyph.update(text_font=Value(FONT))
+        self.renderer = models.GlyphRenderer(
+            data_source=self.source, glyph=self._glyph, name=glyphs.name
+        )
+        self._mapper: models.ContinuousColorMapper | None = None
+        self._categories: dict[str, models.CategoricalMapper] = {}
+        self.hover: models.HoverTool | None = None
+        self.bar: models.ColorBar | None = None
+        if any(ramp.label is not None for ramp in _ramps(glyphs)):
+            self.bar = models.ColorBar(width=10)
+        if glyphs.hover:
+            self.hover = models.HoverTool(
+                renderers=[self.renderer], limit=_HOVER_LIMIT, visible=False
+            )
+
+    def can_follow(self, glyphs: Glyphs) -> bool:
+        """Return whether the models can show `glyphs`."""
+        return self._models == _models_for(glyphs)
+
+    def follow(self, glyphs: Glyphs, theme: Theme) -> None:
+        """Show other values of the same kind."""
+        columns = dict(glyphs.columns)
+        if "line_dash" in glyphs.at:
+            dashes = [_DASHES[name] for name in glyphs.values("line_dash")]
+            columns[glyphs.at["line_dash"]] = np.array(dashes, dtype=object)
+        values = {}
+        for name, look in glyphs.looks.items():
+            values.update(self._look(name, look, columns, theme))
+        if not _is_same(self.source.data, columns):
+            self.source.data = columns
+        self._glyph.update(**glyphs.at, **values)
+        self.renderer.visible = True
+        if self.hover is not None:
+            self.hover.tooltips = list(glyphs.hover)
+
+    def hide(self) -> None:
+        """Show nothing until other values come."""
+        self.renderer.visible = False
+
+    def _look(
+        self, name: str, look: Look, columns: dict[str, np.ndarray], theme: Theme
+    ) -> dict[str, Any]:
+        """Return the properties of Bokeh's glyph; adds columns that they need."""
+        if isinstance(look, Ramp):
+            return self._ramp(name, look, theme)
+        if isinstance(look, By):
+            return {name: self._by(name, look, columns, theme)}
+        if name.endswith("_color"):
+            look = theme.colour(look)  # type: ignore[arg-type]
+        if name in _OF_ALL.get(self.kind, ()):
+            return {name: look}
+        return {name: Value(_DASHES[str(look)] if name == "line_dash" else look)}
+
+    def _ramp(self, name: str, ramp: Ramp, theme: Theme) -> dict[str, Any]:
+        low, high = ramp.limits
+        if self._mapper is None:
+            kind = models.LogColorMapper if ramp.is_log else models.LinearColorMapper
+            self._mapper = kind(nan_color=_TRANSPARENT)
+        self._mapper.update(low=low, high=high, palette=theme.palette(ramp.palette))
+        if self.bar is not None:
+            self.bar.update(color_mapper=self._mapper, title=ramp.label or None)
+        if self.kind == "image":
+            return {"color_mapper": self._mapper}
+        return {name: Field(ramp.column, transform=self._mapper)}
+
+    def _by(self, name: str, by: By, columns: dict[str, np.ndarray], theme: Theme) -> Field:
+        """Return the look of each row; numbers and words are added to the columns."""
+        texts = list(by.looks)
+        if name.endswith("_color"):
+            colours = [theme.colour(str(look)) for look in by.looks.values()]
+            mapper = self._categories.setdefault(name, models.CategoricalColorMapper())
+            mapper.update(factors=texts, palette=colours)
+            return Field(by.column, transform=mapper)
+        if name == "marker":
+            mapper = self._categories.setdefault(name, models.CategoricalMarkerMapper())
+            mapper.update(factors=texts, markers=list(by.looks.values()))
+            return Field(by.column, transform=mapper)
+        looks = [by.looks.get(text) for text in columns[by.column]]
+        is_text = any(isinstance(look, str) for look in looks)
+        columns[f"{name}_by"] = np.asarray(looks, dtype=object if is_text else float)
+        return Field(f"{name}_by")
+
+
+def _ramps(glyphs: Glyphs) -> list[Ramp]:
+    return [look for look in glyphs.looks.values() if isinstance(look, Ramp)]
+
+
+def _models_for(glyphs: Glyphs) -> tuple[object, ...]:
+    """Return what decides which models are needed."""
+    ramps = [(ramp.is_log, ramp.label is None) for ramp in _ramps(glyphs)]
+    return glyphs.kind, bool(glyphs.hover), glyphs.reach is None, ramps
+
+
+def _is_same(data: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> bool:
+    """Return whether the values are the same; those that differ are sent to the browser."""
+    if data.keys() != columns.keys():
+        return False
+    return all(
+        len(data[name]) == len(values)
+        and (data[name] is values or bool(np.all(_equal(np.asarray(data[name]), values))))
+        for name, values in columns.items()
+    )
+
+
+def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray | bool:
+    if a.dtype == object or b.dtype == object:
+        return all(np.array_equal(one, two) for one, two in zip(a, b, strict=True))
+    return (a == b) | ((a != a) & (b != b))

@@ -100,6 +100,7 @@ def test_every_figure_is_drawn_when_near_and_in_both_themes(page):
     page.wait_for_timeout(1000)
     assert canvas.count() == 0
     assert value(page, "Converged") == "yes"
+    expect(page.locator("details.verdict summary").first).to_contain_text("This solution")
     assert 0.9 < float(chi2(page).split()[0]) < 1.1
     see(page, "convergence")
     assert not is_faded(canvas)

@@ -8,6 +8,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.reports.summary_strip import STYLE
+from plateviz.tables.verdict import Verdict
 
 _STYLES = [STYLE, (Path(__file__).parent / "style.css").read_text(encoding="utf-8")]
 
@@ -30,6 +31,16 @@ def themed(markup: str, theme: str) -> str:
 def titled(role: str, name: str) -> str:
     """Return a title line for what is shown below it."""
     return f"<p class='solution'><span class='muted'>{role}:</span> <b>{escape(name)}</b></p>"
+
+
+def judged(verdict: Verdict) -> str:
+    """Return the headline of a verdict; its reasons are open unless it is good."""
+    sentences = "".join(f"<li>{escape(text)}</li>" for text in verdict.reasons + verdict.notable)
+    is_open = "" if verdict.state == "good" else " open"
+    return (
+        f"<details class='verdict {verdict.state}'{is_open}>"
+        f"<summary>{escape(verdict.headline)}</summary><ul>{sentences}</ul></details>"
+    )
 
 
 def heading(text: str) -> pmui.Typography:

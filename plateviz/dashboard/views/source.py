@@ -10,6 +10,7 @@ from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.views.figure import FigureGrid, FigureView
 from plateviz.dashboard.views.markup import (
     heading,
+    judged,
     markup_pane,
     numbers,
     paragraph,
@@ -19,8 +20,8 @@ from plateviz.dashboard.views.markup import (
 from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.table import DataTable
-from plateviz.plots.gallery import source_figures
 from plateviz.figures.figure import Figure
+from plateviz.plots.gallery import source_figures
 from plateviz.plots.survey_figure import SourceFigure
 from plateviz.reports.summary_strip import strip
 from plateviz.tables import (
@@ -32,6 +33,7 @@ from plateviz.tables import (
 )
 from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE, SOURCES_OF_RUN, in_words
 from plateviz.tables.survey_tables import SourceTables
+from plateviz.tables.verdict import source_verdict
 
 _INVITATION = (
     "Write a source's id on the left, choose one below, or tap a point of a figure of the "
@@ -118,8 +120,9 @@ class SourcePage(pn.viewable.Viewer):
         self._entry.value = str(found.source_id)
         kind = source_class(found.history)
         title = titled(f"{kind.capitalize()} source", str(found.source_id))
+        verdict = judged(source_verdict(found.history, found.motion))
         items = strip(source_strip(found.history, found.motion))
-        self._head.object = themed(title + items, theme)
+        self._head.object = themed(verdict + title + items, theme)
         if found.motion is None:
             words = "Motions are fitted once all orbits of the run are fitted."
             self._motion.object = paragraph(words, "caption", theme)

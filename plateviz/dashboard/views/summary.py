@@ -1,21 +1,24 @@
-"""SummaryView: the numbers that show whether to trust a solution, in one strip."""
+"""SummaryView: whether to trust a solution, in words and as numbers in one strip."""
 
 import panel as pn
 
 from plateviz.dashboard.session import Session, Solution, Stage
-from plateviz.dashboard.views.markup import markup_pane, paragraph, titled
+from plateviz.dashboard.views.markup import judged, markup_pane, paragraph, titled
 from plateviz.reports.summary_strip import strip
 from plateviz.tables import summary_strip
+from plateviz.tables.verdict import orbit_verdict
+from solver.data.result import FitResult
 
 
 class SummaryView(pn.viewable.Viewer):
-    """The strip of the solution on the screen, and of the one it is compared with."""
+    """The verdict on the solution on the screen, its strip, and that of the one compared with."""
 
     def __init__(self, session: Session, **params: object) -> None:
         """Follow `session`."""
         super().__init__(**params)
         self._session = session
         self._strip = markup_pane()
+        self._judged: tuple[FitResult, str] | None = None
         session.param.watch(self._write, ["shown", "other", "stage", "theme"])
         self._write()
 
@@ -30,11 +33,19 @@ class SummaryView(pn.viewable.Viewer):
             text = session.message if session.stage is Stage.FAILED else "No solution yet."
             self._strip.object = paragraph(text, "empty", session.theme)
             return
-        rows = [_row(shown, "(B) Solution" if other else "Solution")]
+        rows = [
+            self._verdict(shown.result),
+            _row(shown, "(B) Solution" if other else "Solution"),
+        ]
         if other is not None:
             rows.append(_row(other, "(A) Compared with solution"))
         stale = " stale" if session.stage is Stage.STALE else ""
         self._strip.object = f"<div class='{session.theme}{stale}'>{''.join(rows)}</div>"
+
+    def _verdict(self, result: FitResult) -> str:
+        if self._judged is None or self._judged[0] is not result:
+            self._judged = (result, judged(orbit_verdict(result)))
+        return self._judged[1]
 
 
 def _row(solution: Solution, role: str) -> str:

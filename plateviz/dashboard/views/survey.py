@@ -8,10 +8,18 @@ import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.views.figure import FigureGrid, FigureView
-from plateviz.dashboard.views.markup import heading, markup_pane, paragraph, themed, titled
+from plateviz.dashboard.views.markup import (
+    heading,
+    judged,
+    markup_pane,
+    paragraph,
+    themed,
+    titled,
+)
 from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.table import DataTable
+from plateviz.figures.figure import Figure
 from plateviz.plots.gallery import survey_figures
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.reports.summary_strip import strip
@@ -19,8 +27,8 @@ from plateviz.runs.load_tables import survey_tables
 from plateviz.tables import orbit_list, orbit_states, run_strip
 from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.tables.run_health import MISSING
-from plateviz.figures.figure import Figure
 from plateviz.tables.survey_tables import SurveyTables
+from plateviz.tables.verdict import run_verdict
 
 _INCOMPLETE = (
     "This run is not complete. Orbits that have been fitted since this page was loaded appear when "
@@ -86,7 +94,9 @@ class SurveyPage(pn.viewable.Viewer):
             self._head.object = paragraph(words, "empty", theme)
             return
         title = titled("Run", self._navigation.run_name)
-        head = themed(title + strip(run_strip(self._orbits, self._motions)), theme)
+        verdict = judged(run_verdict(self._orbits, self._motions))
+        numbers = strip(run_strip(self._orbits, self._motions))
+        head = themed(verdict + title + numbers, theme)
         if (self._orbits["status"] == MISSING).any():
             head += paragraph(_INCOMPLETE, "caption", theme)
         self._head.object = head

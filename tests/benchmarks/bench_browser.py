@@ -1,0 +1,223 @@
+"""Time what a person waits for in the dashboard, in headless Chromium.
+
+    python tests/benchmarks/bench_browser.py DIR [--repeat 20]
+
+DIR is a survey with a run, such as `plateviz simulate DIR && plateviz survey DIR` make. The script
+serves it, and times each action in the browser: from the event that a person causes to the first
+picture of the screen on which the answer is complete. It prints the median and the 95th percentile
+in milliseconds, with the time of ten million additions in Python, which tells how fast and how
+quiet the machine was.
+"""
+
+import argparse
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+# Import this checkout, whatever the working directory.
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from tests.benchmarks.machine import cpu_model, usable_cores, write
+
+_FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"]
+_SIZE = {"width": 1920, "height": 1080}
+_PATIENCE_MS = 120_000
+# Functions of the page: what is drawn in a card, and whether it is complete.
+_PRELUDE = """
+window.plateviz = (() => {
+  const views = () => {
+    const found = [];
+    const walk = view => { found.push(view); (view.child_views ?? []).forEach(walk); };
+    for (const view of Bokeh.index) walk(view);
+    return found;
+  };
+  const card = view => {
+    for (let e = view.el; e; e = e.parentElement ?? e.getRootNode().host)
+      for (const name of e.classList ?? []) if (name.startsWith('figure-')) return name.slice(7);
+  };
+  const isOnScreen = view => {
+    const box = view.el.getBoundingClientRect();
+    return box.width > 0 && box.bottom > 0 && box.top < innerHeight;
+  };
+  const plots = () => views().filter(view => view.model.type === 'Plot' && isOnScreen(view));
+  // What the figures on the screen show, as a text that differs for other solutions.
+  const shown = () => plots().map(view => [card(view), ...view.model.renderers.map(renderer => {
+    const data = renderer.data_source?.data ?? {};
+    const columns = data instanceof Map ? [...data.values()] : Object.values(data);
+    return columns.map(column => `${column.length} ${Array.from(column).slice(0, 20)}`).join();
+  })].join(';'));
+  const texts = () => {
+    const found = [];
+    const walk = root => {
+      for (const e of root.querySelectorAll('*')) {
+        if (e.matches('.solution, .strip')) found.push(e.textContent);
+        if (e.shadowRoot) walk(e.shadowRoot);
+      }
+    };
+    walk(document);
+    return found.join();
+  };
+  // Resolve with the milliseconds until `isDone`, and one more picture, have passed.
+  const until = isDone => new Promise(resolve => {
+    const begin = performance.now();
+    const look = () => isDone()
+      ? requestAnimationFrame(() => resolve(performance.now() - begin))
+      : requestAnimationFrame(look);
+    look();
+  });
+  return { plots, card, shown, texts, until };
+})();
+"""
+
+
+def main() -> None:
+    arguments = parse_arguments()
+    with served(arguments.survey) as address, chromium() as open_page:
+        write(f"{cpu_model()}, {usable_cores()} cores; ten million additions {additions():.2f} s")
+        write(f"{'from':<34}{'to':<34}{'median':>9}{'95 %':>9}{'n':>5}")
+        opened(open_page(), f"{address}?view=orbit&orbit=0")
+        times = []
+        for _ in range(arguments.repeat):
+            page = open_page()
+            times.append(opened(page, f"{address}?view=orbit&orbit=0"))
+            page.close()
+        report("a warm server's address", "first useful picture", times)
+        page = open_page()
+        opened(page, f"{address}?view=orbit&orbit=0&field=0&plates=0-0&detector=0")
+        page.wait_for_timeout(5000)
+        for start, end, act in (
+            ("exposure", "residual map", next_exposure),
+            ("what-if: another order", "strip and all visible figures", next_order),
+            ("another orbit", "strip and all visible figures", next_orbit),
+        ):
+            # The first answer is not counted: the solver may have to fit the orbit for it.
+            times = [act(page, number) for number in range(arguments.repeat + 1)]
+            report(start, end, times[1:])
+
+
+def next_exposure(page: Page, number: int) -> float:
+    """Select the next exposure; return the milliseconds until the residual map shows it."""
+    thumb = page.get_by_role("slider", name="Exposures of the field").last
+    thumb.focus()
+    return answered(page, lambda: thumb.press("ArrowRight"), {"residual-map"}, words=False)
+
+
+def next_order(page: Page, number: int) -> float:
+    """Change the order of the distortion; return the milliseconds until everything shows it."""
+    slider = page.get_by_role("slider", name="Distortion order")
+    slider.focus()
+    key = "ArrowLeft" if number % 2 == 0 else "ArrowRight"
+    return answered(page, lambda: slider.press(key), None, words=True)
+
+
+def next_orbit(page: Page, number: int) -> float:
+    """Choose another orbit; return the milliseconds until everything shows it."""
+    box = page.get_by_role("combobox", name="Orbit", exact=True)
+    box.focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown" if number % 2 == 0 else "ArrowUp")
+    return answered(page, lambda: page.keyboard.press("Enter"), None, words=True)
+
+
+def answered(page: Page, act: Callable[[], object], cards: set[str] | None, words: bool) -> float:
+    """Act, and return the milliseconds until figures and, if asked for, words are others.
+
+    Parameters
+    ----------
+    cards : names of the figures that have to change; None for all of a solution on the screen
+    """
+    wanted = sorted(cards) if cards else None
+    page.evaluate(
+        """([wanted, words]) => {
+          const { plots, card, shown, texts, until } = window.plateviz;
+          const of = rows => rows.filter(row => !wanted || wanted.includes(row.split(';')[0]));
+          const [before, text] = [of(shown()), texts()];
+          window.answer = until(() => {
+            const now = of(shown());
+            return now.length === before.length && now.every((row, i) => row !== before[i])
+              && (!words || texts() !== text);
+          });
+        }""",
+        [wanted, words],
+    )
+    begin = time.perf_counter()
+    act()
+    page.evaluate("() => window.answer")
+    taken = 1e3 * (time.perf_counter() - begin)
+    page.wait_for_timeout(1500)
+    return taken
+
+
+def opened(page: Page, address: str) -> float:
+    """Open an address; return the milliseconds until the first figure shows something."""
+    begin = time.perf_counter()
+    page.goto(address, wait_until="commit")
+    page.wait_for_function(
+        "() => window.Bokeh?.index && window.plateviz.shown().some(row => row.length > 200)",
+        timeout=_PATIENCE_MS,
+        polling="raf",
+    )
+    return 1e3 * (time.perf_counter() - begin)
+
+
+def report(start: str, end: str, milliseconds: list[float]) -> None:
+    ordered = sorted(milliseconds)
+    high = ordered[min(len(ordered) - 1, round(0.95 * len(ordered)))]
+    median = statistics.median(ordered)
+    write(f"{start:<34}{end:<34}{median:9.0f}{high:9.0f}{len(ordered):5}")
+
+
+def additions() -> float:
+    """Return the seconds of ten million additions."""
+    begin, total = time.perf_counter(), 0
+    for number in range(10**7):
+        total += number
+    return time.perf_counter() - begin
+
+
+@contextmanager
+def served(survey: Path) -> Iterator[str]:
+    """Serve a survey; yield its address."""
+    command = [sys.executable, "-m", "plateviz.cli.main", "serve", str(survey), "--port", "0"]
+    process = subprocess.Popen([*command, "--no-open"], stdout=subprocess.PIPE, text=True)
+    try:
+        line = next(line for line in process.stdout or () if "http" in line)
+        yield next(word for word in line.split() if word.startswith("http"))
+    finally:
+        process.terminate()
+        process.wait()
+
+
+@contextmanager
+def chromium() -> Iterator[Callable[[], Page]]:
+    """Yield the function that opens an empty page."""
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=_FLAGS)
+
+        def open_page() -> Page:
+            page = browser.new_page(viewport=_SIZE)
+            page.set_default_timeout(_PATIENCE_MS)
+            page.add_init_script(_PRELUDE)
+            return page
+
+        yield open_page
+        browser.close()
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description="Time the dashboard in a browser.")
+    parser.add_argument("survey", type=Path, metavar="DIR", help="a survey with a run")
+    parser.add_argument("--repeat", type=int, default=20)
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

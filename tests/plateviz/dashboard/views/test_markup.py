@@ -1,0 +1,20 @@
+"""Pieces of HTML of the pages."""
+
+import pytest
+
+from plateviz.dashboard.views.markup import judged
+from plateviz.tables.verdict import Verdict
+
+
+@pytest.mark.parametrize(("state", "is_open"), [("good", False), ("warn", True), ("bad", True)])
+def test_reasons_of_a_verdict_are_open_unless_it_is_good(state, is_open):
+    html = judged(Verdict(state, "The headline.", ["A reason."], ["What stands out."]))
+    assert html.startswith(f"<details class='verdict {state}'{' open' if is_open else ''}>")
+    assert "<summary>The headline.</summary>" in html
+    assert "<li>A reason.</li><li>What stands out.</li>" in html
+
+
+def test_verdict_is_text():
+    html = judged(Verdict("bad", "<b>", ["<img src=x onerror=alert(1)>"], []))
+    assert "<b>" not in html
+    assert "<img" not in html

@@ -9,19 +9,19 @@ from bokeh.document import Document
 from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
 
-from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.pages import Pages
 from plateviz.solving.solution_store import SolutionStore
 
-_TICK_MILLISECONDS = 100
+_TICK_MILLISECONDS = 50
 _SIDEBAR_WIDTH = 300
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
 
 def build_app(store: SolutionStore) -> pmui.Page:
     """Return the page of one session over `store`."""
-    navigation, pages = _pages(store)
+    navigation, ticker, pages = _pages(store)
     session, title = navigation.session, f"plateviz · {store.title}"
     page = pmui.Page(
         title=title,
@@ -41,22 +41,22 @@ def build_app(store: SolutionStore) -> pmui.Page:
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     _set_theme(session, page.dark_theme)
     _write_address(navigation)
-    _poll_while_needed(navigation, pages)
+    ticker.follow(navigation, pages)
     return page
 
 
 def build_part(store: SolutionStore) -> pn.Row:
     """Return the dashboard in the light theme, as a part of another page."""
-    navigation, pages = _pages(store)
-    _poll_while_needed(navigation, pages)
+    navigation, ticker, pages = _pages(store)
+    ticker.follow(navigation, pages)
     sidebar = pn.Column(pages.sidebar, width=_SIDEBAR_WIDTH)
     return pn.Row(sidebar, pages, sizing_mode="stretch_width")
 
 
-def _pages(store: SolutionStore) -> tuple[Navigation, Pages]:
-    navigation = Navigation(Session(store))
+def _pages(store: SolutionStore) -> tuple[Navigation, "_Ticker", Pages]:
+    navigation, ticker = Navigation(Session(store)), _Ticker()
     navigation.begin(_arguments())
-    return navigation, Pages(navigation)
+    return navigation, ticker, Pages(navigation, ticker.wake)
 
 
 def _prepare(document: Document) -> None:
@@ -84,35 +84,50 @@ def _write_address(navigation: Navigation) -> None:
             # Panel declares the values as mappings, but accepts strings.
             location.update_query(**navigation.address())  # type: ignore[arg-type]
 
-    navigation.param.watch(write, ["view", "run_name", "found"])
+    navigation.param.watch(write, ["view", *WORKSPACES.values(), "run_name", "found"])
     navigation.session.param.watch(write, "shown")
     navigation.session.selection.param.watch(write, ["orbit", "field", "plates", "detector"])
 
 
-def _poll_while_needed(navigation: Navigation, pages: Pages) -> None:
-    """Poll the job and draw the figures that are due, while there are any.
+class _Ticker:
+    """Polls the job and draws the figures that are due, while there are any.
 
     The page polls because a job belongs to the server and may outlive the page.
     """
-    session = navigation.session
 
-    def tick() -> None:
+    def __init__(self) -> None:
+        self._callback = pn.state.add_periodic_callback(
+            self._tick, period=_TICK_MILLISECONDS, start=False
+        )
+        self._navigation: Navigation | None = None
+        self._pages: Pages | None = None
+
+    def follow(self, navigation: Navigation, pages: Pages) -> None:
+        """Begin once the page has loaded; drawing before would delay it."""
+        session = navigation.session
+        session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
+        session.selection.param.watch(self.wake, ["field", "plates", "detector"])
+        navigation.param.watch(self.wake, ["view", *WORKSPACES.values(), "run_name", "found"])
+
+        def begin() -> None:
+            self._navigation, self._pages = navigation, pages
+            self.wake()
+
+        pn.state.onload(begin)
+
+    def wake(self, *_: object) -> None:
+        """Tick until nothing is left to do."""
+        if self._pages is not None and not self._callback.running:
+            self._callback.start()
+
+    def _tick(self) -> None:
+        if self._navigation is None or self._pages is None:
+            return
+        session = self._navigation.session
         session.poll()
-        pages.draw_due()
-        if session.job is None and not pages.is_due:
-            callback.stop()
-
-    def wake(*_: object) -> None:
-        if not callback.running:
-            callback.start()
-
-    callback = pn.state.add_periodic_callback(tick, period=_TICK_MILLISECONDS, start=False)
-    session.param.watch(wake, ["stage", "shown", "other", "theme"])
-    session.selection.param.watch(wake, ["field", "plates", "detector"])
-    navigation.param.watch(wake, ["view", "run_name", "found"])
-    pages.on_visibility(wake)
-    # Drawing before the page has loaded would delay it.
-    pn.state.onload(wake)
+        self._pages.draw_due()
+        if session.job is None and not self._pages.is_due:
+            self._callback.stop()
 
 
 def _set_theme(session: Session, is_dark: bool) -> None:

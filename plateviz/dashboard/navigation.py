@@ -3,12 +3,14 @@
 import re
 from collections.abc import Mapping
 from enum import StrEnum
+from types import MappingProxyType
 from typing import NamedTuple
 
 import pandas as pd
 import param
 
 from plateviz.dashboard.session import Session
+from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.queries import SurveyRun
 from plateviz.solving.origin import SurveyFolder
 from solver.data.result import FitResult
@@ -27,6 +29,16 @@ class View(StrEnum):
     SOURCE = "source"
 
 
+# Each view keeps its own workspace while others are on the screen.
+WORKSPACES: Mapping[View, str] = MappingProxyType(
+    {
+        View.SURVEY: "survey_workspace",
+        View.ORBIT: "orbit_workspace",
+        View.SOURCE: "source_workspace",
+    }
+)
+
+
 class FoundSource(NamedTuple):
     """One source of a run: a row per orbit and, once the run is complete, its motion."""
 
@@ -43,6 +55,9 @@ class Navigation(param.Parameterized):
     """
 
     view = param.Selector(default=View.ORBIT, objects=list(View), doc="view on the screen")
+    survey_workspace = param.Selector(objects=list(SurveyWorkspace), doc="of the Survey view")
+    orbit_workspace = param.Selector(objects=list(OrbitWorkspace), doc="of the Orbit view")
+    source_workspace = param.Selector(objects=list(SourceWorkspace), doc="of the Source view")
     run_name = param.Selector(default=None, objects=[None], doc="run of the survey")
     found = param.ClassSelector(class_=FoundSource, default=None, allow_None=True)
     message = param.String(default="", doc="why no source is shown")
@@ -60,6 +75,16 @@ class Navigation(param.Parameterized):
             if self._runs[self.run_name].is_gathered:
                 self.view = View.SURVEY
         self.param.watch(lambda *_: self._look(), "run_name")
+
+    @property
+    def workspace(self) -> Workspace:
+        """The workspace on the screen."""
+        return getattr(self, WORKSPACES[self.view])
+
+    @property
+    def workspaces_of_view(self) -> list[Workspace]:
+        """The workspaces of the view on the screen, in page order."""
+        return list(self.param[WORKSPACES[self.view]].objects)
 
     @property
     def run(self) -> SurveyRun | None:
@@ -100,10 +125,13 @@ class Navigation(param.Parameterized):
         selectable = self.session.selection.param.values()
         default = View.ORBIT if any(name in selectable for name in address) else self.view
         self.turn_to(views.get(address.get("view", ""), default))
+        known = {workspace.value: workspace for workspace in self.workspaces_of_view}
+        self.turn_to_workspace(known.get(address.get("workspace", ""), self.workspace))
 
     def address(self) -> dict[str, str]:
         """Return what is on the screen as the query of the page's address."""
-        query = {"view": self.view.value, **self.session.selection.address()}
+        query = {"view": self.view.value, "workspace": self.workspace.value}
+        query |= self.session.selection.address()
         if self.run_name is not None:
             query["run"] = self.run_name
         if self.found is not None:
@@ -116,6 +144,10 @@ class Navigation(param.Parameterized):
         session = self.session
         if view is View.ORBIT and session.shown is None and session.job is None:
             self.choose_orbit(session.selection.orbit)
+
+    def turn_to_workspace(self, workspace: Workspace) -> None:
+        """Show a workspace of the view on the screen."""
+        self.param.update({WORKSPACES[self.view]: workspace})
 
     def choose_orbit(self, orbit: int | None) -> None:
         """Show an orbit with the settings on the screen, from the run if it has that solution."""

@@ -6,9 +6,10 @@ a few milliseconds and sends only what differs.
 
 from bokeh import models
 
-from plateviz.figures.bokeh_frame import BokehFrame, subtitles_of
+from plateviz.figures.bokeh_frame import BokehFrame
 from plateviz.figures.figure import Figure
 from plateviz.figures.theme import theme_of
+from plateviz.figures.words import words_of_row
 
 
 class BokehFigure:
@@ -42,9 +43,9 @@ class BokehFigure:
         for first in range(0, len(figure), figure.columns):
             row = slice(first, first + figure.columns)
             frames = figure.frames[row]
-            subtitles = subtitles_of(frames)
-            for drawn, frame, subtitle in zip(self.frames[row], frames, subtitles, strict=True):
-                drawn.follow(frame, colours, subtitle)
+            words = words_of_row(frames)
+            for drawn, frame, one in zip(self.frames[row], frames, words, strict=True):
+                drawn.follow(frame, colours, one)
 
     def _make(self, figure: Figure) -> None:
         # A grid whose children change is laid out by BokehJS before all their views are there, so

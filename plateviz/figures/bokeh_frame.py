@@ -1,24 +1,31 @@
 """The Bokeh models of one frame: a plot with its axes, words, glyphs and legend."""
 
 import math
-import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from bokeh import models
 from bokeh.core.property.vectorization import Field, Value
 
 from plateviz.figures.bokeh_glyphs import BokehGlyphs
-from plateviz.figures.figure import Axis, Frame
+from plateviz.figures.figure import MARGIN, Axis, Frame
 from plateviz.figures.theme import FONT, Theme
+from plateviz.figures.words import Words
 
+# Least room to the left of a frame, and room for a tick label, screen pixels.
+_LEFT, _TICK = 5, 70
 _TITLE_SIZE, _LABEL_SIZE, _TICK_SIZE = "13px", "12px", "11px"
-# Screen pixels per character of the subtitle's font.
-_PER_CHARACTER = 5.3
 # Shows an image while the reach of the frame's limits is between those in its tags.
 _SHOW_WITHIN_REACH = """
     const reach = Math.max(...[x.start, x.end, y.start, y.end].map(Math.abs));
     const [least, most] = image.tags;
     image.visible = reach > least && reach <= most;
+"""
+# BokehJS knows the height of another text only after it has laid out the plot.
+_MAKE_ROOM = """
+    const lines = cb_obj.text.split("\\n").length;
+    if (lines !== cb_obj.lines_with_room)
+      setTimeout(() => Bokeh.index.find_one(plot)?.invalidate_layout(), 0);
+    cb_obj.lines_with_room = lines;
 """
 
 
@@ -55,9 +62,11 @@ class BokehFrame:
             toolbar=models.Toolbar(logo=None, autohide=True, active_drag=self._pan),
             toolbar_location="above",
             output_backend="canvas",
-            # Without it, the frame is cut off where another in its column has wider labels.
-            min_border_right=14,
+            # At a fraction of a pixel the edge keeps some of the colour of a former theme.
+            styles={"clip-path": "inset(2px)"},
         )
+        for words in (self._title, self._subtitle):
+            words.js_on_change("text", models.CustomJS(args={"plot": self.plot}, code=_MAKE_ROOM))
         self._box = models.BoxZoomTool()
         self.plot.add_layout(self._x, "below")
         self.plot.add_layout(self._y, "left")
@@ -80,24 +89,28 @@ class BokehFrame:
             if one.name in self._glyphs
         )
 
-    def follow(self, frame: Frame, theme: Theme, subtitle: list[str]) -> None:
+    def follow(self, frame: Frame, theme: Theme, words: Words) -> None:
         """Show another frame.
 
         Parameters
         ----------
-        subtitle : the lines below the title, as many as in the other frames of the row
+        words : of the frame, with as many lines as those of the other frames of the row
         """
+        self._write(words, theme)
         self.plot.update(
             frame_width=frame.width,
             frame_height=frame.frame_height,
+            # Without it, the frame is cut off where another in its column has wider labels.
+            min_border_right=frame.margin,
+            # A frame with a wide margin stands in the middle.
+            min_border_left=_LEFT + frame.margin - MARGIN,
             background_fill_color=theme.background,
             border_fill_color=theme.background,
             outline_line_color=theme.muted,
         )
         self._box.match_aspect = frame.height is None
-        self._write_titles(frame.title, subtitle, theme)
-        _follow_axis(self._x, self.x_range, frame.x, theme)
-        _follow_axis(self._y, self.y_range, frame.y, theme)
+        _follow_axis(self._x, self.x_range, frame.x, frame.width, theme)
+        _follow_axis(self._y, self.y_range, frame.y, 2 * frame.frame_height, theme)
         for grid in self._grids:
             grid.grid_line_color = theme.grid
         self._follow_glyphs(frame, theme)
@@ -107,13 +120,15 @@ class BokehFrame:
         """Iterate over the glyphs, hidden ones among them."""
         return iter(self._glyphs.values())
 
-    def _write_titles(self, title: str, subtitle: list[str], theme: Theme) -> None:
+    def _write(self, words: Words, theme: Theme) -> None:
         self._title.update(
-            text=title, **_font("text", theme.text, _TITLE_SIZE), text_font_style="bold"
+            text="\n".join(words.title),
+            **_font("text", theme.text, _TITLE_SIZE),
+            text_font_style="bold",
         )
         self._subtitle.update(
-            text="\n".join(subtitle),
-            visible=bool(subtitle),
+            text="\n".join(words.subtitle),
+            visible=bool(words.subtitle),
             **_font("text", theme.muted, _TICK_SIZE),
             text_font_style="normal",
         )
@@ -190,27 +205,16 @@ class BokehFrame:
         )
 
 
-def subtitles_of(row: Sequence[Frame]) -> list[list[str]]:
-    """Return the subtitles of a row, wrapped to the frames' widths, with as many lines each."""
-    wrapped = [
-        [
-            part
-            for line in frame.subtitle.split("\n")
-            for part in textwrap.wrap(line, int(frame.width / _PER_CHARACTER))
-        ]
-        for frame in row
-    ]
-    most = max(map(len, wrapped))
-    # Bokeh drops empty lines, but not one with a space of no width.
-    return [[*lines, *["\u200b"] * (most - len(lines))] for lines in wrapped]
-
-
 def _axis(axis: Axis) -> models.LinearAxis | models.LogAxis:
     return models.LogAxis() if axis.is_log else models.LinearAxis()
 
 
 def _follow_axis(
-    drawn: models.LinearAxis | models.LogAxis, limits: models.Range1d, axis: Axis, theme: Theme
+    drawn: models.LinearAxis | models.LogAxis,
+    limits: models.Range1d,
+    axis: Axis,
+    length: int,
+    theme: Theme,
 ) -> None:
     start, end = axis.limits
     limits.update(start=start, end=end, reset_start=start, reset_end=end)
@@ -221,6 +225,8 @@ def _follow_axis(
         drawn.ticker.update(ticks=places, minor_ticks=[])
     elif isinstance(drawn.ticker, models.FixedTicker):
         drawn.update(ticker=models.LogTicker() if axis.is_log else models.BasicTicker())
+    if isinstance(drawn.ticker, models.BasicTicker):
+        drawn.ticker.desired_num_ticks = min(6, max(2, length // _TICK))
     drawn.update(
         axis_label=axis.label,
         major_label_overrides=dict(axis.ticks or ()),

@@ -28,7 +28,7 @@ Kind = Literal[
     "strip",
 ]
 Link = Literal["", "x", "xy"]
-FRAME_WIDTH = 460
+FRAME_WIDTH, MARGIN = 460, 14
 MESSAGE = "message"
 """Name of the text of a figure that has nothing to show."""
 
@@ -143,6 +143,7 @@ class Frame:
     height : screen pixels; None for equal scales of both axes
     legend_columns : columns of the legend, which is below the frame so that it covers no data;
         0 for no legend
+    margin : room to the right of the frame, over which its words may reach, screen pixels
     """
 
     glyphs: tuple[Glyphs, ...]
@@ -153,6 +154,7 @@ class Frame:
     width: int = FRAME_WIDTH
     height: int | None = None
     legend_columns: int = 0
+    margin: int = MARGIN
 
     def __getitem__(self, name: str) -> Glyphs:
         """Return the glyphs of that name; KeyError if there are none."""

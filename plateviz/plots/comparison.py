@@ -9,6 +9,7 @@ from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import steps
 from plateviz.plots.style import ARROW_LIMIT, SERIES_COLOURS
 from plateviz.plots.units import angle_text
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.residuals import binned_vectors
 
@@ -148,6 +149,7 @@ DIAGNOSTICS = (
         "The current solution (B) minus the previous one (A): positions on the sky, and the "
         "differences over their uncertainty. Good: differences well below the uncertainty, so "
         "that the change of settings does not matter.",
+        OrbitWorkspace.ORDERS,
         86,
         _plot,
         is_wide=True,

@@ -15,6 +15,7 @@ from plateviz.figures.figure import (
 from plateviz.figures.glyphs import horizontal, line, points, texts
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.style import PANEL_WIDTH
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.convergence import convergence, loss_excess
 
 _TITLE = "Convergence"
@@ -165,6 +166,7 @@ DIAGNOSTICS = (
         "Convergence",
         "The largest step of any parameter over its uncertainty, and the objective or, for svi, "
         "the loss. Good: the last step is far below the tolerance.",
+        OrbitWorkspace.CALIBRATION,
         90,
         _plot,
         is_wide=True,

@@ -11,6 +11,7 @@ from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import class_points
 from plateviz.plots.style import PANEL_WIDTH
 from plateviz.plots.units import angle_unit
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.sources import CLASSES, deviation, deviation_statistics
 
 _TITLE = "Deviation from the truth"
@@ -122,6 +123,7 @@ DIAGNOSTICS = (
         "Estimated minus true position on the sky, for each class of source; only for simulated "
         "orbits. Good: an rms of deviation / σ of one. A common shift is the mean error of the "
         "reference sources.",
+        OrbitWorkspace.SKY,
         50,
         _plot,
         is_wide=True,

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from plateviz.figures.figure import Figure
+from plateviz.plots.workspace import OrbitWorkspace
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 
@@ -46,18 +47,22 @@ class Diagnostic:
     name : short and unique, used in addresses and file names
     title : displayed title
     caption : what it shows and what a good solution looks like, in a few sentences
+    workspace : part of the Orbit page that shows the figure
     order : sort key on the page
     plot : function of a `Chosen` that returns the figure
     follows_selection : whether the figure depends on the selected exposures and detector
-    is_wide : whether it takes the whole width of the page
+    is_wide : whether it takes the whole width of its workspace, or of a report
     has_data : whether there is anything to draw, such as a truth or another solution
+    is_key : whether the Verdict workspace shows it, small
     """
 
     name: str
     title: str
     caption: str
+    workspace: OrbitWorkspace
     order: int
     plot: Callable[[Chosen], Figure]
     follows_selection: bool = False
     is_wide: bool = False
     has_data: Callable[[Chosen], bool] = _always
+    is_key: bool = False

@@ -10,6 +10,7 @@ from plateviz.figures.glyphs import paths
 from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.units import angle_text
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.calibration import distortion
 from solver.data.instrument import Detector
 
@@ -80,7 +81,9 @@ DIAGNOSTICS = (
         "Distortion",
         "Displacement on the focal plane by the fitted Legendre terms, zero at the optical centre. "
         "Good: a smooth pattern without strong growth towards the edges.",
+        OrbitWorkspace.CALIBRATION,
         80,
         _plot,
+        is_key=True,
     ),
 )

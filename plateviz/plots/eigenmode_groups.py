@@ -9,6 +9,7 @@ from plateviz.figures.figure import Axis, Figure, Glyphs, Ramp, framed, message
 from plateviz.figures.glyphs import rectangles, texts
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.units import angle_text
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.eigenmodes import eigenmode_groups
 
 _PAGE_WIDTH = 860
@@ -118,6 +119,7 @@ DIAGNOSTICS = (
         "How far one sigma along each weak direction moves each parameter group, and the sources "
         "with it. A direction that moves parameters far but does not shift the sources is "
         "harmless.",
+        OrbitWorkspace.WEAK_DIRECTIONS,
         84,
         _plot_groups,
         is_wide=True,

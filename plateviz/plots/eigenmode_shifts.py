@@ -7,6 +7,7 @@ from plateviz.figures.figure import Axis, Figure, framed, message, side_by_side
 from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.units import angle_text
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.eigenmodes import eigenmode_shifts
 from plateviz.tables.residuals import binned_vectors
 
@@ -86,6 +87,7 @@ DIAGNOSTICS = (
         "How all sources move together per sigma along a weak direction, for the up to nine "
         "directions that shift them most. More measurements do not reduce such common shifts, "
         "rolls and stretches; only more or better reference sources do.",
+        OrbitWorkspace.WEAK_DIRECTIONS,
         85,
         _plot,
         is_wide=True,

@@ -11,6 +11,7 @@ from plateviz.figures.figure import Axis, Figure, Glyphs, framed, message, side_
 from plateviz.figures.glyphs import horizontal, points, rectangles, texts
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.style import CLASS_COLOURS, PANEL_WIDTH, SERIES_COLOURS
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.eigenmodes import (
     CALIBRATION,
     DATA,
@@ -200,6 +201,7 @@ DIAGNOSTICS = (
         "its information that comes from the measurements, and its information relative to that "
         "with the other parameters fixed. Good: at most a dozen weak ones, clearly apart from "
         "the rest.",
+        OrbitWorkspace.WEAK_DIRECTIONS,
         82,
         _plot_spectrum,
         is_wide=True,
@@ -211,6 +213,7 @@ DIAGNOSTICS = (
         "instead. Good: the reference sources constrain what moves the sky, and the calibration's "
         "priors constrain only what moves pointings against detectors. What a prior constrains is "
         "assumed, not measured.",
+        OrbitWorkspace.WEAK_DIRECTIONS,
         83,
         _plot_deciders,
         is_wide=True,

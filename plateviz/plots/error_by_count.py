@@ -9,6 +9,7 @@ from plateviz.plots.style import CLASS_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.ticks import log_ticks
 from plateviz.plots.units import angle_text
+from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.sources import ARTIFICIAL, REFERENCE
 from plateviz.tables.survey_tables import SurveyTables
 
@@ -160,6 +161,7 @@ SURVEY_FIGURES = (
         "The error of the mean position over N orbits. Good: points along the solid prediction. "
         "The paper's square-root law has no floor; the errors of the reference sources are the "
         "same in every orbit and do not average out.",
+        SurveyWorkspace.ACCURACY,
         40,
         _plot,
     ),

@@ -7,6 +7,7 @@ from plateviz.figures.figure import FRAME_WIDTH, Axis, By, Figure, Glyphs, frame
 from plateviz.figures.glyphs import paths, texts
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import class_points
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 
 _TITLE = "Footprint of the orbit"
@@ -20,7 +21,7 @@ _HOVER = [
 ]
 _DASHES = ("solid", "dashed", "dotdash", "dotted")
 # Room for the fields' names beside the outermost corners.
-_MARGIN_X, _MARGIN_Y = 1.3, 1.12
+_MARGIN_X, _MARGIN_Y = 1.4, 1.2
 
 
 def plot_footprint(
@@ -106,7 +107,9 @@ DIAGNOSTICS = (
         "The sources on the sky, and the fields of this orbit. Good: reference sources in every "
         "field. They tie the solution to the sky; a field with few of them depends on the other "
         "fields.",
+        OrbitWorkspace.SKY,
         10,
         _plot,
+        is_key=True,
     ),
 )

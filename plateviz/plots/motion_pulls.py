@@ -6,6 +6,7 @@ from plateviz.figures.figure import Axis, Figure, framed, message, side_by_side
 from plateviz.plots.points import steps, unit_normal
 from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
+from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.motion_pulls import CHI2, LEAST_ORBITS, motion_pulls
 from plateviz.tables.survey_tables import SurveyTables
 
@@ -80,6 +81,7 @@ SURVEY_FIGURES = (
         f"non-reference sources in at least {LEAST_ORBITS} orbits. Good: the unit normal. Sources "
         "of one region share the reference sources' errors, so that the mean may differ from "
         "zero; the width should be one.",
+        SurveyWorkspace.ACCURACY,
         60,
         _plot,
         is_wide=True,

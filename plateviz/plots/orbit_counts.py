@@ -7,6 +7,7 @@ from plateviz.plots.points import steps
 from plateviz.plots.style import CLASS_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.ticks import log_ticks
+from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.orbit_counts import orbit_counts
 from plateviz.tables.survey_tables import SurveyTables
 
@@ -82,6 +83,7 @@ SURVEY_FIGURES = (
         "Orbits of each source",
         "Number of orbits that measured each source, by class. Sources near the target are "
         "measured most often. Good: similar histograms for classes in the same part of the sky.",
+        SurveyWorkspace.CATALOGUE,
         30,
         _plot,
     ),

@@ -15,6 +15,7 @@ from plateviz.figures.figure import (
 from plateviz.figures.glyphs import band, horizontal, line, points
 from plateviz.plots.style import SERIES_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
+from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.orbit_health import orbit_health
 from plateviz.tables.survey_tables import SurveyTables
 
@@ -196,6 +197,7 @@ SURVEY_FIGURES = (
         "Chi2 over its degrees of freedom for each orbit, and the deviations of the reference "
         "sources from their priors. Good: two thirds of the orbits within the band, and "
         "deviations near their expected value, which is below 1 for a point estimate.",
+        SurveyWorkspace.VERDICT,
         5,
         _plot,
         is_wide=True,

@@ -19,6 +19,7 @@ from plateviz.figures.figure import (
 from plateviz.figures.glyphs import band, horizontal, line, points, vertical
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.orders import order_comparison, preferred_order
 from solver.data.settings import MAX_ORDER
 
@@ -207,6 +208,7 @@ DIAGNOSTICS = (
         "reserved sources that were kept out of the fit. The dotted line is the fitted order. "
         "Good: it has the highest evidence (5 less is odds of 1 to 150), and from it upwards "
         "the chi2 of the reserved sources is inside the band.",
+        OrbitWorkspace.ORDERS,
         82,
         _plot,
         is_wide=True,

@@ -9,6 +9,7 @@ from plateviz.plots.points import steps
 from plateviz.plots.style import CLASS_COLOURS, PANEL_WIDTH
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.units import angle_text, angle_unit
+from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.prior_separation import EPOCH, prior_separation, prior_separation_histogram
 from plateviz.tables.survey_tables import SurveyTables
 
@@ -84,6 +85,7 @@ SURVEY_FIGURES = (
         "Catalogue minus truth",
         "Separation between catalogue and truth at the epoch of the survey: the errors of the "
         "priors. Good: histograms that follow the catalogue's stated uncertainties.",
+        SurveyWorkspace.CATALOGUE,
         20,
         _plot,
         is_wide=True,

@@ -5,6 +5,7 @@ import pandas as pd
 from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Glyphs, framed, message
 from plateviz.figures.glyphs import points, rectangles, texts, vertical
 from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.prior_shares import prior_shares
 
 _TITLE = "Prior share of the calibration, by group"
@@ -85,6 +86,7 @@ DIAGNOSTICS = (
         "The marginal variance of each parameter over its prior variance. Good: near 0, which "
         "is measured; near 1 is assumed. A share of a quarter in each of four detectors means "
         "that their common part is assumed.",
+        OrbitWorkspace.CALIBRATION,
         81,
         _plot,
     ),

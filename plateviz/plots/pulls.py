@@ -8,6 +8,7 @@ from plateviz.figures.glyphs import band, horizontal, points
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import steps, unit_normal
 from plateviz.plots.style import SERIES_COLOURS
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
 
 _PULLS = "Standardised residuals"
@@ -121,15 +122,19 @@ DIAGNOSTICS = (
         "All residuals over their expected scatter, corrected for leverage. Good: the unit "
         "normal. A wider histogram means underestimated measurement errors, long tails mean "
         "outliers.",
+        OrbitWorkspace.RESIDUALS,
         40,
         _plot_pulls,
+        is_key=True,
     ),
     Diagnostic(
         "exposure-chi2",
         "Chi2 of each exposure",
         "Chi2 of each exposure over its expected value. Good: points inside the band. A single "
         "exposure far above it was disturbed.",
+        OrbitWorkspace.RESIDUALS,
         70,
         _plot_chi2,
+        is_key=True,
     ),
 )

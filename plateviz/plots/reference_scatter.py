@@ -18,6 +18,7 @@ from plateviz.plots.points import steps, unit_normal
 from plateviz.plots.style import PANEL_WIDTH, ROW_LIMIT, SERIES_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.ticks import log_ticks
+from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.histogram import pull_bins
 from plateviz.tables.reference_scatter import LEAST_ORBITS, reference_scatter, scatter_cells
 from plateviz.tables.survey_tables import SurveyTables
@@ -157,6 +158,7 @@ SURVEY_FIGURES = (
         "predict, and its mean deviation over its expected sigma from noise and catalogue. Good: "
         "points about the line, and a unit normal. The scatter is far below the reported sigma, "
         "because the error of a prior is the same in every orbit.",
+        SurveyWorkspace.ACCURACY,
         50,
         _plot,
         is_wide=True,

@@ -9,6 +9,7 @@ from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_lengt
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.style import ARROW_LIMIT
 from plateviz.plots.units import angle_text
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.residuals import binned_vectors, residual_map
 from solver.data.instrument import Detector, Instrument
 
@@ -147,8 +148,10 @@ DIAGNOSTICS = (
         "Measured minus predicted position on the detector, for the selected exposures and "
         "detector. Good: directions without a pattern. Neighbouring arrows with a common "
         "direction mean distortion that the order does not describe.",
+        OrbitWorkspace.RESIDUALS,
         20,
         _plot,
         follows_selection=True,
+        is_key=True,
     ),
 )

@@ -8,6 +8,7 @@ from plateviz.figures.glyphs import ellipse, points
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import raster
 from plateviz.plots.style import CLASS_COLOURS, ROW_LIMIT, SERIES_COLOURS
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.residuals import ScatterStatistics, residual_scatter, scatter_statistics
 from plateviz.tables.sources import REFERENCE
 
@@ -103,6 +104,7 @@ DIAGNOSTICS = (
         "Residual scatter",
         "Residuals of the selected exposures and detector, x against y. Good: a round cloud "
         "about zero, as wide as the measurement errors predict.",
+        OrbitWorkspace.RESIDUALS,
         30,
         _plot,
         follows_selection=True,

@@ -17,6 +17,7 @@ from plateviz.figures.glyphs import image, paths, points
 from plateviz.plots.points import class_points
 from plateviz.plots.style import PANEL_WIDTH
 from plateviz.plots.survey_figure import SurveyFigure
+from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sources import CLASSES
 from plateviz.tables.survey_tables import SurveyTables
@@ -159,6 +160,7 @@ SURVEY_FIGURES = (
         "The sources of the catalogue in Galactic coordinates, by class. Good: reference sources "
         "over the whole area, because the solution of an orbit is tied to the sky by those in "
         "its fields. Artificial sources lie about the target.",
+        SurveyWorkspace.CATALOGUE,
         10,
         _plot,
         is_wide=True,

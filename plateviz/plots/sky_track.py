@@ -9,6 +9,7 @@ from plateviz.plots.points import error_bars
 from plateviz.plots.style import SERIES_COLOURS
 from plateviz.plots.survey_figure import SourceFigure
 from plateviz.plots.units import angle_text, orbits_text
+from plateviz.plots.workspace import SourceWorkspace
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
 from plateviz.tables.survey_tables import SourceTables
 
@@ -171,6 +172,7 @@ SOURCE_FIGURES = (
         "The estimated position of the source in each orbit with its marginal sigma, and the "
         "catalogue and true positions. Good: the estimates follow the truth. A common offset of "
         "a reference source is the error of its catalogue entry.",
+        SourceWorkspace.MOTION,
         10,
         _plot,
     ),

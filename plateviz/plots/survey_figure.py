@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from plateviz.figures.figure import Figure
+from plateviz.plots.workspace import SourceWorkspace, SurveyWorkspace
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 
 
@@ -20,14 +21,16 @@ class SurveyFigure:
     name : short and unique, used in addresses and file names
     title : displayed title
     caption : what it shows and what a good solution looks like, in a few sentences
+    workspace : part of the Survey page that shows the figure
     order : sort key on the page
     plot : function of the tables that returns the figure
-    is_wide : whether it takes the whole width of the page
+    is_wide : whether it takes the whole width of its workspace, or of a report
     """
 
     name: str
     title: str
     caption: str
+    workspace: SurveyWorkspace
     order: int
     plot: Callable[[SurveyTables], Figure]
     is_wide: bool = False
@@ -40,6 +43,7 @@ class SourceFigure:
     name: str
     title: str
     caption: str
+    workspace: SourceWorkspace
     order: int
     plot: Callable[[SourceTables], Figure]
     is_wide: bool = False

@@ -9,6 +9,7 @@ from plateviz.plots.points import error_bars
 from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS
 from plateviz.plots.survey_figure import SourceFigure
 from plateviz.plots.units import orbits_text
+from plateviz.plots.workspace import SourceWorkspace
 from plateviz.tables.survey_tables import SourceTables
 from plateviz.tables.time_series import time_series
 
@@ -176,6 +177,7 @@ SOURCE_FIGURES = (
         "the residuals of the fitted motion over the noise. Good: residuals within the band for "
         "two thirds of the orbits, without a trend; the truth within the band of the fitted "
         "motion.",
+        SourceWorkspace.MOTION,
         20,
         _plot,
         is_wide=True,

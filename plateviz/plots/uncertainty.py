@@ -20,6 +20,7 @@ from plateviz.figures.glyphs import line, points, segments
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.style import CLASS_COLOURS, PANEL_WIDTH, ROW_LIMIT
 from plateviz.plots.ticks import log_ticks
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.sources import CLASSES, KINDS, uncertainty, uncertainty_by_count
 
 Coordinate = Literal["ra", "dec", "both"]
@@ -154,8 +155,10 @@ DIAGNOSTICS = (
         "construction. The marginal one (calibration integrated out) is the actual uncertainty. "
         "Good: marginal values close above the conditional ones; the difference is the "
         "uncertainty that the calibration adds.",
+        OrbitWorkspace.SKY,
         60,
         _plot,
         is_wide=True,
+        is_key=True,
     ),
 )

@@ -13,6 +13,13 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import sync_playwright
 
+from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
+from plateviz.plots.workspace import title_of
+
+_WORKSPACES = {
+    figure.name: figure.workspace
+    for figure in (*diagnostics(), *survey_figures(), *source_figures())
+}
 _FLAGS = [
     "--no-sandbox",
     "--disable-gpu",
@@ -32,7 +39,8 @@ VIEWS = """
     for (let e = view.el; e; e = e.parentElement ?? e.getRootNode().host)
       for (const name of e.classList ?? []) if (name.startsWith('figure-')) return name.slice(7);
   };
-  const figures = views.filter(view => view.model.type === 'Plot');
+  const figures = views.filter(view => view.model.type === 'Plot'
+    && view.el.checkVisibility({ visibilityProperty: true }));
   const column = (source, name) => source.data[name] ?? source.data.get?.(name);
 """
 # Colour behind each figure that is drawn, by its name.
@@ -93,9 +101,17 @@ def _announced(process, said):
     pytest.fail(f"the server ended: {said.read_text(encoding='utf-8')}")
 
 
+def turn_to_workspace(page, workspace):
+    """Show a workspace of the page on the screen."""
+    switch = page.get_by_role("button", name=title_of(workspace), exact=True)
+    if switch.get_attribute("aria-pressed") != "true":
+        switch.click()
+
+
 def see(page, name):
-    """Scroll to a figure, which is drawn for who comes near it, and wait for that."""
-    card = page.locator(f".figure-{name}")
+    """Go to a figure in its workspace, and wait until it is drawn."""
+    turn_to_workspace(page, _WORKSPACES[name])
+    card = page.locator(f".figure-{name}:visible")
     card.scroll_into_view_if_needed()
     card.locator("canvas").first.wait_for(state="attached")
 

@@ -7,9 +7,10 @@ import pytest
 from playwright.sync_api import expect
 
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
+from plateviz.plots.workspace import SourceWorkspace
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
-from tests.ui.conftest import VIEWS, see, serving, turn_dark, until
+from tests.ui.conftest import VIEWS, see, serving, turn_dark, turn_to_workspace, until
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -121,6 +122,7 @@ def test_from_the_survey_to_an_orbit_to_a_source_and_back(page):
     expect(heading(page, f"source: {source}")).to_be_visible()
     expect(page.get_by_label("Source id")).to_have_value(source)
     assert 0 not in drawn(page, source_figures()).values()
+    turn_to_workspace(page, SourceWorkspace.ORBITS)
     row(page, 0).click()
     expect(heading(page, "Solution of orbit")).to_be_visible()
     turn_to(page, "Survey")

@@ -1,4 +1,4 @@
-"""FigureView: a card with one figure, its caption and its state."""
+"""FigureView: a card with one figure and its state; FigureGrid: the cards of a workspace."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -8,29 +8,52 @@ from typing import Protocol
 import panel as pn
 import panel_material_ui as pmui
 
+from plateviz.dashboard.views.card_tools import CardTools
 from plateviz.dashboard.views.markup import markup_pane, paragraph
 from plateviz.dashboard.views.tap_links import Links, TapLinks
 from plateviz.dashboard.views.visibility import Visibility
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import Figure
+from plateviz.figures.resized import resized
 from solver.errors import InputError
 
 _BATCH = 2
-# Height of an empty card, about that of a figure; without it, all cards would be near the screen.
-_EMPTY_HEIGHT = 420
+# Screen pixels between the edge of a card and its figure.
+_INSET = 4
+# Fills its card, whatever it shows.
+_BODY = {
+    "position": "absolute",
+    "inset": f"{_INSET}px",
+    "width": f"calc(100% - {2 * _INSET}px)",
+    "height": f"calc(100% - {2 * _INSET}px)",
+    "overflow": "auto",
+}
+_CENTRED = {
+    "overflow": "hidden",
+    "display": "flex",
+    "align-items": "center",
+    "justify-content": "center",
+}
 _NO_LINKS: Links = MappingProxyType({})
 _LOG = logging.getLogger(__name__)
+
+Part = pn.viewable.Viewable | pn.viewable.Viewer
 
 PlotFigure = Callable[[], Figure | None]
 """Returns a figure, or None while there are no data."""
 
 
 class FigureText(Protocol):
-    """Name, caption and width of a figure."""
+    """Name, title, caption and width of a figure."""
 
     @property
     def name(self) -> str:
         """Short unique name, used in CSS class names."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """Displayed title."""
         ...
 
     @property
@@ -40,12 +63,12 @@ class FigureText(Protocol):
 
     @property
     def is_wide(self) -> bool:
-        """Whether the figure takes the whole width of the page."""
+        """Whether the figure takes a whole row where the number of cards is odd."""
         ...
 
 
 class FigureView(pn.viewable.Viewer):
-    """A card with one figure, which is due to be drawn when its data change.
+    """A card with one figure, which is due to be drawn when its data or its room change.
 
     The figure is drawn once; after that, it follows its data in place. Until then it is faded.
     """
@@ -57,6 +80,7 @@ class FigureView(pn.viewable.Viewer):
         *,
         waiting: str = "",
         links: Links = _NO_LINKS,
+        theme: str = "light",
         **params: object,
     ) -> None:
         """Show `figure` as `plot_figure` draws it.
@@ -65,38 +89,25 @@ class FigureView(pn.viewable.Viewer):
         ----------
         waiting : text while there is nothing to draw
         links : actions for a tap on a point
+        theme : of the first drawing
         """
         super().__init__(**params)
-        self._figure, self._plot_figure = figure, plot_figure
+        self.is_wide = figure.is_wide
+        self._name, self._plot_figure = figure.name, plot_figure
         self._links = TapLinks(links)
+        self._figure: Figure | None = None
         self._drawn: BokehFigure | None = None
         self._pane: pn.pane.Bokeh | None = None
-        self._waiting, self._theme = waiting, "light"
+        self._waiting = waiting
         self._is_changed = self._is_stale = False
+        self._shown_room: list[int] = []
         self.visibility = Visibility()
-        self._caption = markup_pane()
         # A plain Panel column lays out a new figure at once. Other containers do so a moment later,
         # and the page may measure a figure without a layout.
-        self._body = pn.Column(sizing_mode="stretch_width", margin=0)
-        self._card = pmui.Paper(
-            self.visibility,
-            self._caption,
-            self._body,
-            css_classes=["figure", f"figure-{figure.name}"],
-            styles={
-                "flex": "1 1 100%" if figure.is_wide else "1 1 520px",
-                "min-width": "0",
-                "align-self": "stretch",
-                "height": "auto",
-                "min-height": f"{_EMPTY_HEIGHT}px",
-            },
-            stylesheets=[".paper { height: 100%; }"],
-            margin=6,
-            sx={"height": "100%", "position": "relative", "zIndex": 0},
-            elevation=0,
-            variant="outlined",
-        )
-        self.change(self._theme)
+        self._body = pn.Column(margin=0)
+        self._tools = CardTools(figure.title, figure.caption)
+        self._card = _card(self.visibility, self._body, self._tools, name=figure.name)
+        self.change(theme)
         self._show_text("Being drawn.")
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -106,31 +117,39 @@ class FigureView(pn.viewable.Viewer):
     @property
     def is_due(self) -> bool:
         """Whether the figure is to be drawn: it has changed, and is on or near the screen."""
-        return self._is_changed and self.visibility.is_near
+        has_room = min(self.visibility.room) > 0
+        is_resized = self._shown_room != self.visibility.room
+        return self.visibility.is_near and has_room and (self._is_changed or is_resized)
 
     @property
     def is_drawn(self) -> bool:
         """Whether the figure has been drawn, so that it follows its data in place."""
         return self._drawn is not None
 
+    def take_row(self) -> None:
+        """Take a whole row of the grid."""
+        self._card.styles = {**self._card.styles, "grid-column": "1 / -1"}
+
     def change(self, theme: str) -> None:
         """Mark the figure as changed, and set the theme for the next drawing."""
         self._theme, self._is_changed = theme, True
-        self._caption.object = paragraph(self._figure.caption, "caption", theme)
+        self._tools.theme = theme
         self._fade()
 
     def draw(self) -> None:
         """Draw the figure from the current data."""
-        self._is_changed = False
+        self._shown_room = list(self.visibility.room)
         try:
-            figure = self._plot_figure()
-            if figure is None:
+            if self._is_changed:
+                self._is_changed = False
+                self._figure = self._plot_figure()
+            if self._figure is None:
                 self._show_text(self._waiting)
             else:
-                self._show(figure)
+                self._show(self._figure)
         except (InputError, ValueError, KeyError, TypeError, ArithmeticError) as error:
             # One figure that cannot be drawn must not break the page.
-            _LOG.exception("%s cannot be drawn", self._figure.name)
+            _LOG.exception("%s cannot be drawn", self._name)
             self._show_text(f"This figure cannot be drawn: {error}")
 
     def mark_stale(self, is_stale: bool) -> None:
@@ -139,6 +158,8 @@ class FigureView(pn.viewable.Viewer):
         self._fade()
 
     def _show(self, figure: Figure) -> None:
+        width, height = (length - 2 * _INSET for length in self.visibility.room)
+        figure = resized(figure, width, height)
         if self._drawn is None:
             self._drawn = BokehFigure(figure, self._theme)
         else:
@@ -159,18 +180,71 @@ class FigureView(pn.viewable.Viewer):
         self._fade()
 
     def _fade(self) -> None:
-        self._body.styles = {"opacity": "0.45" if self._is_changed or self._is_stale else "1"}
+        is_old = self._is_changed or self._is_stale
+        self._body.styles = {**_BODY, **_CENTRED, "opacity": "0.45" if is_old else "1"}
+
+
+def card(content: Part, name: str) -> pmui.Paper:
+    """Return a card of a `FigureGrid` that scrolls; `name` is short, for its CSS class."""
+    return _card(pn.Column(content, styles=_BODY, margin=0), name=name)
+
+
+def _card(*contents: Part, name: str) -> pmui.Paper:
+    return pmui.Paper(
+        *contents,
+        css_classes=["card", "figure", f"figure-{name}"],
+        styles={"align-self": "stretch", "min-width": "0", "height": "auto"},
+        stylesheets=[".paper { height: 100%; }"],
+        margin=0,
+        sx={"height": "100%", "position": "relative", "zIndex": 0},
+        elevation=0,
+        variant="outlined",
+    )
 
 
 class FigureGrid(pn.viewable.Viewer):
-    """Several figures, two in a row where there is room."""
+    """Cards that fill the area they are given, in rows of one height without a hole."""
 
-    def __init__(self, views: Sequence[FigureView], **params: object) -> None:
-        """Arrange the cards in order."""
+    def __init__(
+        self,
+        views: Sequence[FigureView],
+        wake: Callable[..., object],
+        *,
+        columns: int = 2,
+        others: Sequence[Part] = (),
+        **params: object,
+    ) -> None:
+        """Arrange the cards in order.
+
+        Parameters
+        ----------
+        wake : called when a figure comes near the screen, leaves it, or gets another size
+        columns : at most, where there is room
+        others : cards after those of the figures
+        """
         super().__init__(**params)
         self._views = list(views)
+        for view in self._views:
+            view.visibility.param.watch(wake, ["is_near", "room"])
+        if columns == 2 and (len(self._views) + len(others)) % 2:
+            next((v for v in self._views if v.is_wide), self._views[-1]).take_row()
         self._box = pmui.FlexBox(
-            *self._views, align_items="stretch", sizing_mode="stretch_width", margin=(8, 0)
+            *self._views,
+            *others,
+            sx={
+                "display": "grid",
+                "gap": "8px",
+                "gridTemplateColumns": {
+                    "xs": "minmax(0, 1fr)",
+                    "lg": f"repeat({columns}, minmax(0, 1fr))",
+                },
+                "gridAutoFlow": "dense",
+                "gridAutoRows": "minmax(250px, 1fr)",
+            },
+            styles={"align-self": "stretch", "height": "auto"},
+            stylesheets=[".flex-box { height: 100%; }"],
+            sizing_mode="stretch_width",
+            margin=0,
         )
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -181,11 +255,6 @@ class FigureGrid(pn.viewable.Viewer):
     def is_due(self) -> bool:
         """Whether any figure is to be drawn."""
         return any(view.is_due for view in self._views)
-
-    def on_visibility(self, call: Callable[[object], object]) -> None:
-        """Call `call` when a figure comes near the screen or leaves it."""
-        for view in self._views:
-            view.visibility.param.watch(call, "is_near")
 
     def change(self, theme: str) -> None:
         """Mark all figures as changed, and set their theme."""

@@ -33,12 +33,17 @@ def titled(role: str, name: str) -> str:
     return f"<p class='solution'><span class='muted'>{role}:</span> <b>{escape(name)}</b></p>"
 
 
-def judged(verdict: Verdict) -> str:
-    """Return the headline of a verdict; its reasons are open unless it is good."""
+def judged(verdict: Verdict, *, is_open: bool = True) -> str:
+    """Return the headline of a verdict with its reasons.
+
+    Parameters
+    ----------
+    is_open : whether the reasons of a verdict that is not good are open at first
+    """
     sentences = "".join(f"<li>{escape(text)}</li>" for text in verdict.reasons + verdict.notable)
-    is_open = "" if verdict.state == "good" else " open"
+    attribute = " open" if is_open and verdict.state != "good" else ""
     return (
-        f"<details class='verdict {verdict.state}'{is_open}>"
+        f"<details class='verdict {verdict.state}'{attribute}>"
         f"<summary>{escape(verdict.headline)}</summary><ul>{sentences}</ul></details>"
     )
 

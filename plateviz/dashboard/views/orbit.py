@@ -1,5 +1,6 @@
 """OrbitPage: one solution of one orbit, with its figures, tables and refits."""
 
+from collections.abc import Callable
 from functools import partial
 
 import panel as pn
@@ -8,26 +9,37 @@ import panel_material_ui as pmui
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
-from plateviz.dashboard.views.figure import FigureGrid, FigureView
+from plateviz.dashboard.views.figure import FigureGrid, FigureView, card
 from plateviz.dashboard.views.markup import heading
 from plateviz.dashboard.views.refit import RefitView
 from plateviz.dashboard.views.selection import SelectionView
-from plateviz.dashboard.views.summary import SummaryView
+from plateviz.dashboard.views.stack import Stack
+from plateviz.dashboard.views.summary import HeadView, StripView
+from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
+from plateviz.plots.workspace import OrbitWorkspace
 
 
 class OrbitPage(pn.viewable.Viewer):
     """The Orbit view: the solution on the screen, updated when it changes."""
 
-    def __init__(self, navigation: Navigation, **params: object) -> None:
-        """Follow the session of `navigation`."""
+    def __init__(
+        self, navigation: Navigation, wake: Callable[..., object], **params: object
+    ) -> None:
+        """Follow the session of `navigation`.
+
+        Parameters
+        ----------
+        wake : called when a figure may have become due to be drawn
+        """
         super().__init__(**params)
+        self._navigation, self._wake = navigation, wake
         self._session = session = navigation.session
-        views = {d: self._figure_view(d, navigation) for d in diagnostics()}
-        self._selected = [view for d, view in views.items() if d.follows_selection]
-        self.figures = FigureGrid(list(views.values()))
+        self._grids: dict[OrbitWorkspace, FigureGrid] = {}
+        self._selected: list[FigureView] = []
+        self._stack = Stack({one: partial(self._workspace, one) for one in OrbitWorkspace})
         self.sidebar = pmui.Column(
             heading("Shown"),
             SelectionView(navigation),
@@ -37,27 +49,47 @@ class OrbitPage(pn.viewable.Viewer):
             margin=0,
         )
         self._column = pmui.Column(
-            SummaryView(session),
-            self.figures,
-            heading("Calibration"),
-            CalibrationView(session),
-            sizing_mode="stretch_width",
+            HeadView(navigation), self._stack, sizing_mode="stretch_width", margin=0
         )
         session.param.watch(self._change, ["shown", "other", "theme"])
         session.param.watch(self._mark_stale, ["stage"])
         session.selection.param.watch(self._change_selected, ["field", "plates", "detector"])
-        self._change()
+        navigation.param.watch(self._show_workspace, "orbit_workspace")
+        self._show_workspace()
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the page without its sidebar."""
         return self._column
 
-    def _figure_view(self, diagnostic: Diagnostic, navigation: Navigation) -> FigureView:
+    @property
+    def figures(self) -> FigureGrid:
+        """The figures of the workspace on the screen."""
+        return self._grids[self._navigation.orbit_workspace]
+
+    def _workspace(self, one: OrbitWorkspace) -> pn.viewable.Viewable:
+        is_first = one is OrbitWorkspace.VERDICT
+        among = [d for d in diagnostics() if (d.is_key if is_first else d.workspace is one)]
+        views = {d: self._figure_view(d) for d in among}
+        self._selected += [view for d, view in views.items() if d.follows_selection]
+        others, above = [], []
+        if one is OrbitWorkspace.CALIBRATION:
+            others = [card(CalibrationView(self._session), "tables")]
+        if is_first:
+            above = [StripView(self._session)]
+        grid = FigureGrid(
+            list(views.values()), self._wake, columns=3 if is_first else 2, others=others
+        )
+        self._grids[one] = grid
+        return workspace(grid, *above)
+
+    def _figure_view(self, diagnostic: Diagnostic) -> FigureView:
+        navigation = self._navigation
         return FigureView(
             diagnostic,
             partial(self._plot, diagnostic),
             waiting="The first solution is being computed.",
             links={"id": navigation.open_source} if navigation.run else {},
+            theme=self._session.theme,
         )
 
     def _plot(self, diagnostic: Diagnostic) -> Figure | None:
@@ -73,12 +105,17 @@ class OrbitPage(pn.viewable.Viewer):
         )
         return diagnostic.plot(chosen)
 
+    def _show_workspace(self, *_: object) -> None:
+        self._stack.show(self._navigation.orbit_workspace)
+
     def _change(self, *_: object) -> None:
-        self.figures.change(self._session.theme)
+        for grid in self._grids.values():
+            grid.change(self._session.theme)
 
     def _change_selected(self, *_: object) -> None:
         for view in self._selected:
             view.change(self._session.theme)
 
     def _mark_stale(self, *_: object) -> None:
-        self.figures.mark_stale(self._session.stage is Stage.STALE)
+        for grid in self._grids.values():
+            grid.mark_stale(self._session.stage is Stage.STALE)

@@ -1,89 +1,90 @@
-"""Pages: the views of one browser session, with a switch between them."""
+"""Pages: the views of one browser session, with a switch between them and their workspaces."""
 
 from collections.abc import Callable
 
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
 from plateviz.dashboard.views.orbit import OrbitPage
 from plateviz.dashboard.views.source import SourcePage
+from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.survey import SurveyPage
+from plateviz.plots.workspace import title_of
 
-# A hidden view keeps the size of its figures, so that they need no new layout when it is shown
-# again. `content-visibility` lets browsers that support it skip the contents of a hidden view.
-_SHOWN = {
-    "visibility": "inherit",
-    "content-visibility": "visible",
-    "height": "auto",
-    "overflow": "visible",
-}
-_HIDDEN = {
-    "visibility": "hidden",
-    "content-visibility": "hidden",
-    "height": "0",
-    "overflow": "hidden",
-}
 # The views share one scroll bar; each opens at its top.
 _TO_THE_TOP = """
 for (const host of document.querySelectorAll("*"))
   host.shadowRoot?.querySelector(".main-content")?.scrollTo(0, 0)
 """
-_SWITCH = {"& .MuiToggleButton-root": {"textTransform": "none", "fontSize": "14px", "px": 2.5}}
+_SWITCH = {
+    "& .MuiToggleButton-root": {
+        "textTransform": "none",
+        "fontSize": "14px",
+        "px": 2,
+        "py": 0.5,
+        "whiteSpace": "nowrap",
+    }
+}
+_TYPES = {View.SURVEY: SurveyPage, View.ORBIT: OrbitPage, View.SOURCE: SourcePage}
+
+Page = SurveyPage | OrbitPage | SourcePage
 
 
 class Pages(pn.viewable.Viewer):
-    """The view that is on the screen, with the switch between the views above it."""
+    """The view that is on the screen, below the switches; each is made when it is first shown."""
 
-    def __init__(self, navigation: Navigation, **params: object) -> None:
-        """Follow the view of `navigation`."""
+    def __init__(
+        self, navigation: Navigation, wake: Callable[..., object], **params: object
+    ) -> None:
+        """Follow the view of `navigation`.
+
+        Parameters
+        ----------
+        wake : called when a figure may have become due to be drawn
+        """
         super().__init__(**params)
-        self._navigation = navigation
-        self._pages = {
-            View.SURVEY: SurveyPage(navigation),
-            View.ORBIT: OrbitPage(navigation),
-            View.SOURCE: SourcePage(navigation),
-        }
-        # All containers of the figure cards are Material UI ones, whose changes stay local: in a
-        # plain Panel column, every change lays out all figures of all views again.
-        self._contents = {view: page.__panel__() for view, page in self._pages.items()}
-        self._sidebars = {view: page.sidebar for view, page in self._pages.items()}
+        self._navigation, self._wake = navigation, wake
+        self._pages: dict[View, Page] = {}
+        self._stack = Stack({view: lambda view=view: self._page(view).__panel__() for view in View})
+        self.sidebar = Stack({view: lambda view=view: self._page(view).sidebar for view in View})
         self._column = pmui.Column(
-            self._switch(),
-            *self._contents.values(),
+            pmui.FlexBox(
+                self._view_switch(), self._workspace_switch(), sizing_mode="stretch_width", margin=0
+            ),
+            self._stack,
             sizing_mode="stretch_width",
-            margin=(4, 16, 24, 16),
+            margin=(0, 12, 8, 12),
         )
-        self.sidebar = pmui.Column(*self._sidebars.values(), sizing_mode="stretch_width", margin=0)
         navigation.param.watch(self._show_view, "view")
         self._show_view()
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Return the switch and the view."""
+        """Return the switches and the view."""
         return self._column
 
     @property
     def is_due(self) -> bool:
-        """Whether any figure of the view on the screen is to be drawn."""
-        return self._pages[self._navigation.view].figures.is_due
-
-    def on_visibility(self, call: Callable[[object], object]) -> None:
-        """Call `call` when a figure comes near the screen or leaves it."""
-        for page in self._pages.values():
-            page.figures.on_visibility(call)
+        """Whether any figure on the screen is to be drawn."""
+        return self._page(self._navigation.view).figures.is_due
 
     def draw_due(self) -> None:
-        """Draw the first few figures that are due in the view on the screen."""
-        self._pages[self._navigation.view].figures.draw_due()
+        """Draw the first few figures that are due on the screen."""
+        self._page(self._navigation.view).figures.draw_due()
 
-    def _switch(self) -> pmui.RadioButtonGroup:
+    def _page(self, view: View) -> Page:
+        if view not in self._pages:
+            self._pages[view] = _TYPES[view](self._navigation, self._wake)
+        return self._pages[view]
+
+    def _view_switch(self) -> pmui.RadioButtonGroup:
         navigation = self._navigation
         switch = pmui.RadioButtonGroup(
             options={view.value.capitalize(): view for view in View},
             value=navigation.view,
             size="small",
             color="primary",
-            margin=(8, 2),
+            margin=(6, 24, 6, 2),
             sx=_SWITCH,
         )
         switch.jscallback(value=_TO_THE_TOP)
@@ -91,8 +92,25 @@ class Pages(pn.viewable.Viewer):
         navigation.param.watch(lambda event: switch.param.update(value=event.new), "view")
         return switch
 
+    def _workspace_switch(self) -> pmui.RadioButtonGroup:
+        navigation = self._navigation
+        switch = pmui.RadioButtonGroup(
+            options={}, size="small", color="default", margin=(6, 2), sx=_SWITCH
+        )
+
+        def follow(*_: object) -> None:
+            options = {title_of(one): one for one in navigation.workspaces_of_view}
+            switch.param.update(options=options, value=navigation.workspace)
+
+        def choose(event: object) -> None:
+            navigation.turn_to_workspace(event.new)  # type: ignore[attr-defined]
+
+        follow()
+        switch.jscallback(value=_TO_THE_TOP)
+        switch.param.watch(choose, "value")
+        navigation.param.watch(follow, ["view", *WORKSPACES.values()])
+        return switch
+
     def _show_view(self, *_: object) -> None:
-        shown = self._navigation.view
-        for view in View:
-            self._contents[view].styles = _SHOWN if view is shown else _HIDDEN
-            self._sidebars[view].visible = view is shown
+        self._stack.show(self._navigation.view)
+        self.sidebar.show(self._navigation.view)

@@ -1,5 +1,6 @@
 """SourcePage: one source of a run through all its orbits."""
 
+from collections.abc import Callable
 from functools import partial
 
 import pandas as pd
@@ -19,10 +20,13 @@ from plateviz.dashboard.views.markup import (
 )
 from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.run_selector import run_selector
+from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.table import DataTable
+from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
 from plateviz.plots.gallery import source_figures
 from plateviz.plots.survey_figure import SourceFigure
+from plateviz.plots.workspace import SourceWorkspace
 from plateviz.reports.summary_strip import strip
 from plateviz.tables import (
     motion_table,
@@ -47,23 +51,29 @@ _NO_SOURCES = (
 class SourcePage(pn.viewable.Viewer):
     """The Source view: the source that was found, or the list of all sources."""
 
-    def __init__(self, navigation: Navigation, **params: object) -> None:
-        """Follow the source of `navigation`."""
+    def __init__(
+        self, navigation: Navigation, wake: Callable[..., object], **params: object
+    ) -> None:
+        """Follow the source of `navigation`.
+
+        Parameters
+        ----------
+        wake : called when a figure may have become due to be drawn
+        """
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
         self._invitation = _INVITATION
-        self._head, self._motion = markup_pane(), markup_pane()
+        self._head, self._strip, self._motion = markup_pane(), markup_pane(), markup_pane()
         self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row)
         self._list = DataTable(SOURCES_OF_RUN, self._open_source, page_size=20)
-        self.figures = FigureGrid([self._figure_view(figure) for figure in source_figures()])
-        self._rest = pmui.Column(
-            heading("Motion"),
-            self._motion,
-            self.figures,
-            heading("Orbits"),
-            self._orbits,
-            sizing_mode="stretch_width",
+        self.figures = FigureGrid([self._figure_view(f) for f in source_figures()], wake)
+        self._stack = Stack(
+            {
+                SourceWorkspace.MOTION: lambda: workspace(self.figures, self._strip),
+                SourceWorkspace.ORBITS: self._numbers,
+            }
         )
+        self._rest = pmui.Column(self._stack, sizing_mode="stretch_width", margin=0)
         self._choice = pmui.Column(
             NotableSourceLink(navigation), self._list, sizing_mode="stretch_width"
         )
@@ -86,7 +96,9 @@ class SourcePage(pn.viewable.Viewer):
         self._entry.param.watch(lambda event: navigation.find_source(event.new), "value")
         navigation.param.watch(self._list_sources, "run_name")
         navigation.param.watch(self._show, ["run_name", "found", "message"])
+        navigation.param.watch(self._show_workspace, "source_workspace")
         self._session.param.watch(self._show, "theme")
+        self._show_workspace()
         self._list_sources()
         self._show()
 
@@ -94,9 +106,25 @@ class SourcePage(pn.viewable.Viewer):
         """Return the page without its sidebar."""
         return self._column
 
+    def _numbers(self) -> pn.viewable.Viewable:
+        return pmui.Column(
+            heading("Motion"),
+            self._motion,
+            heading("Orbits"),
+            self._orbits,
+            sizing_mode="stretch_width",
+        )
+
     def _figure_view(self, figure: SourceFigure) -> FigureView:
-        links = {"orbit_id": self._open_orbit}
-        return FigureView(figure, partial(self._plot, figure), links=links)
+        return FigureView(
+            figure,
+            partial(self._plot, figure),
+            links={"orbit_id": self._open_orbit},
+            theme=self._session.theme,
+        )
+
+    def _show_workspace(self, *_: object) -> None:
+        self._stack.show(self._navigation.source_workspace)
 
     def _plot(self, figure: SourceFigure) -> Figure | None:
         found = self._navigation.found
@@ -121,8 +149,9 @@ class SourcePage(pn.viewable.Viewer):
         kind = source_class(found.history)
         title = titled(f"{kind.capitalize()} source", str(found.source_id))
         verdict = judged(source_verdict(found.history, found.motion))
+        self._head.object = themed(f"<div class='head'>{verdict}{title}</div>", theme)
         items = strip(source_strip(found.history, found.motion))
-        self._head.object = themed(verdict + title + items, theme)
+        self._strip.object = themed(items, theme)
         if found.motion is None:
             words = "Motions are fitted once all orbits of the run are fitted."
             self._motion.object = paragraph(words, "caption", theme)

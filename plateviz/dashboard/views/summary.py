@@ -1,24 +1,68 @@
-"""SummaryView: whether to trust a solution, in words and as numbers in one strip."""
+"""HeadView: the verdict on the solution on the screen; StripView: the numbers that it rests on."""
 
 import panel as pn
 
+from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Session, Solution, Stage
 from plateviz.dashboard.views.markup import judged, markup_pane, paragraph, titled
+from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.reports.summary_strip import strip
 from plateviz.tables import summary_strip
-from plateviz.tables.verdict import orbit_verdict
+from plateviz.tables.verdict import Verdict, orbit_verdict
 from solver.data.result import FitResult
 
 
-class SummaryView(pn.viewable.Viewer):
-    """The verdict on the solution on the screen, its strip, and that of the one compared with."""
+class HeadView(pn.viewable.Viewer):
+    """The verdict on the solution on the screen, and which solutions are shown.
+
+    In the Verdict workspace the reasons are open, unless the verdict is good.
+    """
+
+    def __init__(self, navigation: Navigation, **params: object) -> None:
+        """Follow `navigation` and its session."""
+        super().__init__(**params)
+        self._navigation, self._session = navigation, navigation.session
+        self._head = markup_pane()
+        self._judged: tuple[FitResult, Verdict] | None = None
+        self._session.param.watch(self._write, ["shown", "other", "stage", "theme"])
+        navigation.param.watch(self._write, "orbit_workspace")
+        self._write()
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the head."""
+        return self._head
+
+    def _write(self, *_: object) -> None:
+        session = self._session
+        shown, other = session.shown, session.other
+        if shown is None:
+            text = session.message if session.stage is Stage.FAILED else "No solution yet."
+            self._head.object = paragraph(text, "empty", session.theme)
+            return
+        is_open = self._navigation.orbit_workspace is OrbitWorkspace.VERDICT
+        names = [_name(shown, "(B) Solution" if other else "Solution")]
+        if other is not None:
+            names.append(_name(other, "(A) Compared with solution"))
+        stale = " stale" if session.stage is Stage.STALE else ""
+        self._head.object = (
+            f"<div class='head {session.theme}{stale}'>"
+            f"{judged(self._verdict(shown.result), is_open=is_open)}{''.join(names)}</div>"
+        )
+
+    def _verdict(self, result: FitResult) -> Verdict:
+        if self._judged is None or self._judged[0] is not result:
+            self._judged = (result, orbit_verdict(result))
+        return self._judged[1]
+
+
+class StripView(pn.viewable.Viewer):
+    """The summary strip of the solution on the screen, and of the one compared with."""
 
     def __init__(self, session: Session, **params: object) -> None:
         """Follow `session`."""
         super().__init__(**params)
         self._session = session
         self._strip = markup_pane()
-        self._judged: tuple[FitResult, str] | None = None
         session.param.watch(self._write, ["shown", "other", "stage", "theme"])
         self._write()
 
@@ -28,26 +72,16 @@ class SummaryView(pn.viewable.Viewer):
 
     def _write(self, *_: object) -> None:
         session = self._session
-        shown, other = session.shown, session.other
-        if shown is None:
-            text = session.message if session.stage is Stage.FAILED else "No solution yet."
-            self._strip.object = paragraph(text, "empty", session.theme)
-            return
-        rows = [
-            self._verdict(shown.result),
-            _row(shown, "(B) Solution" if other else "Solution"),
+        solutions = [one for one in (session.shown, session.other) if one is not None]
+        letters = ("<b>(B)</b>", "<b>(A)</b>") if len(solutions) > 1 else [""] * len(solutions)
+        strips = [
+            f"<div class='lettered'>{letter}{strip(summary_strip(one.result))}</div>"
+            for letter, one in zip(letters, solutions, strict=True)
         ]
-        if other is not None:
-            rows.append(_row(other, "(A) Compared with solution"))
         stale = " stale" if session.stage is Stage.STALE else ""
-        self._strip.object = f"<div class='{session.theme}{stale}'>{''.join(rows)}</div>"
-
-    def _verdict(self, result: FitResult) -> str:
-        if self._judged is None or self._judged[0] is not result:
-            self._judged = (result, judged(orbit_verdict(result)))
-        return self._judged[1]
+        self._strip.object = f"<div class='{session.theme}{stale}'>{''.join(strips)}</div>"
 
 
-def _row(solution: Solution, role: str) -> str:
+def _name(solution: Solution, role: str) -> str:
     of_orbit = "" if solution.orbit is None else f" of orbit {solution.orbit}"
-    return titled(role + of_orbit, solution.label) + strip(summary_strip(solution.result))
+    return titled(role + of_orbit, solution.label)

@@ -1,5 +1,6 @@
 """SurveyPage: the orbits of a run and the quality of their fits, and figures of the survey."""
 
+from collections.abc import Callable
 from functools import partial
 
 import pandas as pd
@@ -18,10 +19,13 @@ from plateviz.dashboard.views.markup import (
 )
 from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.run_selector import run_selector
+from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.table import DataTable
+from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
 from plateviz.plots.gallery import survey_figures
 from plateviz.plots.survey_figure import SurveyFigure
+from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.reports.summary_strip import strip
 from plateviz.runs.load_tables import survey_tables
 from plateviz.tables import orbit_list, orbit_states, run_strip
@@ -39,37 +43,57 @@ _INCOMPLETE = (
 class SurveyPage(pn.viewable.Viewer):
     """The Survey view: the run on the screen."""
 
-    def __init__(self, navigation: Navigation, **params: object) -> None:
-        """Follow the run of `navigation`."""
+    def __init__(
+        self, navigation: Navigation, wake: Callable[..., object], **params: object
+    ) -> None:
+        """Follow the run of `navigation`.
+
+        Parameters
+        ----------
+        wake : called when a figure may have become due to be drawn
+        """
         super().__init__(**params)
-        self._navigation, self._session = navigation, navigation.session
+        self._navigation, self._wake = navigation, wake
+        self._session = navigation.session
+        self._grids: dict[SurveyWorkspace, FigureGrid] = {}
         self._tables: SurveyTables | None = None
         self._orbits = self._motions = pd.DataFrame()
-        self._head = markup_pane()
-        self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=15)
-        self.figures = FigureGrid([self._figure_view(figure) for figure in survey_figures()])
-        self._rest = pmui.Column(
-            NotableSourceLink(navigation),
-            heading("Orbits"),
-            self._table,
-            self.figures,
-            sizing_mode="stretch_width",
-        )
-        self._column = pmui.Column(self._head, self._rest, sizing_mode="stretch_width")
+        self._head, self._strip = markup_pane(), markup_pane()
+        self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=8)
+        self._stack = Stack({one: partial(self._workspace, one) for one in SurveyWorkspace})
+        self._below = pmui.Column(self._stack, sizing_mode="stretch_width", margin=0)
+        self._column = pmui.Column(self._head, self._below, sizing_mode="stretch_width", margin=0)
         self.sidebar = pmui.Column(
             heading("Shown"), *run_selector(navigation), sizing_mode="stretch_width", margin=0
         )
         navigation.param.watch(self._read, "run_name")
+        navigation.param.watch(self._show_workspace, "survey_workspace")
         self._session.param.watch(self._show, "theme")
+        self._show_workspace()
         self._read()
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the page without its sidebar."""
         return self._column
 
+    @property
+    def figures(self) -> FigureGrid:
+        """The figures of the workspace on the screen."""
+        return self._grids[self._navigation.survey_workspace]
+
+    def _workspace(self, one: SurveyWorkspace) -> pn.viewable.Viewable:
+        is_first = one is SurveyWorkspace.VERDICT
+        views = [self._figure_view(f) for f in survey_figures() if f.workspace is one]
+        grid = FigureGrid(views, self._wake, columns=1 if is_first else 2)
+        self._grids[one] = grid
+        above = [self._strip, NotableSourceLink(self._navigation), self._table]
+        return workspace(grid, *(above if is_first else ()))
+
     def _figure_view(self, figure: SurveyFigure) -> FigureView:
         links = {"id": self._navigation.open_source, "orbit_id": self._open_orbit}
-        return FigureView(figure, partial(self._plot, figure), links=links)
+        return FigureView(
+            figure, partial(self._plot, figure), links=links, theme=self._session.theme
+        )
 
     def _plot(self, figure: SurveyFigure) -> Figure | None:
         run = self._navigation.run
@@ -89,19 +113,23 @@ class SurveyPage(pn.viewable.Viewer):
 
     def _show(self, *_: object) -> None:
         theme, words = self._session.theme, self._navigation.why_no_run
-        self._rest.visible = not words
+        self._below.visible = not words
         if words:
             self._head.object = paragraph(words, "empty", theme)
             return
         title = titled("Run", self._navigation.run_name)
         verdict = judged(run_verdict(self._orbits, self._motions))
-        numbers = strip(run_strip(self._orbits, self._motions))
-        head = themed(verdict + title + numbers, theme)
+        head = f"<div class='head'>{verdict}{title}</div>"
+        self._strip.object = themed(strip(run_strip(self._orbits, self._motions)), theme)
         if (self._orbits["status"] == MISSING).any():
             head += paragraph(_INCOMPLETE, "caption", theme)
-        self._head.object = head
+        self._head.object = themed(head, theme)
         self._table.show(orbit_list(self._orbits), theme, orbit_states(self._orbits))
-        self.figures.change(theme)
+        for grid in self._grids.values():
+            grid.change(theme)
+
+    def _show_workspace(self, *_: object) -> None:
+        self._stack.show(self._navigation.survey_workspace)
 
     def _open_row(self, row: pd.Series) -> None:
         self._open_orbit(str(row["orbit_id"]))

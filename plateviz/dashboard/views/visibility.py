@@ -1,32 +1,52 @@
-"""Visibility: whether a part of the page is on or near the screen."""
+"""Visibility: whether a part of the page is on or near the screen, and how large it is."""
 
 import panel as pn
 import param
 
 
 class Visibility(pn.custom.JSComponent):
-    """A background of its container, of the same size, that reports when it is near the screen.
+    """A background of its container, of the same size, that reports that size and where it is.
 
-    A part without a layout, such as one in a hidden view, is not near.
+    A part without a layout, such as one in a hidden view, is not near, and keeps its last size.
     """
 
     is_near = param.Boolean(default=False, doc="whether it is on the screen or close to it")
+    room = param.List(default=[0, 0], item_type=int, doc="width and height, screen pixels")
 
     # The page scrolls inside a container, beyond whose edge only `scrollMargin` reaches. A browser
     # that does not support it reports only what is on the screen.
     _esm = """
     export function render({ model, el }) {
-      const near = "600px 0px"
-      const observer = new IntersectionObserver(
-        entries => { model.is_near = entries.at(-1).isIntersecting },
-        { rootMargin: near, scrollMargin: near },
-      )
-      observer.observe(el.getRootNode().host)
-      model.on("remove", () => observer.disconnect())
+      const near = "300px 0px", host = el.getRootNode().host
+      const measure = box => {
+        const room = [Math.round(box.width), Math.round(box.height)]
+        if (room[0] > 0 && room[1] > 0 && `${room}` !== `${model.room}`) model.room = room
+      }
+      const place = new IntersectionObserver(entries => {
+        const last = entries.at(-1)
+        if (last.isIntersecting) measure(last.boundingClientRect)
+        model.is_near = last.isIntersecting
+      }, { rootMargin: near, scrollMargin: near })
+      // While an edge of the window is dragged, only the last size is drawn.
+      let waiting = null
+      const size = new ResizeObserver(entries => {
+        clearTimeout(waiting)
+        waiting = setTimeout(() => measure(host.getBoundingClientRect()), 120)
+      })
+      place.observe(host)
+      size.observe(host)
+      model.on("remove", () => { place.disconnect(); size.disconnect() })
     }
     """
 
     def __init__(self, **params: object) -> None:
         """Fill the nearest positioned ancestor."""
-        behind = {"position": "absolute", "inset": "0", "z-index": "-1", "pointer-events": "none"}
+        behind = {
+            "position": "absolute",
+            "inset": "0",
+            "width": "100%",
+            "height": "100%",
+            "z-index": "-1",
+            "pointer-events": "none",
+        }
         super().__init__(styles=behind, margin=0, **params)

@@ -8,6 +8,7 @@ import pytest
 
 from plateviz.dashboard.navigation import Navigation, View
 from plateviz.dashboard.session import Session, Stage
+from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.solving.origin import OrbitFiles, SurveyFolder
 from plateviz.solving.solution_store import SolutionStore
 from solver.data.settings import FitSettings
@@ -224,9 +225,26 @@ def test_address_with_a_selection_only_opens_the_orbit_view(navigation):
     assert (navigation.view, navigation.session.shown.orbit) == (View.ORBIT, 0)
 
 
+def test_each_view_keeps_its_workspace_and_the_address_has_that_on_the_screen(navigation):
+    navigation.turn_to(View.ORBIT)
+    navigation.turn_to_workspace(OrbitWorkspace.SKY)
+    navigation.turn_to(View.SURVEY)
+    assert navigation.address()["workspace"] == "verdict"
+    navigation.turn_to(View.ORBIT)
+    assert navigation.address()["workspace"] == "sky"
+    assert navigation.workspaces_of_view == list(OrbitWorkspace)
+
+
+def test_address_restores_the_workspace(navigation):
+    navigation.begin({"view": "orbit", "workspace": "weak-directions"})
+    assert navigation.workspace is OrbitWorkspace.WEAK_DIRECTIONS
+
+
 def test_invalid_address_is_ignored(navigation):
-    navigation.begin({"view": "moon", "run": "../../etc", "source": "\x00", "who": "me"})
+    wrong = {"view": "moon", "workspace": "sky", "run": "../../etc", "source": "\x00", "who": "me"}
+    navigation.begin(wrong)
     assert (navigation.view, navigation.run_name) == (View.SURVEY, "default")
+    assert navigation.workspace is SurveyWorkspace.VERDICT
     assert navigation.found is None
 
 

@@ -105,6 +105,7 @@ def test_following_keeps_the_models_and_sends_what_differs(framed_glyphs, marks)
         "reset_start",
         "reset_end",
         "frame_height",
+        "desired_num_ticks",
     }
     (frame,) = drawn.frames
     assert frame.plot.title.text == "Two"

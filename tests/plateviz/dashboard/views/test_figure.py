@@ -30,6 +30,10 @@ def view(drawn):
     return FigureView(diagnostics()[0], draw, waiting="Nothing yet.")
 
 
+def come_near(view, room=(500, 400)):
+    view.visibility.param.update(is_near=True, room=list(room))
+
+
 def plot(view):
     return view._body[0].object.children[0][0]
 
@@ -45,13 +49,27 @@ def text(view):
 def test_figure_is_due_only_near_the_screen(view):
     assert not view.is_due
     view.visibility.is_near = True
+    assert not view.is_due
+    come_near(view)
     assert view.is_due
     view.draw()
     assert not view.is_due
 
 
+def test_drawn_figure_follows_its_room_without_being_plotted_again(view, drawn):
+    come_near(view)
+    view.draw()
+    assert plot(view).frame_width < 500
+    come_near(view, (900, 400))
+    assert view.is_due
+    view.draw()
+    assert 800 < plot(view).frame_width < 900
+    assert not view.is_due
+    assert len(drawn) == 1
+
+
 def test_change_away_from_the_screen_waits_and_fades_the_figure(view, drawn):
-    view.visibility.is_near = True
+    come_near(view)
     view.draw()
     assert opacity(view) == "1"
     view.visibility.is_near = False
@@ -65,6 +83,7 @@ def test_change_away_from_the_screen_waits_and_fades_the_figure(view, drawn):
 
 
 def test_drawn_figure_follows_in_place(view):
+    come_near(view)
     view.draw()
     first = plot(view)
     assert first.renderers[0].data_source.data["id"].tolist() == ["7"]
@@ -122,12 +141,12 @@ def test_grid_draws_a_few_figures_near_the_screen_at_a_time():
         FigureView(diagnostic, lambda name=diagnostic.name: drawn.append(name))
         for diagnostic in diagnostics()[:6]
     ]
-    grid, calls = FigureGrid(views), []
-    grid.on_visibility(calls.append)
+    calls = []
+    grid = FigureGrid(views, lambda *events: calls.extend(events))
     assert not grid.is_due
     for view in views[1:]:
-        view.visibility.is_near = True
-    assert len(calls) == 5
+        come_near(view)
+    assert len(calls) >= 5
     grid.draw_due()
     assert grid.is_due
     assert drawn == [d.name for d in diagnostics()[1 : 1 + len(drawn)]]

@@ -5,13 +5,19 @@ import pytest
 from plateviz.dashboard.views.markup import judged
 from plateviz.tables.verdict import Verdict
 
+VERDICT = Verdict("warn", "The headline.", ["A reason."], ["What stands out."])
+
 
 @pytest.mark.parametrize(("state", "is_open"), [("good", False), ("warn", True), ("bad", True)])
 def test_reasons_of_a_verdict_are_open_unless_it_is_good(state, is_open):
-    html = judged(Verdict(state, "The headline.", ["A reason."], ["What stands out."]))
+    html = judged(VERDICT._replace(state=state))
     assert html.startswith(f"<details class='verdict {state}'{' open' if is_open else ''}>")
     assert "<summary>The headline.</summary>" in html
     assert "<li>A reason.</li><li>What stands out.</li>" in html
+
+
+def test_reasons_can_be_closed_at_first():
+    assert judged(VERDICT, is_open=False).startswith("<details class='verdict warn'><summary>")
 
 
 def test_verdict_is_text():

@@ -1,0 +1,31 @@
+"""A workspace: cards that fill the screen below what stands above them."""
+
+import panel_material_ui as pmui
+
+from plateviz.dashboard.views.figure import FigureGrid, Part
+
+# Screen pixels above a workspace: the page's bar, the switches, the verdict.
+_ABOVE = 170
+
+
+def workspace(grid: FigureGrid, *above: Part) -> pmui.FlexBox:
+    """Return a workspace as high as the rest of the window, or higher where its cards need it.
+
+    Parameters
+    ----------
+    above : what stands above the cards
+    """
+    rows = ["auto"] * len(above) + ["minmax(0, 1fr)"]
+    return pmui.FlexBox(
+        *above,
+        grid,
+        sx={
+            "display": "grid",
+            "gridTemplateColumns": "minmax(0, 1fr)",
+            "gridTemplateRows": " ".join(rows),
+            "gap": "8px",
+            "minHeight": f"calc(100vh - {_ABOVE}px)",
+        },
+        sizing_mode="stretch_width",
+        margin=0,
+    )

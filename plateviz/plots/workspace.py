@@ -1,0 +1,40 @@
+"""The workspaces of each page of the dashboard: parts that fit a screen, in page order.
+
+Every figure of a page names its workspace; reports and notebooks show the figures in page order.
+"""
+
+from enum import StrEnum
+
+
+class OrbitWorkspace(StrEnum):
+    """Workspaces of the Orbit page; `VERDICT` shows the key figures of the others small."""
+
+    VERDICT = "verdict"
+    RESIDUALS = "residuals"
+    SKY = "sky"
+    CALIBRATION = "calibration"
+    WEAK_DIRECTIONS = "weak-directions"
+    ORDERS = "orders-and-comparison"
+
+
+class SurveyWorkspace(StrEnum):
+    """Workspaces of the Survey page."""
+
+    VERDICT = "verdict"
+    ACCURACY = "accuracy"
+    CATALOGUE = "catalogue"
+
+
+class SourceWorkspace(StrEnum):
+    """Workspaces of the Source page."""
+
+    MOTION = "motion"
+    ORBITS = "orbits-and-numbers"
+
+
+Workspace = OrbitWorkspace | SurveyWorkspace | SourceWorkspace
+
+
+def title_of(workspace: Workspace) -> str:
+    """Return the displayed title of a workspace."""
+    return workspace.value.replace("-", " ").capitalize()

@@ -1,0 +1,109 @@
+"""A figure in another size."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plateviz.figures.figure import Axis, Figure, Ramp, framed, side_by_side
+from plateviz.figures.glyphs import line, points
+from plateviz.figures.resized import resized
+
+X = Axis("x (mm)", (0.0, 10.0))
+TABLE = {"x": [1.0], "y": [1.0], "n": [3.0]}
+
+
+def frame(*, height=100, y=(0.0, 5.0), glyphs=(), **words):
+    marks = [points(TABLE, "x", "y", name="marks", color="mark"), *glyphs]
+    return framed(marks, title="Marks", x=X, y=Axis("y (mm)", y), width=200, height=height, **words)
+
+
+def sizes(figure):
+    return [(one.width, one.frame_height) for one in figure]
+
+
+def test_frame_fills_the_area_around_its_axes_and_words():
+    ((width, height),) = sizes(resized(frame(), 800, 400))
+    assert 640 < width < 800
+    assert 260 < height < 400
+
+
+def test_equal_scales_of_both_axes_are_kept():
+    for area in ((900, 300), (300, 900)):
+        ((width, height),) = sizes(resized(frame(height=None), *area))
+        assert width == pytest.approx(2 * height, abs=1)
+        assert width < area[0]
+        assert height < area[1]
+
+
+def test_only_sizes_and_columns_differ():
+    before = frame()
+    after = resized(before, 800, 400)
+    assert replace(after[0], width=200, height=100).glyphs == before[0].glyphs
+    assert (after[0].x, after[0].title) == (before[0].x, before[0].title)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        {"subtitle": "one line of words"},
+        {"glyphs": [line([0, 1], [0, 1], name="l", color="mark", label="a line")]},
+    ],
+)
+def test_words_and_legend_take_height(words):
+    more = frame(**words, legend_columns=1)
+    assert sizes(resized(more, 800, 400))[0][1] < sizes(resized(frame(), 800, 400))[0][1]
+
+
+def test_legend_has_as_many_columns_as_fit():
+    names = np.array(["a class of sources", "another class of sources"], dtype=object)
+    table = {"x": [1.0, 2.0], "y": [1.0, 2.0], "kind": names}
+    kinds = points(table, "x", "y", name="kinds", color="mark", label="@kind")
+    wide, narrow = (resized(frame(glyphs=[kinds], legend_columns=9), w, 400) for w in (800, 300))
+    assert [wide[0].legend_columns, narrow[0].legend_columns] == [2, 1]
+    assert sizes(narrow)[0][1] < sizes(wide)[0][1]
+
+
+def test_words_are_left_out_where_they_would_take_most_of_the_height():
+    wordy = frame(subtitle="word " * 200)
+    small, large = resized(wordy, 300, 300), resized(wordy, 1500, 900)
+    assert small[0].subtitle == ""
+    assert large[0].subtitle == wordy[0].subtitle
+
+
+def test_frames_of_a_row_have_one_height():
+    row = side_by_side([frame(subtitle="a line"), frame(subtitle="")], columns=2)
+    assert len({height for _, height in sizes(resized(row, 900, 300))}) == 1
+
+
+def test_long_tick_labels_take_width():
+    long = Axis("", (0.0, 1.0), ticks=((0.5, "a label of many words"),))
+    labelled = framed([], title="Marks", x=X, y=long, width=200, height=100)
+    assert sizes(resized(labelled, 800, 400))[0][0] < sizes(resized(frame(), 800, 400))[0][0]
+
+
+def test_colour_bar_takes_width():
+    ramp = Ramp("n", "count", (0.0, 5.0), label="number")
+    barred = frame(glyphs=[points(TABLE, "x", "y", name="barred", color=ramp)])
+    assert sizes(resized(barred, 800, 400))[0][0] < sizes(resized(frame(), 800, 400))[0][0]
+
+
+def test_turned_labels_take_height():
+    long = Axis("", (0.0, 1.0), ticks=((0.5, "a label of many words"),), rotation=30.0)
+    turned = framed([], title="Marks", x=long, y=X, width=200, height=100)
+    assert sizes(resized(turned, 800, 400))[0][1] < sizes(resized(frame(), 800, 400))[0][1]
+
+
+@pytest.mark.parametrize(("area", "columns"), [((1500, 300), 3), ((300, 1200), 1)])
+def test_frames_are_arranged_so_that_they_are_largest(area, columns):
+    three = side_by_side([frame(height=None)] * 3, columns=2)
+    assert resized(three, *area).columns == columns
+
+
+def test_frames_above_one_another_with_one_x_axis_stay_so():
+    two = side_by_side([frame()] * 2, columns=1, linked="x")
+    assert resized(two, 1500, 300).columns == 1
+
+
+def test_smallest_area_has_a_frame():
+    assert min(sizes(resized(Figure(frame().frames * 4, 2), 0, 0))[0]) > 0

@@ -14,7 +14,7 @@ from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.pages import Pages
 from plateviz.solving.solution_store import SolutionStore
 
-_TICK_MILLISECONDS = 50
+_TICK_MILLISECONDS = 30
 _SIDEBAR_WIDTH = 300
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
@@ -90,7 +90,7 @@ def _write_address(navigation: Navigation) -> None:
 
 
 class _Ticker:
-    """Polls the job and draws the figures that are due, while there are any.
+    """Polls the job, draws the figures that are due and completes the page, while there is need.
 
     The page polls because a job belongs to the server and may outlive the page.
     """
@@ -103,17 +103,13 @@ class _Ticker:
         self._pages: Pages | None = None
 
     def follow(self, navigation: Navigation, pages: Pages) -> None:
-        """Begin once the page has loaded; drawing before would delay it."""
+        """Tick from now on when something may have changed."""
+        self._navigation, self._pages = navigation, pages
         session = navigation.session
         session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
         session.selection.param.watch(self.wake, ["field", "plates", "detector"])
         navigation.param.watch(self.wake, ["view", *WORKSPACES.values(), "run_name", "found"])
-
-        def begin() -> None:
-            self._navigation, self._pages = navigation, pages
-            self.wake()
-
-        pn.state.onload(begin)
+        pn.state.onload(self.wake)
 
     def wake(self, *_: object) -> None:
         """Tick until nothing is left to do."""
@@ -126,7 +122,7 @@ class _Ticker:
         session = self._navigation.session
         session.poll()
         self._pages.draw_due()
-        if session.job is None and not self._pages.is_due:
+        if session.job is None and not self._pages.is_due and not self._pages.complete():
             self._callback.stop()
 
 

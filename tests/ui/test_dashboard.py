@@ -132,9 +132,11 @@ def test_a_figure_is_explained_and_opens_as_large_as_the_window(page):
 def test_workspaces_fit_the_screen(page):
     for workspace in OrbitWorkspace:
         turn_to_workspace(page, workspace)
+        page.wait_for_url(f"**workspace={workspace.value}**")
         cards = page.locator(".card:visible")
-        cards.first.wait_for()
-        boxes = [card.bounding_box() for card in cards.all()]
+        cards.first.locator("canvas").first.wait_for(state="attached")
+        boxes = cards.evaluate_all("cards => cards.map(card => card.getBoundingClientRect())")
+        assert len(boxes) > 1
         assert all(box["x"] + box["width"] <= 1500 for box in boxes), workspace
         # The strip of the Verdict workspace takes more of this window than of a large screen.
         room = 1100 if workspace is OrbitWorkspace.VERDICT else 1000

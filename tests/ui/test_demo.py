@@ -6,7 +6,8 @@ import time
 import pytest
 from playwright.sync_api import expect
 
-from tests.ui.conftest import see, serving
+from plateviz.plots.workspace import SurveyWorkspace
+from tests.ui.conftest import see, serving, turn_to_workspace
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -46,6 +47,7 @@ def _see_demo(tmp_path, open_page, program, orbits):
         page.goto(address)
         expect(page.get_by_text(complete).first).to_be_visible()
         see(page, "motion-pulls")
+        turn_to_workspace(page, SurveyWorkspace.VERDICT)
         page.get_by_role("button", name="Most significant motion").first.click()
         see(page, "time-series")
         expect(page.locator(".strip").get_by_text("Rms from the truth, 2-D")).to_be_visible()

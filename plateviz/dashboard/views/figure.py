@@ -17,7 +17,7 @@ from plateviz.figures.figure import Figure
 from plateviz.figures.resized import resized
 from solver.errors import InputError
 
-_BATCH = 2
+_BATCH = 1
 # Screen pixels between the edge of a card and its figure.
 _INSET = 4
 # Fills its card, whatever it shows.

@@ -39,12 +39,12 @@ class OrbitPage(pn.viewable.Viewer):
         self._session = session = navigation.session
         self._grids: dict[OrbitWorkspace, FigureGrid] = {}
         self._selected: list[FigureView] = []
+        self._is_complete = False
         self._stack = Stack({one: partial(self._workspace, one) for one in OrbitWorkspace})
         self.sidebar = pmui.Column(
             heading("Shown"),
             SelectionView(navigation),
             heading("Refit"),
-            RefitView(session),
             sizing_mode="stretch_width",
             margin=0,
         )
@@ -60,6 +60,16 @@ class OrbitPage(pn.viewable.Viewer):
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the page without its sidebar."""
         return self._column
+
+    def complete(self) -> bool:
+        """Make the controls of a refit unless they are there; return whether they were not.
+
+        They are many, and the figures do not wait for them.
+        """
+        was_complete, self._is_complete = self._is_complete, True
+        if not was_complete:
+            self.sidebar.append(RefitView(self._session))
+        return not was_complete
 
     @property
     def figures(self) -> FigureGrid:

@@ -72,6 +72,11 @@ class Pages(pn.viewable.Viewer):
         """Draw the first few figures that are due on the screen."""
         self._page(self._navigation.view).figures.draw_due()
 
+    def complete(self) -> bool:
+        """Make a part of the page that can wait for the figures; return whether there was one."""
+        page = self._page(self._navigation.view)
+        return isinstance(page, OrbitPage) and page.complete()
+
     def _page(self, view: View) -> Page:
         if view not in self._pages:
             self._pages[view] = _TYPES[view](self._navigation, self._wake)

@@ -1,7 +1,6 @@
 """RefitView: request fits and what-ifs of the orbit, show their progress, and cancel them."""
 
 from html import escape
-from typing import Any
 
 import panel as pn
 import panel_material_ui as pmui
@@ -24,7 +23,7 @@ class RefitView(pn.viewable.Viewer):
         """Follow `session`."""
         super().__init__(**params)
         self._session = session
-        self._widths = {group.name: self._width_input(group) for group in PARAMETERS}
+        self._widths: dict[str, pmui.TextInput] = {}
         self._reset = pmui.Button(label="The paper's priors", variant="text", size="small")
         self._fit = pmui.Button(label="Fit", color="primary", sizing_mode="stretch_width")
         self._keep = pmui.Button(
@@ -73,13 +72,7 @@ class RefitView(pn.viewable.Viewer):
         self._show_solutions()
 
     def _priors_card(self) -> pmui.Card:
-        entries: list[Any] = [
-            *self._widths.values(),
-            *_controls(self._session.choices, PriorShifts),
-            self._reset,
-        ]
-        return pmui.Card(
-            *entries,
+        card = pmui.Card(
             title="Priors",
             collapsed=True,
             sizing_mode="stretch_width",
@@ -87,6 +80,16 @@ class RefitView(pn.viewable.Viewer):
             elevation=0,
             variant="outlined",
         )
+
+        def fill(*_: object) -> None:
+            if not self._widths:
+                self._widths = {group.name: self._width_input(group) for group in PARAMETERS}
+                shifts = _controls(self._session.choices, PriorShifts)
+                card[:] = [*self._widths.values(), *shifts, self._reset]
+
+        # They are many; most people never open them.
+        card.param.watch(fill, "collapsed")
+        return card
 
     def _width_input(self, group: Group) -> pmui.TextInput:
         entry = pmui.TextInput(
@@ -108,8 +111,8 @@ class RefitView(pn.viewable.Viewer):
         self._session.choices.param.update(prior_widths=default_widths(), prior_shifts="")
 
     def _show_widths(self, *_: object) -> None:
-        for name, text in self._session.choices.prior_widths.items():
-            self._widths[name].value = text
+        for name, entry in self._widths.items():
+            entry.value = self._session.choices.prior_widths[name]
 
     def _show_stage(self, *_: object) -> None:
         stage, message = self._session.stage, self._session.message

@@ -56,7 +56,7 @@ class HeadView(pn.viewable.Viewer):
 
 
 class StripView(pn.viewable.Viewer):
-    """The summary strip of the solution on the screen, and of the one compared with."""
+    """The summary strip of the solution on the screen, and where the one compared with differs."""
 
     def __init__(self, session: Session, **params: object) -> None:
         """Follow `session`."""
@@ -72,12 +72,17 @@ class StripView(pn.viewable.Viewer):
 
     def _write(self, *_: object) -> None:
         session = self._session
-        solutions = [one for one in (session.shown, session.other) if one is not None]
-        letters = ("<b>(B)</b>", "<b>(A)</b>") if len(solutions) > 1 else [""] * len(solutions)
-        strips = [
-            f"<div class='lettered'>{letter}{strip(summary_strip(one.result))}</div>"
-            for letter, one in zip(letters, solutions, strict=True)
-        ]
+        if session.shown is None:
+            self._strip.object = ""
+            return
+        items = summary_strip(session.shown.result)
+        strips = [strip(items)]
+        if session.other is not None:
+            others = [one for one in summary_strip(session.other.result) if one not in items]
+            strips = [
+                f"<div class='lettered'><b>({letter})</b>{strip(shown)}</div>"
+                for letter, shown in (("B", items), ("A", others))
+            ]
         stale = " stale" if session.stage is Stage.STALE else ""
         self._strip.object = f"<div class='{session.theme}{stale}'>{''.join(strips)}</div>"
 

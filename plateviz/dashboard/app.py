@@ -103,13 +103,17 @@ class _Ticker:
         self._pages: Pages | None = None
 
     def follow(self, navigation: Navigation, pages: Pages) -> None:
-        """Tick from now on when something may have changed."""
-        self._navigation, self._pages = navigation, pages
+        """Begin once the page has loaded; drawing before would delay it."""
         session = navigation.session
         session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
         session.selection.param.watch(self.wake, ["field", "plates", "detector"])
         navigation.param.watch(self.wake, ["view", *WORKSPACES.values(), "run_name", "found"])
-        pn.state.onload(self.wake)
+
+        def begin() -> None:
+            self._navigation, self._pages = navigation, pages
+            self.wake()
+
+        pn.state.onload(begin)
 
     def wake(self, *_: object) -> None:
         """Tick until nothing is left to do."""

@@ -44,7 +44,8 @@ window.plateviz = (() => {
   };
   const isOnScreen = view => {
     const box = view.el.getBoundingClientRect();
-    return box.width > 0 && box.bottom > 0 && box.top < innerHeight;
+    return box.width > 0 && box.bottom > 0 && box.top < innerHeight
+      && view.el.checkVisibility({ visibilityProperty: true });
   };
   const plots = () => views().filter(view => view.model.type === 'Plot' && isOnScreen(view));
   const total = column => Array.from(column).reduce(

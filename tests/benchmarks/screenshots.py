@@ -1,0 +1,74 @@
+"""Take a screenshot of every workspace of the dashboard, in both themes and three sizes.
+
+    python tests/benchmarks/screenshots.py DIR OUTPUT [--source ID]
+
+DIR is a survey with a run, such as `plateviz simulate DIR && plateviz survey DIR` make. OUTPUT gets
+one PNG each, such as `orbit-sky-dark-1366x768.png`, and is made if it is not there.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from playwright.sync_api import Page
+
+# Import this checkout, whatever the working directory.
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace
+from tests.benchmarks.bench_browser import chromium, served
+from tests.benchmarks.machine import write
+
+_SIZES = ((1920, 1080), (1366, 768), (768, 1024))
+# Time for all figures of a workspace to be drawn.
+_DRAWN_MS = 4000
+
+
+def main() -> None:
+    arguments = parse_arguments()
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    with served(arguments.survey) as address, chromium() as open_page:
+        for width, height in _SIZES:
+            for name, query in queries(arguments.source):
+                page = open_page()
+                page.set_viewport_size({"width": width, "height": height})
+                page.goto(f"{address}?{query}")
+                page.wait_for_timeout(_DRAWN_MS)
+                for theme in ("light", "dark"):
+                    take(page, arguments.output / f"{name}-{theme}-{width}x{height}.png", theme)
+                page.close()
+
+
+def queries(source: str | None) -> Iterator[tuple[str, str]]:
+    """Iterate over the name and the address of each workspace."""
+    for view, workspaces, more in (
+        ("survey", SurveyWorkspace, ""),
+        ("orbit", OrbitWorkspace, "&orbit=0"),
+        ("source", SourceWorkspace if source else (), f"&source={source}"),
+    ):
+        for workspace in workspaces:
+            name = f"{view}-{workspace.value}"
+            yield name, f"view={view}&workspace={workspace.value}{more}"
+
+
+def take(page: Page, path: Path, theme: str) -> None:
+    """Write a screenshot in a theme; a page begins in the light one."""
+    if theme == "dark":
+        page.get_by_label("Toggle theme").click()
+        page.mouse.move(0, 0)
+    page.wait_for_timeout(_DRAWN_MS)
+    page.screenshot(path=path)
+    write(str(path))
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description="Take a screenshot of every workspace.")
+    parser.add_argument("survey", type=Path, metavar="DIR", help="a survey with a run")
+    parser.add_argument("output", type=Path, metavar="OUTPUT", help="directory of the screenshots")
+    parser.add_argument("--source", metavar="ID", help="source whose page is shown, too")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,6 +1,7 @@
 """The dashboard: one page per browser session, over a shared solution store."""
 
 from html import escape
+from urllib.parse import urlencode
 
 import panel as pn
 import panel_material_ui as pmui
@@ -12,6 +13,7 @@ from panel.io.resources import get_dist_path
 from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.pages import Pages
+from plateviz.dashboard.views.selection_bar import SelectionBar
 from plateviz.solving.solution_store import SolutionStore
 
 _TICK_MILLISECONDS = 30
@@ -23,12 +25,14 @@ def build_app(store: SolutionStore) -> pmui.Page:
     """Return the page of one session over `store`."""
     navigation, ticker, pages = _pages(store)
     session, title = navigation.session, f"plateviz · {store.title}"
+    bar = SelectionBar(navigation)
     page = pmui.Page(
         title=title,
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
+        header=[bar],
         sidebar=[pages.sidebar],
-        main=[pages],
+        main=[pages, bar.windows],
         sidebar_width=_SIDEBAR_WIDTH,
         theme_config={"typography": {"fontSize": 13}},
     )
@@ -50,7 +54,9 @@ def build_part(store: SolutionStore) -> pn.Row:
     navigation, ticker, pages = _pages(store)
     ticker.follow(navigation, pages)
     sidebar = pn.Column(pages.sidebar, width=_SIDEBAR_WIDTH)
-    return pn.Row(sidebar, pages, sizing_mode="stretch_width")
+    bar = SelectionBar(navigation)
+    main = pn.Column(bar, pages, bar.windows, sizing_mode="stretch_width")
+    return pn.Row(sidebar, main, sizing_mode="stretch_width")
 
 
 def _pages(store: SolutionStore) -> tuple[Navigation, "_Ticker", Pages]:
@@ -81,12 +87,14 @@ def _write_address(navigation: Navigation) -> None:
 
     def write(*_: object) -> None:
         if navigation.view is not View.ORBIT or navigation.session.shown is not None:
-            # Panel declares the values as mappings, but accepts strings.
-            location.update_query(**navigation.address())  # type: ignore[arg-type]
+            # As a whole: what is no longer selected is not in it.
+            location.search = f"?{urlencode(navigation.address(), safe=',')}"
 
     navigation.param.watch(write, ["view", *WORKSPACES.values(), "run_name", "found"])
     navigation.session.param.watch(write, "shown")
-    navigation.session.selection.param.watch(write, ["orbit", "field", "plates", "detector"])
+    navigation.session.selection.param.watch(
+        write, ["orbit", "field", "plates", "detector", "sources"]
+    )
 
 
 class _Ticker:
@@ -106,7 +114,7 @@ class _Ticker:
         """Begin once the page has loaded; drawing before would delay it."""
         session = navigation.session
         session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
-        session.selection.param.watch(self.wake, ["field", "plates", "detector"])
+        session.selection.param.watch(self.wake, ["field", "plates", "detector", "sources"])
         navigation.param.watch(self.wake, ["view", *WORKSPACES.values(), "run_name", "found"])
 
         def begin() -> None:

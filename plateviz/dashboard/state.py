@@ -15,16 +15,26 @@ from solver.data.text_setting import PriorWidths, Texts
 
 ALL = "all"
 _PLATES = re.compile(r"(-?\d+)-(-?\d+)")
+_SOURCES = re.compile(r"-?\d{1,19}(,-?\d{1,19})*")
+# Maximum number of sources in an address.
+_FEW = 20
+_LARGEST_ID = 2**63 - 1
 
 
 class Selection(param.Parameterized):
-    """The exposures and the detector that every view of the session shows."""
+    """The exposures, the detector and the sources that every view of the session shows.
+
+    Sources are selected by id, and stay selected in an orbit that has not measured them.
+    """
 
     orbit = param.Selector(doc="orbit on the screen")
     field = param.Selector(default=ALL, objects=[ALL], doc="field of the exposures, or all")
     plates = param.Range(default=(0, 0), bounds=(0, 0), step=1, doc="first and last exposure")
     detector = param.Selector(
         default=ALL, objects=[ALL], doc="detector of the residual map, or all"
+    )
+    sources = param.ClassSelector(
+        class_=frozenset, default=frozenset(), doc="ids of the selected sources"
     )
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
@@ -64,13 +74,21 @@ class Selection(param.Parameterized):
         if plates:
             requested["plates"] = tuple(sorted(int(number) for number in plates.groups()))
         self._requested = requested
+        if _SOURCES.fullmatch(address.get("sources", "")):
+            ids = map(int, address["sources"].split(",")[:_FEW])
+            self.sources = frozenset(one for one in ids if abs(one) <= _LARGEST_ID)
         orbits = {str(orbit): orbit for orbit in self.param["orbit"].objects}
         self.orbit = orbits.get(address.get("orbit", ""), self.orbit)
 
     def address(self) -> dict[str, str]:
-        """Return the selection as the query of the page's address; `restore` reads it back."""
+        """Return the selection as the query of the page's address; `restore` reads it back.
+
+        More than a few selected sources are left out.
+        """
         first, last = self.plates
         query = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
+        if 0 < len(self.sources) <= _FEW:
+            query["sources"] = ",".join(map(str, sorted(self.sources)))
         return query if self.orbit is None else {"orbit": str(self.orbit), **query}
 
     @property

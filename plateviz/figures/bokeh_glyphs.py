@@ -1,6 +1,6 @@
 """The Bokeh models of one glyph table: a renderer, its hover and its colour mapper."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
@@ -37,6 +37,8 @@ _DASHES: Mapping[str, str] = MappingProxyType(
 _TRANSPARENT = "rgba(0, 0, 0, 0)"
 # Maximum number of glyphs that one hover describes.
 _HOVER_LIMIT = 3
+# Rows of these kinds are selected by a column; the others are faded while some are.
+SELECTED_BY, _SELECTABLE, _FADED = "id", ("points", "segments"), 0.12
 
 
 class BokehGlyphs:
@@ -50,8 +52,15 @@ class BokehGlyphs:
         self._glyph = _GLYPHS[glyphs.kind](**glyphs.at)
         if glyphs.kind == "texts":
             self._glyph.update(text_font=Value(FONT))
+        self._faded: Glyph | None = None
+        if glyphs.kind in _SELECTABLE:
+            self._faded = _GLYPHS[glyphs.kind](**glyphs.at)
         self.renderer = models.GlyphRenderer(
-            data_source=self.source, glyph=self._glyph, name=glyphs.name
+            data_source=self.source,
+            glyph=self._glyph,
+            selection_glyph=None,
+            nonselection_glyph=self._faded,
+            name=glyphs.name,
         )
         self._mapper: models.ContinuousColorMapper | None = None
         self._categories: dict[str, models.CategoricalMapper] = {}
@@ -80,6 +89,8 @@ class BokehGlyphs:
         if not _is_same(self.source.data, columns):
             self.source.data = columns
         self._glyph.update(**glyphs.at, **values)
+        if self._faded is not None:
+            self._faded.update(**glyphs.at, **(values | _faded_looks(values, theme)))
         self.renderer.visible = True
         if self.hover is not None:
             self.hover.tooltips = list(glyphs.hover)
@@ -130,6 +141,12 @@ class BokehGlyphs:
         is_text = any(isinstance(look, str) for look in looks)
         columns[f"{name}_by"] = np.asarray(looks, dtype=object if is_text else float)
         return Field(f"{name}_by")
+
+
+def _faded_looks(names: Iterable[str], theme: Theme) -> dict[str, Value]:
+    """Return the looks of rows that are not selected, those among them that differ."""
+    looks = {"_alpha": Value(_FADED), "_color": Value(theme.muted)}
+    return {name: looks[name[-6:]] for name in names if name[-6:] in looks}
 
 
 def _ramps(glyphs: Glyphs) -> list[Ramp]:

@@ -83,10 +83,12 @@ def segments(
     alpha: Look = 1.0,
     keep: Mapping[str, object] | None = None,
 ) -> Glyphs:
-    """Return a straight stroke per row; `keep` has columns that a look needs."""
+    """Return a straight stroke per row; `keep` has other columns."""
     table = {"x0": x0, "y0": y0, "x1": x1, "y1": y1, **(keep or {})}
     looks = {"line_color": color, "line_width": width, "line_alpha": alpha}
-    return _glyphs("segments", name, table, _same("x0", "y0", "x1", "y1"), looks)
+    return _glyphs(
+        "segments", name, table, _same("x0", "y0", "x1", "y1"), looks, keep=list(keep or ())
+    )
 
 
 def rectangles(

@@ -70,7 +70,8 @@ def arrows(
 
     Parameters
     ----------
-    table : tails `x`, `y` and vectors `u`, `v` in the units of the axes, columns of the hover
+    table : tails `x`, `y` and vectors `u`, `v` in the units of the axes, columns of the hover,
+        and `id` where an arrow is of one source
     scale : drawn length over true length
     field : the area drawn on; limits the size of the heads
     colour : of the arrows
@@ -84,8 +85,11 @@ def arrows(
     x, y = (table[name].to_numpy(dtype=float) for name in "xy")
     u, v = (scale * table[name].to_numpy(dtype=float) for name in "uv")
     strokes = _strokes(x, y, x + u, y + v, field)
+    ids = table["id"].to_numpy(dtype=object) if "id" in table else None
+    # An arrow is selected with its tail.
+    keep = None if ids is None else {"id": np.concatenate([ids, np.repeat(ids, 2)])}
     return [
-        segments(*strokes, name="arrows", color=colour),
+        segments(*strokes, name="arrows", color=colour, keep=keep),
         points(table, "x", "y", name="tails", color=colour, size=3.5, alpha=0.6, hover=hover),
     ]
 

@@ -34,6 +34,7 @@ from plateviz.tables.residuals import (
     scatter_statistics,
 )
 from plateviz.tables.run_health import orbit_list, orbit_states, run_strip
+from plateviz.tables.selected_sources import selected_sources
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
 from plateviz.tables.source_profile import (
@@ -104,6 +105,7 @@ __all__ = [
     "run_strip",
     "scatter_cells",
     "scatter_statistics",
+    "selected_sources",
     "sky_density",
     "sky_distribution",
     "sky_track",

@@ -7,6 +7,7 @@ import pandas as pd
 
 _ALPHA, _DELTA = "Reference sources, α", "Reference sources, δ"
 _CATALOGUE, _TRUTH, _SIGMA = "minus catalogue, mas", "minus truth, mas", "marginal σ, mas"
+_PRIOR = "minus prior, mas"
 
 
 class Heading(NamedTuple):
@@ -54,6 +55,19 @@ ORBITS_OF_SOURCE: Mapping[str, Heading] = {
     "sigma_ra_marginal": Heading("α cos δ", "0.000", _SIGMA),
     "sigma_dec_marginal": Heading("δ", "0.000", _SIGMA),
     "chi2_per_dof": Heading("χ²/dof", "0.000"),
+}
+SELECTED_SOURCES: Mapping[str, Heading] = {
+    "id": Heading("source"),
+    "source_class": Heading("class"),
+    "n_orbits": Heading("orbits", "0"),
+    "n_obs": Heading("measurements", "0,0"),
+    "ra": Heading("α (deg)", "0.000000"),
+    "dec": Heading("δ (deg)", "0.000000"),
+    "offset_ra": Heading("Δα cos δ", "0.000", _PRIOR),
+    "offset_dec": Heading("Δδ", "0.000", _PRIOR),
+    "sigma_ra_marginal": Heading("α cos δ", "0.000", _SIGMA),
+    "sigma_dec_marginal": Heading("δ", "0.000", _SIGMA),
+    "chi2_per_dof": Heading("χ²/dof", "0.00"),
 }
 SOURCES_OF_RUN: Mapping[str, Heading] = {
     "id": Heading("source"),

@@ -10,6 +10,8 @@ from solver.data.orbit import OrbitData
 from solver.errors import InputError
 
 _EXCLUSION = re.compile(r"(source|detector)=(-?\d+)|(exposure)=(-?\d+)/(-?\d+)")
+# Number of excluded items of a kind that a short description names one by one.
+_FEW = 4
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,19 @@ class Exclusions:
             *(f"exposure {_text(pair)}" for pair in sorted(self.exposures)),
             *(f"detector {number}" for number in sorted(self.detectors)),
         ]
+
+    def short_names(self) -> list[str]:
+        """Return the names, but "132 sources" where there are more than a few of a kind."""
+        kinds = {
+            "sources": Exclusions(sources=self.sources),
+            "exposures": Exclusions(exposures=self.exposures),
+            "detectors": Exclusions(detectors=self.detectors),
+        }
+        names = []
+        for kind, only in kinds.items():
+            excluded = only.names()
+            names += excluded if len(excluded) <= _FEW else [f"{len(excluded):,} {kind}"]
+        return names
 
     def to_dict(self) -> dict[str, list]:
         """Return the exclusions as plain values; `from_dict` reads them back."""

@@ -122,6 +122,6 @@ class LeftOut(Texts):
         return [name.replace(" ", "=") for name in value.names()]
 
     def described(self, value: Exclusions, default: object) -> list[str]:
-        """Return a phrase for each exclusion."""
+        """Return a phrase for each exclusion; of many sources or exposures, their number."""
         del default
-        return [self.phrase.format(name) for name in value.names()]
+        return [self.phrase.format(name) for name in value.short_names()]

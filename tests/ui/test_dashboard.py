@@ -1,5 +1,7 @@
 """The Orbit page in a real Chromium: its figures, what-ifs, fits, theme and address."""
 
+import re
+
 import pytest
 from playwright.sync_api import expect
 
@@ -18,6 +20,11 @@ ROWS = """() => Object.fromEntries(
     .filter(m => m.type === 'Plot')
     .map(f => [f.above.concat(f.title ? [f.title] : []).map(t => t.text ?? '').join(' | '),
                Math.max(0, ...f.renderers.map(r => r.data_source?.get_length() ?? 0))]))"""
+
+SELECTED = f"""name => {{ {VIEWS}
+  const one = figures.find(figure => card(figure) === name);
+  const source = one.model.renderers.map(r => r.data_source).find(s => column(s, 'id'));
+  return [source.selected.indices.length, column(source, 'id').length]; }}"""
 
 
 @pytest.fixture(scope="module")
@@ -142,6 +149,40 @@ def test_workspaces_fit_the_screen(page):
         # The strip of the Verdict workspace takes more of this window than of a large screen.
         room = 1100 if workspace is OrbitWorkspace.VERDICT else 1000
         assert all(box["y"] + box["height"] <= room for box in boxes), workspace
+
+
+def selected(page, name):
+    """Numbers of selected and of all rows of a figure that shows sources."""
+    return page.evaluate(SELECTED, name)
+
+
+def test_sources_are_selected_in_one_figure_shown_in_all_and_left_out(page):
+    page.locator(".figure-footprint:visible canvas").first.wait_for(state="attached")
+    box = page.locator(".figure-residual-map:visible canvas").first.bounding_box()
+    places = [(0.3, 0.4), (0.6, 0.4), (0.6, 0.7), (0.3, 0.7)]
+    corners = [(box["x"] + x * box["width"], box["y"] + y * box["height"]) for x, y in places]
+    page.mouse.move(*corners[0])
+    page.mouse.down()
+    for corner in corners[1:]:
+        page.mouse.move(*corner, steps=5)
+    page.mouse.up()
+    expect(page.get_by_text(re.compile(r"^\d+ sources? selected$"))).to_be_visible()
+    until(page, lambda: selected(page, "footprint")[0] > 0)
+    n_selected, n_sources = selected(page, "footprint")
+    assert 0 < n_selected < n_sources
+    page.get_by_role("button", name="List", exact=True).click()
+    window = page.get_by_role("dialog")
+    expect(window.locator(".tabulator-row").first).to_contain_text(re.compile("reference|artif"))
+    page.keyboard.press("Escape")
+    expect(window).to_be_hidden()
+    page.get_by_role("button", name="Leave out of the fit").click()
+    expect(shown(page)).to_contain_text("without ")
+    until(page, lambda: selected(page, "footprint")[1] == n_sources - n_selected)
+    page.get_by_role("button", name="Put back into the fit").click()
+    expect(shown(page)).not_to_contain_text("without ")
+    until(page, lambda: selected(page, "footprint") == [n_selected, n_sources])
+    page.get_by_role("button", name="Clear", exact=True).click()
+    until(page, lambda: selected(page, "footprint") == [0, n_sources])
 
 
 def test_a_change_is_tried_at_once_kept_and_fitted(page):

@@ -119,6 +119,8 @@ def test_from_the_survey_to_an_orbit_to_a_source_and_back(page):
     rows = drawn(page, diagnostics())
     assert rows["footprint"] > 0
     source = tap(page, "deviation", "id")
+    expect(page.get_by_text("1 source selected")).to_be_visible()
+    page.get_by_role("button", name="Open", exact=True).click()
     expect(heading(page, f"source: {source}")).to_be_visible()
     expect(page.get_by_label("Source id")).to_have_value(source)
     assert 0 not in drawn(page, source_figures()).values()

@@ -2,7 +2,6 @@
 
 import logging
 from collections.abc import Callable, Sequence
-from types import MappingProxyType
 from typing import Protocol
 
 import panel as pn
@@ -10,7 +9,7 @@ import panel_material_ui as pmui
 
 from plateviz.dashboard.views.card_tools import CardTools
 from plateviz.dashboard.views.markup import markup_pane, paragraph
-from plateviz.dashboard.views.tap_links import Links, TapLinks
+from plateviz.dashboard.views.point_actions import NO_LINKS, Links, PointActions, Select
 from plateviz.dashboard.views.visibility import Visibility
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import Figure
@@ -34,7 +33,6 @@ _CENTRED = {
     "align-items": "center",
     "justify-content": "center",
 }
-_NO_LINKS: Links = MappingProxyType({})
 _LOG = logging.getLogger(__name__)
 
 Part = pn.viewable.Viewable | pn.viewable.Viewer
@@ -79,7 +77,8 @@ class FigureView(pn.viewable.Viewer):
         plot_figure: PlotFigure,
         *,
         waiting: str = "",
-        links: Links = _NO_LINKS,
+        links: Links = NO_LINKS,
+        select: Select | None = None,
         theme: str = "light",
         **params: object,
     ) -> None:
@@ -89,12 +88,14 @@ class FigureView(pn.viewable.Viewer):
         ----------
         waiting : text while there is nothing to draw
         links : actions for a tap on a point
+        select : action for sources that are selected; None if they cannot be
         theme : of the first drawing
         """
         super().__init__(**params)
         self.is_wide = figure.is_wide
         self._name, self._plot_figure = figure.name, plot_figure
-        self._links = TapLinks(links)
+        self._actions = PointActions(links, select)
+        self._selected = self._shown_selected = frozenset[str]()
         self._figure: Figure | None = None
         self._drawn: BokehFigure | None = None
         self._pane: pn.pane.Bokeh | None = None
@@ -118,8 +119,8 @@ class FigureView(pn.viewable.Viewer):
     def is_due(self) -> bool:
         """Whether the figure is to be drawn: it has changed, and is on or near the screen."""
         has_room = min(self.visibility.room) > 0
-        is_resized = self._shown_room != self.visibility.room
-        return self.visibility.is_near and has_room and (self._is_changed or is_resized)
+        is_old = self._needs_drawing or self._shown_selected != self._selected
+        return self.visibility.is_near and has_room and is_old
 
     @property
     def is_drawn(self) -> bool:
@@ -136,8 +137,27 @@ class FigureView(pn.viewable.Viewer):
         self._tools.theme = theme
         self._fade()
 
+    def show_selected(self, ids: frozenset[str]) -> None:
+        """Show which sources are selected when the figure is drawn next."""
+        self._selected = ids
+
     def draw(self) -> None:
-        """Draw the figure from the current data."""
+        """Draw the figure from the current data, with the selected sources."""
+        if self._needs_drawing or self._drawn is None:
+            self._draw()
+        self._shown_selected = self._selected
+        self._actions.show(self._selected)
+
+    def mark_stale(self, is_stale: bool) -> None:
+        """Mark the figure as stale while a new solution is being computed."""
+        self._is_stale = is_stale
+        self._fade()
+
+    @property
+    def _needs_drawing(self) -> bool:
+        return self._is_changed or self._shown_room != self.visibility.room
+
+    def _draw(self) -> None:
         self._shown_room = list(self.visibility.room)
         try:
             if self._is_changed:
@@ -152,11 +172,6 @@ class FigureView(pn.viewable.Viewer):
             _LOG.exception("%s cannot be drawn", self._name)
             self._show_text(f"This figure cannot be drawn: {error}")
 
-    def mark_stale(self, is_stale: bool) -> None:
-        """Mark the figure as stale while a new solution is being computed."""
-        self._is_stale = is_stale
-        self._fade()
-
     def _show(self, figure: Figure) -> None:
         width, height = (length - 2 * _INSET for length in self.visibility.room)
         figure = resized(figure, width, height)
@@ -166,7 +181,7 @@ class FigureView(pn.viewable.Viewer):
             self._drawn.follow(figure, self._theme)
         if self._pane is None or self._pane.object is not self._drawn.model:
             self._pane = pn.pane.Bokeh(self._drawn.model, align="center", margin=0)
-        self._links.follow(self._drawn)
+        self._actions.follow(self._drawn)
         self._put(self._pane)
 
     def _show_text(self, text: str) -> None:
@@ -260,6 +275,11 @@ class FigureGrid(pn.viewable.Viewer):
         """Mark all figures as changed, and set their theme."""
         for view in self._views:
             view.change(theme)
+
+    def show_selected(self, ids: frozenset[str]) -> None:
+        """Show which sources are selected in all figures."""
+        for view in self._views:
+            view.show_selected(ids)
 
     def mark_stale(self, is_stale: bool) -> None:
         """Mark all figures as stale while a new solution is being computed."""

@@ -53,6 +53,7 @@ class OrbitPage(pn.viewable.Viewer):
         )
         session.param.watch(self._change, ["shown", "other", "theme"])
         session.param.watch(self._mark_stale, ["stage"])
+        session.selection.param.watch(self._show_selected, "sources")
         session.selection.param.watch(self._change_selected, ["field", "plates", "detector"])
         navigation.param.watch(self._show_workspace, "orbit_workspace")
         self._show_workspace()
@@ -90,15 +91,15 @@ class OrbitPage(pn.viewable.Viewer):
             list(views.values()), self._wake, columns=3 if is_first else 2, others=others
         )
         self._grids[one] = grid
+        self._show_selected()
         return workspace(grid, *above)
 
     def _figure_view(self, diagnostic: Diagnostic) -> FigureView:
-        navigation = self._navigation
         return FigureView(
             diagnostic,
             partial(self._plot, diagnostic),
             waiting="The first solution is being computed.",
-            links={"id": navigation.open_source} if navigation.run else {},
+            select=self._session.select_sources,
             theme=self._session.theme,
         )
 
@@ -125,6 +126,10 @@ class OrbitPage(pn.viewable.Viewer):
     def _change_selected(self, *_: object) -> None:
         for view in self._selected:
             view.change(self._session.theme)
+
+    def _show_selected(self, *_: object) -> None:
+        for grid in self._grids.values():
+            grid.show_selected(self._session.selected_ids)
 
     def _mark_stale(self, *_: object) -> None:
         for grid in self._grids.values():

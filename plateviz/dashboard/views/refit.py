@@ -127,12 +127,15 @@ class RefitView(pn.viewable.Viewer):
         )
 
     def _show_solutions(self, *_: object) -> None:
-        solutions = {solution.label: solution for solution in self._session.solutions}
-        shown = self._session.shown
-        self._keep.visible = False
+        shown, kept = self._session.shown, list(self._session.solutions)
+        self._keep.visible = shown is not None and shown.is_what_if
         if shown is not None and shown.is_what_if:
-            self._keep.visible = True
-            solutions[shown.label] = shown
+            kept.append(shown)
+        solutions: dict[str, Solution] = {}
+        for solution in kept:
+            # Different sources may be left out, of which the label has the number only.
+            same = sum(other.label == solution.label for other in solutions.values())
+            solutions[solution.label + (f" ({same + 1})" if same else "")] = solution
         # A value that is not among the options would be sent to the browser unchanged.
         chosen = next((s for s in solutions.values() if s is shown), None)
         self._solutions.param.update(options=solutions, value=chosen, visible=len(solutions) > 1)

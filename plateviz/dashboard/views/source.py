@@ -40,8 +40,8 @@ from plateviz.tables.survey_tables import SourceTables
 from plateviz.tables.verdict import source_verdict
 
 _INVITATION = (
-    "Write a source's id on the left, choose one below, or tap a point of a figure of the "
-    "Survey or the Orbit view."
+    "Write a source's id on the left, choose one below, or tap its point in a figure of the "
+    "Survey or the Orbit view and open it."
 )
 _NO_SOURCES = (
     "No orbit of this run was fitted when this page was loaded. Load it again to see its sources."

@@ -69,6 +69,7 @@ class SurveyPage(pn.viewable.Viewer):
         navigation.param.watch(self._read, "run_name")
         navigation.param.watch(self._show_workspace, "survey_workspace")
         self._session.param.watch(self._show, "theme")
+        self._session.selection.param.watch(self._show_selected, "sources")
         self._show_workspace()
         self._read()
 
@@ -86,13 +87,17 @@ class SurveyPage(pn.viewable.Viewer):
         views = [self._figure_view(f) for f in survey_figures() if f.workspace is one]
         grid = FigureGrid(views, self._wake, columns=1 if is_first else 2)
         self._grids[one] = grid
+        self._show_selected()
         above = [self._strip, NotableSourceLink(self._navigation), self._table]
         return workspace(grid, *(above if is_first else ()))
 
     def _figure_view(self, figure: SurveyFigure) -> FigureView:
-        links = {"id": self._navigation.open_source, "orbit_id": self._open_orbit}
         return FigureView(
-            figure, partial(self._plot, figure), links=links, theme=self._session.theme
+            figure,
+            partial(self._plot, figure),
+            links={"orbit_id": self._open_orbit},
+            select=self._session.select_sources,
+            theme=self._session.theme,
         )
 
     def _plot(self, figure: SurveyFigure) -> Figure | None:
@@ -127,6 +132,10 @@ class SurveyPage(pn.viewable.Viewer):
         self._table.show(orbit_list(self._orbits), theme, orbit_states(self._orbits))
         for grid in self._grids.values():
             grid.change(theme)
+
+    def _show_selected(self, *_: object) -> None:
+        for grid in self._grids.values():
+            grid.show_selected(self._session.selected_ids)
 
     def _show_workspace(self, *_: object) -> None:
         self._stack.show(self._navigation.survey_workspace)

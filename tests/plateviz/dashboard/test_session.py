@@ -389,3 +389,61 @@ def test_every_setting_with_a_control_is_a_parameter():
     controls = {name for name, one in SETTINGS.items() if one.control}
     assert controls == set(CONTROLS) == set(FitChoices.param) - {"name", "what_if_at_once"}
     assert set(ANSWERED_AT_ONCE) == controls - {"engine", "compare_orders"}
+
+
+def test_selected_sources_are_left_out_and_put_back(live, fit_result):
+    ids = fit_result.sources["source_id"].tolist()
+    live.select_sources(frozenset([*ids[:2], -7]))
+    assert live.selected_in_orbit == frozenset(ids[:2])
+    live.leave_out_selection()
+    (_, settings, job) = live.store.requested[-1]
+    assert settings.exclusions.sources == frozenset(ids[:2])
+    assert job.request["what_if"]
+    assert live.is_selection_left_out
+    live.put_back_selection()
+    assert not live.is_selection_left_out
+    assert live.choices.settings() == FitSettings()
+
+
+def test_sources_that_the_orbit_has_not_measured_are_not_left_out(live):
+    before = live.choices.settings()
+    live.select_sources(frozenset([-7]))
+    assert not live.is_selection_left_out
+    live.leave_out_selection()
+    assert live.stage is Stage.FAILED
+    assert "measured none of the selected sources" in live.message
+    assert live.choices.settings() == before
+
+
+def test_invalid_settings_refuse_to_leave_out_a_source(live, fit_result):
+    live.choices.prior_widths = {**default_widths(), "detector_x": "-3"}
+    live.select_sources(frozenset(fit_result.sources["source_id"].tolist()[:1]))
+    live.leave_out_selection()
+    assert "detector_x" in live.message
+    assert live.choices.exclusions == ""
+
+
+def test_selection_is_inverted_among_the_measured_sources(live, fit_result):
+    ids = fit_result.sources["source_id"].tolist()
+    live.select_sources(frozenset(ids[1:]))
+    live.invert_selection()
+    assert live.selection.sources == frozenset(ids[:1])
+
+
+@pytest.mark.parametrize("count", [1, 20])
+def test_address_has_a_few_selected_sources(count):
+    first, second = Selection(), Selection()
+    first.sources = frozenset(range(2**63 - count, 2**63))
+    second.restore(first.address())
+    assert second.sources == first.sources
+    first.sources = frozenset(range(21))
+    assert "sources" not in first.address()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "x", "1,", "99999999999999999999", "1;2", "9223372036854775808"]
+)
+def test_invalid_selected_sources_of_an_address_are_ignored(text):
+    selection = Selection()
+    selection.restore({"sources": text})
+    assert selection.sources == frozenset()

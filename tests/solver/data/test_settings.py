@@ -171,6 +171,10 @@ def test_what_if_is_valid_unless_the_model_or_the_outliers_change(changes, holds
         ({"thin": 3, "engine": "svi"}, "order 5, svi, one in 3 sources"),
         ({"svi": SviSettings(seed=3)}, "order 5, svi seed 3"),
         ({"exclusions": Exclusions(detectors=frozenset({1}))}, "order 5, without detector 1"),
+        (
+            {"exclusions": Exclusions(frozenset(range(132)), detectors=frozenset({1}))},
+            "order 5, without 132 sources, without detector 1",
+        ),
         ({"prior_shifts": {"detector_x[2]": -5.0}}, "order 5, detector_x[2]=-5um"),
         ({"max_iterations": 9, "robust": True}, "order 5, at most 9 iterations, without outliers"),
     ],

@@ -96,7 +96,7 @@ def test_drawn_figure_follows_in_place(view):
     assert first.background_fill_color == "#121212"
 
 
-def test_tapped_source_is_opened_once_and_not_selected(drawn):
+def test_tapped_orbit_is_opened_once_and_not_selected():
     opened = []
     view = FigureView(diagnostics()[0], lambda: figure_of(["7", "8"]), links={"id": opened.append})
     view.draw()
@@ -107,6 +107,31 @@ def test_tapped_source_is_opened_once_and_not_selected(drawn):
     assert source.selected.indices == []
     (tool,) = [tool for tool in plot(view).tools if type(tool).__name__ == "TapTool"]
     assert tool.renderers == plot(view).renderers
+
+
+def test_sources_are_selected_and_shown_as_selected_when_drawn_next():
+    chosen = []
+    rows = ["7", "8", "7", "9"]
+    view = FigureView(diagnostics()[0], lambda: figure_of(rows), select=chosen.append)
+    come_near(view)
+    view.draw()
+    source = plot(view).renderers[0].data_source
+    source.selected.indices = [1, 2]
+    assert chosen == [frozenset({7, 8})]
+    view.show_selected(frozenset({"7", "8"}))
+    assert view.is_due
+    view.draw()
+    assert not view.is_due
+    assert source.selected.indices == [0, 1, 2]
+    assert len(chosen) == 1
+    rows.reverse()
+    view.change("dark")
+    view.draw()
+    assert source.selected.indices == [1, 2, 3]
+    view.show_selected(frozenset())
+    view.draw()
+    assert source.selected.indices == []
+    assert len(chosen) == 1
 
 
 def test_stale_figure_is_faded(view):

@@ -1,0 +1,122 @@
+"""PointActions: a tap on a point opens its orbit; a tap, lasso or box selects sources."""
+
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+
+from bokeh import models
+
+from plateviz.figures.bokeh_figure import BokehFigure
+from plateviz.figures.bokeh_frame import BokehFrame
+from plateviz.figures.bokeh_glyphs import SELECTED_BY, BokehGlyphs
+
+Links = Mapping[str, Callable[[str], object]]
+"""Column of a point's data -> function that is called with its value as text."""
+Select = Callable[[frozenset[int]], object]
+"""Called with the ids of the sources that a person has selected."""
+
+NO_LINKS: Links = MappingProxyType({})
+
+
+class PointActions:
+    """What the points of one drawn figure do; the first link whose column they have is followed.
+
+    Points with a source's `id` are selected instead, if there is a function for that.
+    """
+
+    def __init__(self, links: Links = NO_LINKS, select: Select | None = None) -> None:
+        """Begin without a figure."""
+        self._links, self._select = links, select
+        self._followed: set[str] = set()
+        self._frames: dict[str, _FrameTools] = {}
+        self._of_sources: list[list[BokehGlyphs]] = []
+        self._is_showing = False
+
+    def follow(self, drawn: BokehFigure) -> None:
+        """Make the points of a figure act, those among them that are new."""
+        self._of_sources = []
+        for frame in drawn.frames:
+            of_sources = [one for one in frame.glyphs() if SELECTED_BY in one.source.data]
+            self._of_sources.append(of_sources)
+            for glyphs in frame.glyphs():
+                if glyphs.source.id in self._followed:
+                    continue
+                if self._select is not None and glyphs in of_sources:
+                    self._followed.add(glyphs.source.id)
+                    self._select_from(frame, glyphs)
+                elif column := next((c for c in self._links if c in glyphs.source.data), None):
+                    self._followed.add(glyphs.source.id)
+                    self._open_on_tap(frame, glyphs, column)
+
+    def show(self, selected: frozenset[str]) -> None:
+        """Show which sources are selected, by their ids."""
+        self._is_showing = True
+        try:
+            for glyphs in (one for frame in self._of_sources for one in frame):
+                ids = glyphs.source.data[SELECTED_BY] if selected else ()
+                rows = [row for row, one in enumerate(ids) if one in selected]
+                if glyphs.source.selected.indices != rows:
+                    glyphs.source.selected.indices = rows
+        finally:
+            self._is_showing = False
+
+    def _select_from(self, frame: BokehFrame, glyphs: BokehGlyphs) -> None:
+        def take(name: str, old: list[int], new: list[int]) -> None:
+            # The tables of a frame answer one after the other; the last one completes the answer.
+            among = next((one for one in self._of_sources if glyphs in one), None)
+            if self._is_showing or self._select is None or among is None:
+                return
+            self._select(frozenset(int(one) for part in among for one in _selected_ids(part)))
+
+        glyphs.source.selected.on_change("indices", take)
+        if glyphs.kind == "points":
+            self._tools_of(frame).select_among(glyphs.renderer)
+
+    def _open_on_tap(self, frame: BokehFrame, glyphs: BokehGlyphs, column: str) -> None:
+        source = glyphs.source
+
+        def open_link(name: str, old: list[int], new: list[int]) -> None:
+            if new:
+                # A tap is not a selection: the other points must not stay faded.
+                source.selected.indices = []
+                self._links[column](str(source.data[column][new[0]]))
+
+        source.selected.on_change("indices", open_link)
+        self._tools_of(frame).tap_among(glyphs.renderer)
+
+    def _tools_of(self, frame: BokehFrame) -> "_FrameTools":
+        return self._frames.setdefault(frame.plot.id, _FrameTools(frame.plot))
+
+
+class _FrameTools:
+    """The tools of one plot that points answer to; each is added with its first points."""
+
+    def __init__(self, plot: models.Plot) -> None:
+        self._plot = plot
+        self._tap = models.TapTool(renderers=[])
+        self._lasso = models.LassoSelectTool(renderers=[], continuous=False)
+        self._box = models.BoxSelectTool(renderers=[], continuous=False)
+
+    def tap_among(self, renderer: models.DataRenderer) -> None:
+        """Let a tap reach the points."""
+        self._extend(self._tap, renderer)
+
+    def select_among(self, renderer: models.DataRenderer) -> None:
+        """Let a tap, a lasso and a box reach the points; a drag is a lasso."""
+        for tool in (self._tap, self._lasso, self._box):
+            self._extend(tool, renderer)
+        self._plot.toolbar.active_drag = self._lasso
+
+    def _extend(
+        self,
+        tool: models.TapTool | models.LassoSelectTool | models.BoxSelectTool,
+        renderer: models.DataRenderer,
+    ) -> None:
+        if tool not in self._plot.tools:
+            self._plot.add_tools(tool)
+        before = [one for one in tool.renderers if isinstance(one, models.DataRenderer)]
+        tool.renderers = [*before, renderer]
+
+
+def _selected_ids(glyphs: BokehGlyphs) -> Iterable[str]:
+    ids = glyphs.source.data[SELECTED_BY]
+    return (ids[row] for row in glyphs.source.selected.indices)

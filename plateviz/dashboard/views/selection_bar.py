@@ -1,0 +1,103 @@
+"""SelectionBar: which sources are selected, and what can be done with them."""
+
+from collections.abc import Callable
+
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.views.source_list import SourceList
+
+_IN_THE_BAR = {"color": "inherit", "textTransform": "none", "whiteSpace": "nowrap", "minWidth": 0}
+
+
+class SelectionBar(pn.viewable.Viewer):
+    """A line of words and buttons; empty while no source is selected.
+
+    Attributes
+    ----------
+    windows : place of the window with the list; elsewhere on the page, since a window has the
+        colours of what it is in
+    """
+
+    def __init__(self, navigation: Navigation, **params: object) -> None:
+        """Follow the selection of the session of `navigation`."""
+        super().__init__(**params)
+        self._navigation, self._session = navigation, navigation.session
+        self._row = pmui.Row(margin=0, sx={"alignItems": "center"})
+        self.windows = pmui.Column(margin=0)
+        self._parts: list[pn.viewable.Viewable] = []
+        self._session.selection.param.watch(self._show, "sources")
+        self._session.choices.param.watch(self._show, "exclusions")
+        self._session.param.watch(self._show, "shown")
+        navigation.param.watch(self._show, "view")
+        self._show()
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the line."""
+        return self._row
+
+    def _make(self) -> None:
+        session = self._session
+        self._words = pmui.Typography("", variant="body2", margin=(0, 8), sx=_IN_THE_BAR)
+        self._list = SourceList(self._navigation)
+        self._open = self._button("Open", self._open_source)
+        self._leave_out = self._button("Leave out of the fit", session.leave_out_selection)
+        self._put_back = self._button("Put back into the fit", session.put_back_selection)
+        self._invert = self._button("Invert", session.invert_selection)
+        self._parts = [
+            self._words,
+            self._button("List", self._list.open),
+            self._open,
+            self._leave_out,
+            self._put_back,
+            self._invert,
+            self._button("Clear", self._clear),
+        ]
+        self.windows.append(self._list)
+
+    def _button(self, label: str, act: Callable[[], None]) -> pmui.Button:
+        button = pmui.Button(
+            label=label, variant="text", size="small", margin=(0, 2), sx=_IN_THE_BAR
+        )
+        button.on_click(lambda _: act())
+        return button
+
+    def _show(self, *_: object) -> None:
+        session, selected = self._session, self._session.selection.sources
+        if not selected:
+            self._row.clear()
+            return
+        if not self._parts:
+            self._make()
+        is_orbit = self._navigation.view is View.ORBIT and session.shown is not None
+        self._words.object = words(len(selected), len(session.selected_in_orbit), is_orbit)
+        self._open.visible = len(selected) == 1 and self._navigation.run is not None
+        self._leave_out.visible = is_orbit and not session.is_selection_left_out
+        self._put_back.visible = is_orbit and session.is_selection_left_out
+        self._invert.visible = is_orbit
+        self._list.show()
+        if list(self._row) != self._parts:
+            self._row[:] = self._parts
+
+    def _open_source(self) -> None:
+        (source,) = self._session.selection.sources
+        self._navigation.open_source(str(source))
+
+    def _clear(self) -> None:
+        self._session.selection.sources = frozenset()
+
+
+def words(n_selected: int, n_in_orbit: int, is_orbit: bool) -> str:
+    """Return the selection in words.
+
+    Parameters
+    ----------
+    n_selected : number of selected sources
+    n_in_orbit : number of those that the orbit on the screen has measured
+    is_orbit : whether an orbit is on the screen
+    """
+    text = f"{n_selected:,} source{'s' if n_selected > 1 else ''} selected"
+    if is_orbit and n_in_orbit < n_selected:
+        text += f", {n_in_orbit:,} of them in this orbit" if n_in_orbit else ", none in this orbit"
+    return text

@@ -1,0 +1,56 @@
+"""SourceList: a window with a row per selected source."""
+
+import pandas as pd
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.views.table import DataTable
+from plateviz.tables import selected_sources
+from plateviz.tables.headings import SELECTED_SOURCES
+
+_PAGE_SIZE = 15
+
+
+class SourceList(pn.viewable.Viewer):
+    """The selected sources with their values in the solution on the screen, or in the run."""
+
+    def __init__(self, navigation: Navigation, **params: object) -> None:
+        """Follow the session of `navigation`; the list is filled when it is opened."""
+        super().__init__(**params)
+        self._navigation = navigation
+        self._table: DataTable | None = None
+        self._window = pmui.Dialog(
+            title="Selected sources",
+            open=False,
+            show_close_button=True,
+            close_on_click=True,
+            width_option="lg",
+        )
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the window."""
+        return self._window
+
+    def open(self) -> None:
+        """Open the window."""
+        if self._table is None:
+            self._table = DataTable(SELECTED_SOURCES, self._open_source, page_size=_PAGE_SIZE)
+            self._window.append(self._table)
+        self._window.open = True
+        self.show()
+
+    def show(self) -> None:
+        """Show the sources that are selected now, if the window is open."""
+        if self._table is None or not self._window.open:
+            return
+        session = self._navigation.session
+        result = session.shown.result if session.shown else None
+        run = self._navigation.run
+        counts = run.counts() if run is not None else None
+        table = selected_sources(session.selection.sources, result, counts)
+        self._table.show(table, session.theme)
+
+    def _open_source(self, row: pd.Series) -> None:
+        self._window.open = False
+        self._navigation.open_source(str(row["id"]))

@@ -2,12 +2,12 @@
 
 import logging
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.views.card_tools import CardTools
+from plateviz.dashboard.views.figure_text import FigureText
 from plateviz.dashboard.views.markup import markup_pane, paragraph
 from plateviz.dashboard.views.point_actions import NO_LINKS, Links, PointActions, Select
 from plateviz.dashboard.views.visibility import Visibility
@@ -39,30 +39,6 @@ Part = pn.viewable.Viewable | pn.viewable.Viewer
 
 PlotFigure = Callable[[], Figure | None]
 """Returns a figure, or None while there are no data."""
-
-
-class FigureText(Protocol):
-    """Name, title, caption and width of a figure."""
-
-    @property
-    def name(self) -> str:
-        """Short unique name, used in CSS class names."""
-        ...
-
-    @property
-    def title(self) -> str:
-        """Displayed title."""
-        ...
-
-    @property
-    def caption(self) -> str:
-        """What the figure shows, and how it looks for a good solution."""
-        ...
-
-    @property
-    def is_wide(self) -> bool:
-        """Whether the figure takes a whole row where the number of cards is odd."""
-        ...
 
 
 class FigureView(pn.viewable.Viewer):
@@ -270,6 +246,11 @@ class FigureGrid(pn.viewable.Viewer):
     def is_due(self) -> bool:
         """Whether any figure is to be drawn."""
         return any(view.is_due for view in self._views)
+
+    @property
+    def is_laid_out(self) -> bool:
+        """Whether the browser has said how large any card is."""
+        return any(min(view.visibility.room) > 0 for view in self._views)
 
     def change(self, theme: str) -> None:
         """Mark all figures as changed, and set their theme."""

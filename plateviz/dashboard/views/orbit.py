@@ -63,14 +63,16 @@ class OrbitPage(pn.viewable.Viewer):
         return self._column
 
     def complete(self) -> bool:
-        """Make the controls of a refit unless they are there; return whether they were not.
+        """Make the controls of a refit unless they are there; return whether they were made.
 
-        They are many, and the figures do not wait for them.
+        They are many, and the figures do not wait for them. Before the browser has laid the page
+        out, it may lose what is added.
         """
-        was_complete, self._is_complete = self._is_complete, True
-        if not was_complete:
-            self.sidebar.append(RefitView(self._session))
-        return not was_complete
+        if self._is_complete or not self.figures.is_laid_out:
+            return False
+        self._is_complete = True
+        self.sidebar.append(RefitView(self._session))
+        return True
 
     @property
     def figures(self) -> FigureGrid:

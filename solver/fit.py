@@ -135,6 +135,11 @@ class OrbitFitter:
         result = _with_outliers(result, outliers)
         return _with_orders(result, orders, time.perf_counter() - fitted)
 
+    @property
+    def fitted_settings(self) -> FitSettings | None:
+        """The settings of the last fit with a solution; None if there is none."""
+        return self._last_fit.settings if self._last_fit else None
+
     def what_if(self, settings: FitSettings) -> FitResult | None:
         """Return the solution under other settings without a refit.
 
@@ -163,11 +168,7 @@ class OrbitFitter:
         return replace(_with_outliers(result, last.outliers), orders=orders)
 
     def history(self, result: FitResult) -> pd.DataFrame:
-        """Return the rows that the last fit adds to the history of its sources.
-
-        Parameters
-        ----------
-        result : the result of the last fit
+        """Return the rows that the last fit, whose result this is, adds to its sources' history.
 
         Returns
         -------

@@ -27,6 +27,8 @@ from plateviz.cache import keep_compilations
 from plateviz.runs.fitted_orbit import write_fitted_orbit
 from plateviz.solving.origin import origin_from_dict
 from plateviz.tables.verdict import with_verdict
+from solver.data.exclusions import Exclusions
+from solver.data.result import FitResult
 from solver.data.settings import COUNTED, FitSettings
 from solver.engines.gauss_newton import Iteration
 from solver.errors import CancelledError, FitError, InputError
@@ -158,12 +160,28 @@ def _fit(request: Request, progress: Callable[..., None]) -> Speculative:
         progress(stage=stage, **iteration._asdict())
 
     progress(stage="linearising")
-    result = fitter.what_if(settings) if request["what_if"] else None
+    result = _what_if(fitter, settings, on_iteration) if request["what_if"] else None
     if result is None:
         result = fitter.fit(settings, on_iteration)
     progress(stage="writing the result")
     write_fitted_orbit(Path(request["directory"]), with_verdict(result))
     return fitter.precompute(settings.order)
+
+
+def _what_if(
+    fitter: OrbitFitter, settings: FitSettings, progress: Callable[[Iteration], None]
+) -> FitResult | None:
+    """Return a solution by a step from a fit, or None if it needs a fit of its own."""
+    result = fitter.what_if(settings)
+    whole = settings.with_(exclusions=Exclusions(), compare_orders=False)
+    if result is not None or not settings.exclusions or fitter.fitted_settings == whole:
+        return result
+    # A fit without some measurements is no start for a what-if without others; one of all is.
+    try:
+        fitter.fit(whole, progress)
+    except FitError:
+        return None
+    return fitter.what_if(settings)
 
 
 def _simulate(request: Request, progress: Callable[..., None]) -> Speculative:

@@ -6,6 +6,8 @@ from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.origin import OrbitFiles, SurveyFolder, origin_from_dict, origin_to_dict
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_queue import SolverQueue
+from solver.data.exclusions import Exclusions
+from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 
@@ -142,6 +144,18 @@ def test_what_if_is_a_step_from_the_last_fit(store):
     assert job.wait(LONG) is JobStatus.DONE, job.message
     assert store.result(0, settings) is None
     assert store.result(0, settings, what_if=True).summary["converged"]
+
+
+def test_what_if_without_sources_starts_from_all_measurements(store):
+    """As for a solution of a run, of which the solver has no fit yet."""
+    sources = store.origin.read(1).measurements["source_id"].unique().tolist()
+    for excluded in (sources[:3], sources[3:6]):
+        settings = FitSettings(exclusions=Exclusions(frozenset(excluded)))
+        job = store.request(1, settings, what_if=True)
+        assert job.wait(LONG) is JobStatus.DONE, job.message
+        result = store.result(1, settings, what_if=True)
+        assert result.summary["reason"] == FitStatus.WHAT_IF.value
+        assert not result.sources["source_id"].isin(excluded).any()
 
 
 def test_what_if_beyond_a_step_is_fitted(store):

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 
 from solver.data.orbit import OrbitData
 from solver.errors import InputError
@@ -44,20 +45,23 @@ class Exclusions:
         if not self:
             return data
         rows = data.measurements
-        exposure = list(zip(rows["field_id"], rows["plate_id"], strict=True))
+        exposure = pd.MultiIndex.from_frame(rows[["field_id", "plate_id"]])
         is_excluded = np.zeros(len(rows), dtype=bool)
         for kind, excluded, measured in (
-            ("source", self.sources, rows["source_id"].tolist()),
+            ("source", self.sources, pd.Index(rows["source_id"])),
             ("exposure", self.exposures, exposure),
-            ("detector", self.detectors, rows["detector_id"].tolist()),
+            ("detector", self.detectors, pd.Index(rows["detector_id"])),
         ):
-            missing = excluded - set(measured)
+            if not excluded:
+                continue
+            removed = measured.isin(list(excluded))
+            missing = excluded.difference(measured[removed].tolist())
             if missing:
                 raise InputError(
                     f"excluded {kind} {_text(min(missing))}: expected one with measurements in "
                     f"orbit {data.orbit_id}, found none"
                 )
-            is_excluded |= np.fromiter((value in excluded for value in measured), bool, len(rows))
+            is_excluded |= removed
         if is_excluded.all():
             raise InputError(
                 f"exclusions: expected some measurements of orbit {data.orbit_id} to remain, "

@@ -85,13 +85,13 @@ def arrows(
     x, y = (table[name].to_numpy(dtype=float) for name in "xy")
     u, v = (scale * table[name].to_numpy(dtype=float) for name in "uv")
     strokes = _strokes(x, y, x + u, y + v, field)
-    ids = table["id"].to_numpy(dtype=object) if "id" in table else None
     # An arrow is selected with its tail.
-    keep = None if ids is None else {"id": np.concatenate([ids, np.repeat(ids, 2)])}
-    return [
-        segments(*strokes, name="arrows", color=colour, keep=keep),
-        points(table, "x", "y", name="tails", color=colour, size=3.5, alpha=0.6, hover=hover),
-    ]
+    kept = {name: table[name].to_numpy(dtype=object) for name in ("id",) if name in table}
+    of_strokes = {name: np.concatenate([ids, np.repeat(ids, 2)]) for name, ids in kept.items()}
+    tails = points(
+        table, "x", "y", name="tails", color=colour, size=3.5, alpha=0.6, hover=hover, keep=[*kept]
+    )
+    return [segments(*strokes, name="arrows", color=colour, keep=of_strokes), tails]
 
 
 def key(length: float, text: str, *, scale: float, field: Field) -> list[Glyphs]:

@@ -71,24 +71,21 @@ class Exclusions:
 
     def names(self) -> list[str]:
         """Return the excluded items as text, sorted."""
-        return [
-            *(f"source {number}" for number in sorted(self.sources)),
-            *(f"exposure {_text(pair)}" for pair in sorted(self.exposures)),
-            *(f"detector {number}" for number in sorted(self.detectors)),
-        ]
+        return [name for names in self._names_by_kind().values() for name in names]
 
     def short_names(self) -> list[str]:
         """Return the names, but "132 sources" where there are more than a few of a kind."""
-        kinds = {
-            "sources": Exclusions(sources=self.sources),
-            "exposures": Exclusions(exposures=self.exposures),
-            "detectors": Exclusions(detectors=self.detectors),
+        short = []
+        for kind, names in self._names_by_kind().items():
+            short += names if len(names) <= _FEW else [f"{len(names):,} {kind}"]
+        return short
+
+    def _names_by_kind(self) -> dict[str, list[str]]:
+        return {
+            "sources": [f"source {number}" for number in sorted(self.sources)],
+            "exposures": [f"exposure {_text(pair)}" for pair in sorted(self.exposures)],
+            "detectors": [f"detector {number}" for number in sorted(self.detectors)],
         }
-        names = []
-        for kind, only in kinds.items():
-            excluded = only.names()
-            names += excluded if len(excluded) <= _FEW else [f"{len(excluded):,} {kind}"]
-        return names
 
     def to_dict(self) -> dict[str, list]:
         """Return the exclusions as plain values; `from_dict` reads them back."""

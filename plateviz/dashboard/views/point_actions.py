@@ -65,7 +65,7 @@ class PointActions:
             among = next((one for one in self._of_sources if glyphs in one), None)
             if self._is_showing or self._select is None or among is None:
                 return
-            self._select(frozenset(int(one) for part in among for one in _selected_ids(part)))
+            self._select(frozenset(int(one) for part in among for one in _chosen_ids(part)))
 
         glyphs.source.selected.on_change("indices", take)
         if glyphs.kind == "points":
@@ -117,6 +117,10 @@ class _FrameTools:
         tool.renderers = [*before, renderer]
 
 
-def _selected_ids(glyphs: BokehGlyphs) -> Iterable[str]:
+def _chosen_ids(glyphs: BokehGlyphs) -> Iterable[str]:
+    """Return the ids that a person has chosen among points; other glyphs only follow them."""
+    if glyphs.kind != "points" or not glyphs.renderer.visible:
+        return ()
     ids = glyphs.source.data[SELECTED_BY]
-    return (ids[row] for row in glyphs.source.selected.indices)
+    # They come from the browser.
+    return (ids[row] for row in glyphs.source.selected.indices if 0 <= row < len(ids))

@@ -85,7 +85,7 @@ class SelectionBar(pn.viewable.Viewer):
         self._navigation.open_source(str(source))
 
     def _clear(self) -> None:
-        self._session.selection.sources = frozenset()
+        self._session.select_sources(frozenset())
 
 
 def words(n_selected: int, n_in_orbit: int, is_orbit: bool) -> str:

@@ -35,7 +35,8 @@ class SourceList(pn.viewable.Viewer):
     def open(self) -> None:
         """Open the window."""
         if self._table is None:
-            self._table = DataTable(SELECTED_SOURCES, self._open_source, page_size=_PAGE_SIZE)
+            on_row = self._open_source if self._navigation.run else None
+            self._table = DataTable(SELECTED_SOURCES, on_row, page_size=_PAGE_SIZE)
             self._window.append(self._table)
         self._window.open = True
         self.show()

@@ -6,6 +6,7 @@ import pytest
 from plateviz.dashboard.views.figure import FigureGrid, FigureView
 from plateviz.figures.figure import Axis, framed
 from plateviz.figures.glyphs import points
+from plateviz.plots.arrows import Field, arrows
 from plateviz.plots.gallery import diagnostics
 
 
@@ -132,6 +133,31 @@ def test_sources_are_selected_and_shown_as_selected_when_drawn_next():
     view.draw()
     assert source.selected.indices == []
     assert len(chosen) == 1
+
+
+def test_next_selection_in_a_map_of_arrows_replaces_the_first():
+    table = pd.DataFrame({"x": [0.0, 1.0], "y": 0.0, "u": 0.1, "v": 0.1, "id": ["7", "8"]})
+    field = Field((0.0, 9.0), (0.0, 9.0))
+    axes = {"x": Axis("x (mm)", field.x), "y": Axis("y (mm)", field.ylim)}
+    marks = arrows(table, scale=1.0, field=field, colour="mark", hover=[])
+    chosen = []
+    view = FigureView(
+        diagnostics()[0],
+        lambda: framed(marks, title="Arrows", width=200, **axes),
+        select=chosen.append,
+    )
+    come_near(view)
+    view.draw()
+    shafts, tails = (renderer.data_source for renderer in plot(view).renderers)
+    tails.selected.indices = [0]
+    view.show_selected(frozenset({"7"}))
+    view.draw()
+    # The shaft and both strokes of the head.
+    assert shafts.selected.indices == [0, 2, 3]
+    tails.selected.indices = [1]
+    assert chosen == [frozenset({7}), frozenset({8})]
+    tails.selected.indices = [0, 99]
+    assert chosen[-1] == frozenset({7})
 
 
 def test_stale_figure_is_faded(view):

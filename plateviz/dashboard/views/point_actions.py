@@ -1,4 +1,4 @@
-"""PointActions: a tap on a point opens its orbit; a tap, lasso or box selects sources."""
+"""PointActions: a tap on a point opens its orbit; a tap, box or lasso selects sources."""
 
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
@@ -101,10 +101,11 @@ class _FrameTools:
         self._extend(self._tap, renderer)
 
     def select_among(self, renderer: models.DataRenderer) -> None:
-        """Let a tap, a lasso and a box reach the points; a drag is a lasso."""
-        for tool in (self._tap, self._lasso, self._box):
+        """Let a tap, a box and a lasso reach the points; a drag is a box."""
+        for tool in (self._tap, self._box, self._lasso):
             self._extend(tool, renderer)
-        self._plot.toolbar.active_drag = self._lasso
+        # BokehJS 3 reports an error for a drag of its lasso that begins beside the frame.
+        self._plot.toolbar.active_drag = self._box
 
     def _extend(
         self,

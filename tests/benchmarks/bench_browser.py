@@ -57,6 +57,12 @@ window.plateviz = (() => {
     const columns = data instanceof Map ? [...data.values()] : Object.values(data);
     return columns.map(column => `${column.length} ${total(column)}`).join();
   })].join(';'));
+  // Which sources are selected, for each figure on the screen that shows sources.
+  const selected = () => plots().map(view => [card(view), ...view.model.renderers
+    .map(renderer => renderer.data_source)
+    .filter(source => source.data.id ?? source.data.get?.('id'))
+    .map(source => `${source.selected.indices.length} ${total(source.selected.indices)}`)].join())
+    .filter(row => row.includes(','));
   const texts = () => {
     const found = [];
     const walk = root => {
@@ -76,7 +82,7 @@ window.plateviz = (() => {
       : requestAnimationFrame(look);
     look();
   });
-  return { plots, card, shown, texts, until };
+  return { plots, card, shown, selected, texts, until };
 })();
 """
 
@@ -99,6 +105,8 @@ def main() -> None:
         for start, end, act in (
             ("exposure", "residual map", next_exposure),
             ("what-if: another order", "strip and all visible figures", next_order),
+            ("a box of sources", "selected in all visible figures", next_selection),
+            ("what-if: these left out", "strip and all visible figures", leave_out),
             ("another orbit", "strip and all visible figures", next_orbit),
         ):
             # The first answer is not counted: the solver may have to fit the orbit for it.
@@ -119,6 +127,46 @@ def next_order(page: Page, number: int) -> float:
     slider.focus()
     key = "ArrowLeft" if number % 2 == 0 else "ArrowRight"
     return answered(page, lambda: slider.press(key), None, words=True)
+
+
+def next_selection(page: Page, number: int) -> float:
+    """Drag a box across the residual map; return the milliseconds until all figures show it."""
+    box = page.locator(".figure-residual-map:visible canvas").first.bounding_box()
+    if box is None:
+        raise RuntimeError("expected a residual map on the screen")
+    # Boxes of different sizes, so that every figure has other sources of them.
+    last = 0.5 + 0.02 * (number % 5)
+    places = [
+        (box["x"] + share * box["width"], box["y"] + share * box["height"])
+        for share in (0.35, last)
+    ]
+    page.mouse.move(*places[0])
+    page.mouse.down()
+    page.mouse.move(*places[1], steps=5)
+    page.evaluate(
+        """() => {
+          const { selected, until } = window.plateviz;
+          const before = selected();
+          window.answer = until(() => selected().every(row => !before.includes(row)));
+        }"""
+    )
+    begin = time.perf_counter()
+    page.mouse.up()
+    page.evaluate("() => window.answer")
+    taken = 1e3 * (time.perf_counter() - begin)
+    page.wait_for_timeout(1000)
+    return taken
+
+
+def leave_out(page: Page, number: int) -> float:
+    """Leave a selection out of the fit; return the milliseconds until everything shows it."""
+    next_selection(page, number)
+    button = page.get_by_role("button", name="Leave out of the fit")
+    taken = answered(page, button.click, None, words=True)
+    page.get_by_role("button", name="Put back into the fit").click()
+    page.get_by_role("button", name="Leave out of the fit").wait_for()
+    page.wait_for_timeout(3000)
+    return taken
 
 
 def next_orbit(page: Page, number: int) -> float:

@@ -99,6 +99,8 @@ class Session(param.Parameterized):
         self.param.update(solutions=[], other=None)
         self._put_on_screen(solution)
         self.choices.load(result.settings)
+        if self.choices.what_if_at_once:
+            self.store.prepare(orbit, result.settings)
 
     def refuse(self, message: str) -> None:
         """Show why a request failed; the last solution stays."""

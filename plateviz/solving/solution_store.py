@@ -18,7 +18,7 @@ from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
 from plateviz.solving.solver_queue import SolverQueue
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
-from solver.data.settings import FitSettings
+from solver.data.settings import ENGINES, FitSettings
 from solver.io.disk import writing
 from solver.io.scratch import ScratchFolder, temporary_folder
 
@@ -65,6 +65,15 @@ class SolutionStore:
                 self._jobs[directory] = job
             return job
 
+    def prepare(self, orbit: int | None, settings: FitSettings) -> None:
+        """Let the solver, once it is idle, fit what the what-ifs of a solution start from.
+
+        A solution of a run was fitted by another process, which has ended. Only the first engine
+        answers what-ifs.
+        """
+        if settings.engine == ENGINES[0]:
+            self._solver.prepare(self._fit_of(orbit, settings))
+
     def cancel(self, job: Job) -> None:
         """Cancel a waiting or running job."""
         self._solver.cancel(job)
@@ -84,14 +93,12 @@ class SolutionStore:
     def _request(
         self, orbit: int | None, settings: FitSettings, what_if: bool, directory: Path
     ) -> dict[str, object]:
-        return {
-            "do": "fit",
-            "origin": origin_to_dict(self.origin),
-            "orbit": orbit,
-            "settings": settings.to_dict(),
-            "what_if": what_if,
-            "directory": str(directory),
-        }
+        fit = self._fit_of(orbit, settings)
+        return {"do": "fit", **fit, "what_if": what_if, "directory": str(directory)}
+
+    def _fit_of(self, orbit: int | None, settings: FitSettings) -> dict[str, object]:
+        origin = origin_to_dict(self.origin)
+        return {"origin": origin, "orbit": orbit, "settings": settings.to_dict()}
 
     def _directory(self, orbit: int | None, settings: FitSettings, what_if: bool) -> Path:
         request = json.dumps([orbit, settings.to_dict(), what_if], sort_keys=True)

@@ -7,7 +7,8 @@ on standard error; `plateviz.solving.solver_queue` reports that and starts anoth
 
 Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory"},
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
-"directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}.
+"directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}, and without events
+{"do": "prepare", "origin", "orbit", "settings"}: fit while idle what a what-if starts from.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -19,6 +20,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import TextIO
@@ -44,6 +46,9 @@ Send = Callable[[dict], None]
 Speculative = Iterator[None]
 # Idle seconds before speculative work starts.
 _IDLE_S = 0.3
+# Further steps without a request, and their length, before an orbit is fitted unasked: the page
+# that shows its solution is drawn first.
+_PATIENT_STEPS, _PATIENT_STEP_S = 12, 0.1
 # Time in which the process removes what it has not finished, once its server has ended.
 _END_S = 3.0
 
@@ -83,7 +88,10 @@ def _serve_all() -> None:
     send({"event": "ready"})
     speculative: Speculative = iter(())
     while (request := _next_request(requests, speculative)) is not None:
-        speculative = _serve(request, send, cancellations)
+        if request["do"] == "prepare":
+            speculative = _prepare(request, requests)
+        else:
+            speculative = _serve(request, send, cancellations)
 
 
 def _next_request(
@@ -150,9 +158,48 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Specu
     return iter(())
 
 
+def _prepare(request: Request, requests: "queue.Queue[Request | None]") -> Speculative:
+    """Fit an orbit and precompute its likely what-ifs; give way to requests for anything else."""
+    for _ in range(_PATIENT_STEPS):
+        time.sleep(_PATIENT_STEP_S)
+        yield
+
+    def give_way(_: Iteration) -> None:
+        with requests.mutex:
+            waiting = list(requests.queue)
+        if not all(_starts_from(request, later) for later in waiting):
+            raise CancelledError("another request waits")
+
+    # What is wrong with the orbit is said when something is asked of it.
+    with suppress(CancelledError, InputError, FitError):
+        fitter, settings = _fitter_of(request), FitSettings.from_dict(request["settings"])
+        if not _serves_what_ifs(fitter.fitted_settings, settings):
+            fitter.fit(settings, give_way)
+        yield from fitter.precompute(settings.order)
+
+
+def _starts_from(prepared: Request, later: Request | None) -> bool:
+    """Return whether a later request is a what-if that starts from the prepared fit."""
+    return (
+        later is not None
+        and bool(later.get("what_if"))
+        and all(later[key] == prepared[key] for key in ("origin", "orbit"))
+    )
+
+
+def _serves_what_ifs(fitted: FitSettings | None, settings: FitSettings) -> bool:
+    """Return whether what-ifs of `settings` can start from the last fit of their orbit."""
+    return (
+        fitted is not None
+        and not fitted.exclusions
+        and fitted.order >= settings.order
+        and fitted.what_if_holds(settings)
+    )
+
+
 def _fit(request: Request, progress: Callable[..., None]) -> Speculative:
     progress(stage="reading the orbit")
-    fitter = _fitter(json.dumps(request["origin"], sort_keys=True), request["orbit"])
+    fitter = _fitter_of(request)
     settings = FitSettings.from_dict(request["settings"])
 
     def on_iteration(iteration: Iteration) -> None:
@@ -209,6 +256,10 @@ def _survey(request: Request, progress: Callable[..., None]) -> Speculative:
         progress=lambda now: progress(stage="fitting orbits", done=now.done, total=now.total),
     )
     return iter(())
+
+
+def _fitter_of(request: Request) -> OrbitFitter:
+    return _fitter(json.dumps(request["origin"], sort_keys=True), request["orbit"])
 
 
 @lru_cache(maxsize=4)

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 from collections import deque
+from collections.abc import Mapping
 from tempfile import TemporaryFile
 from typing import IO
 
@@ -48,6 +49,11 @@ class SolverQueue:
             if len(self._jobs) == 1:
                 self._send(job.request)
         return job
+
+    def prepare(self, request: Mapping[str, object]) -> None:
+        """Send a request for preparations, which give way to every job; nothing is reported."""
+        with self._lock:
+            self._send({"do": "prepare", **request})
 
     def cancel(self, job: Job) -> None:
         """Cancel a job at its next progress event; kill the process if there is none in time."""
@@ -98,7 +104,7 @@ class SolverQueue:
         threading.Thread(target=self._listen, args=(process, errors), daemon=True).start()
         return process
 
-    def _send(self, request: dict) -> None:
+    def _send(self, request: Mapping[str, object]) -> None:
         """Send a request to the process; start a new process if the last one has ended."""
         process = self._process or self._start()
         if process.stdin is not None:

@@ -26,11 +26,14 @@ class FakeStore:
 
     def __init__(self, result):
         self._result = result
-        self.requested, self.cancelled = [], []
+        self.requested, self.prepared, self.cancelled = [], [], []
 
     def request(self, orbit, settings, what_if=False):
         self.requested.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
         return self.requested[-1][2]
+
+    def prepare(self, orbit, settings):
+        self.prepared.append((orbit, settings))
 
     def cancel(self, job):
         self.cancelled.append(job)
@@ -68,6 +71,15 @@ def test_first_orbit_is_requested_with_the_settings_of_the_paper(session):
     assert session.stage is Stage.READY
     assert session.shown.settings == FitSettings()
     assert session.other is None
+
+
+def test_solution_of_a_run_is_prepared_for_what_ifs(fit_result):
+    session = Session(FakeStore(fit_result))
+    session.show_result(0, fit_result)
+    assert session.store.prepared == [(0, fit_result.settings)]
+    session.choices.what_if_at_once = False
+    session.show_result(1, fit_result)
+    assert len(session.store.prepared) == 1
 
 
 def test_last_solution_stays_until_the_next_one_is_complete(session):

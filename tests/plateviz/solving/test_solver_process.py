@@ -4,7 +4,13 @@ import queue
 
 import pytest
 
-from plateviz.solving.solver_process import _next_request
+from plateviz.solving import solver_process
+from plateviz.solving.origin import SurveyFolder, origin_to_dict
+from plateviz.solving.solver_process import _fitter_of, _next_request, _prepare
+from solver.data.exclusions import Exclusions
+from solver.data.result import FitStatus
+from solver.data.settings import FitSettings
+from solver.errors import InputError
 
 
 @pytest.fixture
@@ -44,3 +50,100 @@ def test_speculative_work_is_finished_without_requests(requests):
 
     assert _next_request(requests, speculative()) is None
     assert done == [0, 1, 2]
+
+
+class Fitter:
+    """An orbit's fitter without an orbit: a fit takes its settings and tells of one iteration."""
+
+    def __init__(self, fitted):
+        self.fitted_settings = fitted
+
+    def fit(self, settings, progress):
+        progress(None)
+        self.fitted_settings = settings
+
+    def precompute(self, order):
+        yield from range(order)
+
+
+SETTINGS = FitSettings(order=3)
+PREPARED = {"do": "prepare", "origin": "here", "orbit": 0, "settings": SETTINGS.to_dict()}
+
+
+@pytest.fixture
+def prepare(monkeypatch, requests):
+    """Prepare an orbit that was fitted with some settings, or not; return the settings then."""
+
+    def prepared(fitted=None):
+        fitter = Fitter(fitted)
+        monkeypatch.setattr(solver_process, "_PATIENT_STEPS", 0)
+        monkeypatch.setattr(solver_process, "_fitter_of", lambda request: fitter)
+        steps = list(_prepare(PREPARED, requests))
+        return fitter.fitted_settings, steps
+
+    return prepared
+
+
+def test_orbit_is_fitted_and_its_likely_what_ifs_are_precomputed(prepare):
+    assert prepare() == (SETTINGS, [0, 1, 2])
+
+
+def test_orbit_whose_fit_serves_is_not_fitted_again(prepare):
+    fitted = FitSettings(order=4, prior_widths={"sources": 3.0})
+    assert prepare(fitted)[0] is fitted
+
+
+@pytest.mark.parametrize(
+    "fitted",
+    [
+        FitSettings(order=2),
+        FitSettings(order=3, aberration=False),
+        FitSettings(order=3, exclusions=Exclusions(detectors=frozenset([1]))),
+    ],
+    ids=["lower-order", "other-model", "fewer-measurements"],
+)
+def test_fit_that_cannot_serve_is_replaced(prepare, fitted):
+    assert prepare(fitted)[0] == SETTINGS
+
+
+@pytest.mark.parametrize(
+    ("change", "is_fitted"),
+    [
+        ({"do": "fit", "what_if": True}, True),
+        ({"do": "fit", "what_if": True, "orbit": 1}, False),
+        ({"do": "fit", "what_if": False}, False),
+        ({"do": "prepare", "orbit": 1}, False),
+    ],
+    ids=["its-what-if", "what-if-of-another-orbit", "fit", "another-orbit"],
+)
+def test_preparation_gives_way_to_all_but_its_what_ifs(prepare, requests, change, is_fitted):
+    requests.put({**PREPARED, **change})
+    assert (prepare()[0] is not None) == is_fitted
+
+
+def test_page_that_shows_the_solution_is_drawn_first(requests, monkeypatch):
+    monkeypatch.setattr(solver_process, "_PATIENT_STEP_S", 0.0)
+    requests.put({"job": "1"})
+    assert _next_request(requests, _prepare(PREPARED, requests)) == {"job": "1"}
+
+
+def test_what_if_of_a_prepared_orbit_needs_no_fit(monkeypatch, requests, small_survey):
+    """As for a solution of a run, of which no process has a fit in memory."""
+    monkeypatch.setattr(solver_process, "_PATIENT_STEPS", 0)
+    settings = FitSettings()
+    origin = origin_to_dict(SurveyFolder(str(small_survey)))
+    request = {**PREPARED, "origin": origin, "settings": settings.to_dict()}
+    later = settings.with_(prior_widths={"sources": 3.0})
+    assert _fitter_of(request).what_if(later) is None
+    next(_prepare(request, requests))
+    assert _fitter_of(request).what_if(later).summary["reason"] == FitStatus.WHAT_IF.value
+    solver_process._fitter.cache_clear()
+
+
+def test_what_is_wrong_with_an_orbit_is_not_said_unasked(monkeypatch, requests):
+    def unreadable(request):
+        raise InputError("obs.fits: no such file")
+
+    monkeypatch.setattr(solver_process, "_PATIENT_STEPS", 0)
+    monkeypatch.setattr(solver_process, "_fitter_of", unreadable)
+    assert list(_prepare(PREPARED, requests)) == []

@@ -34,6 +34,14 @@ def sample_fitter(sample_orbit):
     return fitted(OrbitFitter(sample_orbit))
 
 
+@pytest.fixture(scope="module")
+def prepared_fitter(sample_orbit):
+    """A fitter with warm starts for every lower order."""
+    prepared = fitted(OrbitFitter(sample_orbit))
+    assert len(list(prepared.precompute(6))) > 4
+    return prepared
+
+
 def fitted(fitter):
     fitter.fit(FitSettings(order=6))
     return fitter
@@ -126,18 +134,16 @@ PREPARED = {
 @pytest.mark.slow
 @pytest.mark.parametrize("change", PREPARED)
 def test_precomputed_order_is_not_linearised_again(
-    change, sample_orbit, sample_fitter, monkeypatch
+    change, sample_orbit, sample_fitter, prepared_fitter, monkeypatch
 ):
     settings = FitSettings(**{"order": 6, **PREPARED[change](sample_orbit)})
     expected = sample_fitter.what_if(settings)
-    prepared = fitted(OrbitFitter(sample_orbit))
-    assert len(list(prepared.precompute(6))) > 4
 
     def refuse(*_):
         raise AssertionError("linearised again")
 
     monkeypatch.setattr("solver.linear.update.accumulate", refuse)
-    found = prepared.what_if(settings)
+    found = prepared_fitter.what_if(settings)
     step = found.sources["offset_ra"] - expected.sources["offset_ra"]
     assert np.abs(step / expected.sources["sigma_ra_marginal"]).max() < 1e-3
     for name in ("sigma_dec_marginal", "chi2"):
@@ -161,14 +167,13 @@ def test_lower_order_without_a_shifted_term_is_not_precomputed(orbit):
 
 
 @pytest.mark.slow
-def test_every_lower_order_is_precomputed(sample_orbit):
+def test_every_lower_order_is_precomputed(sample_orbit, sample_fitter, prepared_fitter):
     """This includes an order that otherwise needs a refit."""
     variants = [FitSettings(order=order) for order in (4, 1)]
-    prepared = fitted(OrbitFitter(sample_orbit))
-    assert prepared.what_if(variants[-1]) is None
-    list(prepared.precompute(6))
+    assert sample_fitter.what_if(variants[-1]) is None
     for settings in variants:
-        found, expected = prepared.what_if(settings), fit_orbit(sample_orbit, settings=settings)
+        found = prepared_fitter.what_if(settings)
+        expected = fit_orbit(sample_orbit, settings=settings)
         moved = found.sources["offset_ra"] - expected.sources["offset_ra"]
         assert np.abs(moved / expected.sources["sigma_ra_marginal"]).max() < AGREEMENT
         assert found.summary["chi2"] == pytest.approx(expected.summary["chi2"], rel=1e-6)
@@ -209,9 +214,9 @@ def test_change_too_large_for_a_linear_model_needs_a_refit(orbit, fitter):
         ((0.7, 0.6, 0.5, 0.4, 0.3, 1e-4), False),
     ],
 )
-def test_steps_of_a_nearly_linear_model_become_shorter(orbit, monkeypatch, steps, is_solved):
+def test_steps_of_a_nearly_linear_model_become_shorter(fitter, monkeypatch, steps, is_solved):
     """A solution is returned once a step is below the tolerance."""
-    fitter, remaining = fitted(OrbitFitter(orbit.data, orbit.instrument)), iter(steps)
+    remaining = iter(steps)
     monkeypatch.setattr(what_if, "largest_step", lambda *_: (next(remaining), "detector x [0]"))
     found = fitter.what_if(FitSettings(order=6, prior_widths={"sources": 3.0}))
     assert (found is not None) == is_solved

@@ -34,15 +34,23 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """Run the tests of a file in one process, and those of tests/ui, which share a browser."""
+    """Run the tests of a file in one process, and those of tests/ui, with a browser, in two."""
     config.option.loadscopereorder = False
     return _ByFile(config, log)
 
 
 class _ByFile(LoadFileScheduling):
+    """Give each process a file at a time, and half of tests/ui at once.
+
+    One chain of browser tests would take longer than all others; more than two browsers at a time
+    would wait for one another.
+    """
+
     def _split_scope(self, nodeid):
         file = super()._split_scope(nodeid)
-        return "tests/ui" if file.startswith("tests/ui/") else file
+        if not file.startswith("tests/ui/"):
+            return file
+        return "tests/ui, first half" if file < "tests/ui/test_n" else "tests/ui, second half"
 
 
 def _share_compilations(config):

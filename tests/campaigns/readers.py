@@ -206,6 +206,9 @@ class _Store:
     def request(self, *request: object) -> Job:
         return Job({"do": "fit"})
 
+    def prepare(self, *request: object) -> None:
+        pass
+
     def cancel(self, job: Job) -> None:
         job.cancel()
 

@@ -9,10 +9,12 @@ from typing import NamedTuple
 import pandas as pd
 import param
 
+from plateviz.dashboard.exploration import Exploration
 from plateviz.dashboard.session import Session
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.queries import SurveyRun
 from plateviz.solving.origin import SurveyFolder
+from plateviz.tables.explore import EXPLORABLE
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import InputError
@@ -51,7 +53,8 @@ class Navigation(param.Parameterized):
     """What is on the screen of one browser session.
 
     `run_name` is None if the survey has no run. `found` is the result of the last search for a
-    source of the run; if it is None, `message` says why.
+    source of the run; if it is None, `message` says why. `exploration` is what the Explore
+    workspace draws.
     """
 
     view = param.Selector(default=View.ORBIT, objects=list(View), doc="view on the screen")
@@ -66,6 +69,7 @@ class Navigation(param.Parameterized):
         """Begin with the first whole run, or with the orbit while no run has been gathered."""
         super().__init__()
         self.session = session
+        self.exploration = Exploration(list(EXPLORABLE))
         self._source_text = ""
         self._runs = {run.name: run for run in session.store.runs()}
         if self._runs:
@@ -117,6 +121,7 @@ class Navigation(param.Parameterized):
             Orbit view
         """
         self.session.selection.restore(address)
+        self.exploration.restore(address)
         views = {view.value: view for view in View}
         if address.get("run") in self._runs:
             self.run_name = address["run"]
@@ -136,6 +141,8 @@ class Navigation(param.Parameterized):
             query["run"] = self.run_name
         if self.found is not None:
             query["source"] = str(self.found.source_id)
+        if self.workspace is OrbitWorkspace.EXPLORE:
+            query |= self.exploration.address()
         return query
 
     def turn_to(self, view: View) -> None:

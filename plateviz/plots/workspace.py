@@ -7,7 +7,11 @@ from enum import StrEnum
 
 
 class OrbitWorkspace(StrEnum):
-    """Workspaces of the Orbit page; `VERDICT` shows the key figures of the others small."""
+    """Workspaces of the Orbit page.
+
+    `VERDICT` shows the key figures of the others small; `EXPLORE` has one figure, of columns that a
+    person chooses.
+    """
 
     VERDICT = "verdict"
     RESIDUALS = "residuals"
@@ -15,6 +19,7 @@ class OrbitWorkspace(StrEnum):
     CALIBRATION = "calibration"
     WEAK_DIRECTIONS = "weak-directions"
     ORDERS = "orders-and-comparison"
+    EXPLORE = "explore"
 
 
 class SurveyWorkspace(StrEnum):

@@ -1,22 +1,23 @@
-"""FigureView: a card with one figure and its state; FigureGrid: the cards of a workspace."""
+"""FigureView: a card with one figure and its state."""
 
 import logging
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 
 import panel as pn
 import panel_material_ui as pmui
+from bokeh.events import Event, RangesUpdate, Reset
 
 from plateviz.dashboard.views.card_tools import CardTools
 from plateviz.dashboard.views.figure_text import FigureText
 from plateviz.dashboard.views.markup import markup_pane, paragraph
-from plateviz.dashboard.views.point_actions import NO_LINKS, Links, PointActions, Select
+from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.visibility import Visibility
 from plateviz.figures.bokeh_figure import BokehFigure
-from plateviz.figures.figure import Figure
+from plateviz.figures.figure import Figure, Limits
 from plateviz.figures.resized import resized
 from solver.errors import InputError
 
-_BATCH = 1
 # Screen pixels between the edge of a card and its figure.
 _INSET = 4
 # Fills its card, whatever it shows.
@@ -39,6 +40,7 @@ Part = pn.viewable.Viewable | pn.viewable.Viewer
 
 PlotFigure = Callable[[], Figure | None]
 """Returns a figure, or None while there are no data."""
+Zoom = Callable[[tuple[Limits, Limits] | None], object]
 
 
 class FigureView(pn.viewable.Viewer):
@@ -53,8 +55,8 @@ class FigureView(pn.viewable.Viewer):
         plot_figure: PlotFigure,
         *,
         waiting: str = "",
-        links: Links = NO_LINKS,
-        select: Select | None = None,
+        actions: PointActions | None = None,
+        zoom: Zoom | None = None,
         theme: str = "light",
         **params: object,
     ) -> None:
@@ -63,14 +65,15 @@ class FigureView(pn.viewable.Viewer):
         Parameters
         ----------
         waiting : text while there is nothing to draw
-        links : actions for a tap on a point
-        select : action for sources that are selected; None if they cannot be
+        actions : what its points do
+        zoom : called with the limits of the first frame's axes when a person changes them, and
+            with None when they are reset
         theme : of the first drawing
         """
         super().__init__(**params)
         self.is_wide = figure.is_wide
         self._name, self._plot_figure = figure.name, plot_figure
-        self._actions = PointActions(links, select)
+        self._actions, self._zoom = actions or PointActions(), zoom
         self._selected = self._shown_selected = frozenset[str]()
         self._figure: Figure | None = None
         self._drawn: BokehFigure | None = None
@@ -157,8 +160,18 @@ class FigureView(pn.viewable.Viewer):
             self._drawn.follow(figure, self._theme)
         if self._pane is None or self._pane.object is not self._drawn.model:
             self._pane = pn.pane.Bokeh(self._drawn.model, align="center", margin=0)
+            self._follow_zoom(self._drawn)
         self._actions.follow(self._drawn)
         self._put(self._pane)
+
+    def _follow_zoom(self, drawn: BokehFigure) -> None:
+        if self._zoom is not None:
+            for event in (RangesUpdate, Reset):
+                drawn.frames[0].plot.on_event(event, self._take_zoom)
+
+    def _take_zoom(self, event: Event) -> None:
+        if self._zoom is not None:
+            self._zoom(_limits(event) if isinstance(event, RangesUpdate) else None)
 
     def _show_text(self, text: str) -> None:
         pane = markup_pane()
@@ -173,6 +186,15 @@ class FigureView(pn.viewable.Viewer):
     def _fade(self) -> None:
         is_old = self._is_changed or self._is_stale
         self._body.styles = {**_BODY, **_CENTRED, "opacity": "0.45" if is_old else "1"}
+
+
+def _limits(event: RangesUpdate) -> tuple[Limits, Limits] | None:
+    """Return the limits of both axes; None if the browser has sent something else."""
+    ends = (event.x0, event.x1, event.y0, event.y1)
+    if not all(isinstance(end, float | int) and math.isfinite(end) for end in ends):
+        return None
+    x0, x1, y0, y1 = map(float, ends)  # type: ignore[arg-type]
+    return (x0, x1), (y0, y1)
 
 
 def card(content: Part, name: str) -> pmui.Paper:
@@ -191,90 +213,3 @@ def _card(*contents: Part, name: str) -> pmui.Paper:
         elevation=0,
         variant="outlined",
     )
-
-
-class FigureGrid(pn.viewable.Viewer):
-    """Cards that fill the area they are given, in rows of one height without a hole."""
-
-    def __init__(
-        self,
-        views: Sequence[FigureView],
-        wake: Callable[..., object],
-        *,
-        columns: int = 2,
-        others: Sequence[Part] = (),
-        **params: object,
-    ) -> None:
-        """Arrange the cards in order.
-
-        Parameters
-        ----------
-        wake : called when a figure comes near the screen, leaves it, or gets another size
-        columns : at most, where there is room
-        others : cards after those of the figures
-        """
-        super().__init__(**params)
-        self._views = list(views)
-        for view in self._views:
-            view.visibility.param.watch(wake, ["is_near", "room"])
-        if columns == 2 and (len(self._views) + len(others)) % 2:
-            next((v for v in self._views if v.is_wide), self._views[-1]).take_row()
-        self._box = pmui.FlexBox(
-            *self._views,
-            *others,
-            sx={
-                "display": "grid",
-                "gap": "8px",
-                "gridTemplateColumns": {
-                    "xs": "minmax(0, 1fr)",
-                    "lg": f"repeat({columns}, minmax(0, 1fr))",
-                },
-                "gridAutoFlow": "dense",
-                "gridAutoRows": "minmax(250px, 1fr)",
-            },
-            styles={"align-self": "stretch", "height": "auto"},
-            stylesheets=[".flex-box { height: 100%; }"],
-            sizing_mode="stretch_width",
-            margin=0,
-        )
-
-    def __panel__(self) -> pn.viewable.Viewable:
-        """Return the cards."""
-        return self._box
-
-    @property
-    def is_due(self) -> bool:
-        """Whether any figure is to be drawn."""
-        return any(view.is_due for view in self._views)
-
-    @property
-    def is_laid_out(self) -> bool:
-        """Whether the browser has said how large any card is."""
-        return any(min(view.visibility.room) > 0 for view in self._views)
-
-    def change(self, theme: str) -> None:
-        """Mark all figures as changed, and set their theme."""
-        for view in self._views:
-            view.change(theme)
-
-    def show_selected(self, ids: frozenset[str]) -> None:
-        """Show which sources are selected in all figures."""
-        for view in self._views:
-            view.show_selected(ids)
-
-    def mark_stale(self, is_stale: bool) -> None:
-        """Mark all figures as stale while a new solution is being computed."""
-        for view in self._views:
-            view.mark_stale(is_stale)
-
-    def draw_due(self) -> None:
-        """Let all due figures follow that are drawn, and draw the first few of the others.
-
-        A first drawing changes the page, which takes a while. With batches, the page opens at
-        once, fills from the top, and remains responsive.
-        """
-        due = [view for view in self._views if view.is_due]
-        new = [view for view in due if not view.is_drawn]
-        with pn.io.hold():
-            for view in [view for view in due if view.is_drawn] + new[:_BATCH]:
-                view.draw()

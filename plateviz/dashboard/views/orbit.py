@@ -9,8 +9,11 @@ import panel_material_ui as pmui
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
-from plateviz.dashboard.views.figure import FigureGrid, FigureView, card
+from plateviz.dashboard.views.explore import ExploreView
+from plateviz.dashboard.views.figure import FigureView, card
+from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import heading
+from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.refit import RefitView
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.dashboard.views.stack import Stack
@@ -80,6 +83,10 @@ class OrbitPage(pn.viewable.Viewer):
         return self._grids[self._navigation.orbit_workspace]
 
     def _workspace(self, one: OrbitWorkspace) -> pn.viewable.Viewable:
+        if one is OrbitWorkspace.EXPLORE:
+            explore = ExploreView(self._navigation, self._wake)
+            self._grids[one] = explore.grid
+            return explore.__panel__()
         is_first = one is OrbitWorkspace.VERDICT
         among = [d for d in diagnostics() if (d.is_key if is_first else d.workspace is one)]
         views = {d: self._figure_view(d) for d in among}
@@ -101,7 +108,7 @@ class OrbitPage(pn.viewable.Viewer):
             diagnostic,
             partial(self._plot, diagnostic),
             waiting="The first solution is being computed.",
-            select=self._session.select_sources,
+            actions=PointActions(select=self._session.select_sources),
             theme=self._session.theme,
         )
 

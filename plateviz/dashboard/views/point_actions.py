@@ -1,9 +1,12 @@
 """PointActions: a tap on a point opens its orbit; a tap, box or lasso selects sources."""
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from types import MappingProxyType
 
+import numpy as np
 from bokeh import models
+from bokeh.events import Event, SelectionGeometry
 
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.bokeh_frame import BokehFrame
@@ -14,6 +17,10 @@ Links = Mapping[str, Callable[[str], object]]
 Select = Callable[[frozenset[int]], object]
 """Called with the ids of the sources that a person has selected."""
 
+SelectArea = Callable[[np.ndarray], object]
+"""Called with the corners, (n, 2), of an area where a person has drawn one and there are no points.
+"""
+
 NO_LINKS: Links = MappingProxyType({})
 
 
@@ -23,9 +30,14 @@ class PointActions:
     Points with a source's `id` are selected instead, if there is a function for that.
     """
 
-    def __init__(self, links: Links = NO_LINKS, select: Select | None = None) -> None:
+    def __init__(
+        self,
+        links: Links = NO_LINKS,
+        select: Select | None = None,
+        select_area: SelectArea | None = None,
+    ) -> None:
         """Begin without a figure."""
-        self._links, self._select = links, select
+        self._links, self._select, self._select_area = links, select, select_area
         self._followed: set[str] = set()
         self._frames: dict[str, _FrameTools] = {}
         self._of_sources: list[list[BokehGlyphs]] = []
@@ -37,6 +49,10 @@ class PointActions:
         for frame in drawn.frames:
             of_sources = [one for one in frame.glyphs() if SELECTED_BY in one.source.data]
             self._of_sources.append(of_sources)
+            if self._select_area is not None and frame.plot.id not in self._frames:
+                self._tools_of(frame).select_anywhere()
+                take_area = partial(self._take_area, frame)
+                frame.plot.on_event(SelectionGeometry, lambda event, take=take_area: take(event))
             for glyphs in frame.glyphs():
                 if glyphs.source.id in self._followed:
                     continue
@@ -71,6 +87,17 @@ class PointActions:
         if glyphs.kind == "points":
             self._tools_of(frame).select_among(glyphs.renderer)
 
+    def _take_area(self, frame: BokehFrame, event: Event) -> None:
+        if not isinstance(event, SelectionGeometry) or self._select_area is None:
+            return
+        has_points = any(
+            one.kind == "points" and one.renderer.visible and SELECTED_BY in one.source.data
+            for one in frame.glyphs()
+        )
+        corners = _corners(event.geometry or {})
+        if event.final and corners is not None and not has_points:
+            self._select_area(corners)
+
     def _open_on_tap(self, frame: BokehFrame, glyphs: BokehGlyphs, column: str) -> None:
         source = glyphs.source
 
@@ -100,6 +127,11 @@ class _FrameTools:
         """Let a tap reach the points."""
         self._extend(self._tap, renderer)
 
+    def select_anywhere(self) -> None:
+        """Have a box and a lasso, even where there are no points."""
+        self._plot.add_tools(self._box, self._lasso)
+        self._plot.toolbar.active_drag = self._box
+
     def select_among(self, renderer: models.DataRenderer) -> None:
         """Let a tap, a box and a lasso reach the points; a drag is a box."""
         for tool in (self._tap, self._box, self._lasso):
@@ -125,3 +157,18 @@ def _chosen_ids(glyphs: BokehGlyphs) -> Iterable[str]:
     ids = glyphs.source.data[SELECTED_BY]
     # They come from the browser.
     return (ids[row] for row in glyphs.source.selected.indices if 0 <= row < len(ids))
+
+
+def _corners(geometry: Mapping[str, object]) -> np.ndarray | None:
+    """Return the corners of an area that the browser has sent; None for anything else."""
+    try:
+        if geometry["type"] == "rect":
+            x0, x1, y0, y1 = (float(geometry[name]) for name in ("x0", "x1", "y0", "y1"))  # type: ignore[arg-type]
+            corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+        elif geometry["type"] == "poly":
+            corners = np.stack([geometry["x"], geometry["y"]], axis=1).astype(float)  # type: ignore[list-item]
+        else:
+            return None
+    except (KeyError, TypeError, ValueError):
+        return None
+    return corners if np.isfinite(corners).all() else None

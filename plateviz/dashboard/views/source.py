@@ -8,7 +8,8 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.views.figure import FigureGrid, FigureView
+from plateviz.dashboard.views.figure import FigureView
+from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import (
     heading,
     judged,
@@ -19,6 +20,7 @@ from plateviz.dashboard.views.markup import (
     titled,
 )
 from plateviz.dashboard.views.notable_source import NotableSourceLink
+from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.table import DataTable
@@ -119,7 +121,7 @@ class SourcePage(pn.viewable.Viewer):
         return FigureView(
             figure,
             partial(self._plot, figure),
-            links={"orbit_id": self._open_orbit},
+            actions=PointActions({"orbit_id": self._open_orbit}),
             theme=self._session.theme,
         )
 

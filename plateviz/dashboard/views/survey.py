@@ -8,7 +8,8 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.views.figure import FigureGrid, FigureView
+from plateviz.dashboard.views.figure import FigureView
+from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import (
     heading,
     judged,
@@ -18,6 +19,7 @@ from plateviz.dashboard.views.markup import (
     titled,
 )
 from plateviz.dashboard.views.notable_source import NotableSourceLink
+from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.table import DataTable
@@ -92,12 +94,12 @@ class SurveyPage(pn.viewable.Viewer):
         return workspace(grid, *(above if is_first else ()))
 
     def _figure_view(self, figure: SurveyFigure) -> FigureView:
+        session = self._session
         return FigureView(
             figure,
             partial(self._plot, figure),
-            links={"orbit_id": self._open_orbit},
-            select=self._session.select_sources,
-            theme=self._session.theme,
+            actions=PointActions({"orbit_id": self._open_orbit}, session.select_sources),
+            theme=session.theme,
         )
 
     def _plot(self, figure: SurveyFigure) -> Figure | None:

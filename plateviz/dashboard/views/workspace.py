@@ -2,7 +2,8 @@
 
 import panel_material_ui as pmui
 
-from plateviz.dashboard.views.figure import FigureGrid, Part
+from plateviz.dashboard.views.figure import Part
+from plateviz.dashboard.views.figure_grid import FigureGrid
 
 # Screen pixels above a workspace: the page's bar, the switches, the verdict.
 _ABOVE = 170

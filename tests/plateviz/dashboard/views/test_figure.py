@@ -1,10 +1,15 @@
 """FigureView: drawn once when near the screen, then followed in place; faded while out of date."""
 
+import numpy as np
 import pandas as pd
 import pytest
+from bokeh.events import RangesUpdate, Reset, SelectionGeometry
 
-from plateviz.dashboard.views.figure import FigureGrid, FigureView
-from plateviz.figures.figure import Axis, framed
+from plateviz.dashboard.views.figure import FigureView
+from plateviz.dashboard.views.figure_grid import FigureGrid
+from plateviz.dashboard.views.point_actions import PointActions
+from plateviz.figures import glyphs
+from plateviz.figures.figure import Axis, Ramp, framed
 from plateviz.figures.glyphs import points
 from plateviz.plots.arrows import Field, arrows
 from plateviz.plots.gallery import diagnostics
@@ -99,7 +104,9 @@ def test_drawn_figure_follows_in_place(view):
 
 def test_tapped_orbit_is_opened_once_and_not_selected():
     opened = []
-    view = FigureView(diagnostics()[0], lambda: figure_of(["7", "8"]), links={"id": opened.append})
+    view = FigureView(
+        diagnostics()[0], lambda: figure_of(["7", "8"]), actions=PointActions({"id": opened.append})
+    )
     view.draw()
     view.draw()
     source = plot(view).renderers[0].data_source
@@ -113,7 +120,9 @@ def test_tapped_orbit_is_opened_once_and_not_selected():
 def test_sources_are_selected_and_shown_as_selected_when_drawn_next():
     chosen = []
     rows = ["7", "8", "7", "9"]
-    view = FigureView(diagnostics()[0], lambda: figure_of(rows), select=chosen.append)
+    view = FigureView(
+        diagnostics()[0], lambda: figure_of(rows), actions=PointActions(select=chosen.append)
+    )
     come_near(view)
     view.draw()
     source = plot(view).renderers[0].data_source
@@ -144,7 +153,7 @@ def test_next_selection_in_a_map_of_arrows_replaces_the_first():
     view = FigureView(
         diagnostics()[0],
         lambda: framed(marks, title="Arrows", width=200, **axes),
-        select=chosen.append,
+        actions=PointActions(select=chosen.append),
     )
     come_near(view)
     view.draw()
@@ -205,3 +214,52 @@ def test_grid_draws_a_few_figures_near_the_screen_at_a_time():
         grid.draw_due()
     assert not grid.is_due
     assert sorted(drawn) == sorted(d.name for d in diagnostics()[1:6])
+
+
+def cells():
+    ramp = Ramp("count", "count", (0.0, 1.0))
+    image = glyphs.image(np.eye(2), (0.0, 9.0), (0.0, 2.0), name="cells", ramp=ramp)
+    axes = {"x": Axis("x (mm)", (0.0, 9.0)), "y": Axis("y (mm)", (0.0, 2.0))}
+    return framed([image], title="Cells", width=200, height=100, **axes)
+
+
+def area_of(plot, **geometry):
+    return SelectionGeometry(plot, geometry=geometry, final=True)
+
+
+def test_area_is_selected_where_there_are_no_points():
+    areas, shown = [], [cells()]
+    view = FigureView(
+        diagnostics()[0], lambda: shown[-1], actions=PointActions(select_area=areas.append)
+    )
+    come_near(view)
+    view.draw()
+    drawn = plot(view)
+    drawn._trigger_event(area_of(drawn, type="rect", x0=1.0, x1=2.0, y0=0.5, y1=1.0))
+    drawn._trigger_event(area_of(drawn, type="poly", x=[1, 2, 3], y=[0, 1, 0]))
+    assert [area.tolist() for area in areas] == [
+        [[1.0, 0.5], [2.0, 0.5], [2.0, 1.0], [1.0, 1.0]],
+        [[1.0, 0.0], [2.0, 1.0], [3.0, 0.0]],
+    ]
+    # What a browser of ours never sends.
+    for geometry in ({"type": "rect"}, {"type": "poly", "x": [1], "y": []}, {"type": "point"}):
+        drawn._trigger_event(area_of(drawn, **geometry))
+    # Points answer by themselves.
+    shown.append(figure_of(["7", "8"]))
+    view.change("light")
+    view.draw()
+    drawn._trigger_event(area_of(drawn, type="rect", x0=1.0, x1=2.0, y0=0.5, y1=1.0))
+    assert len(areas) == 2
+
+
+def test_zoom_is_told_and_a_reset_too():
+    zooms = []
+    view = FigureView(diagnostics()[0], cells, zoom=zooms.append)
+    come_near(view)
+    view.draw()
+    view.draw()
+    drawn = plot(view)
+    drawn._trigger_event(RangesUpdate(drawn, x0=1.0, x1=2.0, y0=0.5, y1=1.0))
+    drawn._trigger_event(Reset(drawn))
+    drawn._trigger_event(RangesUpdate(drawn, x0=None, x1=2.0, y0=0.5, y1=1.0))
+    assert zooms == [((1.0, 2.0), (0.5, 1.0)), None, None]

@@ -1,0 +1,132 @@
+"""Exploration: what the Explore workspace draws against what, in one browser session."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import param
+
+from plateviz.figures.figure import Limits
+from plateviz.plots.explore import Columns
+
+# A control shows an empty value as if nothing were chosen.
+NONE = "none"
+_OPTIONAL = ("colour", "only")
+# What is shown first of each table, where it has these columns.
+_FIRST: Mapping[str, tuple[str, str]] = {
+    "measurements": ("focal_x", "residual_x"),
+    "sources": ("n_obs", "sigma_ra_marginal"),
+    "exposures": ("time", "chi2_per_dof"),
+}
+_NUMBER = r"-?\d+(?:\.\d*)?(?:e[+-]?\d+)?"
+_NUMBERS = re.compile(rf"{_NUMBER}(?:~{_NUMBER})*")
+_SWITCHES = ("is_log_x", "is_log_y", "has_median")
+
+
+class Exploration(param.Parameterized):
+    """A table, the columns of it that are drawn, and the limits of the axes.
+
+    The names of the parameters are those of `plots.explore.Columns`.
+    """
+
+    table = param.Selector(doc="what a row is")
+    x = param.Selector(doc="column along the lower axis")
+    y = param.Selector(doc="column along the left axis")
+    colour = param.Selector(default=NONE, objects=[NONE], doc="column that decides the colour")
+    only = param.Selector(default=NONE, objects=[NONE], doc="column whose values limit the rows")
+    lowest = param.Number(default=-math.inf, doc="least value of that column")
+    highest = param.Number(default=math.inf, doc="largest value of that column")
+    is_log_x = param.Boolean(default=False, doc="whether the lower axis is logarithmic")
+    is_log_y = param.Boolean(default=False, doc="whether the left axis is logarithmic")
+    has_median = param.Boolean(default=False, doc="whether medians in bins are drawn")
+    limits = param.Tuple(default=None, length=2, allow_None=True, doc="limits of the axes, or None")
+
+    def __init__(self, tables: list[str], **values: Any) -> None:  # noqa: ANN401 as param
+        """Begin with the first of the tables."""
+        super().__init__(**values)
+        self.param["table"].objects = tables
+        self.table = tables[0]
+        self._requested: dict[str, str] = {}
+        self.param.watch(self._forget, ["table", "x", "y", "only", "is_log_x", "is_log_y"])
+
+    def offer(self, columns: list[str]) -> None:
+        """Limit the choice to the columns of the table; a column that it lacks is replaced."""
+        requested, self._requested = self._requested, {}
+        first = [name for name in _FIRST[self.table] if name in columns] or columns[:1]
+        defaults = {"x": first[0], "y": first[-1], "colour": NONE, "only": NONE}
+        wanted = {name: requested.get(name, getattr(self, name)) for name in defaults}
+        for name, default in defaults.items():
+            options = [NONE, *columns] if name in _OPTIONAL else columns
+            # A control takes the first of other options, so that the value is set after them.
+            self.param[name].objects = options
+            found = wanted[name] if wanted[name] in options else default
+            self.param.update(**{name: found})
+        # Another kind of axis forgets its limits.
+        numbers = _numbers_of(requested)
+        limits = {name: numbers.pop(name) for name in ("limits",) if name in numbers}
+        self.param.update(**numbers)
+        self.param.update(**limits)
+
+    def columns(self) -> Columns:
+        """Return what is to be drawn."""
+        values: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(Columns)}
+        values |= {name: "" for name in _OPTIONAL if values[name] == NONE}
+        return Columns(**values)
+
+    def zoom(self, x: Limits, y: Limits) -> None:
+        """Show a part of the axes."""
+        self.limits = (x, y)
+
+    def restore(self, address: Mapping[str, str]) -> None:
+        """Draw what a page's address requests, once its table is there; ignore invalid values."""
+        if address.get("rows") in self.param["table"].objects:
+            self.table = address["rows"]
+            self._requested = dict(address)
+
+    def address(self) -> dict[str, str]:
+        """Return what is drawn as the query of the page's address; `restore` reads it back."""
+        if self.x is None:
+            return {}
+        query = {"rows": self.table, "x": self.x, "y": self.y}
+        query |= {name: getattr(self, name) for name in _OPTIONAL if getattr(self, name) != NONE}
+        if self.only != NONE and math.isfinite(self.lowest) and math.isfinite(self.highest):
+            query["between"] = _text((self.lowest, self.highest))
+        switches = [name for name in _SWITCHES if getattr(self, name)]
+        if switches:
+            query["with"] = ",".join(switches)
+        if self.limits is not None:
+            query["zoom"] = _text((*self.limits[0], *self.limits[1]))
+        return query
+
+    def _forget(self, *events: param.parameterized.Event) -> None:
+        """Forget limits that were of other columns."""
+        names = {event.name for event in events}
+        values: dict[str, object] = {"limits": None}
+        if names & {"table", "only"}:
+            values |= {"lowest": -math.inf, "highest": math.inf}
+        self.param.update(**values)
+
+
+def _text(numbers: tuple[float, ...]) -> str:
+    return "~".join(f"{number:.8g}" for number in numbers)
+
+
+def _numbers_of(address: Mapping[str, str]) -> dict[str, Any]:
+    """Return the switches and limits that an address requests."""
+    switches = address.get("with", "").split(",") if "with" in address else []
+    values: dict[str, Any] = {name: True for name in _SWITCHES if name in switches}
+    between, zoom = (_parsed(address.get(name, ""), n) for name, n in (("between", 2), ("zoom", 4)))
+    if between is not None:
+        values |= {"lowest": between[0], "highest": between[1]}
+    if zoom is not None and zoom[0] != zoom[1] and zoom[2] != zoom[3]:
+        values["limits"] = (zoom[:2], zoom[2:])
+    return values
+
+
+def _parsed(text: str, count: int) -> tuple[float, ...] | None:
+    if not _NUMBERS.fullmatch(text):
+        return None
+    numbers = tuple(map(float, text.split("~")))
+    return numbers if len(numbers) == count and all(map(math.isfinite, numbers)) else None

@@ -1,0 +1,98 @@
+"""FigureGrid: the cards of a workspace, in rows of one height."""
+
+from collections.abc import Callable, Sequence
+
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.dashboard.views.figure import FigureView, Part
+
+# Figures that are drawn for the first time at once.
+_BATCH = 1
+
+
+class FigureGrid(pn.viewable.Viewer):
+    """Cards that fill the area they are given, in rows of one height without a hole."""
+
+    def __init__(
+        self,
+        views: Sequence[FigureView],
+        wake: Callable[..., object],
+        *,
+        columns: int = 2,
+        others: Sequence[Part] = (),
+        **params: object,
+    ) -> None:
+        """Arrange the cards in order.
+
+        Parameters
+        ----------
+        wake : called when a figure comes near the screen, leaves it, or gets another size
+        columns : at most, where there is room
+        others : cards after those of the figures
+        """
+        super().__init__(**params)
+        self._views = list(views)
+        for view in self._views:
+            view.visibility.param.watch(wake, ["is_near", "room"])
+        if columns == 2 and (len(self._views) + len(others)) % 2:
+            next((v for v in self._views if v.is_wide), self._views[-1]).take_row()
+        self._box = pmui.FlexBox(
+            *self._views,
+            *others,
+            sx={
+                "display": "grid",
+                "gap": "8px",
+                "gridTemplateColumns": {
+                    "xs": "minmax(0, 1fr)",
+                    "lg": f"repeat({columns}, minmax(0, 1fr))",
+                },
+                "gridAutoFlow": "dense",
+                "gridAutoRows": "minmax(250px, 1fr)",
+            },
+            styles={"align-self": "stretch", "height": "auto"},
+            stylesheets=[".flex-box { height: 100%; }"],
+            sizing_mode="stretch_width",
+            margin=0,
+        )
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the cards."""
+        return self._box
+
+    @property
+    def is_due(self) -> bool:
+        """Whether any figure is to be drawn."""
+        return any(view.is_due for view in self._views)
+
+    @property
+    def is_laid_out(self) -> bool:
+        """Whether the browser has said how large any card is."""
+        return any(min(view.visibility.room) > 0 for view in self._views)
+
+    def change(self, theme: str) -> None:
+        """Mark all figures as changed, and set their theme."""
+        for view in self._views:
+            view.change(theme)
+
+    def show_selected(self, ids: frozenset[str]) -> None:
+        """Show which sources are selected in all figures."""
+        for view in self._views:
+            view.show_selected(ids)
+
+    def mark_stale(self, is_stale: bool) -> None:
+        """Mark all figures as stale while a new solution is being computed."""
+        for view in self._views:
+            view.mark_stale(is_stale)
+
+    def draw_due(self) -> None:
+        """Let all due figures follow that are drawn, and draw the first few of the others.
+
+        A first drawing changes the page, which takes a while. With batches, the page opens at
+        once, fills from the top, and remains responsive.
+        """
+        due = [view for view in self._views if view.is_due]
+        new = [view for view in due if not view.is_drawn]
+        with pn.io.hold():
+            for view in [view for view in due if view.is_drawn] + new[:_BATCH]:
+                view.draw()

@@ -1,0 +1,76 @@
+"""What the Explore workspace draws, and that its address says it."""
+
+import math
+
+import pytest
+
+from plateviz.dashboard.exploration import Exploration
+
+TABLES = ["measurements", "sources", "exposures"]
+COLUMNS = ["ra", "dec", "n_obs", "sigma_ra_marginal"]
+
+
+@pytest.fixture
+def exploration():
+    made = Exploration(TABLES)
+    made.table = "sources"
+    made.offer(COLUMNS)
+    return made
+
+
+def test_first_columns_are_those_of_the_table(exploration):
+    assert (exploration.x, exploration.y) == ("n_obs", "sigma_ra_marginal")
+    assert exploration.columns().colour == ""
+
+
+def test_column_that_the_next_table_lacks_is_replaced(exploration):
+    exploration.param.update(x="dec", colour="ra", only="n_obs", lowest=2.0, highest=3.0)
+    exploration.table = "exposures"
+    exploration.offer(["time", "chi2_per_dof", "dec"])
+    assert (exploration.x, exploration.y) == ("dec", "chi2_per_dof")
+    assert exploration.columns().colour == exploration.columns().only == ""
+    assert exploration.columns().lowest == -math.inf
+
+
+def test_zoom_is_forgotten_with_other_columns_only(exploration):
+    exploration.zoom((0.0, 1.0), (2.0, 3.0))
+    exploration.colour = "ra"
+    assert exploration.limits == ((0.0, 1.0), (2.0, 3.0))
+    exploration.x = "dec"
+    assert exploration.limits is None
+
+
+def test_address_is_read_back(exploration):
+    exploration.param.update(y="dec", colour="ra", only="n_obs", is_log_x=True, has_median=True)
+    exploration.param.update(lowest=2.5, highest=30.0)
+    exploration.zoom((1.0, 20.0), (-0.5, 1.5e-3))
+    other = Exploration(TABLES)
+    other.restore(exploration.address())
+    other.offer(COLUMNS)
+    assert other.table == "sources"
+    assert other.columns() == exploration.columns()
+    assert other.address() == exploration.address()
+
+
+@pytest.mark.parametrize(
+    "nonsense",
+    [
+        {"rows": "nothing", "x": "dec"},
+        {"rows": "sources", "x": "<b>", "y": "", "colour": "../..", "only": "0"},
+        {"rows": "sources", "zoom": "1~1~2~3"},
+        {"rows": "sources", "zoom": "1~2~3"},
+        {"rows": "sources", "zoom": "nan~1e999~3~4"},
+        {"rows": "sources", "with": "limits,table", "between": "a~b"},
+    ],
+)
+def test_nonsense_in_an_address_is_ignored(nonsense):
+    found, expected = Exploration(TABLES), Exploration(TABLES)
+    expected.table = "sources" if nonsense["rows"] == "sources" else TABLES[0]
+    found.restore(nonsense)
+    for one in (found, expected):
+        one.offer(COLUMNS)
+    assert found.columns() == expected.columns()
+
+
+def test_address_is_empty_before_the_columns_are_known():
+    assert Exploration(TABLES).address() == {}

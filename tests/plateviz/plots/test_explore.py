@@ -1,0 +1,162 @@
+"""Any column against any other: what is drawn of how many rows, and between which limits."""
+
+import numpy as np
+import pytest
+
+from plateviz.figures.figure import Axis
+from plateviz.plots.cells import counts_in_cells, edges_of, means_in_cells
+from plateviz.plots.explore import Columns, explored_figure
+from plateviz.plots.style import ROW_LIMIT
+from plateviz.tables.explore import EXPLORABLE, ExplorableTable
+from solver.data.columns import Column
+
+
+def table_of(**columns):
+    size = len(next(iter(columns.values())))
+    named = {name: Column(name, "float64", "mas", f"meaning of {name}") for name in columns}
+    values = {"source_id": np.arange(size), **columns}
+    return ExplorableTable("stars", size, named, values.__getitem__, True, False)
+
+
+@pytest.fixture(scope="module")
+def many():
+    random = np.random.default_rng(1)
+    size = ROW_LIMIT + 5_000
+    return table_of(x=random.uniform(1.0, 9.0, size), y=random.normal(5.0, 1.0, size))
+
+
+def test_few_rows_are_points_with_the_ids_of_their_sources(fit_result):
+    table = EXPLORABLE["sources"](fit_result)
+    (frame,) = explored_figure(table, Columns("n_obs", "sigma_ra_marginal"))
+    marks = frame["rows by class"]
+    np.testing.assert_array_equal(marks.values("x"), table.numbers("n_obs"))
+    assert marks.columns["id"].tolist() == [str(one) for one in table.read("source_id")]
+    assert "mas" in frame.y.label
+    assert frame.subtitle == f"{table.size:,} sources"
+
+
+@pytest.mark.parametrize("name", EXPLORABLE)
+@pytest.mark.parametrize("switch", [False, True])
+def test_every_column_can_be_drawn_against_every_other(name, switch, fit_result):
+    table = EXPLORABLE[name](fit_result)
+    names = list(table.columns)
+    for x, y in zip(names, names[1:] + names[:1], strict=True):
+        chosen = Columns(x, y, colour=y, is_log_x=switch, is_log_y=switch, has_median=switch)
+        figure = explored_figure(table, chosen)
+        assert figure.message is not None or len(figure[0].glyphs) > 2
+
+
+def test_many_rows_are_counted_in_cells(many):
+    (frame,) = explored_figure(many, Columns("x", "y"))
+    cells = frame["cells by number"].values("image")[0]
+    assert np.nansum(cells) == many.size
+    assert frame.subtitle == f"{many.size:,} stars"
+
+
+def test_zoom_counts_what_is_between_the_limits(many):
+    limits = ((2.0, 3.0), (4.0, 6.0))
+    (frame,) = explored_figure(many, Columns("x", "y", limits=limits))
+    x, y = many.numbers("x"), many.numbers("y")
+    expected = np.sum((x >= 2.0) & (x < 3.0) & (y >= 4.0) & (y < 6.0))
+    assert np.nansum(frame["cells by number"].values("image")[0]) == expected
+    assert (frame.x.limits, frame.y.limits) == limits
+
+
+@pytest.mark.parametrize("limits", [((1.0, 1.0), (2.0, 3.0)), ((-1.0, 2.0), (2.0, 3.0))])
+def test_limits_that_an_axis_cannot_have_are_replaced(many, limits):
+    (frame,) = explored_figure(many, Columns("x", "y", is_log_x=True, limits=limits))
+    low, high = frame.x.limits
+    assert 0.0 < low < 1.1
+    assert high > 8.9
+    assert frame.y.limits == limits[1]
+
+
+def test_cells_show_the_mean_of_the_column_that_gives_the_colour(many):
+    (frame,) = explored_figure(many, Columns("x", "y", colour="x"))
+    means = frame["cells by value"].values("image")[0]
+    edges = np.linspace(*frame.x.limits, means.shape[1] + 1)
+    is_filled = np.isfinite(means)
+    assert is_filled.sum() > 1000
+    assert np.all((means >= edges[:-1])[is_filled])
+    assert np.all((means <= edges[1:])[is_filled])
+
+
+def test_selected_sources_are_marked_among_cells(many):
+    (frame,) = explored_figure(many, Columns("x", "y"), selected=frozenset([3, 5, -1]))
+    marks = frame["selected sources"]
+    assert marks.columns["source"].tolist() == ["3", "5"]
+    assert "id" not in marks.columns
+    assert marks.values("x").tolist() == many.numbers("x")[[3, 5]].tolist()
+
+
+def test_rows_are_limited_by_a_column():
+    table = table_of(x=np.arange(10.0), y=np.ones(10), z=np.arange(10.0))
+    chosen = Columns("x", "y", only="z", lowest=2.0, highest=5.0)
+    (frame,) = explored_figure(table, chosen)
+    assert frame["rows"].values("x").tolist() == [2.0, 3.0, 4.0, 5.0]
+    assert frame.subtitle == "4 of 10 stars; 6 not between the limits of z"
+
+
+def test_rows_without_a_value_are_counted():
+    table = table_of(x=np.array([1.0, np.nan, -1.0, 2.0]), y=np.ones(4))
+    (frame,) = explored_figure(table, Columns("x", "y", is_log_x=True))
+    assert frame["rows"].values("x").tolist() == [1.0, 2.0]
+    assert frame.subtitle == "2 of 4 stars; 2 without a value on these axes"
+
+
+def test_nothing_to_draw_is_said():
+    table = table_of(x=np.full(3, np.nan), y=np.ones(3))
+    assert explored_figure(table, Columns("x", "y")).message == "No stars to draw"
+
+
+def test_unknown_column_is_refused():
+    with pytest.raises(KeyError, match="nothing"):
+        explored_figure(table_of(x=np.ones(3)), Columns("x", "nothing"))
+
+
+def test_right_ascension_increases_to_the_left(fit_result):
+    (frame,) = explored_figure(EXPLORABLE["sources"](fit_result), Columns("ra", "dec"))
+    assert frame.x.limits[0] > frame.x.limits[1]
+    assert frame.y.limits[0] < frame.y.limits[1]
+    heights = frame["histogram of y"].columns["left"], frame["histogram of y"].columns["right"]
+    assert np.all(heights[1] <= heights[0])
+
+
+def test_histograms_have_all_rows_and_reach_a_tenth_of_the_frame():
+    values = np.array([1.0, 1.0, 2.0, 8.0])
+    (frame,) = explored_figure(table_of(x=values, y=values[::-1].copy()), Columns("x", "y"))
+    bars = frame["histogram of x"]
+    reach = (bars.columns["top"] - frame.y.limits[0]) / frame.y.length
+    assert reach.max() == pytest.approx(0.1)
+    assert reach.sum() == pytest.approx(0.2)
+    assert len(bars.columns["left"]) == len(bars.columns["right"])
+
+
+def test_median_and_its_range_follow_the_data():
+    random = np.random.default_rng(2)
+    x = random.uniform(0.0, 10.0, 6_000)
+    y = 3.0 * x + random.normal(0.0, 0.5, 6_000)
+    (frame,) = explored_figure(table_of(x=x, y=y), Columns("x", "y", has_median=True))
+    median = frame["median"]
+    # A bin is a third wide, over which y rises by one.
+    np.testing.assert_allclose(median.values("y"), 3.0 * median.values("x"), atol=0.6)
+    half = 0.5 * (frame["16 to 84 %"].values("y2") - frame["16 to 84 %"].values("y1"))
+    assert 0.4 < np.median(half) < 0.75
+
+
+def test_cells_of_a_logarithmic_axis_are_equal_on_it():
+    axis = Axis("x", (1.0, 100.0), is_log=True)
+    np.testing.assert_allclose(edges_of(axis, 2), [1.0, 10.0, 100.0])
+    plain = Axis("y", (0.0, 1.0))
+    counts = counts_in_cells(np.array([5.0, 50.0, 50.0]), np.full(3, 0.5), axis, plain)
+    columns = np.flatnonzero(np.isfinite(counts).any(axis=0))
+    ends = counts.shape[1] * np.log10([5.0, 50.0]) / 2.0
+    assert columns.tolist() == np.floor(ends).astype(int).tolist()
+    assert np.nanmax(counts) == 2.0
+
+
+def test_values_that_are_missing_do_not_count_in_a_mean():
+    axis = Axis("x", (0.0, 1.0))
+    middle = np.full(3, 0.5)
+    means = means_in_cells(middle, middle, np.array([1.0, np.nan, 3.0]), axis, axis)
+    assert means[np.isfinite(means)].tolist() == [2.0]

@@ -128,6 +128,9 @@ class _Ticker:
         """Tick until nothing is left to do."""
         if self._pages is not None and not self._callback.running:
             self._callback.start()
+            if pn.state.curdoc is not None:
+                # The first figures follow at once, not after the first interval.
+                pn.state.curdoc.add_next_tick_callback(self._tick)
 
     def _tick(self) -> None:
         if self._navigation is None or self._pages is None:

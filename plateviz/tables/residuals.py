@@ -175,11 +175,14 @@ def _selected(
 ) -> pd.DataFrame:
     keep = np.ones(len(residuals), dtype=bool)
     if exposures is not None:
-        keys = pd.MultiIndex.from_tuples(list(exposures), names=["field_id", "plate_id"])
-        rows = pd.MultiIndex.from_frame(residuals[["field_id", "plate_id"]])
-        keep &= rows.isin(keys)
+        pairs = np.array(list(exposures), dtype=np.int64).reshape(-1, 2)
+        fields, plates = (residuals[name].to_numpy() for name in ("field_id", "plate_id"))
+        # One number per exposure: an index of pairs takes a hundred times as long to build.
+        low = min(int(plates.min(initial=0)), int(pairs[:, 1].min(initial=0)))
+        span = max(int(plates.max(initial=0)), int(pairs[:, 1].max(initial=0))) - low + 1
+        keep &= np.isin(fields * span + plates - low, pairs[:, 0] * span + pairs[:, 1] - low)
     if detector_id is not None:
-        keep &= (residuals["detector_id"] == detector_id).to_numpy()
+        keep &= residuals["detector_id"].to_numpy() == detector_id
     return residuals[keep]
 
 

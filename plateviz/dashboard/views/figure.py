@@ -114,7 +114,9 @@ class FigureView(pn.viewable.Viewer):
         """Mark the figure as changed, and set the theme for the next drawing."""
         self._theme, self._is_changed = theme, True
         self._tools.theme = theme
-        self._fade()
+        # A figure on the screen is drawn at once; to fade it for so short a time would flicker.
+        if not self.visibility.is_near:
+            self._fade()
 
     def show_selected(self, ids: frozenset[str]) -> None:
         """Show which sources are selected when the figure is drawn next."""

@@ -23,6 +23,9 @@ class SelectionView(pn.viewable.Viewer):
             description="",
             sizing_mode="stretch_width",
         )
+        for control in (field, plates, detector):
+            # Panel waits 50 ms for further changes; a hand on the slider sends some ten a second.
+            control._debounce = 0  # type: ignore[misc]
         self._column = pmui.Column(field, plates, detector, sizing_mode="stretch_width", margin=0)
         if len(session.store.orbits) > 1:
             orbit = pmui.Select(

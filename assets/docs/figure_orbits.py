@@ -77,6 +77,37 @@ def _moved_detector(rows: pd.DataFrame, _: np.random.Generator) -> None:
     rows.loc[late, "nx"] += 0.1
 
 
+def _displaced_columns(rows: pd.DataFrame, _: np.random.Generator) -> None:
+    """Displace the last 160 columns of detector 3 along x, by about the measurement error."""
+    edge = (rows["detector_id"] == 3) & (rows["nx"] > 800.0)
+    rows.loc[edge, "nx"] += 0.012
+
+
+def _drifting_detector(rows: pd.DataFrame, _: np.random.Generator) -> None:
+    """Move detector 1 along x in the course of each field, by 0.02 pixels."""
+    on = rows["detector_id"] == 1
+    rows.loc[on, "nx"] += 0.02 * rows.loc[on, "plate_id"] / 23.0
+
+
+def _deforming(rows: pd.DataFrame, random: np.random.Generator) -> None:
+    """Add gradients of waves of 12 mm to each exposure, of a quarter of the measurement error."""
+    number = {d.detector_id: i for i, d in enumerate(MINI_MOCK.detectors)}
+    own = rows["detector_id"].map(number).to_numpy()
+    angle = np.radians([d.rotation_deg for d in MINI_MOCK.detectors])[own]
+    centre = np.array([(d.x_um, d.y_um) for d in MINI_MOCK.detectors])[own].T / 1000.0
+    nx, ny = 0.01 * rows["nx"].to_numpy(), 0.01 * rows["ny"].to_numpy()
+    place = (np.cos(angle) * nx + np.sin(angle) * ny, np.cos(angle) * ny - np.sin(angle) * nx)
+    exposure = rows.groupby(["field_id", "plate_id"]).ngroup().to_numpy()
+    field = np.zeros((2, len(rows)))
+    for _ in range(12):
+        towards, start = random.uniform(0.0, 2.0 * np.pi, (2, exposure.max() + 1))[:, exposure]
+        along = np.cos(towards) * (place[0] + centre[0]) + np.sin(towards) * (place[1] + centre[1])
+        wave = 0.001 * np.sin(2.0 * np.pi / 12.0 * along + start)
+        field += wave * np.array([np.cos(towards), np.sin(towards)])
+    rows["nx"] += np.cos(angle) * field[0] - np.sin(angle) * field[1]
+    rows["ny"] += np.sin(angle) * field[0] + np.cos(angle) * field[1]
+
+
 def _trailed(rows: pd.DataFrame, random: np.random.Generator) -> None:
     """Smear two exposures along x."""
     for field, plate in ((1, 9), (2, 20)):
@@ -153,14 +184,26 @@ ORBITS: Mapping[str, Pair] = {
         lambda: _chosen(_good(), plates=_FIELDS),
         lambda: _chosen(_fitted(order=2), plates=_FIELDS),
     ),
+    "mean-residual-map": (
+        lambda: _chosen(_good(), plates=_FIELDS),
+        lambda: _chosen(_fitted(_measured(_displaced_columns)), plates=_FIELDS),
+    ),
     "residual-scatter": (
         lambda: _chosen(_good(), detector=1),
         lambda: _chosen(_fitted(_measured(_moved_detector)), detector=1),
     ),
     "pulls": (_good_chosen, lambda: _chosen(_fitted(_measured(_understated)))),
+    "residual-correlation": (
+        _good_chosen,
+        lambda: _chosen(_fitted(_measured(_deforming))),
+    ),
     "deviation": (_good_chosen, lambda: _chosen(_overconfident_catalogue())),
     "uncertainty": (_good_chosen, lambda: _chosen(_few_references())),
     "exposure-chi2": (_good_chosen, lambda: _chosen(_fitted(_measured(_trailed)))),
+    "detector-shifts": (
+        _good_chosen,
+        lambda: _chosen(_fitted(_measured(_drifting_detector))),
+    ),
     "distortion": (_good_chosen, lambda: _chosen(_sparse_distortion())),
     "prior-shares": (_good_chosen, lambda: _chosen(_assumed())),
     "eigenmode-spectrum": (_good_chosen, lambda: _chosen(_one_field())),

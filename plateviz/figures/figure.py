@@ -54,14 +54,14 @@ class Ramp:
     Attributes
     ----------
     column : name of the column
-    palette : of the theme, "count" or "share"
+    palette : of the theme: "count", "share", or "difference" from a value in the middle
     limits : numbers with the first and the last colour
     is_log : whether colours are in logarithmic steps
     label : of the colour bar; None for no bar
     """
 
     column: str
-    palette: Literal["count", "share"]
+    palette: Literal["count", "share", "difference"]
     limits: Limits
     is_log: bool = False
     label: str | None = None

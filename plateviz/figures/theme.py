@@ -19,6 +19,7 @@ class Theme:
     line : guide lines, outlines, expected curves
     mark : data without classes
     ramp : colours of increasing counts
+    difference : colours from below a middle value, which has nearly the background, to above
     """
 
     background: str
@@ -28,14 +29,15 @@ class Theme:
     line: str
     mark: str
     ramp: tuple[str, ...]
+    difference: tuple[str, ...]
 
     def colour(self, name: str | None) -> str | None:
         """Return the colour that a figure names, such as "muted"; other colours as they are."""
         return getattr(self, name) if name in _NAMED else name
 
     def palette(self, name: str) -> list[str]:
-        """Return the palette that a figure names, "count" or "share"."""
-        return {"count": self.count_palette, "share": self.share_palette}[name]
+        """Return the palette that a figure names: "count", "share" or "difference"."""
+        return getattr(self, f"{name}_palette")
 
     @property
     def count_palette(self) -> list[str]:
@@ -46,6 +48,11 @@ class Theme:
     def share_palette(self) -> list[str]:
         """256 colours of shares from zero (the background colour) to one."""
         return list(interp_palette((self.background, *self.ramp[:4]), 256))
+
+    @property
+    def difference_palette(self) -> list[str]:
+        """256 colours of differences, symmetric about the middle: blue below, orange above."""
+        return list(interp_palette(self.difference, 256))
 
 
 _NAMED = frozenset({"background", "text", "muted", "grid", "line", "mark"})
@@ -59,6 +66,7 @@ THEMES: Mapping[str, Theme] = MappingProxyType(
             "#3e4c59",
             "#2b78b8",
             ("#d3e5f4", "#9cc6e6", "#5ea2d5", "#2b78b8", "#15507f", "#0a2f4f"),
+            ("#0f4272", "#2b78b8", "#8dbde0", "#f4f5f6", "#f2ad85", "#d3571f", "#84300b"),
         ),
         "dark": Theme(
             "#121212",
@@ -68,6 +76,7 @@ THEMES: Mapping[str, Theme] = MappingProxyType(
             "#c2cbd3",
             "#62aee6",
             ("#1c3f5e", "#24608f", "#3a87c8", "#6db3e8", "#a9d6f5", "#e5f4fd"),
+            ("#a9d6f5", "#4f9fdc", "#1f4f78", "#1c1d1f", "#7a3a1a", "#e2753b", "#ffc9a6"),
         ),
     }
 )

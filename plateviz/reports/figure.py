@@ -39,6 +39,7 @@ def dark_colours() -> dict[str, object]:
         "palettes": [
             [light.count_palette, dark.count_palette],
             [light.share_palette, dark.share_palette],
+            [light.difference_palette, dark.difference_palette],
         ],
     }
 

@@ -8,6 +8,11 @@ if it is None.
 from plateviz.tables.calibration import calibration_tables, distortion
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.convergence import convergence, loss_excess
+from plateviz.tables.detector_shifts import (
+    ShiftStatistics,
+    detector_shifts,
+    shift_statistics,
+)
 from plateviz.tables.eigenmodes import (
     eigenmode_deciders,
     eigenmode_groups,
@@ -16,6 +21,7 @@ from plateviz.tables.eigenmodes import (
 )
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.histogram import pull_bins
+from plateviz.tables.mean_residuals import MapStatistics, map_statistics, mean_residuals
 from plateviz.tables.motion_pulls import motion_pulls
 from plateviz.tables.orbit_counts import orbit_counts
 from plateviz.tables.orbit_health import orbit_health
@@ -26,6 +32,11 @@ from plateviz.tables.prior_shares import prior_shares
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
 from plateviz.tables.reference_scatter import reference_scatter, scatter_cells
 from plateviz.tables.reproduction import reproduction
+from plateviz.tables.residual_correlation import (
+    CorrelationStatistics,
+    correlation_statistics,
+    residual_correlation,
+)
 from plateviz.tables.residuals import (
     ScatterStatistics,
     binned_vectors,
@@ -62,15 +73,20 @@ from solver.model.apparent_motion import julian_year
 __all__ = [
     "ARTIFICIAL",
     "CLASSES",
+    "CorrelationStatistics",
+    "MapStatistics",
     "NON_REFERENCE",
     "REFERENCE",
     "ScatterStatistics",
+    "ShiftStatistics",
     "SummaryItem",
     "TrackStatistics",
     "binned_vectors",
     "calibration_tables",
     "comparison",
     "convergence",
+    "correlation_statistics",
+    "detector_shifts",
     "deviation",
     "deviation_statistics",
     "difference_histogram",
@@ -84,6 +100,8 @@ __all__ = [
     "eigenmode_groups",
     "eigenmode_shifts",
     "eigenmode_spectrum",
+    "map_statistics",
+    "mean_residuals",
     "motion_pulls",
     "motion_table",
     "orbit_counts",
@@ -100,12 +118,14 @@ __all__ = [
     "pull_histogram",
     "reference_scatter",
     "reproduction",
+    "residual_correlation",
     "residual_map",
     "residual_scatter",
     "run_strip",
     "scatter_cells",
     "scatter_statistics",
     "selected_sources",
+    "shift_statistics",
     "sky_density",
     "sky_distribution",
     "sky_track",

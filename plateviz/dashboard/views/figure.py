@@ -20,6 +20,8 @@ from solver.errors import InputError
 
 # Screen pixels between the edge of a card and its figure.
 _INSET = 4
+# Width of the window from which a grid has several columns, screen pixels ("lg").
+_LARGE = 1200
 # Fills its card, whatever it shows.
 _BODY = {
     "position": "absolute",
@@ -109,6 +111,11 @@ class FigureView(pn.viewable.Viewer):
     def take_row(self) -> None:
         """Take a whole row of the grid."""
         self._card.styles = {**self._card.styles, "grid-column": "1 / -1"}
+
+    def take_columns(self, number: int) -> None:
+        """Take as many columns of the grid, where it has several."""
+        span = f"@media (min-width: {_LARGE}px) {{ :host {{ grid-column: span {number}; }} }}"
+        self._card.stylesheets = [*self._card.stylesheets, span]
 
     def change(self, theme: str) -> None:
         """Mark the figure as changed, and set the theme for the next drawing."""

@@ -24,6 +24,9 @@ from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace
 
+# Number of figures that fit a screen in two columns.
+_FEW = 6
+
 
 class OrbitPage(pn.viewable.Viewer):
     """The Orbit view: the solution on the screen, updated when it changes."""
@@ -96,8 +99,13 @@ class OrbitPage(pn.viewable.Viewer):
             others = [card(CalibrationView(self._session), "tables")]
         if is_first:
             above = [StripView(self._session)]
+        is_full = not is_first and len(views) > _FEW
         grid = FigureGrid(
-            list(views.values()), self._wake, columns=3 if is_first else 2, others=others
+            list(views.values()),
+            self._wake,
+            columns=3 if is_first or is_full else 2,
+            wide=2 if is_full else 1,
+            others=others,
         )
         self._grids[one] = grid
         self._show_selected()

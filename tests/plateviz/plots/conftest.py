@@ -45,6 +45,18 @@ def orbit_drawings(fit_result, compared, make_fit_result, truth, instrument):
         "eigenmode_groups": (plots.plot_eigenmode_groups, tables.eigenmode_groups(fit_result)),
         "eigenmode_shifts": (plots.plot_eigenmode_shifts, tables.eigenmode_shifts(fit_result)),
         "prior_shares": (plots.plot_prior_shares, tables.prior_shares(fit_result)),
+        "mean_residual_map": (
+            lambda t, **o: plots.plot_mean_residual_map(t, instrument, **o),
+            tables.mean_residuals(fit_result, instrument),
+        ),
+        "detector_shifts": (
+            plots.plot_detector_shifts,
+            tables.detector_shifts(fit_result, instrument),
+        ),
+        "residual_correlation": (
+            plots.plot_residual_correlation,
+            tables.residual_correlation(fit_result, instrument),
+        ),
     }
 
 

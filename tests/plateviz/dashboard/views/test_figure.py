@@ -263,3 +263,14 @@ def test_zoom_is_told_and_a_reset_too():
     drawn._trigger_event(Reset(drawn))
     drawn._trigger_event(RangesUpdate(drawn, x0=None, x1=2.0, y0=0.5, y1=1.0))
     assert zooms == [((1.0, 2.0), (0.5, 1.0)), None, None]
+
+
+def test_wide_figures_take_several_columns_of_a_grid_that_says_so():
+    def spans(**options):
+        views = [FigureView(diagnostic, lambda: None) for diagnostic in diagnostics()]
+        FigureGrid(views, lambda *_: None, columns=3, **options)
+        sheets = [" ".join(map(str, view.__panel__().stylesheets)) for view in views]
+        return ["grid-column: span 2" in sheet for sheet in sheets]
+
+    assert spans(wide=2) == [diagnostic.is_wide for diagnostic in diagnostics()]
+    assert not any(spans())

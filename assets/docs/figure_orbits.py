@@ -115,6 +115,35 @@ def _trailed(rows: pd.DataFrame, random: np.random.Generator) -> None:
         rows.loc[smeared, "nx"] += 0.02 * random.standard_normal(int(smeared.sum()))
 
 
+def _mismatched(rows: pd.DataFrame, random: np.random.Generator) -> None:
+    """Take a neighbour for the star in 15 measurements, and let a star move during the orbit."""
+    wrong = random.choice(len(rows), 15, replace=False)
+    rows.loc[rows.index[wrong], "nx"] += 0.01 * random.uniform(8.0, 20.0, 15)
+    often = rows["source_id"].value_counts().index[0]
+    moving = rows["source_id"] == often
+    rows.loc[moving, "nx"] += 0.002 * (rows.loc[moving, "plate_id"] - 12.0)
+
+
+@cache
+def _wrong_references() -> FitResult:
+    """Fit with two reference sources of which the catalogue has a wrong position."""
+    catalogue = _orbit().catalogue.copy()
+    measured = _orbit().measurements["source_id"].value_counts()
+    rows = catalogue.index[catalogue["is_reference"] & catalogue["source_id"].isin(measured.index)]
+    for row, mas in zip(rows[:2], (6.0, -9.0), strict=True):
+        catalogue.loc[row, "dec"] += mas / 3.6e6
+    return _fitted(replace(_orbit(), catalogue=catalogue))
+
+
+def _stale_attitude() -> FitResult:
+    """Fit with estimates of the pointing that lag behind in a field, and a narrow prior."""
+    exposures = _orbit().exposures.copy()
+    late = (exposures["field_id"] == 2) & (exposures["plate_id"] >= 12)
+    exposures.loc[late, "dec_est"] -= 12.0 / 3600.0
+    narrow = dict.fromkeys(("pointing_ra", "pointing_dec"), 3.0)
+    return _fitted(replace(_orbit(), exposures=exposures), prior_widths=narrow)
+
+
 @cache
 def _few_references() -> FitResult:
     """Fit with five reference sources, all in the east of the orbit's fields."""
@@ -176,6 +205,14 @@ def _good_chosen() -> Chosen:
     return _chosen(_good())
 
 
+def _with_wider_priors() -> Chosen:
+    return _chosen(_fitted(prior_widths=dict.fromkeys(_CALIBRATION[2:], 2.0)), _good())
+
+
+def _with_low_order() -> Chosen:
+    return _chosen(_low_order(), _good())
+
+
 Pair = tuple[Callable[[], Chosen], Callable[[], Chosen]]
 
 ORBITS: Mapping[str, Pair] = {
@@ -197,13 +234,16 @@ ORBITS: Mapping[str, Pair] = {
         _good_chosen,
         lambda: _chosen(_fitted(_measured(_deforming))),
     ),
+    "largest-residuals": (_good_chosen, lambda: _chosen(_fitted(_measured(_mismatched)))),
     "deviation": (_good_chosen, lambda: _chosen(_overconfident_catalogue())),
     "uncertainty": (_good_chosen, lambda: _chosen(_few_references())),
+    "reference-influence": (_good_chosen, lambda: _chosen(_wrong_references())),
     "exposure-chi2": (_good_chosen, lambda: _chosen(_fitted(_measured(_trailed)))),
     "detector-shifts": (
         _good_chosen,
         lambda: _chosen(_fitted(_measured(_drifting_detector))),
     ),
+    "exposure-tracks": (_good_chosen, lambda: _chosen(_stale_attitude())),
     "distortion": (_good_chosen, lambda: _chosen(_sparse_distortion())),
     "prior-shares": (_good_chosen, lambda: _chosen(_assumed())),
     "eigenmode-spectrum": (_good_chosen, lambda: _chosen(_one_field())),
@@ -211,10 +251,8 @@ ORBITS: Mapping[str, Pair] = {
     "weak-directions": (_good_chosen, lambda: _chosen(_one_field())),
     "eigenmode-groups": (_good_chosen, lambda: _chosen(_one_field())),
     "eigenmode-shifts": (_good_chosen, lambda: _chosen(_few_references())),
-    "comparison": (
-        lambda: _chosen(_fitted(prior_widths=dict.fromkeys(_CALIBRATION[2:], 2.0)), _good()),
-        lambda: _chosen(_low_order(), _good()),
-    ),
+    "comparison": (_with_wider_priors, _with_low_order),
+    "distortion-comparison": (_with_wider_priors, _with_low_order),
     "convergence": (
         lambda: _chosen(_by_svi(SviSettings())),
         lambda: _chosen(_by_svi(SviSettings(steps=150, max_steps=150))),

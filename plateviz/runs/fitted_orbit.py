@@ -16,7 +16,7 @@ import pandas as pd
 import pyarrow as pa
 
 from solver.data.result import FitResult
-from solver.data.schema import RESULT_TABLES, TRACE
+from solver.data.schema import RESULT_TABLES, TRACE, Table
 from solver.errors import InputError
 from solver.io.atomic import flush
 from solver.io.disk import writing
@@ -105,7 +105,7 @@ def read_fitted_orbit(directory: Path) -> FitResult:
                 f"{directory}: expected a fitted orbit of format {FORMAT} or older, found "
                 f"{head['format']}; it was written by a newer plateviz"
             )
-        tables = {table.name: _read_table(directory, table.name) for table in RESULT_TABLES}
+        tables = {table.name: _read_table(directory, table) for table in RESULT_TABLES}
         trace = read_frame(directory / "trace.parquet")
         tables["trace"] = trace.assign(seconds=timings["trace"])[TRACE.names]
         return FitResult(
@@ -186,9 +186,9 @@ def _write_head(directory: Path, result: FitResult) -> None:
         (directory / name).write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
-def _read_table(directory: Path, name: str) -> pd.DataFrame | None:
-    path = directory / f"{name}.parquet"
-    return read_frame(path) if path.is_file() else None
+def _read_table(directory: Path, table: Table) -> pd.DataFrame | None:
+    path = directory / f"{table.name}.parquet"
+    return table.completed(read_frame(path)) if path.is_file() else None
 
 
 def _read_timings(directory: Path) -> dict[str, Any]:

@@ -13,14 +13,17 @@ from plateviz.tables.detector_shifts import (
     detector_shifts,
     shift_statistics,
 )
+from plateviz.tables.distortion_comparison import distortion_comparison
 from plateviz.tables.eigenmodes import (
     eigenmode_deciders,
     eigenmode_groups,
     eigenmode_shifts,
     eigenmode_spectrum,
 )
+from plateviz.tables.exposure_tracks import exposure_tracks
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.histogram import pull_bins
+from plateviz.tables.largest_residuals import largest_residuals
 from plateviz.tables.mean_residuals import MapStatistics, map_statistics, mean_residuals
 from plateviz.tables.motion_pulls import motion_pulls
 from plateviz.tables.orbit_counts import orbit_counts
@@ -30,6 +33,7 @@ from plateviz.tables.outliers import outlier_list
 from plateviz.tables.prior_separation import prior_separation, prior_separation_histogram
 from plateviz.tables.prior_shares import prior_shares
 from plateviz.tables.pulls import exposure_chi2, pull_histogram
+from plateviz.tables.reference_influence import reference_influence
 from plateviz.tables.reference_scatter import reference_scatter, scatter_cells
 from plateviz.tables.reproduction import reproduction
 from plateviz.tables.residual_correlation import (
@@ -91,10 +95,13 @@ __all__ = [
     "deviation_statistics",
     "difference_histogram",
     "distortion",
+    "distortion_comparison",
     "exposure_chi2",
+    "exposure_tracks",
     "footprint_fields",
     "footprint_sources",
     "julian_year",
+    "largest_residuals",
     "loss_excess",
     "eigenmode_deciders",
     "eigenmode_groups",
@@ -116,6 +123,7 @@ __all__ = [
     "prior_shares",
     "pull_bins",
     "pull_histogram",
+    "reference_influence",
     "reference_scatter",
     "reproduction",
     "residual_correlation",

@@ -31,3 +31,22 @@ def largest_by_chance(count: int, probability: float = RARE) -> float:
         )
     of_one = -math.expm1(math.log1p(-probability) / count)
     return float(-ndtri(0.5 * of_one))
+
+
+def largest_chi2(count: int) -> float:
+    """Return the chi2 of two degrees of freedom that the largest of `count` exceeds by chance.
+
+    Parameters
+    ----------
+    count : number of independent values
+
+    Raises
+    ------
+    ValueError
+        If `count` is not positive.
+    """
+    if count < 1:
+        raise ValueError(f"count: expected at least 1, found {count}")
+    # The probability of a single value, without rounding for large counts.
+    single = -math.expm1(math.log1p(-RARE) / count)
+    return -2.0 * math.log(single)

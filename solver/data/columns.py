@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 import numpy as np
+import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,14 @@ class Table:
     def names(self) -> list[str]:
         """The canonical column names in order."""
         return [c.name for c in self.columns]
+
+    def completed(self, frame: pd.DataFrame) -> pd.DataFrame:
+        """Return `frame` with the optional columns that it lacks, at their defaults, in order."""
+        missing = [c for c in self.columns if not c.required and c.name not in frame]
+        if not missing:
+            return frame
+        wanted = frame.assign(**{c.name: c.default for c in missing})
+        return wanted[[name for name in self.names if name in wanted]]
 
 
 def numpy_dtype(column: Column) -> np.dtype:

@@ -31,6 +31,15 @@ SOURCES = Table(
         Column("prior_dec", "float64", "deg", "prior Dec at the mean epoch"),
         Column("prior_sigma_ra", "float64", "mas", "prior sigma of ra cos(dec)"),
         Column("prior_sigma_dec", "float64", "mas", "prior sigma of dec"),
+        Column(
+            "prior_corr",
+            "float64",
+            "",
+            "prior RA-Dec correlation",
+            # Results of older versions lack it.
+            required=False,
+            default=0.0,
+        ),
         Column("offset_ra", "float64", "mas", "estimate minus prior, ra cos(dec)"),
         Column("offset_dec", "float64", "mas", "estimate minus prior, dec"),
         Column("chi2", "float64", "", "sum of squared whitened residuals"),

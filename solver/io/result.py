@@ -259,20 +259,20 @@ def _table(path: Path, file: FitsFile, name: str) -> RawTable:
 
 def _frame(path: Path, file: FitsFile, hdu_layout: PublishedTable) -> pd.DataFrame:
     table = _table(path, file, hdu_layout.hdu)
-    missing = [
-        hdu_layout.name(c) for c in hdu_layout.table if hdu_layout.name(c) not in table.colnames
-    ]
+    found = [c for c in hdu_layout.table if hdu_layout.name(c) in table.colnames]
+    missing = [hdu_layout.name(c) for c in hdu_layout.table if c.required and c not in found]
     if missing:
         raise InputError(
             f"{path}, HDU {hdu_layout.hdu}: expected the columns of a result, "
             f"found none called {', '.join(missing)}"
         )
-    return pd.DataFrame(
+    frame = pd.DataFrame(
         {
             c.name: _restored(table[hdu_layout.name(c)], c, f"{path}, HDU {hdu_layout.hdu}")
-            for c in hdu_layout.table
+            for c in found
         }
     )
+    return hdu_layout.table.completed(frame)
 
 
 def _restored(values: np.ndarray, column: schema.Column, where: str) -> np.ndarray | pd.Series:

@@ -79,7 +79,7 @@ def source_table(solution: SolvedProblem) -> pd.DataFrame:
     prior_ra, prior_dec = sky_position(frame[:, 0])
     n_src, index = problem.n_src, problem.measurements.index.source
     chi2 = (solution.residuals.whitened**2).sum(axis=1)
-    prior_sigma = _sigmas(np.linalg.inv(problem.priors.precision))
+    prior = uncertainties("prior", np.linalg.inv(problem.priors.precision))
     columns = {
         "source_id": sources["source_id"].to_numpy(),
         "is_reference": sources["is_reference"].to_numpy(bool),
@@ -91,8 +91,9 @@ def source_table(solution: SolvedProblem) -> pd.DataFrame:
         **uncertainties("marginal", solution.marginal),
         "prior_ra": prior_ra,
         "prior_dec": prior_dec,
-        "prior_sigma_ra": prior_sigma[:, 0],
-        "prior_sigma_dec": prior_sigma[:, 1],
+        "prior_sigma_ra": prior["sigma_ra_prior"],
+        "prior_sigma_dec": prior["sigma_dec_prior"],
+        "prior_corr": prior["corr_prior"],
         "offset_ra": solution.mode.sources[:, 0],
         "offset_dec": solution.mode.sources[:, 1],
         "chi2": np.bincount(index, chi2, n_src),

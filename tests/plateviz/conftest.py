@@ -259,7 +259,7 @@ def _sources(
         table[f"prior_{coordinate}"] = truth[coordinate] + off_prior / 3.6e6 / cos
         table[coordinate] = truth[coordinate] + off_truth / 3.6e6 / cos
         table[f"offset_{coordinate}"] = off_truth - off_prior
-    table["corr_conditional"] = 0.0
+    table["corr_conditional"] = table["prior_corr"] = 0.0
     table["corr_marginal"] = correlation
     weight = 1.0 - 0.5 * residuals["leverage"]
     table["chi2"] = table["source_id"].map(_chi2(residuals).groupby(residuals["source_id"]).sum())

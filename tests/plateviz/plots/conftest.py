@@ -1,6 +1,7 @@
 """Every plot with an example table, its frames, and its drawn figures."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,10 +9,18 @@ import pytest
 
 from plateviz import plots, tables
 from plateviz.figures.bokeh_figure import BokehFigure
+from tests.plateviz.linear_stars import N_STARS, LinearStars
 
 
 @pytest.fixture(scope="module")
-def orbit_drawings(fit_result, compared, make_fit_result, truth, instrument):
+def linear_fit(fit_result):
+    """A fit whose sources are those of a dense linear problem."""
+    ids = fit_result.sources["source_id"].head(N_STARS)
+    return replace(fit_result, sources=LinearStars().sources(ids))
+
+
+@pytest.fixture(scope="module")
+def orbit_drawings(fit_result, linear_fit, compared, make_fit_result, truth, instrument):
     """Return name -> (draw, table): the plot as a function of the table."""
     residuals = tables.residual_map(fit_result, instrument, detector_id=0)
     fields = tables.footprint_fields(fit_result, instrument)
@@ -57,6 +66,16 @@ def orbit_drawings(fit_result, compared, make_fit_result, truth, instrument):
             plots.plot_residual_correlation,
             tables.residual_correlation(fit_result, instrument),
         ),
+        "exposure_tracks": (plots.plot_exposure_tracks, tables.exposure_tracks(fit_result)),
+        "distortion_comparison": (
+            plots.plot_distortion_comparison,
+            tables.distortion_comparison(fit_result, make_fit_result(2)[0], instrument),
+        ),
+        "reference_influence": (
+            plots.plot_reference_influence,
+            tables.reference_influence(linear_fit),
+        ),
+        "largest_residuals": (plots.plot_largest_residuals, tables.largest_residuals(fit_result)),
     }
 
 

@@ -14,6 +14,7 @@ from plateviz.reports.report import Report
 from plateviz.tables.verdict import Verdict
 from solver.data.orbit import OrbitData
 
+OF_COMPARISON = {"comparison", "distortion-comparison", "orders"}
 FACTS = {"Report": {"Command": "plateviz report <b>here</b>"}}
 MADE = datetime(2030, 1, 2, 3, 4, 5, tzinfo=UTC)
 _ADDRESS = re.compile(r"""(?:src|href)=["']?(?!data:)[^"'\s>]+|@import|url\(""")
@@ -48,7 +49,7 @@ def test_page_has_every_figure_with_data_and_its_caption(report, page, fit_resul
     shell = shell_of(page)
     for diagnostic in diagnostics():
         there = f'id="figure-{diagnostic.name}"' in shell
-        assert there == (diagnostic.name not in ("comparison", "orders"))
+        assert there == (diagnostic.name not in OF_COMPARISON)
     assert all(figure.title in shell for figure in report.figures)
 
 

@@ -2,12 +2,13 @@
 
 import errno
 import json
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from plateviz.runs.fitted_orbit import FORMAT, is_complete, read_fitted_orbit, write_fitted_orbit
-from solver.data.schema import RESULT_TABLES
+from solver.data.schema import RESULT_TABLES, SOURCES
 from solver.errors import DiskError, InputError
 
 
@@ -25,6 +26,14 @@ def test_fitted_orbit_is_unchanged_when_read_back(fit_result, tmp_path):
     assert back.settings == fit_result.settings
     assert back.summary == json.loads(json.dumps(fit_result.summary))
     assert back.sources["source_id"].dtype == "int64"
+
+
+def test_fitted_orbit_of_an_older_version_has_uncorrelated_priors(fit_result, tmp_path):
+    older = replace(fit_result, sources=fit_result.sources.drop(columns="prior_corr"))
+    write_fitted_orbit(tmp_path / "run", older)
+    sources = read_fitted_orbit(tmp_path / "run").sources
+    assert list(sources.columns) == SOURCES.names
+    assert (sources["prior_corr"] == 0.0).all()
 
 
 def test_compared_orders_are_stored(compared, tmp_path):

@@ -313,6 +313,13 @@ def test_result_of_an_older_version_has_no_number_of_tables(written):
     assert read_result(_edited(written, change)).true_places is None
 
 
+def test_result_of_an_older_version_has_uncorrelated_priors(written, result):
+    path = _edited(written, lambda hdus: hdus["RESULT"].columns.del_col("prior_corr"))
+    sources = read_result(path).sources
+    assert list(sources.columns) == list(result.sources.columns)
+    assert (sources["prior_corr"] == 0.0).all()
+
+
 def test_missing_column_is_refused(written):
     path = _edited(written, lambda hdus: hdus["RESULT"].columns.del_col("src_a_loc"))
     with pytest.raises(InputError, match="HDU RESULT: .*found none called src_a_loc"):

@@ -78,6 +78,15 @@ def test_prior_sigma_of_a_source_includes_proper_motion_and_parallax(small_orbit
     np.testing.assert_allclose(result.sources["prior_sigma_dec"], expected, rtol=1e-6)
 
 
+def test_prior_correlation_is_that_of_the_prior_covariance(solution, result):
+    covariance = np.linalg.inv(solution.problem.priors.precision)
+    both = result.sources["prior_corr"] * result.sources["prior_sigma_ra"]
+    found = both * result.sources["prior_sigma_dec"]
+    np.testing.assert_allclose(found, covariance[:, 0, 1], rtol=1e-9, atol=1e-15)
+    # The catalogue has no correlation of the coordinates; the parallax gives a small one.
+    assert result.sources["prior_corr"].abs().max() > 1e-5
+
+
 def test_marginal_sigmas_lie_between_the_conditional_and_the_prior_ones(result):
     sources = result.sources
     for axis in ("ra", "dec"):

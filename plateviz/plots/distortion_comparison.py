@@ -1,0 +1,120 @@
+"""Difference between the distortions of two solutions as vectors on the focal plane."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from plateviz.figures.figure import (
+    FRAME_WIDTH,
+    Axis,
+    Figure,
+    Glyphs,
+    framed,
+    message,
+    side_by_side,
+)
+from plateviz.figures.glyphs import paths
+from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
+from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.units import angle_text
+from plateviz.plots.workspace import OrbitWorkspace
+from plateviz.tables.distortion_comparison import ALONE, TOGETHER, distortion_comparison
+from solver.data.instrument import Detector
+
+_TITLE = "Difference of the distortion, B minus A"
+_TITLES = {ALONE: _TITLE, TOGETHER: "Difference of distortion and detectors, B minus A"}
+_XLABEL, _YLABEL = "focal-plane x (mm)", "focal-plane y (mm)"
+_HOVER = [
+    ("at", "@{x}{0.00}, @{y}{0.00} mm, detector @{detector_id}"),
+    ("x", "@{dx_um}{0.00000} µm = @{dx_mas}{0.0000} mas"),
+    ("y", "@{dy_um}{0.00000} µm = @{dy_mas}{0.0000} mas"),
+]
+_MARGIN = 1.2
+
+
+def plot_distortion_comparison(
+    table: pd.DataFrame, *, detectors: Sequence[Detector] = (), width: int = FRAME_WIDTH
+) -> Figure:
+    """Draw the difference of the distortion alone, and of distortion and detectors, to scale.
+
+    Parameters
+    ----------
+    table : `tables.distortion_comparison`
+    detectors : detectors to outline
+    width : of each panel's frame, screen pixels
+    """
+    if table.empty:
+        text = "No second solution"
+        return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_YLABEL)
+    half = _MARGIN * float(np.abs(table[["x", "y"]].to_numpy()).max())
+    field = Field((-half, half), (-half, half))
+    panels = [
+        _panel(rows, _TITLES[str(part)], detectors, field, width)
+        for part, rows in table.groupby("part", sort=False)
+    ]
+    return side_by_side(panels, columns=2)
+
+
+def _panel(
+    rows: pd.DataFrame, title: str, detectors: Sequence[Detector], field: Field, width: int
+) -> Figure:
+    scale, rms = automatic_scale(rows, field), rms_length(rows)
+    length = round_125(2.0 * rms)
+    mas_per_mm = float(rows["mas_per_unit"].iloc[0])
+    length_text = f"{_length(1000.0 * length)} = {angle_text(length * mas_per_mm)}"
+    return framed(
+        [
+            _outlines(detectors),
+            *arrows(rows, scale=scale, field=field, colour="mark", hover=_HOVER),
+            *key(length, length_text, scale=scale, field=field),
+        ],
+        title=title,
+        subtitle=f"rms {_length(1000.0 * rms)} = {angle_text(rms * mas_per_mm)}; {_removed(rows)}\n"
+        f"Arrows enlarged {scale:,.12g} times; key: {length_text}",
+        x=Axis(_XLABEL, field.x),
+        y=Axis(_YLABEL, field.ylim),
+        width=width,
+    )
+
+
+def _removed(rows: pd.DataFrame) -> str:
+    shift, roll, scale = (
+        float(np.abs(rows[name].iloc[0])) for name in ("shift_um", "roll_arcsec", "scale_ppm")
+    )
+    return f"removed: {_length(shift)}, {angle_text(1000.0 * roll)}, {scale:.2f} ppm"
+
+
+def _length(um: float) -> str:
+    """Return a length to two digits or more: "12 µm", "0.05 nm"."""
+    return f"{um:.3g} µm" if um >= 0.001 or um == 0.0 else f"{1000.0 * um:.2g} nm"
+
+
+def _outlines(detectors: Sequence[Detector]) -> Glyphs:
+    corners = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detectors]
+    return paths(corners, name="outlines", color="muted")
+
+
+def _plot(chosen: Chosen) -> Figure:
+    if chosen.other is None:
+        return message(_TITLE, "Fit with other settings to compare two solutions.")
+    table = distortion_comparison(chosen.other, chosen.result, chosen.instrument)
+    return plot_distortion_comparison(table, detectors=chosen.instrument.detectors)
+
+
+DIAGNOSTICS = (
+    Diagnostic(
+        "distortion-comparison",
+        "Comparison of two distortions",
+        "The distortion of the current solution (B) minus that of the previous one (A), left, and "
+        "the same with the places, rotations and pitches of the detectors, right. A common shift, "
+        "roll and scale are removed, because pointing, roll and focal length absorb them. Good: "
+        "on the right, differences well below the uncertainty of the positions. What is on the "
+        "left alone has moved from the distortion to the detectors and does no harm.",
+        OrbitWorkspace.ORDERS,
+        87,
+        _plot,
+        is_wide=True,
+        has_data=lambda chosen: chosen.other is not None,
+    ),
+)

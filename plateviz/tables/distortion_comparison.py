@@ -1,0 +1,143 @@
+"""Table of the difference between two calibrations of the focal plane, as a vector field."""
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.calibration import displacement_um
+from solver.data.instrument import Instrument
+from solver.data.result import FitResult
+from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
+
+ALONE, TOGETHER = "distortion alone", "distortion and detectors"
+_UM_PER_MM = 1000.0
+_POINTS = 256
+_LEAST_PER_SIDE = 3
+# The distortion changes by less than a hundredth of the distance: each step of the inversion
+# gains two digits or more.
+_INVERSION_STEPS = 10
+_MILLIONTH = 1e-6
+
+
+def distortion_comparison(
+    result_a: FitResult, result_b: FitResult, instrument: Instrument
+) -> pd.DataFrame:
+    """Return calibration B minus calibration A on a grid of pixels of every detector.
+
+    A star at the same place of the sky lies elsewhere on the detectors in B than in A. The
+    pointing, the roll and the focal length of the exposures absorb a common shift, rotation
+    and scale of the field; the ones that fit the grid best are removed. A shift includes its
+    projection: away from the centre it is longer, as on a tangent plane.
+
+    The distortion alone is not determined as well as the distortion and the detectors together:
+    if all detectors move against the optical axis, the distortion about the new axis has other
+    coefficients, but every star stays where it was.
+
+    Parameters
+    ----------
+    result_a : the fit taken as reference
+    result_b : the fit compared with it
+    instrument : of both fits; gives the pixels and the scale s of the polynomials
+
+    Returns
+    -------
+    A row per part ("distortion alone", "distortion and detectors") and point: `part`,
+    `detector_id`, the tail `x`, `y` (ideal position in A) and the difference `u`, `v` in mm,
+    `mas_per_unit` (mas per mm), the difference as `dx_um`, `dy_um`, `dx_mas`, `dy_mas`, and
+    what was removed: `shift_um`, `roll_arcsec`, `scale_ppm`
+    """
+    numbers, pixels = _grid(instrument)
+    focal = _focal_length(result_a)
+    places_a, places_b = (_ideal(one, instrument, numbers, pixels) for one in (result_a, result_b))
+    moved = focal * (places_a / focal - places_b / _focal_length(result_b))
+    scale = instrument.distortion_scale_um
+    by_optics = _displaced(result_b, places_a, scale) - _displaced(result_a, places_a, scale)
+    ids = np.array([d.detector_id for d in instrument.detectors])[numbers]
+    parts = [
+        _part(name, ids, places_a, difference, focal)
+        for name, difference in ((ALONE, by_optics), (TOGETHER, moved))
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def _part(
+    name: str, ids: np.ndarray, places: np.ndarray, difference: np.ndarray, focal: float
+) -> pd.DataFrame:
+    rest, (shift_x, shift_y, roll, scale) = _without_common(places, difference, focal)
+    mas_per_um = 1.0 / focal / RAD_PER_MAS
+    return pd.DataFrame(
+        {
+            "part": name,
+            "detector_id": ids,
+            "x": places[:, 0] / _UM_PER_MM,
+            "y": places[:, 1] / _UM_PER_MM,
+            "u": rest[:, 0] / _UM_PER_MM,
+            "v": rest[:, 1] / _UM_PER_MM,
+            "mas_per_unit": mas_per_um * _UM_PER_MM,
+            "dx_um": rest[:, 0],
+            "dy_um": rest[:, 1],
+            "dx_mas": rest[:, 0] * mas_per_um,
+            "dy_mas": rest[:, 1] * mas_per_um,
+            "shift_um": math.hypot(shift_x, shift_y),
+            "roll_arcsec": roll / RAD_PER_ARCSEC,
+            "scale_ppm": scale / _MILLIONTH,
+        }
+    )
+
+
+def _without_common(
+    places: np.ndarray, difference: np.ndarray, focal: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the differences without the common shift, roll and scale, and these (um, rad, 1)."""
+    x, y = places.T
+    zero = np.zeros_like(x)
+    # A small rotation of the sphere about each of three axes, on the tangent plane, and a scale.
+    terms = np.array(
+        [
+            (1.0 + (x / focal) ** 2, x * y / focal**2),
+            (x * y / focal**2, 1.0 + (y / focal) ** 2),
+            (zero - y, zero + x),
+            (x, y),
+        ]
+    ).reshape(4, -1)
+    # Columns of one size, so that none is lost by rounding.
+    size = np.linalg.norm(terms, axis=1)
+    found, *_ = np.linalg.lstsq((terms.T / size), difference.T.ravel(), rcond=None)
+    common = (terms.T @ (found / size)).reshape(2, -1).T
+    return difference - common, found / size
+
+
+def _grid(instrument: Instrument) -> tuple[np.ndarray, np.ndarray]:
+    """Return the number of the detector and the pixel coordinates of each point of the grid."""
+    detectors = instrument.detectors
+    side = max(_LEAST_PER_SIDE, math.isqrt(_POINTS // len(detectors)))
+    unit = np.stack(np.meshgrid(*[np.linspace(-0.5, 0.5, side)] * 2), axis=-1).reshape(-1, 2)
+    pixels = np.concatenate([unit * (d.n_x, d.n_y) for d in detectors])
+    return np.repeat(np.arange(len(detectors)), len(unit)), pixels
+
+
+def _ideal(
+    result: FitResult, instrument: Instrument, numbers: np.ndarray, pixels: np.ndarray
+) -> np.ndarray:
+    """Return the undistorted positions of pixels in um: the inverse of Eq. (exp:model:nxny)."""
+    fitted = result.values_on("det").iloc[numbers]
+    x, y = (pixels * fitted[["pitch_x", "pitch_y"]].to_numpy()).T
+    angle = np.radians(fitted["detector_rotation"].to_numpy())
+    turned = [np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x]
+    focal_plane = fitted[["detector_x", "detector_y"]].to_numpy() + np.stack(turned, axis=-1)
+    ideal = focal_plane
+    for _ in range(_INVERSION_STEPS):
+        ideal = focal_plane - _displaced(result, ideal, instrument.distortion_scale_um)
+    return ideal
+
+
+def _displaced(result: FitResult, places: np.ndarray, scale_um: float) -> np.ndarray:
+    fitted = result.values_on("coef")
+    x, y = (places / scale_um).T
+    groups = ("distortion_x", "distortion_y")
+    return np.stack([displacement_um(fitted[g].to_numpy(), x, y) for g in groups], axis=-1)
+
+
+def _focal_length(result: FitResult) -> float:
+    return float(result.values_on("exp")["focal_length"].mean())

@@ -33,24 +33,29 @@ class SourceList(pn.viewable.Viewer):
         return self._window
 
     def open(self) -> None:
-        """Open the window."""
-        if self._table is None:
-            on_row = self._open_source if self._navigation.run else None
-            self._table = DataTable(SELECTED_SOURCES, on_row, page_size=_PAGE_SIZE)
-            self._window.append(self._table)
+        """Open the window with a new table.
+
+        The browser drops the table of a window that is closed, and reports an error where one that
+        it is still making gets other rows.
+        """
+        on_row = self._open_source if self._navigation.run else None
+        self._table = DataTable(SELECTED_SOURCES, on_row, page_size=_PAGE_SIZE)
+        self._fill(self._table)
+        self._window[:] = [self._table]
         self._window.open = True
-        self.show()
 
     def show(self) -> None:
         """Show the sources that are selected now, if the window is open."""
-        if self._table is None or not self._window.open:
-            return
+        if self._table is not None and self._window.open:
+            self._fill(self._table)
+
+    def _fill(self, table: DataTable) -> None:
         session = self._navigation.session
         result = session.shown.result if session.shown else None
         run = self._navigation.run
         counts = run.counts() if run is not None else None
-        table = selected_sources(session.selection.sources, result, counts)
-        self._table.show(table, session.theme)
+        rows = selected_sources(session.selection.sources, result, counts)
+        table.show(rows, session.theme)
 
     def _open_source(self, row: pd.Series) -> None:
         self._window.open = False

@@ -140,6 +140,7 @@ class _Ticker:
         self._pages.draw_due()
         if session.job is None and not self._pages.is_due and not self._pages.complete():
             self._callback.stop()
+            session.prepare_what_ifs()
 
 
 def _set_theme(session: Session, is_dark: bool) -> None:

@@ -71,6 +71,7 @@ class Session(param.Parameterized):
         self._requested: FitSettings = FitSettings()
         self._requested_what_if = False
         self._next_what_if: FitSettings | None = None
+        self._unprepared: Solution | None = None
         self.choices.param.watch(
             lambda *_: self.ask_what_if(),
             [*ANSWERED_AT_ONCE, "what_if_at_once"],
@@ -99,8 +100,16 @@ class Session(param.Parameterized):
         self.param.update(solutions=[], other=None)
         self._put_on_screen(solution)
         self.choices.load(result.settings)
-        if self.choices.what_if_at_once:
-            self.store.prepare(orbit, result.settings)
+        self._unprepared = solution
+
+    def prepare_what_ifs(self) -> None:
+        """Let the solver fit what the what-ifs of an existing result start from, once.
+
+        The page asks for it when it has nothing left to draw.
+        """
+        solution, self._unprepared = self._unprepared, None
+        if solution is not None and self.shown is solution and self.choices.what_if_at_once:
+            self.store.prepare(solution.orbit, solution.settings)
 
     def refuse(self, message: str) -> None:
         """Show why a request failed; the last solution stays."""
@@ -231,7 +240,7 @@ class Session(param.Parameterized):
             self._job = None
             self.refuse(reason)
         else:
-            self.message = _progress_text(self._job)
+            self.message = self._job.progress_text
 
     def bring_up(self, solution: Solution) -> None:
         """Show an earlier solution; the fitted one on the screen becomes the other."""
@@ -250,7 +259,7 @@ class Session(param.Parameterized):
         self._requested, self._requested_what_if = settings, what_if
         self._job = self.store.request(self.selection.orbit, settings, what_if)
         stage = Stage.STALE if self.shown else Stage.LOADING
-        self.param.update(stage=stage, message=_progress_text(self._job))
+        self.param.update(stage=stage, message=self._job.progress_text)
         self.poll()
 
     def _cancel_job(self) -> None:
@@ -285,14 +294,3 @@ def _what_if_settings(settings: FitSettings, fitted: FitSettings) -> FitSettings
     """Return the settings of a what-if; it keeps a comparison of orders only if still valid."""
     is_still_valid = settings.with_(order=fitted.order, compare_orders=True) == fitted
     return settings.with_(compare_orders=is_still_valid)
-
-
-def _progress_text(job: Job) -> str:
-    """Return the progress of a job as text."""
-    if job.status is JobStatus.QUEUED:
-        return "waiting for the solver"
-    last = job.progress[-1] if job.progress else {}
-    text = str(last.get("stage", "starting"))
-    if last.get("largest_step") == last.get("largest_step") and "largest_step" in last:
-        text += f", largest step {last['largest_step']:.2g} sigma"
-    return f"{text} ({job.seconds:.0f} s)"

@@ -1,5 +1,6 @@
 """Job: one request to the solver process, with its status and progress."""
 
+import math
 import threading
 import time
 import uuid
@@ -57,6 +58,19 @@ class Job:
     def progress(self) -> list[Mapping[str, object]]:
         """Progress events so far."""
         return list(self._progress)
+
+    @property
+    def progress_text(self) -> str:
+        """How far the job is, in words."""
+        if self._status is JobStatus.QUEUED:
+            return "waiting for the solver"
+        last = self._progress[-1] if self._progress else {}
+        text = str(last.get("stage", "starting"))
+        step = last.get("largest_step")
+        # The start of a fit has no step.
+        if isinstance(step, float) and math.isfinite(step):
+            text += f", largest step {step:.2g} sigma"
+        return f"{text} ({self.seconds:.0f} s)"
 
     @property
     def seconds(self) -> float:

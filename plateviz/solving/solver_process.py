@@ -46,9 +46,6 @@ Send = Callable[[dict], None]
 Speculative = Iterator[None]
 # Idle seconds before speculative work starts.
 _IDLE_S = 0.3
-# Further steps without a request, and their length, before an orbit is fitted unasked: the page
-# that shows its solution is drawn first.
-_PATIENT_STEPS, _PATIENT_STEP_S = 12, 0.1
 # Time in which the process removes what it has not finished, once its server has ended.
 _END_S = 3.0
 
@@ -160,9 +157,6 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Specu
 
 def _prepare(request: Request, requests: "queue.Queue[Request | None]") -> Speculative:
     """Fit an orbit and precompute its likely what-ifs; give way to requests for anything else."""
-    for _ in range(_PATIENT_STEPS):
-        time.sleep(_PATIENT_STEP_S)
-        yield
 
     def give_way(_: Iteration) -> None:
         with requests.mutex:
@@ -172,7 +166,7 @@ def _prepare(request: Request, requests: "queue.Queue[Request | None]") -> Specu
 
     # What is wrong with the orbit is said when something is asked of it.
     with suppress(CancelledError, InputError, FitError):
-        fitter, settings = _fitter_of(request), FitSettings.from_dict(request["settings"])
+        fitter, settings = _fitter_of(request), _base(FitSettings.from_dict(request["settings"]))
         if not _serves_what_ifs(fitter.fitted_settings, settings):
             fitter.fit(settings, give_way)
         yield from fitter.precompute(settings.order)
@@ -219,16 +213,22 @@ def _what_if(
     fitter: OrbitFitter, settings: FitSettings, progress: Callable[[Iteration], None]
 ) -> FitResult | None:
     """Return a solution by a step from a fit, or None if it needs a fit of its own."""
-    result = fitter.what_if(settings)
-    whole = settings.with_(exclusions=Exclusions(), compare_orders=False)
-    if result is not None or not settings.exclusions or fitter.fitted_settings == whole:
+    result, base = fitter.what_if(settings), _base(settings)
+    if result is not None or not settings.exclusions or fitter.fitted_settings == base:
         return result
-    # A fit without some measurements is no start for a what-if without others; one of all is.
     try:
-        fitter.fit(whole, progress)
+        fitter.fit(base, progress)
     except FitError:
         return None
     return fitter.what_if(settings)
+
+
+def _base(settings: FitSettings) -> FitSettings:
+    """Return the settings of the fit that the what-ifs of `settings` start from.
+
+    A fit without some measurements is no start for a what-if without others; one of all is.
+    """
+    return settings.with_(exclusions=Exclusions(), compare_orders=False)
 
 
 def _simulate(request: Request, progress: Callable[..., None]) -> Speculative:

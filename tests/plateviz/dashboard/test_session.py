@@ -73,13 +73,25 @@ def test_first_orbit_is_requested_with_the_settings_of_the_paper(session):
     assert session.other is None
 
 
-def test_solution_of_a_run_is_prepared_for_what_ifs(fit_result):
+def test_solution_of_a_run_is_prepared_once_for_what_ifs(fit_result):
     session = Session(FakeStore(fit_result))
     session.show_result(0, fit_result)
+    assert session.store.prepared == []
+    session.prepare_what_ifs()
+    session.prepare_what_ifs()
     assert session.store.prepared == [(0, fit_result.settings)]
+
+
+def test_nothing_is_prepared_for_what_is_no_longer_shown_or_not_wanted(fit_result):
+    session = Session(FakeStore(fit_result))
+    session.show_result(0, fit_result)
+    session.refit()
+    finish(session)
+    session.prepare_what_ifs()
     session.choices.what_if_at_once = False
     session.show_result(1, fit_result)
-    assert len(session.store.prepared) == 1
+    session.prepare_what_ifs()
+    assert session.store.prepared == []
 
 
 def test_last_solution_stays_until_the_next_one_is_complete(session):

@@ -76,7 +76,6 @@ def prepare(monkeypatch, requests):
 
     def prepared(fitted=None):
         fitter = Fitter(fitted)
-        monkeypatch.setattr(solver_process, "_PATIENT_STEPS", 0)
         monkeypatch.setattr(solver_process, "_fitter_of", lambda request: fitter)
         steps = list(_prepare(PREPARED, requests))
         return fitter.fitted_settings, steps
@@ -86,6 +85,12 @@ def prepare(monkeypatch, requests):
 
 def test_orbit_is_fitted_and_its_likely_what_ifs_are_precomputed(prepare):
     assert prepare() == (SETTINGS, [0, 1, 2])
+
+
+def test_all_measurements_are_fitted_and_no_orders_compared(prepare, monkeypatch):
+    special = SETTINGS.with_(exclusions=Exclusions(detectors=frozenset([1])), compare_orders=True)
+    monkeypatch.setitem(PREPARED, "settings", special.to_dict())
+    assert prepare()[0] == SETTINGS
 
 
 def test_orbit_whose_fit_serves_is_not_fitted_again(prepare):
@@ -121,15 +126,8 @@ def test_preparation_gives_way_to_all_but_its_what_ifs(prepare, requests, change
     assert (prepare()[0] is not None) == is_fitted
 
 
-def test_page_that_shows_the_solution_is_drawn_first(requests, monkeypatch):
-    monkeypatch.setattr(solver_process, "_PATIENT_STEP_S", 0.0)
-    requests.put({"job": "1"})
-    assert _next_request(requests, _prepare(PREPARED, requests)) == {"job": "1"}
-
-
-def test_what_if_of_a_prepared_orbit_needs_no_fit(monkeypatch, requests, small_survey):
+def test_what_if_of_a_prepared_orbit_needs_no_fit(requests, small_survey):
     """As for a solution of a run, of which no process has a fit in memory."""
-    monkeypatch.setattr(solver_process, "_PATIENT_STEPS", 0)
     settings = FitSettings()
     origin = origin_to_dict(SurveyFolder(str(small_survey)))
     request = {**PREPARED, "origin": origin, "settings": settings.to_dict()}
@@ -144,6 +142,5 @@ def test_what_is_wrong_with_an_orbit_is_not_said_unasked(monkeypatch, requests):
     def unreadable(request):
         raise InputError("obs.fits: no such file")
 
-    monkeypatch.setattr(solver_process, "_PATIENT_STEPS", 0)
     monkeypatch.setattr(solver_process, "_fitter_of", unreadable)
     assert list(_prepare(PREPARED, requests)) == []

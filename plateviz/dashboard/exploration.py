@@ -8,21 +8,22 @@ from typing import Any
 
 import param
 
-from plateviz.figures.figure import Limits
 from plateviz.plots.explore import Columns
 
 # A control shows an empty value as if nothing were chosen.
 NONE = "none"
 _OPTIONAL = ("colour", "only")
+_ALL = (-math.inf, math.inf)
 # What is shown first of each table, where it has these columns.
 _FIRST: Mapping[str, tuple[str, str]] = {
     "measurements": ("focal_x", "residual_x"),
     "sources": ("n_obs", "sigma_ra_marginal"),
     "exposures": ("time", "chi2_per_dof"),
 }
-_NUMBER = r"-?\d+(?:\.\d*)?(?:e[+-]?\d+)?"
+_NUMBER = r"-?(?:\d+(?:\.\d*)?(?:e[+-]?\d+)?|inf)"
 _NUMBERS = re.compile(rf"{_NUMBER}(?:~{_NUMBER})*")
-_SWITCHES = ("is_log_x", "is_log_y", "has_median")
+SWITCHES: Mapping[str, str] = {"is_log_x": "log x", "is_log_y": "log y", "has_median": "median"}
+"""Names of the switches, and what they are called on the page."""
 
 
 class Exploration(param.Parameterized):
@@ -63,10 +64,9 @@ class Exploration(param.Parameterized):
             self.param[name].objects = options
             found = wanted[name] if wanted[name] in options else default
             self.param.update(**{name: found})
-        # Another kind of axis forgets its limits.
-        numbers = _numbers_of(requested)
-        limits = {name: numbers.pop(name) for name in ("limits",) if name in numbers}
-        self.param.update(**numbers)
+        switches, limits = _requested(requested)
+        self.param.update(**switches)
+        # Another kind of axis forgets its limits, so that they are set last.
         self.param.update(**limits)
 
     def columns(self) -> Columns:
@@ -74,10 +74,6 @@ class Exploration(param.Parameterized):
         values: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(Columns)}
         values |= {name: "" for name in _OPTIONAL if values[name] == NONE}
         return Columns(**values)
-
-    def zoom(self, x: Limits, y: Limits) -> None:
-        """Show a part of the axes."""
-        self.limits = (x, y)
 
     def restore(self, address: Mapping[str, str]) -> None:
         """Draw what a page's address requests, once its table is there; ignore invalid values."""
@@ -91,9 +87,9 @@ class Exploration(param.Parameterized):
             return {}
         query = {"rows": self.table, "x": self.x, "y": self.y}
         query |= {name: getattr(self, name) for name in _OPTIONAL if getattr(self, name) != NONE}
-        if self.only != NONE and math.isfinite(self.lowest) and math.isfinite(self.highest):
+        if self.only != NONE and (self.lowest, self.highest) != _ALL:
             query["between"] = _text((self.lowest, self.highest))
-        switches = [name for name in _SWITCHES if getattr(self, name)]
+        switches = [name for name in SWITCHES if getattr(self, name)]
         if switches:
             query["with"] = ",".join(switches)
         if self.limits is not None:
@@ -103,30 +99,31 @@ class Exploration(param.Parameterized):
     def _forget(self, *events: param.parameterized.Event) -> None:
         """Forget limits that were of other columns."""
         names = {event.name for event in events}
-        values: dict[str, object] = {"limits": None}
+        values: dict[str, object] = {} if names == {"only"} else {"limits": None}
         if names & {"table", "only"}:
-            values |= {"lowest": -math.inf, "highest": math.inf}
+            values |= dict(zip(("lowest", "highest"), _ALL, strict=True))
         self.param.update(**values)
 
 
 def _text(numbers: tuple[float, ...]) -> str:
-    return "~".join(f"{number:.8g}" for number in numbers)
+    # Every digit: who opens the address must see the same rows.
+    return "~".join(f"{number!r}" for number in numbers)
 
 
-def _numbers_of(address: Mapping[str, str]) -> dict[str, Any]:
-    """Return the switches and limits that an address requests."""
-    switches = address.get("with", "").split(",") if "with" in address else []
-    values: dict[str, Any] = {name: True for name in _SWITCHES if name in switches}
+def _requested(address: Mapping[str, str]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the switches and the limits that an address requests."""
+    wanted = address.get("with", "").split(",")
+    limits: dict[str, Any] = {}
     between, zoom = (_parsed(address.get(name, ""), n) for name, n in (("between", 2), ("zoom", 4)))
     if between is not None:
-        values |= {"lowest": between[0], "highest": between[1]}
-    if zoom is not None and zoom[0] != zoom[1] and zoom[2] != zoom[3]:
-        values["limits"] = (zoom[:2], zoom[2:])
-    return values
+        limits |= {"lowest": between[0], "highest": between[1]}
+    if zoom is not None and all(map(math.isfinite, zoom)):
+        limits["limits"] = (zoom[:2], zoom[2:])
+    return {name: True for name in SWITCHES if name in wanted}, limits
 
 
 def _parsed(text: str, count: int) -> tuple[float, ...] | None:
     if not _NUMBERS.fullmatch(text):
         return None
     numbers = tuple(map(float, text.split("~")))
-    return numbers if len(numbers) == count and all(map(math.isfinite, numbers)) else None
+    return numbers if len(numbers) == count else None

@@ -67,7 +67,7 @@ class BokehFrame:
         )
         for words in (self._title, self._subtitle):
             words.js_on_change("text", models.CustomJS(args={"plot": self.plot}, code=_MAKE_ROOM))
-        self._box = models.BoxZoomTool()
+        self._box, self._wheel = models.BoxZoomTool(), models.WheelZoomTool()
         self.plot.add_layout(self._x, "below")
         self.plot.add_layout(self._y, "left")
         self.plot.add_layout(self._legend, "below")
@@ -75,7 +75,7 @@ class BokehFrame:
         self.plot.center = [*self._grids]
         self.plot.add_tools(
             self._pan,
-            models.WheelZoomTool(),
+            self._wheel,
             self._box,
             models.ResetTool(),
             models.SaveTool(),
@@ -115,6 +115,10 @@ class BokehFrame:
             grid.grid_line_color = theme.grid
         self._follow_glyphs(frame, theme)
         self._follow_legend(frame, theme)
+
+    def zoom_by_wheel(self) -> None:
+        """Let the wheel zoom at once; elsewhere it scrolls the page until its tool is chosen."""
+        self.plot.toolbar.update(active_scroll=self._wheel)
 
     def glyphs(self) -> Iterator[BokehGlyphs]:
         """Iterate over the glyphs, hidden ones among them."""

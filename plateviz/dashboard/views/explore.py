@@ -1,7 +1,8 @@
 """ExploreView: any column of a solution's tables against any other."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -9,7 +10,7 @@ import numpy as np
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.exploration import NONE, Exploration
+from plateviz.dashboard.exploration import NONE, SWITCHES
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
@@ -23,8 +24,6 @@ from solver.data.result import FitResult
 
 _STEPS = 200
 _BETWEEN = "between"
-_DRAWN = ["x", "y", "colour", "only", "lowest", "highest", "limits"]
-_SWITCHES = {"is_log_x": "log x", "is_log_y": "log y", "has_median": "median"}
 
 
 class _Text(NamedTuple):
@@ -57,8 +56,7 @@ class ExploreView(pn.viewable.Viewer):
         self._session, self._exploration = navigation.session, navigation.exploration
         self._wake = wake
         self._known: tuple[FitResult, str, ExplorableTable] | None = None
-        self._offered: list[str] = []
-        self._is_offering = self._is_following = False
+        self._is_following = False
         self._figure = FigureView(
             _Text(),
             self._plot,
@@ -75,9 +73,9 @@ class ExploreView(pn.viewable.Viewer):
         )
         self._limits.param.watch(self._take_limits, "value_throttled")
         self._workspace = workspace(self.grid, self._controls())
-        exploration = self._exploration
-        exploration.param.watch(self._show_limits, "only")
-        exploration.param.watch(self._change, ["table", *_DRAWN, *_SWITCHES])
+        names = list(self._exploration.param.values())
+        self._exploration.param.watch(self._show_limits, ["only", "lowest", "highest"])
+        self._exploration.param.watch(self._change, names)
         self._session.selection.param.watch(self._show_selected, "sources")
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -98,7 +96,7 @@ class ExploreView(pn.viewable.Viewer):
                 pmui.Checkbox.from_param(
                     parameters[name], label=label, description="", margin=(4, 6)
                 )
-                for name, label in _SWITCHES.items()
+                for name, label in SWITCHES.items()
             ),
             sx={"alignItems": "center"},
             sizing_mode="stretch_width",
@@ -107,34 +105,36 @@ class ExploreView(pn.viewable.Viewer):
 
     @property
     def _table(self) -> ExplorableTable | None:
-        """The table of the solution on the screen; made once."""
+        """The table of the solution on the screen; made once, with the controls for it."""
         shown, name = self._session.shown, self._exploration.table
         if shown is None:
             return None
         if self._known is None or self._known[0] is not shown.result or self._known[1] != name:
-            self._known = (shown.result, name, EXPLORABLE[name](shown.result))
+            table = EXPLORABLE[name](shown.result)
+            self._known = (shown.result, name, table)
+            with self._following():
+                self._exploration.offer(list(table.columns))
+            self._show_limits()
         return self._known[2]
+
+    @contextmanager
+    def _following(self) -> Iterator[None]:
+        """Change controls without an answer to that."""
+        self._is_following = True
+        try:
+            yield
+        finally:
+            self._is_following = False
 
     def _plot(self) -> Figure | None:
         table = self._table
         if table is None:
             return None
-        self._offer(list(table.columns))
         selected = self._session.selection.sources
         return explored_figure(table, self._exploration.columns(), selected=selected)
 
-    def _offer(self, columns: list[str]) -> None:
-        """Offer the columns of a table before it is drawn."""
-        if columns != self._offered:
-            self._offered = columns
-            self._is_offering = True
-            try:
-                self._exploration.offer(columns)
-            finally:
-                self._is_offering = False
-
     def _change(self, *_: object) -> None:
-        if not self._is_offering:
+        if not self._is_following:
             self._figure.change(self._session.theme)
             self._wake()
 
@@ -148,31 +148,32 @@ class ExploreView(pn.viewable.Viewer):
 
     def _select_area(self, corners: np.ndarray) -> None:
         table, chosen = self._table, self._exploration.columns()
-        if table is not None:
+        # An exposure has all sources, so that an area of exposures selects none.
+        if table is not None and table.has_sources:
             kept = kept_rows(table, chosen)
             self._session.select_sources(sources_within(table, chosen.x, chosen.y, corners, kept))
 
     def _show_limits(self, *_: object) -> None:
         """Let the slider span the values of the column that limits the rows."""
-        table, exploration = self._table, self._exploration
-        if table is None or exploration.only == NONE:
+        known, exploration = self._known, self._exploration
+        if self._is_following:
+            return
+        if known is None or exploration.only == NONE:
             self._limits.param.update(label=_BETWEEN, disabled=True)
             return
-        values = table.numbers(exploration.only)
+        values = known[2].numbers(exploration.only)
         values = values[np.isfinite(values)]
         low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
         high = high if high > low else low + 1.0
-        between = _within(exploration, low, high)
-        self._is_following = True
-        self._limits.param.update(
-            label=f"{exploration.only} between",
-            start=low,
-            end=high,
-            step=(high - low) / _STEPS,
-            value=between,
-            disabled=False,
-        )
-        self._is_following = False
+        with self._following():
+            self._limits.param.update(
+                label=f"{exploration.only} between",
+                start=low,
+                end=high,
+                step=(high - low) / _STEPS,
+                value=(max(low, exploration.lowest), min(high, exploration.highest)),
+                disabled=False,
+            )
 
     def _take_limits(self, event: Any) -> None:  # noqa: ANN401 as param
         if self._is_following or event.new is None:
@@ -183,7 +184,3 @@ class ExploreView(pn.viewable.Viewer):
             lowest=low if low > self._limits.start else -math.inf,
             highest=high if high < self._limits.end else math.inf,
         )
-
-
-def _within(exploration: Exploration, low: float, high: float) -> tuple[float, float]:
-    return max(low, exploration.lowest), min(high, exploration.highest)

@@ -21,6 +21,7 @@ SelectArea = Callable[[np.ndarray], object]
 """Called with the corners, (n, 2), of an area where a person has drawn one and there are no points.
 """
 
+_MOST_CORNERS = 500
 NO_LINKS: Links = MappingProxyType({})
 
 
@@ -171,4 +172,6 @@ def _corners(geometry: Mapping[str, object]) -> np.ndarray | None:
             return None
     except (KeyError, TypeError, ValueError):
         return None
+    # A hand draws hundreds of corners; each takes its time for every row.
+    corners = corners[:: len(corners) // _MOST_CORNERS + 1]
     return corners if np.isfinite(corners).all() else None

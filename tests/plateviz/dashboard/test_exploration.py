@@ -33,17 +33,20 @@ def test_column_that_the_next_table_lacks_is_replaced(exploration):
 
 
 def test_zoom_is_forgotten_with_other_columns_only(exploration):
-    exploration.zoom((0.0, 1.0), (2.0, 3.0))
-    exploration.colour = "ra"
+    exploration.limits = ((0.0, 1.0), (2.0, 3.0))
+    exploration.param.update(colour="ra", only="n_obs")
     assert exploration.limits == ((0.0, 1.0), (2.0, 3.0))
     exploration.x = "dec"
     assert exploration.limits is None
 
 
-def test_address_is_read_back(exploration):
+@pytest.mark.parametrize(
+    "between", [(2.5, 30.0), (-math.inf, 61_822.123456789), (1e-7 / 3.0, math.inf)]
+)
+def test_address_is_read_back(exploration, between):
     exploration.param.update(y="dec", colour="ra", only="n_obs", is_log_x=True, has_median=True)
-    exploration.param.update(lowest=2.5, highest=30.0)
-    exploration.zoom((1.0, 20.0), (-0.5, 1.5e-3))
+    exploration.param.update(lowest=between[0], highest=between[1])
+    exploration.limits = ((1.0, 20.0), (-0.5, 1.5e-3 / 7.0))
     other = Exploration(TABLES)
     other.restore(exploration.address())
     other.offer(COLUMNS)
@@ -57,7 +60,7 @@ def test_address_is_read_back(exploration):
     [
         {"rows": "nothing", "x": "dec"},
         {"rows": "sources", "x": "<b>", "y": "", "colour": "../..", "only": "0"},
-        {"rows": "sources", "zoom": "1~1~2~3"},
+        {"rows": "sources", "zoom": "1~inf~2~3"},
         {"rows": "sources", "zoom": "1~2~3"},
         {"rows": "sources", "zoom": "nan~1e999~3~4"},
         {"rows": "sources", "with": "limits,table", "between": "a~b"},

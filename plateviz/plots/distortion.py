@@ -2,20 +2,18 @@
 
 from collections.abc import Sequence
 
-import numpy as np
 import pandas as pd
 
-from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Glyphs, framed, message
-from plateviz.figures.glyphs import paths
-from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message
+from plateviz.plots.arrows import arrows, automatic_scale, key, rms_length, round_125
 from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.focal_plane import XLABEL, YLABEL, detector_outlines, field_about
 from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.calibration import distortion
 from solver.data.instrument import Detector
 
 _TITLE = "Fitted distortion, distorted minus ideal position"
-_XLABEL, _YLABEL = "focal-plane x (mm)", "focal-plane y (mm)"
 _HOVER = [
     ("at", "@{x}{0.00}, @{y}{0.00} mm"),
     ("x", "@{dx_um}{0.000} µm = @{dx_mas}{0.00} mas"),
@@ -42,9 +40,8 @@ def plot_distortion(
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(_TITLE, "No distortion fitted", width=width, xlabel=_XLABEL, ylabel=_YLABEL)
-    half = _MARGIN * float(np.abs(table[["x", "y"]].to_numpy()).max())
-    field = Field((-half, half), (-half, half))
+        return message(_TITLE, "No distortion fitted", width=width, xlabel=XLABEL, ylabel=YLABEL)
+    field = field_about(table, _MARGIN)
     scale = arrow_scale or automatic_scale(table, field)
     rms_um = 1000.0 * rms_length(table)
     length_um = round_125(2.0 * rms_um) if rms_um > 0 else 1.0
@@ -52,22 +49,17 @@ def plot_distortion(
     length = f"{length_um:g} µm = {angle_text(mas)}"
     return framed(
         [
-            _outlines(detectors),
+            detector_outlines(detectors, "muted"),
             *arrows(table, scale=scale, field=field, colour="mark", hover=_HOVER),
             *key(length_um / 1000.0, length, scale=scale, field=field),
         ],
         title=_TITLE,
         subtitle=f"Zero at the optical centre; rms {rms_um:.3g} µm.\n"
         f"Arrows enlarged {scale:,g} times; key: {length}",
-        x=Axis(_XLABEL, field.x),
-        y=Axis(_YLABEL, field.ylim),
+        x=Axis(XLABEL, field.x),
+        y=Axis(YLABEL, field.ylim),
         width=width,
     )
-
-
-def _outlines(detectors: Sequence[Detector]) -> Glyphs:
-    corners = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detectors]
-    return paths(corners, name="outlines", color="muted")
 
 
 def _plot(chosen: Chosen) -> Figure:

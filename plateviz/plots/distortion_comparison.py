@@ -9,14 +9,13 @@ from plateviz.figures.figure import (
     FRAME_WIDTH,
     Axis,
     Figure,
-    Glyphs,
     framed,
     message,
     side_by_side,
 )
-from plateviz.figures.glyphs import paths
 from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
 from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.focal_plane import XLABEL, YLABEL, detector_outlines, field_about
 from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.distortion_comparison import ALONE, TOGETHER, distortion_comparison
@@ -24,7 +23,6 @@ from solver.data.instrument import Detector
 
 _TITLE = "Difference of the distortion, B minus A"
 _TITLES = {ALONE: _TITLE, TOGETHER: "Difference of distortion and detectors, B minus A"}
-_XLABEL, _YLABEL = "focal-plane x (mm)", "focal-plane y (mm)"
 _HOVER = [
     ("at", "@{x}{0.00}, @{y}{0.00} mm, detector @{detector_id}"),
     ("x", "@{dx_um}{0.00000} µm = @{dx_mas}{0.0000} mas"),
@@ -46,9 +44,8 @@ def plot_distortion_comparison(
     """
     if table.empty:
         text = "No second solution"
-        return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_YLABEL)
-    half = _MARGIN * float(np.abs(table[["x", "y"]].to_numpy()).max())
-    field = Field((-half, half), (-half, half))
+        return message(_TITLE, text, width=width, xlabel=XLABEL, ylabel=YLABEL)
+    field = field_about(table, _MARGIN)
     panels = [
         _panel(rows, _TITLES[str(part)], detectors, field, width)
         for part, rows in table.groupby("part", sort=False)
@@ -65,15 +62,15 @@ def _panel(
     length_text = f"{_length(1000.0 * length)} = {angle_text(length * mas_per_mm)}"
     return framed(
         [
-            _outlines(detectors),
+            detector_outlines(detectors, "muted"),
             *arrows(rows, scale=scale, field=field, colour="mark", hover=_HOVER),
             *key(length, length_text, scale=scale, field=field),
         ],
         title=title,
         subtitle=f"rms {_length(1000.0 * rms)} = {angle_text(rms * mas_per_mm)}; {_removed(rows)}\n"
         f"Arrows enlarged {scale:,.12g} times; key: {length_text}",
-        x=Axis(_XLABEL, field.x),
-        y=Axis(_YLABEL, field.ylim),
+        x=Axis(XLABEL, field.x),
+        y=Axis(YLABEL, field.ylim),
         width=width,
     )
 
@@ -88,11 +85,6 @@ def _removed(rows: pd.DataFrame) -> str:
 def _length(um: float) -> str:
     """Return a length to two digits or more: "12 µm", "0.05 nm"."""
     return f"{um:.3g} µm" if um >= 0.001 or um == 0.0 else f"{1000.0 * um:.2g} nm"
-
-
-def _outlines(detectors: Sequence[Detector]) -> Glyphs:
-    corners = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detectors]
-    return paths(corners, name="outlines", color="muted")
 
 
 def _plot(chosen: Chosen) -> Figure:

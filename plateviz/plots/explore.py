@@ -17,7 +17,7 @@ from plateviz.plots.cells import (
 )
 from plateviz.plots.style import CLASS_COLOURS, COLOUR_OF_CLASS, ROW_LIMIT
 from plateviz.tables.explore import ExplorableTable
-from plateviz.tables.labels import exposure_labels, id_strings
+from plateviz.tables.labels import exposure_labels, id_strings, unit_text
 from plateviz.tables.sources import REFERENCE
 from solver.data.columns import Column
 
@@ -145,7 +145,7 @@ def _drawable(values: np.ndarray, is_log: bool) -> np.ndarray:
 
 
 def _label(column: Column) -> str:
-    return f"{column.meaning} ({column.unit})" if column.unit else column.meaning
+    return f"{column.meaning} ({unit_text(column.unit)})" if column.unit else column.meaning
 
 
 def _axis(

@@ -18,6 +18,7 @@ from plateviz.figures.figure import (
 from plateviz.figures.glyphs import horizontal, line, points, strip
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import error_bars
+from plateviz.plots.units import number_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.exposure_tracks import exposure_tracks
 
@@ -115,11 +116,7 @@ def _subtitle(rows: pd.DataFrame, unit: str, prior: float) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number to three digits."""
-    if value == 0.0:
-        return "0"
-    decimals = min(6, max(0, 2 - math.floor(math.log10(abs(value)))))
-    return f"{value:,.{decimals}f}".replace("-", "−")
+    return number_text(value, 3).replace("-", "−")
 
 
 def _plot(chosen: Chosen) -> Figure:

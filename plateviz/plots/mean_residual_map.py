@@ -6,14 +6,16 @@ import pandas as pd
 from plateviz.figures.figure import (
     Axis,
     Figure,
+    Glyphs,
     Limits,
     Ramp,
     framed,
     message,
     side_by_side,
 )
-from plateviz.figures.glyphs import paths, rectangles
+from plateviz.figures.glyphs import rectangles
 from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.focal_plane import XLABEL, YLABEL, detector_outlines
 from plateviz.plots.style import PANEL_WIDTH
 from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
@@ -21,18 +23,13 @@ from plateviz.tables.mean_residuals import MapStatistics, map_statistics, mean_r
 from solver.data.instrument import Instrument
 
 _TITLE = "Mean residual over the focal plane"
-_XLABEL, _YLABEL = "focal-plane x (mm)", "focal-plane y (mm)"
 _MARGIN = 1.06
 # The colours end at this number of sigmas of a typical bin, of which chance leaves few beyond.
 _COLOUR_SIGMAS = 4.0
 
 
 def plot_mean_residual_map(
-    table: pd.DataFrame,
-    instrument: Instrument,
-    *,
-    detector_id: int | None = None,
-    width: int = PANEL_WIDTH,
+    table: pd.DataFrame, instrument: Instrument, *, width: int = PANEL_WIDTH
 ) -> Figure:
     """Draw the mean residual of each bin along x and y, coloured from blue through zero to orange.
 
@@ -40,23 +37,18 @@ def plot_mean_residual_map(
     ----------
     table : `tables.mean_residuals`
     instrument : whose detectors are outlined
-    detector_id : the detector that fills the frames; None for the whole focal plane
     width : of each panel's frame, screen pixels
     """
     if table.empty:
         text = "No bins in which the fit leaves enough of the residuals"
-        return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_YLABEL)
+        return message(_TITLE, text, width=width, xlabel=XLABEL, ylabel=YLABEL)
     corners = [d.corners_um() / 1000.0 for d in instrument.detectors]
-    chosen = [
-        of_one
-        for of_one, d in zip(corners, instrument.detectors, strict=True)
-        if detector_id in (None, d.detector_id)
-    ]
-    low, high = np.min(chosen, axis=(0, 1)), np.max(chosen, axis=(0, 1))
+    low, high = np.min(corners, axis=(0, 1)), np.max(corners, axis=(0, 1))
     middle, half = 0.5 * (low + high), 0.5 * _MARGIN * float((high - low).max())
     limits = [(float(at - half), float(at + half)) for at in middle]
     statistics = map_statistics(table)
-    panels = [_panel(table, axis, statistics, corners, limits, width) for axis in "xy"]
+    outlines = detector_outlines(instrument.detectors)
+    panels = [_panel(table, axis, statistics, outlines, limits, width) for axis in "xy"]
     return side_by_side(panels, columns=2, linked="xy")
 
 
@@ -64,7 +56,7 @@ def _panel(
     table: pd.DataFrame,
     axis: str,
     statistics: MapStatistics,
-    corners: list[np.ndarray],
+    outlines: Glyphs,
     limits: list[Limits],
     width: int,
 ) -> Figure:
@@ -85,13 +77,12 @@ def _panel(
             ("detector", "@{detector_id}"),
         ],
     )
-    closed = [of_one[[0, 1, 2, 3, 0]] for of_one in corners]
     return framed(
-        [bins, paths(closed, name="outlines", color="line")],
+        [bins, outlines],
         title=f"Mean residual in {axis}",
         subtitle=_subtitle(table, axis, statistics),
-        x=Axis(_XLABEL, limits[0]),
-        y=Axis(_YLABEL, limits[1]),
+        x=Axis(XLABEL, limits[0]),
+        y=Axis(YLABEL, limits[1]),
         width=width,
     )
 
@@ -110,28 +101,22 @@ def _subtitle(table: pd.DataFrame, axis: str, statistics: MapStatistics) -> str:
 
 
 def _plot(chosen: Chosen) -> Figure:
-    table = mean_residuals(
-        chosen.result,
-        chosen.instrument,
-        exposures=chosen.exposures,
-        detector_id=chosen.detector,
-    )
-    return plot_mean_residual_map(table, chosen.instrument, detector_id=chosen.detector)
+    table = mean_residuals(chosen.result, chosen.instrument)
+    return plot_mean_residual_map(table, chosen.instrument)
 
 
 DIAGNOSTICS = (
     Diagnostic(
         "mean-residual-map",
         _TITLE,
-        "Measured minus predicted position, its mean in square bins over the detectors, for the "
-        "selected exposures and detector, corrected for what the source positions absorb. Good: "
+        "Measured minus predicted position in all exposures, its mean in square bins over the "
+        "detectors, corrected for what the source positions absorb. Good: "
         "no pattern, a scatter as expected by chance, and a largest bin below the stated limit. "
         "Neighbouring bins of one colour mean distortion that the order does not describe; a "
         "single bin or column means a defect of the detector.",
-        OrbitWorkspace.RESIDUALS,
+        OrbitWorkspace.PATTERNS,
         25,
         _plot,
-        follows_selection=True,
         is_wide=True,
     ),
 )

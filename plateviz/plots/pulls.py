@@ -132,7 +132,7 @@ DIAGNOSTICS = (
         "Chi2 of each exposure",
         "Chi2 of each exposure over its expected value. Good: points inside the band. A single "
         "exposure far above it was disturbed.",
-        OrbitWorkspace.RESIDUALS,
+        OrbitWorkspace.PATTERNS,
         70,
         _plot_chi2,
         is_key=True,

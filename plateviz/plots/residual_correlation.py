@@ -105,7 +105,7 @@ DIAGNOSTICS = (
         "exposure; B means local rotations. Equal parts mean displacements without preferred "
         "direction, such as errors that neighbouring sources share on the detector. Independent "
         "errors, even understated ones, add to neither.",
-        OrbitWorkspace.RESIDUALS,
+        OrbitWorkspace.PATTERNS,
         42,
         _plot,
     ),

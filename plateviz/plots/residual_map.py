@@ -7,6 +7,7 @@ from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Glyphs, Tooltips,
 from plateviz.figures.glyphs import paths
 from plateviz.plots.arrows import Field, arrows, automatic_scale, key, rms_length, round_125
 from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.focal_plane import XLABEL, YLABEL, detector_outlines
 from plateviz.plots.style import ARROW_LIMIT
 from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
@@ -71,7 +72,7 @@ def _title(detector: Detector | Instrument) -> str:
 
 def _axis_label(detector: Detector | Instrument, axis: str) -> str:
     if isinstance(detector, Instrument):
-        return f"focal-plane {axis} (mm)"
+        return {"x": XLABEL, "y": YLABEL}[axis]
     return f"detector {axis} (pix)"
 
 
@@ -86,11 +87,9 @@ def _field(detector: Detector | Instrument) -> Field:
 
 def _outlines(detector: Detector | Instrument) -> Glyphs:
     if isinstance(detector, Instrument):
-        outlines = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in detector.detectors]
-    else:
-        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
-        outlines = [0.5 * corners * (detector.n_x, detector.n_y)]
-    return paths(outlines, name="outlines", color="line")
+        return detector_outlines(detector.detectors)
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
+    return paths([0.5 * corners * (detector.n_x, detector.n_y)], name="outlines", color="line")
 
 
 def _thinned(

@@ -16,7 +16,7 @@ def angle_unit(size_mas: float) -> tuple[str, float]:
 def angle_text(value_mas: float) -> str:
     """Return an angle to two or three digits with its unit: "4.2 mas", "85 µas"."""
     unit, factor = angle_unit(abs(value_mas))
-    return f"{_digits(value_mas * factor)} {unit}"
+    return f"{number_text(value_mas * factor, 2)} {unit}"
 
 
 def orbits_text(number: int) -> str:
@@ -24,7 +24,8 @@ def orbits_text(number: int) -> str:
     return f"{number:,} orbit{'' if number == 1 else 's'}"
 
 
-def _digits(value: float) -> str:
+def number_text(value: float, digits: int) -> str:
+    """Return a number to so many digits, or more if it is large, with at most six decimals."""
     known = value and math.isfinite(value)
-    decimals = max(0, 1 - math.floor(math.log10(abs(value)))) if known else 0
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value)))) if known else 0
     return f"{value:,.{min(decimals, 6)}f}"

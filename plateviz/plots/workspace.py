@@ -15,6 +15,7 @@ class OrbitWorkspace(StrEnum):
 
     VERDICT = "verdict"
     RESIDUALS = "residuals"
+    PATTERNS = "patterns"
     SKY = "sky"
     CALIBRATION = "calibration"
     WEAK_DIRECTIONS = "weak-directions"

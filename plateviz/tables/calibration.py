@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 from numpy.polynomial import legendre
 
+from plateviz.tables.labels import unit_text
 from solver.data.instrument import Instrument
 from solver.data.parameters import Axis, groups_on
 from solver.data.result import FitResult
@@ -97,7 +98,7 @@ def _display_table(result: FitResult, axis: Axis) -> pd.DataFrame:
         name: result.values_on(axis, name) for name in ("value", "sigma_marginal", "prior_share")
     }
     for group in groups:
-        unit, value_unit = (u.replace("um", "µm") for u in (group.unit, group.value_unit))
+        unit, value_unit = (unit_text(u) for u in (group.unit, group.value_unit))
         columns[f"{group.label} [{value_unit}]"] = wide["value"][group.name]
         columns[f"σ {group.label}, marginal [{unit}]"] = wide["sigma_marginal"][group.name]
         columns[f"{group.label}, prior share"] = wide["prior_share"][group.name]

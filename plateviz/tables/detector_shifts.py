@@ -7,12 +7,12 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.chance import largest_by_chance
+from plateviz.tables.exposures import minutes_since_first
 from plateviz.tables.focal_residuals import FocalResiduals, focal_residuals
 from plateviz.tables.labels import exposure_labels
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 
-_MINUTES_PER_DAY = 1440.0
 # A shift of which less is left in the residuals has no row: that of a single detector.
 _LEAST_SHARE = 0.02
 _BAND_SIGMAS = 2.0
@@ -133,7 +133,7 @@ def _groups(exposures: pd.DataFrame, together: int) -> tuple[pd.DataFrame, np.nd
     visit = (rows["field_id"] != rows["field_id"].shift()).cumsum()
     number = rows.groupby(visit).cumcount() // together
     group = ((visit != visit.shift()) | (number != number.shift())).cumsum() - 1
-    minutes = (rows["obstime"] - rows["obstime"].min()) * _MINUTES_PER_DAY
+    minutes = minutes_since_first(rows)
     named = rows.assign(minutes=minutes, exposure=exposure_labels(rows)).groupby(group.to_numpy())
     groups = named.agg(minutes=("minutes", "mean"), exposure=("exposure", "first"))
     return groups, group.sort_index().to_numpy()

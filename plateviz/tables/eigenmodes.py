@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.labels import id_strings
+from plateviz.tables.labels import id_strings, unit_text
 from plateviz.tables.sky import mean_direction, offsets_arcmin
 from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS
 from solver.data.result import FitResult
@@ -82,7 +82,7 @@ def eigenmode_groups(result: FitResult) -> pd.DataFrame:
     )
     return table.assign(
         move=np.sqrt(table["move"]),
-        unit=table["unit"].str.replace("um", "µm"),
+        unit=table["unit"].map(unit_text),
         name=table["mode"].map(result.modes.set_index("mode")["name"]),
         group=[BY_NAME[name].label for name in table["group"]],
         shift_mas=table["mode"].map(_shift_rms(result)),

@@ -7,14 +7,13 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.sources import deviation, ordered_by_class
+from plateviz.tables.exposures import minutes_since_first
+from plateviz.tables.sources import chi2_per_dof, deviation, ordered_by_class
 from solver.data import schema
 from solver.data.columns import Column, Table
-from solver.data.input_schema import EXPOSURE_KEY
 from solver.data.parameters import groups_on
 from solver.data.result import FitResult
 
-_MINUTES_PER_DAY = 1440.0
 _CHI2_PER_DOF = Column("chi2_per_dof", "float64", "", "chi2 over its expectation")
 _TIME = Column("time", "float64", "min", "time since the first exposure of the orbit")
 _OF_DEVIATION = (
@@ -60,7 +59,7 @@ class ExplorableTable(NamedTuple):
 def explorable_sources(result: FitResult) -> ExplorableTable:
     """Return a row per source, with its deviation from the truth where that is known."""
     frame = ordered_by_class(result.sources)
-    frame["chi2_per_dof"] = _ratio(frame)
+    frame["chi2_per_dof"] = chi2_per_dof(frame)
     added = [_CHI2_PER_DOF]
     if result.true_places is not None:
         deviations = deviation(result, result.true_places)
@@ -75,15 +74,12 @@ def explorable_measurements(result: FitResult) -> ExplorableTable:
     rows = result.residuals
     sources = ordered_by_class(result.sources).set_index("source_id")
     of_source = sources.index.get_indexer(rows["source_id"])
-    times = pd.Series(
-        _minutes(result.exposures), pd.MultiIndex.from_frame(result.exposures[[*EXPOSURE_KEY]])
-    )
     frame = rows.assign(
         standardised=np.hypot(rows["standardised_x"], rows["standardised_y"]),
         phase_x=rows["nx"] - np.floor(rows["nx"]),
         phase_y=rows["ny"] - np.floor(rows["ny"]),
         n_obs=sources["n_obs"].to_numpy()[of_source],
-        time=times.reindex(pd.MultiIndex.from_frame(rows[[*EXPOSURE_KEY]])).to_numpy(),
+        time=minutes_since_first(result.exposures)[result.exposure_index],
         source_class=sources["source_class"].to_numpy()[of_source],
     )
     return _explorable("measurements", frame, schema.RESIDUALS, _OF_MEASUREMENTS)
@@ -92,7 +88,7 @@ def explorable_measurements(result: FitResult) -> ExplorableTable:
 def explorable_exposures(result: FitResult) -> ExplorableTable:
     """Return a row per exposure, with its fitted parameters."""
     frame = result.exposures.assign(
-        time=_minutes(result.exposures), chi2_per_dof=_ratio(result.exposures)
+        time=minutes_since_first(result.exposures), chi2_per_dof=chi2_per_dof(result.exposures)
     )
     added = [_TIME, _CHI2_PER_DOF]
     for kind, of_kind in (("offset", "estimate minus prior"), ("sigma_marginal", "marginal sigma")):
@@ -121,11 +117,12 @@ def sources_within(
 
     Parameters
     ----------
+    table : of sources or measurements
     x, y : columns of the polygon's coordinates
     corners : of the polygon, which closes itself, (n, 2)
     is_kept : whether a row is drawn
     """
-    if not table.has_sources or len(corners) < 3:
+    if len(corners) < 3:
         return frozenset()
     low, high = corners.min(axis=0), corners.max(axis=0)
     places = np.stack([table.numbers(x), table.numbers(y)], axis=1)
@@ -162,13 +159,3 @@ def numbers_of(table: Table) -> list[Column]:
     """Return the columns of a table that are numbers, not names of sources or of the orbit."""
     names = ("source_id", "orbit_id")
     return [column for column in table if column.dtype != "str" and column.name not in names]
-
-
-def _ratio(table: pd.DataFrame) -> np.ndarray:
-    dof = table["dof"].to_numpy(dtype=float)
-    return table["chi2"].to_numpy() / np.where(dof > 0, dof, np.nan)
-
-
-def _minutes(exposures: pd.DataFrame) -> np.ndarray:
-    times = exposures["obstime"].to_numpy(dtype=float)
-    return (times - times.min()) * _MINUTES_PER_DAY

@@ -3,11 +3,11 @@
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.labels import exposure_labels
+from plateviz.tables.exposures import minutes_since_first
+from plateviz.tables.labels import exposure_labels, unit_text
 from solver.data.parameters import groups_on
 from solver.data.result import FitResult
 
-_MINUTES_PER_DAY = 1440.0
 _MAS_PER_ARCSEC = 1000.0
 _IN_UNIT = ["offset", "sigma_conditional", "sigma_marginal", "prior_sigma"]
 
@@ -47,7 +47,7 @@ def exposure_tracks(result: FitResult) -> pd.DataFrame:
 
 
 def _times(exposures: pd.DataFrame) -> pd.DataFrame:
-    minutes = (exposures["obstime"] - exposures["obstime"].min()) * _MINUTES_PER_DAY
+    minutes = minutes_since_first(exposures)
     # Exposures at one and the same time have times that mean nothing.
     is_known = bool(np.isfinite(minutes).all() and (minutes > 0.0).any())
     return pd.DataFrame(
@@ -62,7 +62,7 @@ def _times(exposures: pd.DataFrame) -> pd.DataFrame:
 
 def _in_readable_unit(rows: pd.DataFrame) -> pd.DataFrame:
     """Return angles in mas, and "um" as "µm"."""
-    units = {name: str(rows[name].iloc[0]).replace("um", "µm") for name in ("unit", "value_unit")}
+    units = {name: unit_text(rows[name].iloc[0]) for name in ("unit", "value_unit")}
     if units["unit"] != "arcsec":
         return rows.assign(**units)
     scaled = {name: _MAS_PER_ARCSEC * rows[name] for name in _IN_UNIT}

@@ -1,6 +1,5 @@
 """Residuals as vectors on the focal plane, with what the fitted sources absorb of them."""
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,6 @@ from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.units import RAD_PER_DEG, RAD_PER_MAS
 
-ExposureKey = tuple[int, int]
 _UM_PER_MM = 1000.0
 _MPIX_PER_PIX = 1000.0
 _RAD_PER_ARCMIN = RAD_PER_DEG / 60.0
@@ -85,14 +83,8 @@ class FocalResiduals(NamedTuple):
         return np.stack(found, axis=-1)
 
 
-def focal_residuals(
-    result: FitResult,
-    instrument: Instrument,
-    *,
-    exposures: Iterable[ExposureKey] | None = None,
-    detector_id: int | None = None,
-) -> FocalResiduals:
-    """Return the residuals of selected exposures along the axes of the focal plane.
+def focal_residuals(result: FitResult, instrument: Instrument) -> FocalResiduals:
+    """Return the residuals along the axes of the focal plane.
 
     A millipixel is a thousandth of the mean pixel pitch of the instrument, so that both axes and
     all detectors have one unit.
@@ -101,19 +93,8 @@ def focal_residuals(
     ----------
     result : the fit
     instrument : of the fit; gives the order of the detectors
-    exposures : (field_id, plate_id) of each selected exposure; None for all
-    detector_id : the detector, or None for all
     """
-    rows, index = result.residuals, _exposure_index(result)
-    is_chosen = np.ones(len(result.exposures), dtype=bool)
-    if exposures is not None:
-        wanted = set(exposures)
-        keys = result.exposures[["field_id", "plate_id"]].itertuples(index=False, name=None)
-        is_chosen = np.array([key in wanted for key in keys], dtype=bool)
-    keep = is_chosen[index]
-    if detector_id is not None:
-        keep = keep & (rows["detector_id"] == detector_id).to_numpy()
-    rows = rows[keep]
+    rows = result.residuals
     detector = instrument.index_of(rows["detector_id"].to_numpy())
     fitted = result.values_on("det")
     turn = np.radians(fitted["detector_rotation"].to_numpy())[detector]
@@ -129,7 +110,7 @@ def focal_residuals(
     source, known = pd.factorize(rows["source_id"].to_numpy())
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
     return FocalResiduals(
-        exposure=index[keep],
+        exposure=result.exposure_index,
         detector=detector,
         source=np.searchsorted(ids, known)[source],
         at=rows[["focal_x", "focal_y"]].to_numpy() / _UM_PER_MM,
@@ -141,16 +122,3 @@ def focal_residuals(
         mas_per_mpix=mas_per_mpix,
         arcmin_per_mm=_UM_PER_MM / focal_um / _RAD_PER_ARCMIN,
     )
-
-
-def _exposure_index(result: FitResult) -> np.ndarray:
-    """Return the index of the exposure of each residual."""
-    # Several times as fast as an index of pairs.
-    field, plate = (
-        pd.factorize(np.concatenate([result.exposures[name], result.residuals[name]]))[0]
-        for name in ("field_id", "plate_id")
-    )
-    keys = field * (int(plate.max(initial=0)) + 1) + plate
-    known, rows = np.split(keys, [len(result.exposures)])
-    order = np.argsort(known)
-    return order[np.searchsorted(known[order], rows)]

@@ -1,4 +1,4 @@
-"""Text for exposures, ids and dates, the same in every plot and table."""
+"""Text for exposures, ids, units and dates, the same in every plot and table."""
 
 import pandas as pd
 
@@ -15,6 +15,11 @@ def exposure_labels(table: pd.DataFrame) -> pd.Series:
 def id_strings(ids: pd.Series) -> pd.Series:
     """Return the ids as text, because a browser represents integers exactly up to 2**53 only."""
     return ids.astype("int64").astype(str)
+
+
+def unit_text(unit: str) -> str:
+    """Return a unit as it is shown: "µm" for astropy's "um"."""
+    return unit.replace("um", "µm")
 
 
 def dates(epochs: pd.Series) -> pd.Series:

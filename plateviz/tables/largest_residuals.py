@@ -6,6 +6,7 @@ from scipy.special import betaincinv, chdtrc, gammaln, xlogy
 
 from plateviz.tables.chance import largest_chi2
 from plateviz.tables.labels import exposure_labels, id_strings
+from plateviz.tables.sources import chi2_per_dof
 from solver.data.result import FitResult
 
 MEASUREMENT, SOURCE = "measurement", "source"
@@ -64,7 +65,7 @@ def _of_sources(result: FitResult) -> pd.DataFrame:
         exposure="",
         detector="",
         n_obs=rows["n_obs"].to_numpy(),
-        chi2_per_dof=(chi2 / dof)[chosen],
+        chi2_per_dof=chi2_per_dof(rows),
     )
 
 

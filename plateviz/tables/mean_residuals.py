@@ -1,13 +1,12 @@
 """Table of the mean residuals in bins over the detectors, and its summary."""
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from plateviz.tables.chance import largest_by_chance
-from plateviz.tables.focal_residuals import ExposureKey, focal_residuals
+from plateviz.tables.focal_residuals import focal_residuals
 from solver.data.instrument import Detector, Instrument
 from solver.data.result import FitResult
 
@@ -22,12 +21,7 @@ _OF_EXPOSURES = 4.0
 
 
 def mean_residuals(
-    result: FitResult,
-    instrument: Instrument,
-    *,
-    exposures: Iterable[ExposureKey] | None = None,
-    detector_id: int | None = None,
-    bins: int | None = None,
+    result: FitResult, instrument: Instrument, *, bins: int | None = None
 ) -> pd.DataFrame:
     """Return the mean residual in square bins over the detectors, corrected for leverage.
 
@@ -42,8 +36,6 @@ def mean_residuals(
     ----------
     result : the fit
     instrument : of the fit; gives the outlines of the detectors
-    exposures : (field_id, plate_id) of each selected exposure; None for all
-    detector_id : the detector, or None for all
     bins : number of bins along the longer side of a detector; None for about 50 measurements
         in each, from 4 to 12
 
@@ -54,10 +46,9 @@ def mean_residuals(
     `pull_x` (their ratio), `mean_x_mas`, `sigma_x_mas`. Bins with few measurements, or where
     the sources absorb nearly all, have no row
     """
-    found = focal_residuals(result, instrument, exposures=exposures, detector_id=detector_id)
+    found = focal_residuals(result, instrument)
     if bins is None:
-        detectors = len(instrument.detectors) if detector_id is None else 1
-        wanted = int(np.sqrt(len(found) / (_PER_BIN * detectors)))
+        wanted = int(np.sqrt(len(found) / (_PER_BIN * len(instrument.detectors))))
         bins = min(max(wanted, _FEWEST_BINS), _MOST_BINS)
     grids = [_grid(detector, bins) for detector in instrument.detectors]
     table = pd.concat(grids, ignore_index=True)
@@ -69,7 +60,7 @@ def mean_residuals(
     is_known = (least > _LEAST_KEPT * np.max(own, axis=0)) & (least > 0.0)
     if is_known.any():
         is_known &= least >= _LEAST_SHARE * np.median(least[is_known])
-    share = _share_left(result, len(found), int(is_known.sum()))
+    share = _share_left(result, int(is_known.sum()))
     is_known &= share > 0.0
     known = table[is_known].reset_index(drop=True)
     for number, axis in enumerate("xy"):
@@ -136,17 +127,15 @@ def _grid(detector: Detector, bins: int) -> pd.DataFrame:
     )
 
 
-def _share_left(result: FitResult, count: int, bins: int) -> float:
+def _share_left(result: FitResult, bins: int) -> float:
     """Return the share of the means of `bins` bins, of both axes, that the calibration leaves.
 
-    The parameters of detectors and distortion are fitted to all measurements, of which the bins
-    have `count`. A parameter is as good as its prior lets it be.
+    A parameter of a detector or of the distortion absorbs as much as its prior lets it.
     """
     fitted = sum(
         float((1.0 - result.values_on(axis, "prior_share")).sum().sum()) for axis in ("det", "coef")
     )
-    absorbed = _OF_EXPOSURES + fitted * count / max(len(result.residuals), 1)
-    return max(0.0, 1.0 - absorbed / max(2.0 * bins, 1.0))
+    return max(0.0, 1.0 - (_OF_EXPOSURES + fitted) / max(2.0 * bins, 1.0))
 
 
 def _cells(at: np.ndarray, detector: np.ndarray, grids: list[pd.DataFrame]) -> np.ndarray:

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from plateviz.tables.labels import unit_text
 from solver.data.parameters import BY_NAME
 from solver.data.result import FitResult
 
@@ -38,9 +39,9 @@ def prior_shares(result: FitResult) -> pd.DataFrame:
             "height": row + _HALF_BAND * within,
             "prior_share": rows["prior_share"],
             "value": rows["value"],
-            "value_unit": rows["value_unit"].str.replace("um", "µm"),
+            "value_unit": rows["value_unit"].map(unit_text),
             "sigma_marginal": rows["sigma_marginal"],
             "prior_sigma": rows["prior_sigma"],
-            "unit": rows["unit"].str.replace("um", "µm"),
+            "unit": rows["unit"].map(unit_text),
         }
     )

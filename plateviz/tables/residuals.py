@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from plateviz.tables.exposures import ExposureKey, selected
 from plateviz.tables.labels import exposure_labels, id_strings
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.units import RAD_PER_MAS
 
-ExposureKey = tuple[int, int]
 _MPIX_PER_PIX = 1000.0
 _UM_PER_MM = 1000.0
 
@@ -40,9 +40,11 @@ def residual_map(
     on the detector in `residual_x_mpix`, `residual_y_mpix`, `residual_x_mas`,
     `residual_y_mas`
     """
-    rows = _selected(result.residuals, exposures, detector_id)
+    keep = selected(result, exposures, detector_id)
+    rows = result.residuals[keep]
     fitted = result.values_on("det").loc[instrument.index_of(rows["detector_id"].to_numpy())]
-    focal_um = _focal_length_um(result, rows)
+    focal_lengths = result.values_on("exp")["focal_length"].to_numpy()
+    focal_um = focal_lengths[result.exposure_index[keep]]
     d_x_um = (rows["residual_x"] * fitted["pitch_x"].to_numpy()).to_numpy()
     d_y_um = (rows["residual_y"] * fitted["pitch_y"].to_numpy()).to_numpy()
     mas_per_um = 1.0 / focal_um / RAD_PER_MAS
@@ -95,7 +97,7 @@ def residual_scatter(
     and `expected_x_mpix`, `expected_y_mpix`: the measurement uncertainty reduced by what the
     fit absorbs (half the leverage in each axis)
     """
-    rows = _selected(result.residuals, exposures, detector_id)
+    rows = result.residuals[selected(result, exposures, detector_id)]
     kept = np.sqrt(np.clip(1.0 - 0.5 * rows["leverage"], 0.0, None))
     return pd.DataFrame(
         {
@@ -168,26 +170,3 @@ def binned_vectors(
 def _bin_index(values: pd.Series, limits: tuple[float, float], bins: int) -> np.ndarray:
     scaled = (values.to_numpy(dtype=float) - limits[0]) / (limits[1] - limits[0]) * bins
     return np.clip(np.floor(scaled), 0, bins - 1).astype(np.int64)
-
-
-def _selected(
-    residuals: pd.DataFrame, exposures: Iterable[ExposureKey] | None, detector_id: int | None
-) -> pd.DataFrame:
-    keep = np.ones(len(residuals), dtype=bool)
-    if exposures is not None:
-        pairs = np.array(list(exposures), dtype=np.int64).reshape(-1, 2)
-        fields, plates = (residuals[name].to_numpy() for name in ("field_id", "plate_id"))
-        # One number per exposure: an index of pairs takes a hundred times as long to build.
-        low = min(int(plates.min(initial=0)), int(pairs[:, 1].min(initial=0)))
-        span = max(int(plates.max(initial=0)), int(pairs[:, 1].max(initial=0))) - low + 1
-        keep &= np.isin(fields * span + plates - low, pairs[:, 0] * span + pairs[:, 1] - low)
-    if detector_id is not None:
-        keep &= residuals["detector_id"].to_numpy() == detector_id
-    return residuals[keep]
-
-
-def _focal_length_um(result: FitResult, rows: pd.DataFrame) -> np.ndarray:
-    keys = ["field_id", "plate_id"]
-    fitted = result.values_on("exp")["focal_length"].to_numpy()
-    by_exposure = pd.Series(fitted, index=pd.MultiIndex.from_frame(result.exposures[keys]))
-    return by_exposure.reindex(pd.MultiIndex.from_frame(rows[keys])).to_numpy()

@@ -7,7 +7,7 @@ import pandas as pd
 
 from plateviz.tables.headings import SELECTED_SOURCES
 from plateviz.tables.labels import id_strings
-from plateviz.tables.sources import ordered_by_class
+from plateviz.tables.sources import chi2_per_dof, ordered_by_class
 from solver.data.result import FitResult
 
 
@@ -34,10 +34,7 @@ def selected_sources(
     classes = pd.concat([t[["source_id", "source_class"]] for t in (of_orbit, of_run)])
     table = classes.drop_duplicates("source_id")
     if "ra" in of_orbit:
-        dof = of_orbit["dof"].to_numpy(dtype=float)
-        values = of_orbit.assign(
-            chi2_per_dof=of_orbit["chi2"] / np.where(dof > 0, dof, np.nan)
-        ).drop(columns="source_class")
+        values = of_orbit.assign(chi2_per_dof=chi2_per_dof(of_orbit)).drop(columns="source_class")
         table = table.merge(values, on="source_id", how="left")
     if "n_orbits" in of_run:
         table = table.merge(of_run[["source_id", "n_orbits"]], on="source_id", how="left")

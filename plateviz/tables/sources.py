@@ -44,6 +44,12 @@ def ordered_by_class(sources: pd.DataFrame) -> pd.DataFrame:
     return ranked.drop(columns="_rank").reset_index(drop=True)
 
 
+def chi2_per_dof(table: pd.DataFrame) -> np.ndarray:
+    """Return `chi2` over `dof` of sources or exposures; NaN where nothing is left to judge."""
+    dof = table["dof"].to_numpy(dtype=float)
+    return table["chi2"].to_numpy() / np.where(dof > 0, dof, np.nan)
+
+
 def deviation(result: FitResult, truth: pd.DataFrame | None) -> pd.DataFrame:
     """Return estimated minus true position of each source with a known truth.
 

@@ -3,8 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from solver.data.parameters import groups_on
@@ -83,6 +85,19 @@ class FitResult:
     def orbit_id(self) -> int:
         """The `orbit_id` of the fitted orbit."""
         return int(self.exposures["orbit_id"].iloc[0])
+
+    @cached_property
+    def exposure_index(self) -> np.ndarray:
+        """The row of `exposures` that each residual belongs to, shape (n,)."""
+        # Several times as fast as an index of pairs; figures ask for it at every change.
+        field, plate = (
+            pd.factorize(np.concatenate([self.exposures[name], self.residuals[name]]))[0]
+            for name in ("field_id", "plate_id")
+        )
+        keys = field * (int(plate.max(initial=0)) + 1) + plate
+        known, rows = np.split(keys, [len(self.exposures)])
+        order = np.argsort(known)
+        return order[np.searchsorted(known[order], rows)]
 
     def values_on(self, axis: str, column: str = "value") -> pd.DataFrame:
         """Return one column of `calibration` as a wide table.

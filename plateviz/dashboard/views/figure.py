@@ -20,8 +20,6 @@ from solver.errors import InputError
 
 # Screen pixels between the edge of a card and its figure.
 _INSET = 4
-# Width of the window from which a grid has several columns, screen pixels ("lg").
-_LARGE = 1200
 # Fills its card, whatever it shows.
 _BODY = {
     "position": "absolute",
@@ -112,11 +110,6 @@ class FigureView(pn.viewable.Viewer):
         """Take a whole row of the grid."""
         self._card.styles = {**self._card.styles, "grid-column": "1 / -1"}
 
-    def take_columns(self, number: int) -> None:
-        """Take as many columns of the grid, where it has several."""
-        span = f"@media (min-width: {_LARGE}px) {{ :host {{ grid-column: span {number}; }} }}"
-        self._card.stylesheets = [*self._card.stylesheets, span]
-
     def change(self, theme: str) -> None:
         """Mark the figure as changed, and set the theme for the next drawing."""
         self._theme, self._is_changed = theme, True
@@ -175,8 +168,10 @@ class FigureView(pn.viewable.Viewer):
 
     def _follow_zoom(self, drawn: BokehFigure) -> None:
         if self._zoom is not None:
+            frame = drawn.frames[0]
+            frame.zoom_by_wheel()
             for event in (RangesUpdate, Reset):
-                drawn.frames[0].plot.on_event(event, self._take_zoom)
+                frame.plot.on_event(event, self._take_zoom)
 
     def _take_zoom(self, event: Event) -> None:
         if self._zoom is not None:

@@ -20,7 +20,6 @@ class FigureGrid(pn.viewable.Viewer):
         wake: Callable[..., object],
         *,
         columns: int = 2,
-        wide: int = 1,
         others: Sequence[Part] = (),
         **params: object,
     ) -> None:
@@ -30,16 +29,12 @@ class FigureGrid(pn.viewable.Viewer):
         ----------
         wake : called when a figure comes near the screen, leaves it, or gets another size
         columns : at most, where there is room
-        wide : columns that a wide figure takes, where there is room
         others : cards after those of the figures
         """
         super().__init__(**params)
         self._views = list(views)
         for view in self._views:
             view.visibility.param.watch(wake, ["is_near", "room"])
-        for view in self._views:
-            if view.is_wide and wide > 1:
-                view.take_columns(wide)
         if columns == 2 and (len(self._views) + len(others)) % 2:
             next((v for v in self._views if v.is_wide), self._views[-1]).take_row()
         self._box = pmui.FlexBox(

@@ -24,9 +24,6 @@ from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace
 
-# Number of figures that fit a screen in two columns, and of cells that fit it in three.
-_FEW, _CELLS = 6, 9
-
 
 class OrbitPage(pn.viewable.Viewer):
     """The Orbit view: the solution on the screen, updated when it changes."""
@@ -99,14 +96,8 @@ class OrbitPage(pn.viewable.Viewer):
             others = [card(CalibrationView(self._session), "tables")]
         if is_first:
             above = [StripView(self._session)]
-        is_full = not is_first and len(views) > _FEW
-        has_room = len(views) + sum(d.is_wide for d in views) <= _CELLS
         grid = FigureGrid(
-            list(views.values()),
-            self._wake,
-            columns=3 if is_first or is_full else 2,
-            wide=2 if is_full and has_room else 1,
-            others=others,
+            list(views.values()), self._wake, columns=3 if is_first else 2, others=others
         )
         self._grids[one] = grid
         self._show_selected()

@@ -21,7 +21,7 @@ _SWITCH = {
     "& .MuiToggleButton-root": {
         "textTransform": "none",
         "fontSize": "14px",
-        "px": 2,
+        "px": 1.5,
         "py": 0.5,
         "whiteSpace": "nowrap",
     }

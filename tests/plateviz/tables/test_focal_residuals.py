@@ -33,16 +33,6 @@ def test_exposures_and_sources_are_those_of_the_rows(fit_result, instrument):
     assert ids.tolist() == shuffled.residuals["source_id"].tolist()
 
 
-def test_selection_keeps_these_exposures_and_this_detector(fit_result, instrument):
-    found = focal_residuals(fit_result, instrument, exposures=[(1, 2), (3, 0)], detector_id=2)
-    rows = fit_result.residuals.query(
-        "detector_id == 2 and (field_id == 1 and plate_id == 2 or field_id == 3 and plate_id == 0)"
-    )
-    assert np.array_equal(found.at, rows[["focal_x", "focal_y"]] / 1000.0)
-    assert len(found) == len(rows) > 0
-    assert len(focal_residuals(fit_result, instrument, exposures=[])) == 0
-
-
 def test_weights_turn_with_the_detectors(fit_result, instrument):
     rows = fit_result.residuals.assign(sx=0.02, sy=0.005)
     found = focal_residuals(replace(fit_result, residuals=rows), instrument)

@@ -241,6 +241,9 @@ def test_area_is_selected_where_there_are_no_points():
         [[1.0, 0.5], [2.0, 0.5], [2.0, 1.0], [1.0, 1.0]],
         [[1.0, 0.0], [2.0, 1.0], [3.0, 0.0]],
     ]
+    turns = np.linspace(0.0, 6.0, 100_000)
+    drawn._trigger_event(area_of(drawn, type="poly", x=list(np.cos(turns)), y=list(np.sin(turns))))
+    assert 300 < len(areas.pop()) <= 500
     # What a browser of ours never sends.
     for geometry in ({"type": "rect"}, {"type": "poly", "x": [1], "y": []}, {"type": "point"}):
         drawn._trigger_event(area_of(drawn, **geometry))
@@ -263,14 +266,4 @@ def test_zoom_is_told_and_a_reset_too():
     drawn._trigger_event(Reset(drawn))
     drawn._trigger_event(RangesUpdate(drawn, x0=None, x1=2.0, y0=0.5, y1=1.0))
     assert zooms == [((1.0, 2.0), (0.5, 1.0)), None, None]
-
-
-def test_wide_figures_take_several_columns_of_a_grid_that_says_so():
-    def spans(**options):
-        views = [FigureView(diagnostic, lambda: None) for diagnostic in diagnostics()]
-        FigureGrid(views, lambda *_: None, columns=3, **options)
-        sheets = [" ".join(map(str, view.__panel__().stylesheets)) for view in views]
-        return ["grid-column: span 2" in sheet for sheet in sheets]
-
-    assert spans(wide=2) == [diagnostic.is_wide for diagnostic in diagnostics()]
-    assert not any(spans())
+    assert type(drawn.toolbar.active_scroll).__name__ == "WheelZoomTool"

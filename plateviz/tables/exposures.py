@@ -1,0 +1,38 @@
+"""The exposures of a result: the selected ones, and their times."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from solver.data.result import FitResult
+
+ExposureKey = tuple[int, int]
+"""field_id and plate_id."""
+_MINUTES_PER_DAY = 1440.0
+
+
+def selected(
+    result: FitResult, exposures: Iterable[ExposureKey] | None, detector_id: int | None
+) -> np.ndarray:
+    """Return whether each measurement is of selected exposures and of a detector, shape (n,).
+
+    Parameters
+    ----------
+    exposures : the selected exposures; None for all
+    detector_id : the detector, or None for all
+    """
+    keep = np.ones(len(result.residuals), dtype=bool)
+    if exposures is not None:
+        wanted = set(exposures)
+        keys = result.exposures[["field_id", "plate_id"]].itertuples(index=False, name=None)
+        keep &= np.array([key in wanted for key in keys], dtype=bool)[result.exposure_index]
+    if detector_id is not None:
+        keep &= result.residuals["detector_id"].to_numpy() == detector_id
+    return keep
+
+
+def minutes_since_first(exposures: pd.DataFrame) -> np.ndarray:
+    """Return the time of each exposure since the first one of the orbit, min."""
+    times = exposures["obstime"].to_numpy(dtype=float)
+    return (times - times.min(initial=np.inf)) * _MINUTES_PER_DAY

@@ -11,6 +11,7 @@ from bokeh.events import Event, RangesUpdate, Reset
 from plateviz.dashboard.views.card_tools import CardTools
 from plateviz.dashboard.views.figure_text import FigureText
 from plateviz.dashboard.views.markup import markup_pane, paragraph
+from plateviz.dashboard.views.own_layout import OwnLayout
 from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.visibility import Visibility
 from plateviz.figures.bokeh_figure import BokehFigure
@@ -208,6 +209,7 @@ def card(content: Part, name: str) -> pmui.Paper:
 
 def _card(*contents: Part, name: str) -> pmui.Paper:
     return pmui.Paper(
+        OwnLayout(),
         *contents,
         css_classes=["card", "figure", f"figure-{name}"],
         styles={"align-self": "stretch", "min-width": "0", "height": "auto"},

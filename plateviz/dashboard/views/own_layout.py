@@ -1,0 +1,36 @@
+"""OwnLayout: lets a card lay out its figure alone, whatever happens around it."""
+
+import panel as pn
+
+
+class OwnLayout(pn.custom.JSComponent):
+    """An invisible part of a card, which leaves the card out of the layouts of its containers.
+
+    Whenever a container changes its height, Bokeh lays out all figures in it, hidden ones too, and
+    so does each container around it: to show another workspace took five seconds. A card has its
+    size from the style sheets, and hears of every change of it; nothing else concerns its figure.
+    """
+
+    # What begins a layout of the card, and the steps of it that a container would take.
+    _esm = """
+    export function render({ view }) {
+      const card = view.parent
+      let depth = 0
+      for (const name of ["compute_layout", "invalidate_layout"]) {
+        const begin = card[name].bind(card)
+        card[name] = () => {
+          depth++
+          try { begin() } finally { depth-- }
+        }
+      }
+      for (const name of ["update_layout", "measure_layout", "update_bbox", "_compute_layout",
+                          "after_layout"]) {
+        const step = card[name].bind(card)
+        card[name] = () => depth > 0 ? step() : false
+      }
+    }
+    """
+
+    def __init__(self, **params: object) -> None:
+        """Take no room."""
+        super().__init__(styles={"display": "none"}, margin=0, **params)

@@ -5,10 +5,10 @@ The last solution stays on the screen until the next one is complete; then both 
 
 from dataclasses import replace
 from enum import Enum
-from typing import NamedTuple
 
 import param
 
+from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices, Selection
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.solution_store import SolutionStore
@@ -24,25 +24,6 @@ class Stage(Enum):
     READY = "the solution is the requested one"
     STALE = "another solution is being computed"
     FAILED = "the last request failed"
-
-
-class Solution(NamedTuple):
-    """One solution of the session, with the orbit and settings requested.
-
-    A what-if is requested by a change of a control, and replaced by the next one unless kept.
-    """
-
-    orbit: int | None
-    settings: FitSettings
-    result: FitResult
-    is_what_if: bool = False
-
-    @property
-    def label(self) -> str:
-        """Short description of the solution."""
-        return (
-            f"what if: {self.settings.describe()}" if self.is_what_if else self.settings.describe()
-        )
 
 
 class Session(param.Parameterized):
@@ -247,6 +228,13 @@ class Session(param.Parameterized):
         if solution is not self.shown:
             self.param.update(shown=solution, other=self.fitted)
             self.choices.load(solution.settings)
+
+    def exchange(self) -> None:
+        """Exchange the solution on the screen with the one that it is compared with, if any."""
+        shown, other = self.shown, self.other
+        if shown is not None and other is not None:
+            self.param.update(shown=other, other=shown)
+            self.choices.load(other.settings)
 
     def _return_to(self, solution: Solution) -> None:
         """Return from a what-if to a kept solution, alone if the what-if was compared with it."""

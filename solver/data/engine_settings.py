@@ -174,3 +174,14 @@ def svi_settings(compat: str | None, steps: int | None, seed: int) -> SviSetting
         return chosen
     ENGINE_OPTIONS["steps"].check("svi steps", steps)
     return replace(chosen, steps=steps, max_steps=2 * steps, block=min(chosen.block, steps))
+
+
+def engine_options(svi: SviSettings, nuts: NutsSettings) -> dict[str, Any]:
+    """Return the values of `ENGINE_OPTIONS` that give these settings, without the defaults.
+
+    What no option sets is left out.
+    """
+    compat = None if svi.conditioned else "warpfield"
+    steps = None if svi.steps == svi_settings(compat, None, 0).steps else svi.steps
+    values = {"seed": svi.seed or nuts.seed, "steps": steps, "compat": compat}
+    return {name: value for name, value in values.items() if value}

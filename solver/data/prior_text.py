@@ -97,7 +97,7 @@ def parse_width(name: str, text: str) -> float:
 def format_width(name: str, width: float) -> str:
     """Return a prior width as a text that `parse_width` reads."""
     unit = BY_NAME[name].width_unit
-    return "flat" if math.isinf(width) else f"{width:.6g} {unit}".strip()
+    return "flat" if math.isinf(width) else f"{_shortest(width)} {unit}".strip()
 
 
 def parse_shift(text: str) -> tuple[str, float]:
@@ -128,7 +128,14 @@ def parse_shift(text: str) -> tuple[str, float]:
 
 def format_shift(name: str, shift: float) -> str:
     """Return a shift as a text that `parse_shift` reads."""
-    return f"{name}={shift:+.6g}{split_name(name)[0].unit}"
+    sign = "" if shift < 0 else "+"
+    return f"{name}={sign}{_shortest(shift)}{split_name(name)[0].unit}"
+
+
+def _shortest(number: float) -> str:
+    """Return the shortest text that is read back as the same number."""
+    text = f"{number:.6g}"
+    return text if float(text) == number else repr(float(number))
 
 
 def _factor(what: str, given: str | None, unit: str) -> float:

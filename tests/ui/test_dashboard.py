@@ -311,6 +311,13 @@ def test_the_address_carries_the_selection(page, open_page):
     expect(again.get_by_role("combobox", name="Field")).to_have_text("all")
 
 
+def test_code_of_the_solution_on_the_screen_is_shown(page):
+    page.get_by_role("button", name="Reproduce").click()
+    window = page.get_by_role("dialog", name="Reproduce")
+    expect(window.get_by_text("--run reproduced --orbits 0")).to_be_visible()
+    expect(window.get_by_text(".orbit(0).fit()")).to_be_visible()
+
+
 def test_an_address_of_nonsense_opens_the_page(served, open_page):
     page = open_page(f"{served}?field=%FF&plates=1e9-x&detector=none&orbit=%00")
     page.locator(".figure-footprint canvas").first.wait_for(state="attached")

@@ -5,8 +5,10 @@ from html import escape
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.session import Session, Solution, Stage
+from plateviz.dashboard.session import Session, Stage
+from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.state import CONTROLS, FitChoices, default_widths
+from plateviz.dashboard.views.code_window import CodeWindow
 from solver.data.parameters import PARAMETERS, Group
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import SETTINGS
@@ -35,6 +37,8 @@ class RefitView(pn.viewable.Viewer):
         self._bar = pmui.LinearProgress(variant="indeterminate", sizing_mode="stretch_width")
         self._message = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
+        self._code = CodeWindow(session)
+        self._reproduce = pmui.Button(label="Reproduce", variant="text", size="small")
         self._column = pmui.Column(
             pmui.Switch.from_param(
                 session.choices.param.what_if_at_once,
@@ -49,6 +53,8 @@ class RefitView(pn.viewable.Viewer):
             self._message,
             self._keep,
             self._solutions,
+            self._reproduce,
+            self._code,
             sizing_mode="stretch_width",
             margin=0,
         )
@@ -64,6 +70,7 @@ class RefitView(pn.viewable.Viewer):
         self._stop.on_click(lambda _: session.cancel())
         self._keep.on_click(lambda _: session.keep())
         self._reset.on_click(self._reset_priors)
+        self._reproduce.on_click(lambda _: self._code.open())
         self._solutions.param.watch(self._select, "value")
         session.choices.param.watch(self._show_widths, "prior_widths")
         session.param.watch(self._show_stage, ["stage", "message"])
@@ -128,6 +135,7 @@ class RefitView(pn.viewable.Viewer):
 
     def _show_solutions(self, *_: object) -> None:
         shown, kept = self._session.shown, list(self._session.solutions)
+        self._reproduce.visible = shown is not None
         self._keep.visible = shown is not None and shown.is_what_if
         if shown is not None and shown.is_what_if:
             kept.append(shown)

@@ -1,0 +1,93 @@
+"""A solution as code: the command line and the Python that make it again."""
+
+import shlex
+from collections.abc import Iterator
+
+from plateviz.solving.origin import OrbitFiles, Origin, SurveyFolder
+from solver.data.engine_settings import engine_options
+from solver.data.setting_kinds import Setting, Switch
+from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
+from solver.data.text_setting import LeftOut, Texts
+
+# Name of the run, or of the result file, that the command writes.
+_NAME = "reproduced"
+
+
+def as_command(origin: Origin, orbit: int | None, settings: FitSettings) -> str:
+    """Return the command line that makes a solution.
+
+    Parameters
+    ----------
+    orbit : orbit_id; None if the origin is files with one orbit only
+
+    Raises
+    ------
+    ValueError
+        If a survey is given without an orbit.
+    """
+    if isinstance(origin, SurveyFolder):
+        if orbit is None:
+            raise ValueError("orbit: expected an orbit_id of the survey, found None")
+        words = ["plateviz", "survey", origin.directory, "--run", _NAME, "--orbits", str(orbit)]
+        return _in_lines(words, _options(settings, "survey"))
+    words = ["plateviz", "fit", origin.observations, origin.reference, "-o", f"{_NAME}.fits"]
+    for name, value in _files(origin):
+        words += [f"--{name}", str(value)]
+    return _in_lines(words, _options(settings, "fit"))
+
+
+def as_python(origin: Origin, orbit: int | None, settings: FitSettings) -> str:
+    """Return Python that makes a solution; parameters as for `as_command`."""
+    if isinstance(origin, SurveyFolder):
+        opened = f"plateviz.open({origin.directory!r}).orbit({orbit})"
+    else:
+        files = "".join(f", {name}={value!r}" for name, value in _files(origin))
+        opened = f"plateviz.open({origin.observations!r}, {origin.reference!r}{files})"
+    changes = {
+        one.keyword: _python_value(one, getattr(settings, name))
+        for name, one in _changed(settings)
+        if one.keyword
+    } | engine_options(settings.svi, settings.nuts)
+    arguments = ", ".join(f"{keyword}={value!r}" for keyword, value in changes.items())
+    return f"import plateviz\n\nsolution = {opened}.fit({arguments})"
+
+
+def _files(origin: OrbitFiles) -> Iterator[tuple[str, object]]:
+    """Yield option or keyword, and value, of what is given besides the two inputs."""
+    for name in ("truth", "instrument", "orbit"):
+        if (value := getattr(origin, name)) is not None:
+            yield name, value
+
+
+def _changed(settings: FitSettings) -> Iterator[tuple[str, Setting]]:
+    for name, one in SETTINGS.items():
+        if getattr(settings, name) != DEFAULTS[name]:
+            yield name, one
+
+
+def _options(settings: FitSettings, command: str) -> list[list[str]]:
+    """Return the options of all settings that are not the paper's, each with its value."""
+    options: list[list[str]] = []
+    for name, one in _changed(settings):
+        value = getattr(settings, name)
+        if not one.option or command not in one.commands:
+            continue
+        if isinstance(one, Texts):
+            options += [[f"--{one.option}", text] for text in one.texts(value)]
+        elif isinstance(one, Switch):
+            options.append([f"--{'' if value else 'no-'}{one.option}"])
+        else:
+            options.append([f"--{one.option}", str(value)])
+    engines = engine_options(settings.svi, settings.nuts)
+    return options + [[f"--{name}", str(value)] for name, value in engines.items()]
+
+
+def _python_value(one: Setting, value: object) -> object:
+    if not isinstance(one, Texts):
+        return value
+    texts = one.texts(value)
+    return texts if isinstance(one, LeftOut) else dict(text.split("=", 1) for text in texts)
+
+
+def _in_lines(words: list[str], options: list[list[str]]) -> str:
+    return " \\\n  ".join(shlex.join(part) for part in (words, *options))

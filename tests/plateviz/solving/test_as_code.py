@@ -1,0 +1,135 @@
+"""A solution as code: what is read back equals the settings, and makes the same numbers."""
+
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import plateviz
+from plateviz.cli.options import fit_settings, takes_settings
+from plateviz.notebook.keywords import settings_with
+from plateviz.runs.queries import open_run
+from plateviz.solving.as_code import as_command, as_python
+from plateviz.solving.origin import OrbitFiles, SurveyFolder
+from solver.data.engine_settings import engine_settings
+from solver.data.exclusions import Exclusions
+from solver.data.settings import SETTINGS, FitSettings
+
+SURVEY = SurveyFolder("/data/my sky")
+FILES = OrbitFiles("/data/o'b.fits", "/data/ref.fits", truth="/data/t.fits", orbit=7)
+OF_SURVEYS = [
+    FitSettings(),
+    FitSettings(order=7, aberration=False, robust=True, thin=3),
+    FitSettings(prior_widths={"distortion_x": 1 / 3, "position_angle": float("inf")}),
+    FitSettings(prior_shifts={"focal_length": 100.0, "detector_x[2]": -5.25, "sources[ra]": 0.1}),
+    FitSettings(
+        exclusions=Exclusions(
+            sources=frozenset({-(2**62), 12}),
+            exposures=frozenset({(0, 3)}),
+            detectors=frozenset({1}),
+        )
+    ),
+    FitSettings(engine="nuts", **engine_settings(seed=4)),
+]
+OF_FILES = [
+    FitSettings(compare_orders=True),
+    FitSettings(engine="svi", **engine_settings(seed=2, steps=30)),
+    FitSettings(engine="svi", **engine_settings(steps=2000, compat="warpfield")),
+]
+
+
+def words_of(command):
+    """The words of a command as a shell would read them."""
+    return shlex.split(command.replace("\\\n", ""))
+
+
+def read_options(words, command):
+    """The settings that a command's options give."""
+    taken = []
+
+    @takes_settings(command)
+    def take(**values):
+        taken.append(fit_settings(values))
+
+    app = typer.Typer()
+    app.command()(take)
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    return taken[0]
+
+
+@pytest.mark.parametrize("settings", OF_SURVEYS)
+def test_command_of_a_survey_has_the_settings(settings):
+    program, command, directory, *words = words_of(as_command(SURVEY, 12, settings))
+    assert (program, command, directory) == ("plateviz", "survey", "/data/my sky")
+    assert words[:4] == ["--run", "reproduced", "--orbits", "12"]
+    assert read_options(words[4:], "survey") == settings
+
+
+@pytest.mark.parametrize("settings", OF_SURVEYS + OF_FILES)
+def test_command_of_files_has_the_settings(settings):
+    words = words_of(as_command(FILES, 7, settings))
+    assert words[:6] == [
+        "plateviz",
+        "fit",
+        "/data/o'b.fits",
+        "/data/ref.fits",
+        "-o",
+        "reproduced.fits",
+    ]
+    assert words[6:10] == ["--truth", "/data/t.fits", "--orbit", "7"]
+    assert read_options(words[10:], "fit") == settings
+
+
+@pytest.mark.parametrize("settings", OF_SURVEYS + OF_FILES)
+@pytest.mark.parametrize("origin", [SURVEY, FILES])
+def test_python_has_the_settings(origin, settings, monkeypatch):
+    opened, fitted = [], []
+    orbit = SimpleNamespace(fit=lambda **changes: fitted.append(changes))
+    survey = SimpleNamespace(orbit=lambda number: opened.append(number) or orbit, fit=orbit.fit)
+    monkeypatch.setattr(
+        plateviz, "open", lambda *paths, **files: opened.append((paths, files)) or survey
+    )
+    exec(as_python(origin, 12, settings), {})
+    if origin is SURVEY:
+        assert opened == [(("/data/my sky",), {}), 12]
+    else:
+        assert opened == [
+            (("/data/o'b.fits", "/data/ref.fits"), {"truth": "/data/t.fits", "orbit": 7})
+        ]
+    assert settings_with(FitSettings(), fitted[0]) == settings
+
+
+def test_every_option_and_keyword_is_of_a_setting_that_is_tried():
+    tried = OF_SURVEYS + OF_FILES
+    for name, one in SETTINGS.items():
+        if one.option or one.keyword:
+            assert len({repr(getattr(settings, name)) for settings in tried}) > 1, name
+
+
+def test_survey_needs_an_orbit():
+    with pytest.raises(ValueError, match="expected an orbit_id"):
+        as_command(SURVEY, None, FitSettings())
+
+
+@pytest.mark.slow
+def test_command_and_python_make_the_same_numbers(small_survey, tmp_path):
+    survey = tmp_path / "a sky"
+    survey.symlink_to(small_survey)
+    origin = SurveyFolder(str(survey))
+    settings = FitSettings(order=6, prior_widths={"distortion_x": 2.5})
+    command = words_of(as_command(origin, 1, settings))
+    subprocess.run([sys.executable, "-m", "plateviz.cli.main", *command[1:]], check=True)
+    by_command = open_run(Path(survey), "reproduced").result(1).sources
+    namespace = {}
+    exec(as_python(origin, 1, settings), namespace)
+    by_python = namespace["solution"].sources
+    for name in ("ra", "dec"):
+        # Degrees; the number of threads of the linear algebra changes the last digit.
+        np.testing.assert_allclose(by_command[name], by_python[name], rtol=0, atol=1e-12)

@@ -311,6 +311,30 @@ def test_the_address_carries_the_selection(page, open_page):
     expect(again.get_by_role("combobox", name="Field")).to_have_text("all")
 
 
+def test_keys_do_what_their_list_says(page):
+    page.keyboard.press("?")
+    keys = page.get_by_role("dialog", name="Keys")
+    expect(keys.get_by_text("Next exposure")).to_be_visible()
+    page.keyboard.press(".")
+    page.keyboard.press("Escape")
+    expect(keys).to_be_hidden()
+    before = residual_arrows(page)
+    page.keyboard.press(".")
+    # Once: while the list is open, keys mean nothing else.
+    page.wait_for_url("**plates=1-1**")
+    until(page, lambda: residual_arrows(page) != before)
+    page.keyboard.press("4")
+    page.wait_for_url("**workspace=sky**")
+    assert "plates=1-1" in page.url
+    # What is typed into a control is for the control.
+    box = page.get_by_role("textbox", name="Leave out")
+    box.press_sequentially("d,.4")
+    expect(box).to_have_value("d,.4")
+    assert "workspace=sky" in page.url
+    assert "plates=1-1" in page.url
+    assert "detector=0" in page.url
+
+
 def test_code_of_the_solution_on_the_screen_is_shown(page):
     page.get_by_role("button", name="Reproduce").click()
     window = page.get_by_role("dialog", name="Reproduce")

@@ -56,16 +56,6 @@ class SurveyStore(FakeStore):
         return self._runs
 
 
-@pytest.fixture
-def run(survey, fit_result):
-    return FakeRun("default", survey, fit_result)
-
-
-@pytest.fixture
-def navigation(fit_result, run):
-    return Navigation(Session(SurveyStore(fit_result, [run])))
-
-
 def requested(navigation):
     return [(orbit, settings) for orbit, settings, _ in navigation.session.store.requested]
 

@@ -1,0 +1,90 @@
+"""Keys: what the keys of the keyboard do, without Panel."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from plateviz.dashboard.navigation import Navigation, View
+
+
+class Key(NamedTuple):
+    """What a key does.
+
+    Attributes
+    ----------
+    does : in a few words, for the list of the keys
+    act : does it on the page of a navigation; nothing where there is nothing to do
+    """
+
+    does: str
+    act: Callable[[Navigation], None]
+
+
+def press(navigation: Navigation, key: str) -> None:
+    """Do what a key does; a key without a meaning does nothing.
+
+    Parameters
+    ----------
+    key : as browsers name it (`KeyboardEvent.key`)
+    """
+    if key in KEYS:
+        KEYS[key].act(navigation)
+    elif key in DIGITS:
+        workspaces = navigation.workspaces_of_view
+        number = DIGITS.index(key)
+        if number < len(workspaces):
+            navigation.turn_to_workspace(workspaces[number])
+
+
+def _step_view(navigation: Navigation, step: int) -> None:
+    views = list(View)
+    navigation.turn_to(views[(views.index(navigation.view) + step) % len(views)])
+
+
+def _step_orbit(navigation: Navigation, step: int) -> None:
+    session = navigation.session
+    orbits = session.store.orbits
+    place = orbits.index(session.selection.orbit) + step
+    if navigation.view is View.ORBIT and 0 <= place < len(orbits):
+        navigation.choose_orbit(orbits[place])
+
+
+def _step_exposures(navigation: Navigation, step: int) -> None:
+    """Move the range of exposures, as long as it is, within those of the orbit."""
+    selection = navigation.session.selection
+    first, last = (plate + step for plate in selection.plates)
+    lowest, highest = selection.param["plates"].bounds
+    if navigation.view is View.ORBIT and lowest <= first and last <= highest:
+        selection.plates = (first, last)
+
+
+def _step_detector(navigation: Navigation, step: int) -> None:
+    selection = navigation.session.selection
+    if navigation.view is View.ORBIT:
+        detectors = list(selection.param["detector"].objects)
+        place = detectors.index(selection.detector) + step
+        selection.detector = detectors[place % len(detectors)]
+
+
+def _on_orbit(act: Callable[[Navigation], None]) -> Callable[[Navigation], None]:
+    return lambda navigation: act(navigation) if navigation.view is View.ORBIT else None
+
+
+KEYS: Mapping[str, Key] = MappingProxyType(
+    {
+        "v": Key("Next view: Survey, Orbit, Source", lambda n: _step_view(n, 1)),
+        "]": Key("Next orbit", lambda n: _step_orbit(n, 1)),
+        "[": Key("Previous orbit", lambda n: _step_orbit(n, -1)),
+        ".": Key("Next exposure", lambda n: _step_exposures(n, 1)),
+        ",": Key("Previous exposure", lambda n: _step_exposures(n, -1)),
+        "d": Key("Next detector", lambda n: _step_detector(n, 1)),
+        "D": Key("Previous detector", lambda n: _step_detector(n, -1)),
+        "b": Key("Blink: exchange the two solutions", _on_orbit(lambda n: n.session.exchange())),
+        "f": Key("Fit with the settings of the controls", _on_orbit(lambda n: n.session.refit())),
+        "k": Key("Keep the what-if", _on_orbit(lambda n: n.session.keep())),
+    }
+)
+"""Key -> what it does, in the order of the list that "?" shows."""
+
+DIGITS = tuple("123456789")
+"""The keys of the workspaces of the view on the screen."""

@@ -12,6 +12,7 @@ from panel.io.resources import get_dist_path
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.selection_bar import SelectionBar
 from plateviz.solving.solution_store import SolutionStore
@@ -30,7 +31,7 @@ def build_app(store: SolutionStore) -> pmui.Page:
         title=title,
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
-        header=[bar],
+        header=[bar, Keyboard(navigation)],
         sidebar=[pages.sidebar],
         main=[pages, bar.windows],
         sidebar_width=_SIDEBAR_WIDTH,
@@ -50,7 +51,7 @@ def build_app(store: SolutionStore) -> pmui.Page:
 
 
 def build_part(store: SolutionStore) -> pn.Row:
-    """Return the dashboard in the light theme, as a part of another page."""
+    """Return the dashboard in the light theme as a part of another page, whose keys it leaves."""
     navigation, ticker, pages = _pages(store)
     ticker.follow(navigation, pages)
     sidebar = pn.Column(pages.sidebar, width=_SIDEBAR_WIDTH)

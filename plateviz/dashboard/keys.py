@@ -14,10 +14,14 @@ class Key(NamedTuple):
     ----------
     does : in a few words, for the list of the keys
     act : does it on the page of a navigation; nothing where there is nothing to do
+    is_of_orbit : whether it does something on the Orbit view only
+    is_repeated : whether it does it again and again while it is held
     """
 
     does: str
     act: Callable[[Navigation], None]
+    is_of_orbit: bool = True
+    is_repeated: bool = False
 
 
 def press(navigation: Navigation, key: str) -> None:
@@ -28,7 +32,8 @@ def press(navigation: Navigation, key: str) -> None:
     key : as browsers name it (`KeyboardEvent.key`)
     """
     if key in KEYS:
-        KEYS[key].act(navigation)
+        if navigation.view is View.ORBIT or not KEYS[key].is_of_orbit:
+            KEYS[key].act(navigation)
     elif key in DIGITS:
         workspaces = navigation.workspaces_of_view
         number = DIGITS.index(key)
@@ -36,16 +41,16 @@ def press(navigation: Navigation, key: str) -> None:
             navigation.turn_to_workspace(workspaces[number])
 
 
-def _step_view(navigation: Navigation, step: int) -> None:
+def _turn_to_next_view(navigation: Navigation) -> None:
     views = list(View)
-    navigation.turn_to(views[(views.index(navigation.view) + step) % len(views)])
+    navigation.turn_to(views[(views.index(navigation.view) + 1) % len(views)])
 
 
 def _step_orbit(navigation: Navigation, step: int) -> None:
     session = navigation.session
     orbits = session.store.orbits
     place = orbits.index(session.selection.orbit) + step
-    if navigation.view is View.ORBIT and 0 <= place < len(orbits):
+    if 0 <= place < len(orbits):
         navigation.choose_orbit(orbits[place])
 
 
@@ -54,34 +59,29 @@ def _step_exposures(navigation: Navigation, step: int) -> None:
     selection = navigation.session.selection
     first, last = (plate + step for plate in selection.plates)
     lowest, highest = selection.param["plates"].bounds
-    if navigation.view is View.ORBIT and lowest <= first and last <= highest:
+    if lowest <= first and last <= highest:
         selection.plates = (first, last)
 
 
 def _step_detector(navigation: Navigation, step: int) -> None:
     selection = navigation.session.selection
-    if navigation.view is View.ORBIT:
-        detectors = list(selection.param["detector"].objects)
-        place = detectors.index(selection.detector) + step
-        selection.detector = detectors[place % len(detectors)]
-
-
-def _on_orbit(act: Callable[[Navigation], None]) -> Callable[[Navigation], None]:
-    return lambda navigation: act(navigation) if navigation.view is View.ORBIT else None
+    detectors = list(selection.param["detector"].objects)
+    place = detectors.index(selection.detector) + step
+    selection.detector = detectors[place % len(detectors)]
 
 
 KEYS: Mapping[str, Key] = MappingProxyType(
     {
-        "v": Key("Next view: Survey, Orbit, Source", lambda n: _step_view(n, 1)),
+        "v": Key("Next view: Survey, Orbit, Source", _turn_to_next_view, is_of_orbit=False),
         "]": Key("Next orbit", lambda n: _step_orbit(n, 1)),
         "[": Key("Previous orbit", lambda n: _step_orbit(n, -1)),
-        ".": Key("Next exposure", lambda n: _step_exposures(n, 1)),
-        ",": Key("Previous exposure", lambda n: _step_exposures(n, -1)),
+        ".": Key("Next exposure", lambda n: _step_exposures(n, 1), is_repeated=True),
+        ",": Key("Previous exposure", lambda n: _step_exposures(n, -1), is_repeated=True),
         "d": Key("Next detector", lambda n: _step_detector(n, 1)),
         "D": Key("Previous detector", lambda n: _step_detector(n, -1)),
-        "b": Key("Blink: exchange the two solutions", _on_orbit(lambda n: n.session.exchange())),
-        "f": Key("Fit with the settings of the controls", _on_orbit(lambda n: n.session.refit())),
-        "k": Key("Keep the what-if", _on_orbit(lambda n: n.session.keep())),
+        "b": Key("Blink: exchange the two solutions", lambda n: n.session.exchange()),
+        "f": Key("Fit with the settings of the controls", lambda n: n.session.refit()),
+        "k": Key("Keep the what-if", lambda n: n.session.keep()),
     }
 )
 """Key -> what it does, in the order of the list that "?" shows."""

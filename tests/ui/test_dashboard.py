@@ -340,6 +340,12 @@ def test_code_of_the_solution_on_the_screen_is_shown(page):
     window = page.get_by_role("dialog", name="Reproduce")
     expect(window.get_by_text("--run reproduced --orbits 0")).to_be_visible()
     expect(window.get_by_text(".orbit(0).fit()")).to_be_visible()
+    # Keys are the window's while it is open.
+    page.keyboard.press("4")
+    page.keyboard.press("Escape")
+    expect(window).to_be_hidden()
+    page.keyboard.press(".")
+    page.wait_for_url("**workspace=verdict**plates=1-1**")
 
 
 def test_an_address_of_nonsense_opens_the_page(served, open_page):

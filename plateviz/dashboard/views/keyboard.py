@@ -10,16 +10,19 @@ from plateviz.dashboard.navigation import Navigation
 class Keyboard(pn.custom.JSComponent):
     """A button that lists the keys of the page, and does what they mean when they are pressed.
 
-    A key that is typed into a control, or pressed with Control, Alt or Meta, is left to it.
+    A key that is typed into a control, pressed in a window, or with Control, Alt or Meta, is left
+    to it.
     """
 
     theme = param.Selector(default="light", objects=["light", "dark"])
     known = param.List(item_type=str, doc="keys with a meaning, as browsers name them")
+    repeated = param.List(item_type=str, doc="those that act again and again while they are held")
     rows = param.List(doc="key and what it does, in the order of the list")
 
     _esm = """
     const TEXT = new Set(["INPUT", "TEXTAREA", "SELECT"])
-    const ROLES = new Set(["combobox", "listbox", "option", "menuitem", "textbox", "slider"])
+    const ROLES = new Set(["combobox", "listbox", "option", "menuitem", "textbox", "slider",
+                           "dialog"])
     export function render({ model, el }) {
       const isControl = event => event.composedPath().some(one =>
         TEXT.has(one.tagName) && one.type !== "checkbox" || one.isContentEditable
@@ -48,8 +51,8 @@ class Keyboard(pn.custom.JSComponent):
       const hear = event => {
         if (event.ctrlKey || event.altKey || event.metaKey || isControl(event)) return
         if (event.key === "?") sheet.open ? sheet.close() : sheet.showModal()
-        else if (!sheet.open && model.known.includes(event.key)) model.send_msg(event.key)
-        else return
+        else if (sheet.open || !model.known.includes(event.key)) return
+        else if (!event.repeat || model.repeated.includes(event.key)) model.send_msg(event.key)
         event.preventDefault()
       }
       document.addEventListener("keydown", hear)
@@ -59,10 +62,10 @@ class Keyboard(pn.custom.JSComponent):
 
     _stylesheets = [
         """
-        :host { margin-left: auto; align-self: center; }
+        :host { margin-left: auto; align-self: center; color: white; }
         button { padding: 4px 8px; border: 0; border-radius: 4px; cursor: pointer;
-                 font: 13px Helvetica, Arial, sans-serif; color: #7b8794; background: transparent; }
-        button:hover, button:focus-visible { background: rgb(128 128 128 / 20%); }
+                 font: 13px Helvetica, Arial, sans-serif; color: inherit; background: transparent; }
+        button:hover, button:focus-visible { background: rgb(255 255 255 / 20%); }
         dialog { --text: #1f2933; --line: #d5dbe1; --tile: #ffffff;
                  padding: 14px 22px 18px; border: 1px solid var(--line); border-radius: 6px;
                  font: 14px/1.5 Helvetica, Arial, sans-serif; color: var(--text);
@@ -81,6 +84,7 @@ class Keyboard(pn.custom.JSComponent):
         first, last = DIGITS[0], len(DIGITS)
         super().__init__(
             known=[*KEYS, *DIGITS],
+            repeated=[key for key, one in KEYS.items() if one.is_repeated],
             rows=[
                 [f"{first} to {last}", "Workspace"],
                 *([key, one.does] for key, one in KEYS.items()),

@@ -6,7 +6,6 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
-from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.orbit import OrbitPage
 from plateviz.dashboard.views.source import SourcePage
 from plateviz.dashboard.views.stack import Stack
@@ -51,11 +50,7 @@ class Pages(pn.viewable.Viewer):
         self.sidebar = Stack({view: lambda view=view: self._page(view).sidebar for view in View})
         self._column = pmui.Column(
             pmui.FlexBox(
-                self._view_switch(),
-                self._workspace_switch(),
-                Keyboard(navigation),
-                sizing_mode="stretch_width",
-                margin=0,
+                self._view_switch(), self._workspace_switch(), sizing_mode="stretch_width", margin=0
             ),
             self._stack,
             sizing_mode="stretch_width",

@@ -2,10 +2,10 @@
 
 import pandas as pd
 import panel as pn
-import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.views.table import DataTable
+from plateviz.dashboard.views.window import window
 from plateviz.tables import selected_sources
 from plateviz.tables.headings import SELECTED_SOURCES
 
@@ -20,13 +20,7 @@ class SourceList(pn.viewable.Viewer):
         super().__init__(**params)
         self._navigation = navigation
         self._table: DataTable | None = None
-        self._window = pmui.Dialog(
-            title="Selected sources",
-            open=False,
-            show_close_button=True,
-            close_on_click=True,
-            width_option="lg",
-        )
+        self._window = window("Selected sources", width="lg")
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the window."""

@@ -14,6 +14,7 @@ from plateviz.dashboard.closed_pages import silence_closed_pages
 from plateviz.dashboard.headers import NotebookHeaders, SecurityHeaders
 from plateviz.dashboard.password import PasswordLogin
 from plateviz.dashboard.refused_requests import check_websockets, refuse_paths
+from plateviz.dashboard.waiting_messages import send_waiting_messages
 from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 
@@ -77,6 +78,7 @@ def begin(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of B
 
 def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of Bokeh
     silence_closed_pages()
+    send_waiting_messages()
     check_websockets()
     hosts = sorted({endpoint.address, "localhost", "127.0.0.1"})
     # A server, not a thread, because `threaded` is not set.

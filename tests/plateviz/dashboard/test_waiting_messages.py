@@ -34,9 +34,7 @@ class Connection:
 
 @pytest.fixture
 def connection(monkeypatch):
-    monkeypatch.setitem(
-        panel_document.extra_socket_handlers, Socket, lambda to, msg: to.write(msg)
-    )
+    monkeypatch.setitem(panel_document.extra_socket_handlers, Socket, lambda to, msg: to.write(msg))
     monkeypatch.setattr(panel_document, "_dispatch_msgs", panel_document._dispatch_msgs)
     return Connection()
 

@@ -5,6 +5,7 @@ import importlib
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -76,11 +77,16 @@ def _module_name(path: Path) -> str:
 
 
 MODULES = {
-    _module_name(path): ast.parse(path.read_text("utf-8"))
+    _module_name(path): path
     for package in FOLDERS
     for path in sorted((REPOSITORY / package).rglob("*.py"))
 }
 PLACED = sorted(set(MODULES) - set(FOLDERS))
+
+
+@cache
+def _tree(module: str) -> ast.Module:
+    return ast.parse(MODULES[module].read_text("utf-8"))
 
 
 def _nodes(node: ast.AST, at_load: bool) -> Iterator[ast.AST]:
@@ -107,7 +113,7 @@ def _resolve(module: str, name: str) -> str:
 
 def _imports(module: str, at_load: bool = False) -> set[str]:
     found = set()
-    for node in _nodes(MODULES[module], at_load):
+    for node in _nodes(_tree(module), at_load):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -157,7 +163,7 @@ def test_nothing_else_lies_loose_at_the_top():
 
 @pytest.mark.parametrize("folder", [m for m in PLACED if m not in LOOSE and m.count(".") == 1])
 def test_every_folder_says_in_one_sentence_what_it_holds_and_imports(folder):
-    summary, *rest = (ast.get_docstring(MODULES[folder]) or "").split("\n\n")
+    summary, *rest = (ast.get_docstring(_tree(folder)) or "").split("\n\n")
     assert summary.endswith(".")
     assert "\n" not in summary
     assert "Imports" in "\n\n".join(rest)

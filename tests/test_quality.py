@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -97,14 +98,17 @@ BANNED: dict[str, tuple[Rule, str]] = {
 }
 
 
-TREES = {path: ast.parse(path.read_text("utf-8")) for path in _files(*CODE, "tests")}
+@cache
+def _trees() -> dict[Path, ast.Module]:
+    """Return the parsed code by its file: only the process that looks at it takes the time."""
+    return {path: ast.parse(path.read_text("utf-8")) for path in _files(*CODE, "tests")}
 
 
 def _found(rule: Rule, *folders: str) -> list[str]:
     """Return "file:line" of all in the folders that breaks the rule."""
     return [
         f"{path}:{getattr(node, 'lineno', '?')}"
-        for path, tree in TREES.items()
+        for path, tree in _trees().items()
         if path.relative_to(REPOSITORY).parts[0] in folders
         for node in ast.walk(tree)
         if rule(node)
@@ -169,7 +173,7 @@ def test_shapes_are_checked_in_every_module_that_annotates_them(pytestconfig):
     checked = pytestconfig.getoption("--jaxtyping-packages").split(",")
     annotated = {
         ".".join(path.relative_to(REPOSITORY).with_suffix("").parts)
-        for path, tree in TREES.items()
+        for path, tree in _trees().items()
         for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom) and node.module == "jaxtyping"
     }

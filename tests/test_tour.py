@@ -7,9 +7,7 @@ import os
 import time
 from pathlib import Path
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 TOUR = REPOSITORY / "assets" / "tour.ipynb"
@@ -22,11 +20,19 @@ def code_cells(notebook):
 
 
 @pytest.fixture(scope="module")
-def tour():
+def nbformat():
+    """The package; importing it takes seconds, which only a process that needs it shall wait."""
+    import nbformat
+
+    return nbformat
+
+
+@pytest.fixture(scope="module")
+def tour(nbformat):
     return nbformat.read(TOUR, as_version=4)
 
 
-def test_tour_is_kept_without_outputs(tour):
+def test_tour_is_kept_without_outputs(nbformat, tour):
     nbformat.validate(tour)
     assert all(cell.outputs == [] for cell in code_cells(tour))
     assert all(cell.execution_count is None for cell in code_cells(tour))
@@ -51,7 +57,9 @@ def test_tour_keeps_to_what_a_person_may_use(tour):
 @pytest.mark.full
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_tour_runs_in_time_without_a_complaint(tour, tmp_path):
+def test_tour_runs_in_time_without_a_complaint(nbformat, tour, tmp_path):
+    from nbclient import NotebookClient
+
     notebook = nbformat.from_dict(tour)
     client = NotebookClient(notebook, timeout=200, resources={"metadata": {"path": tmp_path}})
     begun = time.monotonic()

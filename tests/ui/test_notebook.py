@@ -1,5 +1,6 @@
 """The tour in JupyterLab, in Notebook 7 and under `panel serve`, in a real Chromium."""
 
+import json
 import os
 import re
 import subprocess
@@ -8,7 +9,6 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-import nbformat
 import pytest
 from playwright.sync_api import expect
 
@@ -33,7 +33,15 @@ pytestmark = [pytest.mark.ui, pytest.mark.slow, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def nbformat():
+    """The package; importing it takes seconds, which only a process that needs it shall wait."""
+    import nbformat
+
+    return nbformat
+
+
+@pytest.fixture(scope="module")
+def folder(nbformat, tmp_path_factory):
     """A folder with the tour, of a survey that takes less time, and that the next test finds."""
     notebook = nbformat.read(TOUR, as_version=4)
     for cell in notebook.cells:
@@ -117,16 +125,14 @@ def wait_for_kernel(page, address):
 
 
 def save(page, file):
-    """Save the notebook from the menu, and wait until it lies there with its last output."""
+    """Save the notebook from the menu, and return it once it lies there with its last output."""
     page.get_by_role("menuitem", name="File", exact=True).click()
     page.locator('li[data-command="docmanager:save"]').click()
     for _ in range(300):
         text = file.read_text("utf-8")
         # Jupyter writes into the file itself, and every two minutes without being asked.
-        if text.endswith("}\n"):
-            notebook = nbformat.reads(text, as_version=4)
-            if notebook.cells[-1].outputs:
-                return notebook
+        if text.endswith("}\n") and json.loads(text)["cells"][-1]["outputs"]:
+            return text
         page.wait_for_timeout(100)
     pytest.fail("the notebook was not saved")
 
@@ -161,7 +167,7 @@ def assert_cells_show_what_they_are_to_show(notebook):
         pytest.param("notebook", "notebooks", id="classic", marks=pytest.mark.full),
     ],
 )
-def test_tour_runs_and_every_figure_is_drawn(folder, open_jupyter, application, path):
+def test_tour_runs_and_every_figure_is_drawn(nbformat, folder, open_jupyter, application, path):
     with jupyter(application, folder) as address:
         page, complaints = open_jupyter(f"{address}/{path}/tour.ipynb?token={TOKEN}")
         page.locator(".jp-Notebook .jp-CodeCell").first.wait_for()
@@ -180,7 +186,8 @@ def test_tour_runs_and_every_figure_is_drawn(folder, open_jupyter, application, 
         assert page.locator(".jp-OutputArea canvas").count() >= LEAST_CANVASES
         assert page.locator(".jp-OutputArea .strip").count() >= 6
         assert page.locator("[data-mime-type='application/vnd.jupyter.stderr']").count() == 0
-        assert_cells_show_what_they_are_to_show(save(page, folder / "tour.ipynb"))
+        saved = save(page, folder / "tour.ipynb")
+        assert_cells_show_what_they_are_to_show(nbformat.reads(saved, as_version=4))
         names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
         assert names == {"tour.ipynb", "plateviz-tour", "plateviz-tour-star.html"}
         # Before its server ends, of which it would complain.

@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import gc
 import lzma
 import os
 from pathlib import Path
@@ -30,6 +31,11 @@ def pytest_configure(config):
 def pytest_collection_modifyitems(items):
     """Run the browser tests first: of all that one process runs, they take longest."""
     items.sort(key=lambda item: "ui" not in item.keywords)
+
+
+def pytest_collection_finish():
+    """Let the garbage collector pass over what collecting the tests has made: it stays."""
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -12,10 +12,10 @@ from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 
 from plateviz.cache import keep_compilations
 from plateviz.runs.run import Run
+from plateviz.runs.worker_scratch import worker_scratch
 from plateviz.tables.verdict import with_verdict
 from solver.errors import DiskError, FitError, InputError
 from solver.io.disk import disk_error
-from solver.io.scratch import ScratchFolder, remove_abandoned, temporary_folder
 from solver.io.survey import read_survey_instrument, read_survey_orbit
 from solver.runtime.memory import keep_memory
 from solver.runtime.threads import use_one_thread
@@ -29,7 +29,6 @@ _LESS_MONITORING = {
 }
 # Timeout of the connection to a scheduler.
 _TIMEOUT = "20s"
-_SCRATCH = "plateviz-workers"
 
 
 class Outcome(NamedTuple):
@@ -71,11 +70,6 @@ def _fit(run: Run, orbit: int) -> None:
     run.keep(orbit, result, fitter.history(result))
 
 
-def remove_scratch() -> None:
-    """Remove what the workers of a killed survey left in the folder for temporary files."""
-    remove_abandoned(temporary_folder(), _SCRATCH)
-
-
 @contextmanager
 def dask_client(workers: int, scheduler: str | None) -> Iterator[Client]:
     """Give a client of a scheduler, or of workers that are started here and ended afterwards.
@@ -103,7 +97,7 @@ def dask_client(workers: int, scheduler: str | None) -> Iterator[Client]:
             yield client
         return
     with (
-        ScratchFolder(temporary_folder(), _SCRATCH) as scratch,
+        worker_scratch() as scratch,
         dask.config.set({**_LESS_MONITORING, "temporary-directory": str(scratch.path)}),
         LocalCluster(
             n_workers=workers,

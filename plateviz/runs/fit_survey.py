@@ -15,11 +15,12 @@ import pandas as pd
 import pyarrow as pa
 from pyarrow import parquet
 
-from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers, remove_scratch
+from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
 from plateviz.runs.fitted_orbit import read_summary
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import gather_history
 from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run
+from plateviz.runs.worker_scratch import remove_worker_scratch
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, MOTIONS
 from solver.errors import DiskError, InputError
@@ -123,7 +124,7 @@ def _fit_missing(
 ) -> Report:
     start = time.perf_counter()
     run.remove_abandoned()
-    remove_scratch()
+    remove_worker_scratch()
     there = set(run.complete_orbits())
     missing = [orbit for orbit in wanted if orbit not in there]
     failed: dict[int, str] = {}

@@ -113,3 +113,11 @@ def small_survey(tmp_path_factory) -> Path:
     directory = tmp_path_factory.mktemp("survey") / "small"
     simulate_survey(directory, SurveySettings(orbits=2, seed=3).scaled(4000))
     return directory
+
+
+@pytest.fixture(scope="session")
+def nbformat():
+    """The package; importing it takes seconds, which only a process that needs it shall wait."""
+    import nbformat
+
+    return nbformat

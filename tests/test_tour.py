@@ -20,14 +20,6 @@ def code_cells(notebook):
 
 
 @pytest.fixture(scope="module")
-def nbformat():
-    """The package; importing it takes seconds, which only a process that needs it shall wait."""
-    import nbformat
-
-    return nbformat
-
-
-@pytest.fixture(scope="module")
 def tour(nbformat):
     return nbformat.read(TOUR, as_version=4)
 

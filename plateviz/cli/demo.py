@@ -14,7 +14,6 @@ import typer
 from plateviz.cache import cache_directory
 from plateviz.runs.new_run import PACKAGES, begin_run
 from plateviz.runs.run import DEFAULT_RUN, Run
-from plateviz.runs.worker_scratch import remove_worker_scratch
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.progress import Reporter, reporting
 from plateviz.solving.solution_store import SolutionStore
@@ -93,8 +92,6 @@ class BackgroundFit:
             self._is_closed = True
             if self._solver is not None:
                 self._solver.close()
-                # A worker that was just being started may have written while its process ended.
-                remove_worker_scratch()
         if self._thread.is_alive():
             self._thread.join(_PATIENCE_SECONDS)
 

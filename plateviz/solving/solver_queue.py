@@ -16,6 +16,7 @@ from tempfile import TemporaryFile
 from typing import IO
 
 from plateviz.cache import keep_compilations
+from plateviz.runs.worker_scratch import remove_worker_scratch
 from plateviz.solving.job import Job
 from solver.io.scratch import temporary_folder
 
@@ -84,6 +85,8 @@ class SolverQueue:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+            # A worker that was being started may have written while the process cleaned up.
+            remove_worker_scratch()
 
     def _start(self) -> subprocess.Popen[str]:
         folder = temporary_folder()

@@ -33,14 +33,6 @@ pytestmark = [pytest.mark.ui, pytest.mark.slow, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(scope="module")
-def nbformat():
-    """The package; importing it takes seconds, which only a process that needs it shall wait."""
-    import nbformat
-
-    return nbformat
-
-
-@pytest.fixture(scope="module")
 def folder(nbformat, tmp_path_factory):
     """A folder with the tour, of a survey that takes less time, and that the next test finds."""
     notebook = nbformat.read(TOUR, as_version=4)

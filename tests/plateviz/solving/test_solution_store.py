@@ -1,7 +1,10 @@
 """The solution store with a real solver process, which fits, cancels, dies and restarts."""
 
+import tempfile
+
 import pytest
 
+from plateviz.runs.worker_scratch import worker_scratch
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.origin import OrbitFiles, SurveyFolder, origin_from_dict, origin_to_dict
 from plateviz.solving.solution_store import SolutionStore
@@ -163,3 +166,13 @@ def test_what_if_beyond_a_step_is_fitted(store):
     assert store.request(0, settings, what_if=True).wait(LONG) is JobStatus.DONE
     result = store.result(0, settings, what_if=True)
     assert result.summary["reason"].startswith("every step of the last iteration")
+
+
+def test_closed_solver_removes_what_ended_workers_left_only(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with worker_scratch() as of_another_survey:
+        left = of_another_survey.path.with_name("plateviz-workers-0123456789ab.part")
+        (left / "dask-scratch-space").mkdir(parents=True)
+        SolverQueue().close()
+        assert not left.exists()
+        assert of_another_survey.path.is_dir()

@@ -62,9 +62,9 @@ class Keyboard(pn.custom.JSComponent):
 
     _stylesheets = [
         """
-        :host { margin-left: auto; align-self: center; color: white; }
+        :host { margin-left: auto; align-self: center; }
         button { padding: 4px 8px; border: 0; border-radius: 4px; cursor: pointer;
-                 font: 13px Helvetica, Arial, sans-serif; color: inherit; background: transparent; }
+                 font: 13px Helvetica, Arial, sans-serif; color: white; background: transparent; }
         button:hover, button:focus-visible { background: rgb(255 255 255 / 20%); }
         dialog { --text: #1f2933; --line: #d5dbe1; --tile: #ffffff;
                  padding: 14px 22px 18px; border: 1px solid var(--line); border-radius: 6px;

@@ -18,20 +18,20 @@ from tests.campaigns.mutations import FAULTS, outcome, table
 from tests.campaigns.trials import read_records
 
 CAMPAIGN = Path(__file__).resolve().parent / "campaigns" / "mutations.py"
-TRIALS = 500
 
 
 @pytest.mark.slow
-def test_first_trials_have_no_fault(tmp_path):
+@pytest.mark.parametrize("trials", [120, pytest.param(500, marks=pytest.mark.full)])
+def test_first_trials_have_no_fault(trials, tmp_path):
     records = tmp_path / "mutations.jsonl"
-    command = [sys.executable, str(CAMPAIGN), "--trials", str(TRIALS), "--records", str(records)]
+    command = [sys.executable, str(CAMPAIGN), "--trials", str(trials), "--records", str(records)]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout + run.stderr
     found = read_records(records)
-    assert sorted(found) == list(range(TRIALS))
+    assert sorted(found) == list(range(trials))
     kinds = {record["kind"] for record in found.values()}
     assert kinds == {kind.name for kind in readers.KINDS}
-    assert re.search(rf"\| all \| {TRIALS} \| \d+ \| \d+ \| \d+ \| 0 \|", run.stdout)
+    assert re.search(rf"\| all \| {trials} \| \d+ \| \d+ \| \d+ \| 0 \|", run.stdout)
 
 
 def found_of(answer, is_protected=True):

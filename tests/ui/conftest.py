@@ -136,7 +136,14 @@ def turn_dark(page, figures):
 
 @pytest.fixture
 def open_page(browser):
-    """Open a page of a size and colour scheme; what it complains of fails the test."""
+    """Open a page of a size; what it complains of fails the test."""
+    with opening_pages(browser) as open_at:
+        yield open_at
+
+
+@contextmanager
+def opening_pages(browser):
+    """Give the function that opens a page of a size; fail in the end if one has complained."""
     complaints, contexts = [], []
 
     def complain(message):

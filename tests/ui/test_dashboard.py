@@ -9,7 +9,15 @@ from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
-from tests.ui.conftest import VIEWS, see, serving, turn_dark, turn_to_workspace, until
+from tests.ui.conftest import (
+    VIEWS,
+    opening_pages,
+    see,
+    serving,
+    turn_dark,
+    turn_to_workspace,
+    until,
+)
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -36,11 +44,21 @@ def served(tmp_path_factory, chromium_path):
         yield address
 
 
-@pytest.fixture
-def page(served, open_page):
-    page = open_page(served)
+def opened(served, open_at):
+    """Open the dashboard and wait for a figure."""
+    page = open_at(served)
     page.locator(".figure-residual-map:visible canvas").first.wait_for(state="attached")
     return page
+
+
+@pytest.fixture
+def page(served, open_page):
+    return opened(served, open_page)
+
+
+def button(page, name):
+    """The button on the screen: figures of the Verdict workspace are in another one as well."""
+    return page.get_by_role("button", name=name).filter(visible=True)
 
 
 def value(page, name):
@@ -106,62 +124,100 @@ def shown(page):
     return page.locator(".solution").first
 
 
+def require_room(page, workspace):
+    """Fail if a card of a workspace is beside the screen, or by more than the strip below it."""
+    cards = page.locator(".card:visible")
+    cards.locator("canvas").first.wait_for(state="attached")
+    boxes = cards.evaluate_all("cards => cards.map(card => card.getBoundingClientRect())")
+    assert len(boxes) > (workspace is not OrbitWorkspace.EXPLORE)
+    assert all(box["x"] + box["width"] <= 1500 for box in boxes), workspace
+    # The strip of the Verdict workspace takes more of this window than of a large screen.
+    room = 1100 if workspace is OrbitWorkspace.VERDICT else 1000
+    assert all(box["y"] + box["height"] <= room for box in boxes), workspace
+
+
+@pytest.fixture(scope="module")
+def walked(served, browser):
+    """A page on which every figure has been drawn; tests leave it as it was, the last one dark."""
+    with opening_pages(browser) as open_at:
+        page = opened(served, open_at)
+        assert page.locator(".figure-convergence").count() == 0
+        # The first is on the screen already, and the address has it only when it is shown again.
+        for workspace in reversed(OrbitWorkspace):
+            turn_to_workspace(page, workspace)
+            page.wait_for_url(f"**workspace={workspace.value}**")
+            require_room(page, workspace)
+            for diagnostic in diagnostics():
+                if diagnostic.workspace is workspace:
+                    see(page, diagnostic.name)
+        turn_to_workspace(page, OrbitWorkspace.VERDICT)
+        yield page
+
+
 @pytest.mark.newest
-def test_every_figure_is_drawn_when_near_and_in_both_themes(page):
-    assert page.locator(".figure-convergence").count() == 0
-    assert value(page, "Converged") == "yes"
-    expect(page.locator("details.verdict summary").first).to_contain_text("This solution")
-    assert 0.9 < float(chi2(page).split()[0]) < 1.1
-    see(page, "convergence")
-    assert not is_faded(page.locator(".figure-convergence canvas").first)
-    # A part that asks without end whether it can be laid out would take a core.
-    assert rests(page)
-    for diagnostic in diagnostics():
-        see(page, diagnostic.name)
-    rows = page.evaluate(ROWS)
+def test_every_figure_is_drawn_when_near_and_within_the_screen(walked):
+    assert value(walked, "Converged") == "yes"
+    expect(walked.locator("details.verdict summary").first).to_contain_text("This solution")
+    assert 0.9 < float(chi2(walked).split()[0]) < 1.1
+    rows = walked.evaluate(ROWS)
     assert len(rows) >= len(diagnostics())
     empty = [title for title, n in rows.items() if n == 0 and "Comparison" not in title]
     assert [t for t in empty if "Difference of" not in t] == []
-    assert rests(page)
-    # What is drawn keeps its layout when other workspaces are shown: every figure has some forty.
-    metric = metrics_of(page)
+    see(walked, "convergence")
+    assert not is_faded(walked.locator(".figure-convergence canvas").first)
+    # A part that asks without end whether it can be laid out would take a core.
+    assert rests(walked)
+
+
+def test_what_is_drawn_keeps_its_layout(walked):
+    """When other workspaces are shown: every figure has some forty."""
+    assert rests(walked)
+    metric = metrics_of(walked)
     before = metric("LayoutCount")
     for name in ("footprint", "weak-directions", "deviation"):
-        see(page, name)
-    assert rests(page)
+        see(walked, name)
+    assert rests(walked)
     assert metric("LayoutCount") - before < 200
-    turn_dark(page, diagnostics())
 
 
-def test_a_figure_is_explained_and_opens_as_large_as_the_window(page):
-    card = page.locator(".figure-residual-map:visible")
+def test_a_figure_is_explained_and_opens_as_large_as_the_window(walked):
+    turn_to_workspace(walked, OrbitWorkspace.VERDICT)
+    card = walked.locator(".figure-residual-map:visible")
+    until(walked, lambda: card.locator("canvas").count() > 0)
     before = card.bounding_box()
-    page.get_by_role("button", name="What this shows: Residual map").click()
-    expect(page.get_by_text("Measured minus predicted position on the detector")).to_be_visible()
-    page.keyboard.press("Escape")
-    expect(page.get_by_text("Measured minus predicted position on the detector")).to_be_hidden()
-    page.get_by_role("button", name="Open large: Residual map").click()
+    button(walked, "What this shows: Residual map").click()
+    words = walked.get_by_text("Measured minus predicted position on the detector")
+    words = words.filter(visible=True)
+    expect(words).to_have_count(1)
+    walked.keyboard.press("Escape")
+    expect(words).to_have_count(0)
+    button(walked, "Open large: Residual map").click()
     canvas = card.locator("canvas").first
-    until(page, lambda: canvas.bounding_box()["height"] > 800)
+    until(walked, lambda: canvas.bounding_box()["height"] > 800)
     assert card.bounding_box()["width"] > 1400
-    page.keyboard.press("Escape")
-    until(page, lambda: canvas.bounding_box()["height"] < before["height"])
+    walked.keyboard.press("Escape")
+    until(walked, lambda: canvas.bounding_box()["height"] < before["height"])
     assert card.bounding_box() == before
 
 
-def test_workspaces_fit_the_screen(page):
-    # The first is on the screen already, and the address has it only when it is shown again.
-    for workspace in reversed(OrbitWorkspace):
-        turn_to_workspace(page, workspace)
-        page.wait_for_url(f"**workspace={workspace.value}**")
-        cards = page.locator(".card:visible")
-        page.locator(".card:visible canvas").first.wait_for(state="attached")
-        boxes = cards.evaluate_all("cards => cards.map(card => card.getBoundingClientRect())")
-        assert len(boxes) > (workspace is not OrbitWorkspace.EXPLORE)
-        assert all(box["x"] + box["width"] <= 1500 for box in boxes), workspace
-        # The strip of the Verdict workspace takes more of this window than of a large screen.
-        room = 1100 if workspace is OrbitWorkspace.VERDICT else 1000
-        assert all(box["y"] + box["height"] <= room for box in boxes), workspace
+def test_code_of_the_solution_on_the_screen_is_shown(walked):
+    turn_to_workspace(walked, OrbitWorkspace.VERDICT)
+    walked.get_by_role("button", name="Reproduce").click()
+    window = walked.get_by_role("dialog", name="Reproduce")
+    expect(window.get_by_text("--run reproduced --orbits 0")).to_be_visible()
+    expect(window.get_by_text(".orbit(0).fit()")).to_be_visible()
+    # Keys are the window's while it is open.
+    walked.keyboard.press("4")
+    walked.keyboard.press("Escape")
+    expect(window).to_be_hidden()
+    walked.keyboard.press(".")
+    walked.wait_for_url("**workspace=verdict**plates=1-1**")
+    walked.keyboard.press(",")
+    walked.wait_for_url("**workspace=verdict**plates=0-0**")
+
+
+def test_figures_have_both_themes(walked):
+    turn_dark(walked, diagnostics())
 
 
 def selected(page, name):
@@ -333,19 +389,6 @@ def test_keys_do_what_their_list_says(page):
     assert "workspace=sky" in page.url
     assert "plates=1-1" in page.url
     assert "detector=0" in page.url
-
-
-def test_code_of_the_solution_on_the_screen_is_shown(page):
-    page.get_by_role("button", name="Reproduce").click()
-    window = page.get_by_role("dialog", name="Reproduce")
-    expect(window.get_by_text("--run reproduced --orbits 0")).to_be_visible()
-    expect(window.get_by_text(".orbit(0).fit()")).to_be_visible()
-    # Keys are the window's while it is open.
-    page.keyboard.press("4")
-    page.keyboard.press("Escape")
-    expect(window).to_be_hidden()
-    page.keyboard.press(".")
-    page.wait_for_url("**workspace=verdict**plates=1-1**")
 
 
 def test_an_address_of_nonsense_opens_the_page(served, open_page):

@@ -42,7 +42,9 @@ def _see_demo(tmp_path, open_page, program, orbits):
         page = open_page(address)
         see(page, "residual-map")
         page.get_by_role("button", name="Survey", exact=True).click()
-        expect(page.locator("p.caption").get_by_text("This run is not complete")).to_be_visible()
+        # A few small orbits may all be fitted before a busy machine has drawn the page.
+        incomplete = page.locator("p.caption").get_by_text("This run is not complete")
+        expect(incomplete.or_(page.get_by_text(complete)).first).to_be_visible()
         wait_for_file(tmp_path.glob, "plateviz/demo-*/demo/runs/default/COMPLETE")
         page.goto(address)
         expect(page.get_by_text(complete).first).to_be_visible()

@@ -51,6 +51,8 @@ def first(data, *columns):
     return tuple(data.measurements[list(columns)].iloc[0].tolist())
 
 
+# Those that take the same way through the code as another one.
+SIMILAR = ("pointing-held", "distortion-held", "no-exposure")
 CHANGES = {
     "nothing": lambda data: {},
     "detectors-held": lambda data: {"prior_widths": {"detector_x": 10.0, "pitch_x": 1e-3}},
@@ -80,7 +82,12 @@ CHANGES = {
 }
 
 
-@pytest.fixture(scope="module", params=CHANGES)
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(name, marks=pytest.mark.full) if name in SIMILAR else name for name in CHANGES
+    ],
+)
 def pair(request, sample_orbit, sample_fitter):
     """The what-if and the refit of the sample orbit under changed settings."""
     settings = FitSettings(**{"order": 6, **CHANGES[request.param](sample_orbit)})

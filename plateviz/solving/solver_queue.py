@@ -7,6 +7,7 @@ then marked as failed or cancelled; waiting jobs continue.
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -85,7 +86,7 @@ class SolverQueue:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
-            # A worker that was being started may have written while the process cleaned up.
+            _kill_workers(process)
             remove_worker_scratch()
 
     def _start(self) -> subprocess.Popen[str]:
@@ -155,3 +156,10 @@ class SolverQueue:
             if self._jobs and self._jobs[0] is job and self._process is not None:
                 job.cancel()
                 self._process.kill()
+
+
+def _kill_workers(ended: subprocess.Popen[str]) -> None:
+    """End what a process that has ended started, and what may still write: they are its group."""
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(ended.pid, signal.SIGKILL)

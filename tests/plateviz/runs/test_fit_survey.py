@@ -54,6 +54,7 @@ def test_every_orbit_is_fitted(report):
     assert report.run.is_complete
 
 
+@pytest.mark.full
 def test_results_do_not_depend_on_the_number_of_workers(report, fitted_survey):
     other = fit_survey(fitted_survey, "two", SETTINGS, workers=2)
     one, two = contents(report.run), contents(other.run)

@@ -18,7 +18,7 @@ _ALL = (-math.inf, math.inf)
 _FIRST: Mapping[str, tuple[str, str]] = {
     "measurements": ("focal_x", "residual_x"),
     "sources": ("n_obs", "sigma_ra_marginal"),
-    "exposures": ("time", "chi2_per_dof"),
+    "exposures": ("minutes", "chi2_per_dof"),
 }
 _NUMBER = r"-?(?:\d+(?:\.\d*)?(?:e[+-]?\d+)?|inf)"
 _NUMBERS = re.compile(rf"{_NUMBER}(?:~{_NUMBER})*")

@@ -4,6 +4,8 @@ Models are made once. Another figure changes their columns, words, limits and co
 a few milliseconds and sends only what differs.
 """
 
+from dataclasses import replace
+
 from bokeh import models
 
 from plateviz.figures.bokeh_frame import BokehFrame
@@ -46,6 +48,16 @@ class BokehFigure:
             words = words_of_row(frames)
             for drawn, frame, one in zip(self.frames[row], frames, words, strict=True):
                 drawn.follow(frame, colours, one)
+
+    def with_limits(self, figure: Figure) -> Figure:
+        """Return a figure with the limits of the drawn frames, which a person may have changed.
+
+        Parameters
+        ----------
+        figure : one that this one shows
+        """
+        frames = (drawn.with_limits(f) for drawn, f in zip(self.frames, figure, strict=True))
+        return replace(figure, frames=tuple(frames))
 
     def _make(self, figure: Figure) -> None:
         # A grid whose children change is laid out by BokehJS before all their views are there, so

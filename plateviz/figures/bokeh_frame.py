@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from bokeh import models
 from bokeh.core.property.vectorization import Field, Value
@@ -115,6 +116,14 @@ class BokehFrame:
             grid.grid_line_color = theme.grid
         self._follow_glyphs(frame, theme)
         self._follow_legend(frame, theme)
+
+    def with_limits(self, frame: Frame) -> Frame:
+        """Return a frame of the same size with the limits of the drawn one."""
+        x, y = (
+            replace(axis, limits=(drawn.start, drawn.end))
+            for axis, drawn in ((frame.x, self.x_range), (frame.y, self.y_range))
+        )
+        return replace(frame, x=x, y=y, height=frame.frame_height)
 
     def zoom_by_wheel(self) -> None:
         """Let the wheel zoom at once; elsewhere it scrolls the page until its tool is chosen."""

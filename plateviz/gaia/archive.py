@@ -1,15 +1,12 @@
 """Stars of Gaia DR3 for the simulator: fetched once, then cached with the query."""
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from astropy.io import votable
-from astropy.io.votable.tree import Info
 from astropy.table import Column, Table
 
 from plateviz.cache import cache_directory
@@ -21,6 +18,7 @@ from solver.io.disk import writing
 from solver.io.outputs import check_output
 from solver.io.read_orbit import find_catalogue
 from solver.io.table_check import conform
+from solver.io.write_tables import SUFFIXES, write_tables
 from solver.simulate.gaia import GAIA
 from solver.simulate.settings import SurveySettings
 from solver.simulate.sky import galactic_to_icrs
@@ -29,6 +27,8 @@ from solver.simulate.sky import galactic_to_icrs
 MOST_STARS = 3_000_000
 _WHOLE_TURN_DEG = 360.0
 _LARGEST_CIRCLE_DEG = 90.0
+# A file without units and without the query is not kept.
+_SUFFIXES = tuple(suffix for suffix in SUFFIXES if suffix != ".csv")
 
 # The fetched columns: those that the simulator uses, and the magnitude for information.
 ARCHIVE = columns.Table(
@@ -165,7 +165,7 @@ def cached_file(chosen: StarQuery, url: str | None = None) -> Path:
 
 def require_new_table(path: Path, overwrite: bool) -> None:
     """Raise InputError if the stars cannot be written to `path`, or must not replace it."""
-    check_output(path, tuple(_WRITERS), overwrite=overwrite)
+    check_output(path, _SUFFIXES, overwrite=overwrite)
 
 
 def write_stars(table: Table, path: Path, overwrite: bool = False) -> None:
@@ -179,7 +179,7 @@ def write_stars(table: Table, path: Path, overwrite: bool = False) -> None:
     """
     require_new_table(path, overwrite)
     with write_atomically(path, overwrite) as temporary:
-        _WRITERS[path.suffix.lower()](table, temporary)
+        write_tables({ARCHIVE.name: table}, temporary)
 
 
 def _read(kept: Path) -> Table | None:
@@ -208,30 +208,3 @@ def _fetch(query: str, url: str | None) -> Table:
             stars[column.name].to_numpy(), unit=column.unit or None, description=column.meaning
         )
     return table
-
-
-def _write_fits(table: Table, path: Path) -> None:
-    table.write(path, format="fits", overwrite=True)
-
-
-def _write_ecsv(table: Table, path: Path) -> None:
-    table.write(path, format="ascii.ecsv", overwrite=True)
-
-
-def _write_parquet(table: Table, path: Path) -> None:
-    table.write(path, format="parquet", overwrite=True)
-
-
-def _write_votable(table: Table, path: Path) -> None:
-    document = votable.from_table(table)
-    for key, value in table.meta.items():
-        document.resources[0].infos.append(Info(name=key, value=value))
-    document.to_xml(str(path))
-
-
-_WRITERS: dict[str, Callable[[Table, Path], None]] = {
-    ".fits": _write_fits,
-    ".ecsv": _write_ecsv,
-    ".vot": _write_votable,
-    ".parquet": _write_parquet,
-}

@@ -15,7 +15,8 @@ from solver.data.parameters import groups_on
 from solver.data.result import FitResult
 
 _CHI2_PER_DOF = Column("chi2_per_dof", "float64", "", "chi2 over its expectation")
-_TIME = Column("time", "float64", "min", "time since the first exposure of the orbit")
+# Not "time": astropy reads a FITS column of that name as a date.
+_TIME = Column("minutes", "float64", "min", "time since the first exposure of the orbit")
 _OF_DEVIATION = (
     Column("deviation_ra_mas", "float64", "mas", "estimate minus truth, ra cos(dec)"),
     Column("deviation_dec_mas", "float64", "mas", "estimate minus truth, dec"),
@@ -79,7 +80,7 @@ def explorable_measurements(result: FitResult) -> ExplorableTable:
         phase_x=rows["nx"] - np.floor(rows["nx"]),
         phase_y=rows["ny"] - np.floor(rows["ny"]),
         n_obs=sources["n_obs"].to_numpy()[of_source],
-        time=minutes_since_first(result.exposures)[result.exposure_index],
+        minutes=minutes_since_first(result.exposures)[result.exposure_index],
         source_class=sources["source_class"].to_numpy()[of_source],
     )
     return _explorable("measurements", frame, schema.RESIDUALS, _OF_MEASUREMENTS)
@@ -88,7 +89,7 @@ def explorable_measurements(result: FitResult) -> ExplorableTable:
 def explorable_exposures(result: FitResult) -> ExplorableTable:
     """Return a row per exposure, with its fitted parameters."""
     frame = result.exposures.assign(
-        time=minutes_since_first(result.exposures), chi2_per_dof=chi2_per_dof(result.exposures)
+        minutes=minutes_since_first(result.exposures), chi2_per_dof=chi2_per_dof(result.exposures)
     )
     added = [_TIME, _CHI2_PER_DOF]
     for kind, of_kind in (("offset", "estimate minus prior"), ("sigma_marginal", "marginal sigma")):

@@ -9,12 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
+from astropy.table import Table
 
+from plateviz.dashboard.downloads import rows_of
 from plateviz.dashboard.exploration import NONE, SWITCHES
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.point_actions import PointActions
+from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure, Limits
 from plateviz.plots.explore import explored_figure, kept_rows
@@ -23,6 +26,8 @@ from plateviz.tables.explore import EXPLORABLE, ExplorableTable, sources_within
 from solver.data.result import FitResult
 
 _STEPS = 200
+# Columns that say what a saved row is of, besides the id of its source.
+_KEYS = ("field_id", "plate_id", "detector_id")
 _BETWEEN = "between"
 
 
@@ -65,6 +70,7 @@ class ExploreView(pn.viewable.Viewer):
                 select=self._session.select_sources, select_area=self._select_area
             ),
             zoom=self._zoom,
+            saved=Saved(self._session.subject, self._rows),
             theme=self._session.theme,
         )
         self.grid = FigureGrid([self._figure], wake, columns=1)
@@ -132,6 +138,15 @@ class ExploreView(pn.viewable.Viewer):
             return None
         selected = self._session.selection.sources
         return explored_figure(table, self._exploration.columns(), selected=selected)
+
+    def _rows(self) -> dict[str, Table]:
+        """Return the rows between the limits, with the columns that are drawn and those of keys."""
+        table, chosen = self._table, self._exploration.columns()
+        if table is None:
+            return {}
+        drawn = filter(None, (chosen.x, chosen.y, chosen.colour, chosen.only))
+        names = dict.fromkeys((*(name for name in _KEYS if name in table.columns), *drawn))
+        return {table.rows: rows_of(table, kept_rows(table, chosen), names)}
 
     def _change(self, *_: object) -> None:
         if not self._is_following:

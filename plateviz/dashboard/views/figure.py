@@ -13,6 +13,8 @@ from plateviz.dashboard.views.figure_text import FigureText
 from plateviz.dashboard.views.markup import markup_pane, paragraph
 from plateviz.dashboard.views.own_layout import OwnLayout
 from plateviz.dashboard.views.point_actions import PointActions
+from plateviz.dashboard.views.save_button import SaveButton
+from plateviz.dashboard.views.save_choices import OnScreen, Saved, figure_choices
 from plateviz.dashboard.views.visibility import Visibility
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import Figure, Limits
@@ -58,6 +60,7 @@ class FigureView(pn.viewable.Viewer):
         waiting: str = "",
         actions: PointActions | None = None,
         zoom: Zoom | None = None,
+        saved: Saved | None = None,
         theme: str = "light",
         **params: object,
     ) -> None:
@@ -69,6 +72,7 @@ class FigureView(pn.viewable.Viewer):
         actions : what its points do
         zoom : called with the limits of the first frame's axes when a person changes them, and
             with None when they are reset
+        saved : how the figure is named in files, and what its data are
         theme : of the first drawing
         """
         super().__init__(**params)
@@ -87,7 +91,9 @@ class FigureView(pn.viewable.Viewer):
         # and the page may measure a figure without a layout.
         self._body = pn.Column(margin=0)
         self._tools = CardTools(figure.title, figure.caption)
-        self._card = _card(self.visibility, self._body, self._tools, name=figure.name)
+        choices = figure_choices(figure.name, self._on_screen, saved or Saved())
+        self._save = SaveButton(figure.title, choices, place="corner")
+        self._card = _card(self.visibility, self._body, self._save, self._tools, name=figure.name)
         self.change(theme)
         self._show_text("Being drawn.")
 
@@ -114,7 +120,7 @@ class FigureView(pn.viewable.Viewer):
     def change(self, theme: str) -> None:
         """Mark the figure as changed, and set the theme for the next drawing."""
         self._theme, self._is_changed = theme, True
-        self._tools.theme = theme
+        self._tools.theme = self._save.theme = theme
         # A figure on the screen is drawn at once; to fade it for so short a time would flicker.
         if not self.visibility.is_near:
             self._fade()
@@ -154,9 +160,21 @@ class FigureView(pn.viewable.Viewer):
             _LOG.exception("%s cannot be drawn", self._name)
             self._show_text(f"This figure cannot be drawn: {error}")
 
+    def _on_screen(self) -> OnScreen | None:
+        """Return the figure as it is on the screen, with the limits that a person has chosen."""
+        if self._figure is None or self._drawn is None:
+            return None
+        width, height = self._shown_area
+        figure = self._drawn.with_limits(resized(self._figure, width, height))
+        return OnScreen(figure, self._theme)
+
+    @property
+    def _shown_area(self) -> tuple[int, int]:
+        width, height = (length - 2 * _INSET for length in self._shown_room)
+        return width, height
+
     def _show(self, figure: Figure) -> None:
-        width, height = (length - 2 * _INSET for length in self.visibility.room)
-        figure = resized(figure, width, height)
+        figure = resized(figure, *self._shown_area)
         if self._drawn is None:
             self._drawn = BokehFigure(figure, self._theme)
         else:

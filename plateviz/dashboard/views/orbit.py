@@ -15,6 +15,7 @@ from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import heading
 from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.refit import RefitView
+from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.summary import HeadView, StripView
@@ -109,6 +110,7 @@ class OrbitPage(pn.viewable.Viewer):
             partial(self._plot, diagnostic),
             waiting="The first solution is being computed.",
             actions=PointActions(select=self._session.select_sources),
+            saved=Saved(self._session.subject),
             theme=self._session.theme,
         )
 

@@ -2,11 +2,18 @@
 
 from collections.abc import Callable
 
+import numpy as np
 import panel as pn
 import panel_material_ui as pmui
+from astropy.table import Table
 
+from plateviz.dashboard.downloads import described, rows_of
 from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.views.save_button import SaveButton
+from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.dashboard.views.source_list import SourceList
+from plateviz.tables.explore import explorable_measurements, explorable_sources
+from solver.data.survey_schema import MOTIONS
 
 _IN_THE_BAR = {"color": "inherit", "textTransform": "none", "whiteSpace": "nowrap", "minWidth": 0}
 
@@ -52,6 +59,7 @@ class SelectionBar(pn.viewable.Viewer):
             self._leave_out,
             self._put_back,
             self._invert,
+            SaveButton("selected sources", table_choices(self._subject, self._tables), place="bar"),
             self._button("Clear", self._clear),
         ]
         self.windows.append(self._list)
@@ -70,7 +78,7 @@ class SelectionBar(pn.viewable.Viewer):
             return
         if not self._parts:
             self._make()
-        is_orbit = self._navigation.view is View.ORBIT and session.shown is not None
+        is_orbit = self._is_of_orbit
         self._words.object = words(len(selected), len(session.selected_in_orbit), is_orbit)
         self._open.visible = len(selected) == 1 and self._navigation.run is not None
         self._leave_out.visible = is_orbit and not session.is_selection_left_out
@@ -83,6 +91,33 @@ class SelectionBar(pn.viewable.Viewer):
     def _open_source(self) -> None:
         (source,) = self._session.selection.sources
         self._navigation.open_source(str(source))
+
+    @property
+    def _is_of_orbit(self) -> bool:
+        return self._navigation.view is View.ORBIT and self._session.shown is not None
+
+    def _subject(self) -> str:
+        of = self._session.subject() if self._is_of_orbit else f"run-{self._navigation.run_name}"
+        return f"{of}-selection"
+
+    def _tables(self) -> dict[str, Table]:
+        """Return the selected sources and their measurements, or their motions in the run."""
+        shown, run = self._session.shown, self._navigation.run
+        selected = list(self._session.selection.sources)
+        if self._is_of_orbit and shown is not None:
+            result = shown.result
+            tables = {
+                "sources": explorable_sources(result),
+                "measurements": explorable_measurements(result),
+            }
+            return {
+                name: rows_of(table, np.isin(table.read("source_id"), selected))
+                for name, table in tables.items()
+            }
+        if run is None:
+            return {}
+        rows = run.motions() if run.is_gathered else run.counts()
+        return {"sources": described(rows[rows["source_id"].isin(selected)], MOTIONS)}
 
     def _clear(self) -> None:
         self._session.select_sources(frozenset())

@@ -26,7 +26,7 @@ def test_first_columns_are_those_of_the_table(exploration):
 def test_column_that_the_next_table_lacks_is_replaced(exploration):
     exploration.param.update(x="dec", colour="ra", only="n_obs", lowest=2.0, highest=3.0)
     exploration.table = "exposures"
-    exploration.offer(["time", "chi2_per_dof", "dec"])
+    exploration.offer(["minutes", "chi2_per_dof", "dec"])
     assert (exploration.x, exploration.y) == ("dec", "chi2_per_dof")
     assert exploration.columns().colour == exploration.columns().only == ""
     assert exploration.columns().lowest == -math.inf

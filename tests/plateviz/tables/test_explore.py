@@ -47,7 +47,7 @@ def test_measurements_have_the_values_of_their_source_and_exposure(fit_result):
     assert table.numbers("n_obs")[row] == sources["n_obs"][one["source_id"]]
     exposures = fit_result.exposures.set_index(["orbit_id", "field_id", "plate_id"])["obstime"]
     since = exposures[one["orbit_id"], one["field_id"], one["plate_id"]] - exposures.min()
-    assert table.numbers("time")[row] == pytest.approx(1440.0 * since)
+    assert table.numbers("minutes")[row] == pytest.approx(1440.0 * since)
     squares = one["standardised_x"] ** 2 + one["standardised_y"] ** 2
     assert table.numbers("standardised")[row] == pytest.approx(np.sqrt(squares))
     phases = table.numbers("phase_x")

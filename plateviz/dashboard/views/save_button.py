@@ -1,0 +1,176 @@
+"""SaveButton: a menu of what a figure or a table can be saved as."""
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import panel as pn
+import param
+
+from plateviz.dashboard.downloads import Download
+from solver.errors import InputError
+
+
+class Picture(NamedTuple):
+    """A picture that the browser draws and saves.
+
+    Attributes
+    ----------
+    name : of the file; its suffix is that of the format, "png" or "svg"
+    item : Bokeh models as JSON, made for this picture only
+    """
+
+    name: str
+    item: dict[str, Any]
+
+
+Choices = Mapping[str, Callable[[], Download | Picture]]
+
+
+class SaveButton(pn.custom.JSComponent):
+    """A button with a menu; a choice is made into a file that the browser keeps.
+
+    What cannot be saved says why below the button.
+    """
+
+    title = param.String(doc="what is saved, in a few words")
+    theme = param.Selector(default="light", objects=["light", "dark"])
+    labels = param.List(item_type=str, doc="the choices in order")
+    place = param.Selector(
+        default="line",
+        objects=["line", "corner", "bar"],
+        doc="where it stands: in a line of a page, beside the tools of a card, in the page's bar",
+    )
+
+    _esm = """
+    const keep = (name, blob) => {
+      const link = document.createElement("a")
+      link.href = URL.createObjectURL(blob)
+      link.download = name
+      link.click()
+      setTimeout(() => URL.revokeObjectURL(link.href), 60_000)
+    }
+    const pause = () => new Promise(done => setTimeout(done, 50))
+    const draw = async (name, item) => {
+      const place = document.createElement("div")
+      place.id = `picture-${crypto.randomUUID?.() ?? Math.random()}`
+      Object.assign(place.style, { position: "fixed", left: "-20000px", top: "0" })
+      place.setAttribute("aria-hidden", "true")
+      document.body.append(place)
+      const views = await Bokeh.embed.embed_item(JSON.parse(item), place.id)
+      const view = [...views][0]
+      const drawn = view.model.document
+      try {
+        for (let turn = 0; turn < 200 && !drawn.is_idle; turn++) await pause()
+        await pause()
+        keep(name, await view.export(name.split(".").pop()).to_blob())
+      } finally {
+        views.clear()
+        const at = Bokeh.documents.indexOf(drawn)
+        if (at >= 0) Bokeh.documents.splice(at, 1)
+        place.remove()
+      }
+    }
+    export function render({ model, el }) {
+      const box = document.createElement("div")
+      const button = document.createElement("button")
+      const menu = document.createElement("div")
+      const words = document.createElement("p")
+      button.type = "button"
+      button.textContent = { line: "\\u2913 Save", corner: "\\u2913", bar: "Save" }[model.place]
+      button.title = "Save"
+      button.setAttribute("aria-label", `Save: ${model.title}`)
+      button.setAttribute("aria-haspopup", "menu")
+      menu.setAttribute("role", "menu")
+      words.setAttribute("role", "status")
+      const show = isShown => {
+        menu.hidden = !isShown
+        button.setAttribute("aria-expanded", String(isShown))
+      }
+      const say = text => { words.textContent = text; words.hidden = !text }
+      show(false)
+      say("")
+      for (const label of model.labels) {
+        const entry = document.createElement("button")
+        entry.type = "button"
+        entry.textContent = label
+        entry.setAttribute("role", "menuitem")
+        entry.onclick = () => { show(false); say("Being made \\u2026"); model.send_msg(label) }
+        menu.append(entry)
+      }
+      button.onclick = () => { say(""); show(menu.hidden) }
+      box.addEventListener("focusout", event => {
+        if (!box.contains(event.relatedTarget)) show(false)
+      })
+      box.addEventListener("keydown", event => {
+        if (event.key !== "Escape" || menu.hidden) return
+        event.stopPropagation()
+        show(false)
+        button.focus()
+      })
+      model.on("msg:custom", async ({ name, content, item, error }) => {
+        try {
+          if (error) return say(error)
+          if (item) await draw(name, item)
+          else keep(name, new Blob([content]))
+          say("")
+        } catch (problem) { say(`It could not be saved: ${problem.message}`) }
+      })
+      const colour = () => {
+        box.className = `save ${model.theme} ${model.place}`
+      }
+      colour()
+      model.on("theme", colour)
+      box.append(button, menu, words)
+      el.append(box)
+    }
+    """
+
+    _stylesheets = [
+        """
+        :host(.save-in-corner) { position: absolute; top: 2px; right: 54px; z-index: 3; }
+        .save { --text: #1f2933; --muted: #52606d; --line: #d5dbe1; --tile: #ffffff;
+                position: relative; }
+        .save.dark { --text: #e6eaee; --muted: #a5b0bb; --line: #39424c; --tile: #1c222a; }
+        button { padding: 0; border: 0; border-radius: 4px; background: transparent;
+                 font: 14px Helvetica, Arial, sans-serif; color: var(--muted); cursor: pointer; }
+        .save > button { height: 24px; padding: 0 6px; }
+        .corner > button { width: 24px; padding: 0; }
+        .bar > button { height: 30px; padding: 0 5px; font: 500 12px inherit;
+                        font-family: inherit; }
+        .bar > button, .bar > button:hover, .bar > button:focus-visible { color: #ffffff; }
+        .bar > button:hover, .bar > button:focus-visible { background: rgb(255 255 255 / 15%); }
+        button:hover, button:focus-visible { background: var(--line); color: var(--text); }
+        div[role=menu], p { position: absolute; right: 0; top: 26px; z-index: 4; margin: 0;
+            border: 1px solid var(--line); border-radius: 4px; background: var(--tile);
+            box-shadow: 0 2px 10px rgb(0 0 0 / 25%); }
+        .line > div[role=menu], .line > p { right: auto; left: 0; }
+        div[role=menu]:not([hidden]) { display: grid; min-width: 120px; padding: 4px; }
+        [hidden] { display: none; }
+        div[role=menu] button { padding: 6px 10px; text-align: left; font-size: 13px;
+                                white-space: nowrap;
+                                color: var(--text); }
+        p { padding: 8px 12px; width: max-content; max-width: 260px; color: var(--text);
+            font: 13px/1.4 Helvetica, Arial, sans-serif; }
+        """
+    ]
+
+    def __init__(self, title: str, choices: Choices, **params: object) -> None:
+        """Offer the choices: what the menu says -> function that makes the file."""
+        super().__init__(title=title, labels=list(choices), margin=0, **params)
+        self._choices = choices
+        self.css_classes = [f"save-in-{self.place}"]
+
+    def _handle_msg(self, data: object) -> None:
+        make = self._choices.get(str(data))
+        if make is None:
+            return
+        try:
+            made = make()
+        except InputError as error:
+            self._send_msg({"error": f"It could not be saved: {error}."})
+            return
+        if isinstance(made, Picture):
+            self._send_msg({"name": made.name, "item": json.dumps(made.item)})
+        else:
+            self._send_msg({"name": made.name, "content": made.content})

@@ -1,0 +1,69 @@
+"""The numbers of a figure as tables, to be kept in files."""
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+from astropy.table import Column, Table
+
+from plateviz.figures.figure import Figure, Frame, Glyphs
+
+_ALONG_X = ("x", "x0", "x1", "xs", "left", "right")
+_ALONG_Y = ("y", "y0", "y1", "y2", "ys", "bottom", "top")
+# Names at their places, which other marks have as well.
+_WITHOUT_NUMBERS = ("texts",)
+
+
+def figure_tables(figure: Figure) -> dict[str, Table]:
+    """Return a table for each kind of mark in the figure that has rows.
+
+    Returns
+    -------
+    Name -> table. Coordinates are described by the label of their axis, with its unit. Of several
+    frames, a name begins with the number of its frame, from 1. An image has a row per cell that
+    has a value, at the cell's centre; outlines have a row per point, numbered by `path`.
+    """
+    found: dict[str, Table] = {}
+    for number, frame in enumerate(figure, 1):
+        prefix = f"frame{number}_" if len(figure) > 1 else ""
+        for glyphs in frame.glyphs:
+            if len(glyphs) and glyphs.kind not in _WITHOUT_NUMBERS:
+                name = prefix + re.sub(r"\W+", "_", glyphs.name)
+                found[name] = _table(frame, glyphs)
+    return found
+
+
+def _table(frame: Frame, glyphs: Glyphs) -> Table:
+    columns = _cells(glyphs) if glyphs.kind == "image" else _rows(glyphs)
+    labels = dict.fromkeys(_ALONG_X, frame.x.label) | dict.fromkeys(_ALONG_Y, frame.y.label)
+    described = {glyphs.at[at]: labels[at] for at in glyphs.at if at in labels}
+    if glyphs.kind == "image":
+        described = {"x": frame.x.label, "y": frame.y.label}
+    table = Table(meta={"title": frame.title} if frame.title else {})
+    for name, values in columns.items():
+        plain = values.astype(str) if values.dtype == object else values
+        table[name] = Column(plain, description=described.get(name))
+    return table
+
+
+def _cells(glyphs: Glyphs) -> Mapping[str, np.ndarray]:
+    values = np.asarray(glyphs.values("image")[0])
+    rows, columns = values.shape
+    x, y, width, height = (float(glyphs.values(at)[0]) for at in ("x", "y", "dw", "dh"))
+    at_y, at_x = np.nonzero(np.isfinite(values))
+    return {
+        "x": x + (at_x + 0.5) * width / columns,
+        "y": y + (at_y + 0.5) * height / rows,
+        glyphs.at["image"]: values[at_y, at_x],
+    }
+
+
+def _rows(glyphs: Glyphs) -> Mapping[str, np.ndarray]:
+    if glyphs.kind != "paths":
+        return glyphs.columns
+    lengths = [len(points) for points in glyphs.values("xs")]
+    return {
+        "path": np.repeat(np.arange(len(lengths)), lengths),
+        "xs": np.concatenate(list(glyphs.values("xs"))),
+        "ys": np.concatenate(list(glyphs.values("ys"))),
+    }

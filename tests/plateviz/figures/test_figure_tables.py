@@ -1,0 +1,39 @@
+"""The numbers of a figure as tables."""
+
+import numpy as np
+
+from plateviz.figures.figure import Figure, side_by_side
+from plateviz.figures.figure_tables import figure_tables
+
+
+def test_every_kind_of_mark_but_names_has_a_table(every_kind):
+    tables = figure_tables(Figure(every_kind.frames[:1]))
+    kinds = {glyphs.name: glyphs.kind for glyphs in every_kind[0].glyphs if len(glyphs)}
+    assert len(tables) == sum(kind != "texts" for kind in kinds.values())
+    points = tables["sources"]
+    assert points["x"].tolist() == [1.0, 2.0, 3.0]
+    assert points["id"].tolist() == ["7", "4611686018427387904", "9"]
+    assert points["x"].description == "x (mm)"
+
+
+def test_image_has_a_row_per_cell_at_its_centre(every_kind):
+    cells = figure_tables(every_kind)["frame1_image"]
+    assert len(cells) == 9
+    is_one = np.asarray(cells[cells.colnames[-1]]) == 1.0
+    assert cells["x"][is_one].tolist() == [0.5, 1.5, 2.5]
+    assert cells["y"][is_one].tolist() == [0.5, 1.5, 2.5]
+
+
+def test_outlines_have_a_row_per_point(every_kind):
+    outlines = figure_tables(every_kind)["frame1_outlines"]
+    assert outlines["path"].tolist() == [0, 0, 0, 1, 1, 1]
+    assert outlines["xs"].tolist() == [0.0, 1.0, 2.0, 1.0, 2.0, 3.0]
+
+
+def test_frames_are_numbered_where_there_are_several(framed_glyphs, marks):
+    figure = side_by_side([framed_glyphs([marks()]), framed_glyphs([marks(rows=1)])], columns=1)
+    tables = figure_tables(figure)
+    assert {name: len(table) for name, table in tables.items()} == {
+        "frame1_sources": 3,
+        "frame2_sources": 1,
+    }

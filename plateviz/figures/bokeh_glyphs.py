@@ -38,7 +38,7 @@ _TRANSPARENT = "rgba(0, 0, 0, 0)"
 # Maximum number of glyphs that one hover describes.
 _HOVER_LIMIT = 3
 # Rows of these kinds are selected by a column; the others are faded while some are.
-SELECTED_BY, _SELECTABLE, _FADED = "id", ("points", "segments"), 0.12
+SELECTED_BY, _SELECTABLE = "id", ("points", "segments")
 
 
 class BokehGlyphs:
@@ -145,7 +145,8 @@ class BokehGlyphs:
 
 def _faded_looks(names: Iterable[str], theme: Theme) -> dict[str, Value]:
     """Return the looks of rows that are not selected, those among them that differ."""
-    looks = {"_alpha": Value(_FADED), "_color": Value(theme.muted)}
+    # Pale and not transparent: where many lie on one another, they must not become dark.
+    looks = {"_alpha": Value(1.0), "_color": Value(theme.grid)}
     return {name: looks[name[-6:]] for name in names if name[-6:] in looks}
 
 

@@ -20,8 +20,8 @@ _HOVER = [
     ("δ", "@{dec}{0.000000}°"),
 ]
 _DASHES = ("solid", "dashed", "dotdash", "dotted")
-# Room for the fields' names beside the outermost corners.
-_MARGIN_X, _MARGIN_Y = 1.4, 1.2
+# Room for the fields' numbers beside the outermost corners.
+_MARGIN_X, _MARGIN_Y = 1.25, 1.2
 
 
 def plot_footprint(
@@ -41,7 +41,7 @@ def plot_footprint(
     half_y = _MARGIN_Y * _largest(sources["y_arcmin"], fields["y_arcmin"])
     points = class_points(sources, "x_arcmin", "y_arcmin", hover=_HOVER)
     return framed(
-        [_outlines(fields), points, _names(fields)],
+        [_outlines(fields), points, _field_numbers(fields)],
         title=_TITLE,
         subtitle=_subtitle(sources, fields),
         x=Axis(_XLABEL, (half_x, -half_x)),
@@ -59,7 +59,11 @@ def _largest(*columns: pd.Series) -> float:
 def _subtitle(sources: pd.DataFrame, fields: pd.DataFrame) -> str:
     counts = sources["source_class"].value_counts()
     parts = [f"{count:,} {name}" for name, count in counts.items()]
-    return f"{', '.join(parts)} sources; {fields['field_id'].nunique()} fields"
+    return f"{', '.join(parts)} sources; fields {_listed(fields)}"
+
+
+def _listed(fields: pd.DataFrame) -> str:
+    return ", ".join(f"{field:.0f}" for field in sorted(fields["field_id"].unique()))
 
 
 def _outlines(fields: pd.DataFrame) -> Glyphs:
@@ -72,19 +76,21 @@ def _outlines(fields: pd.DataFrame) -> Glyphs:
     return paths(outlines, name="outlines", color="line", width=1.2, dashes=dashes)
 
 
-def _names(fields: pd.DataFrame) -> Glyphs:
-    """Return the name of each field, outside its corner farthest from the centre."""
-    corners = [
-        field.loc[np.hypot(field["x_arcmin"], field["y_arcmin"]).idxmax()]
-        for _, field in fields.groupby("field_id")
-    ]
-    x, y = (np.array([float(corner[c]) for corner in corners]) for c in ("x_arcmin", "y_arcmin"))
+def _field_numbers(fields: pd.DataFrame) -> Glyphs:
+    """Return the number of each field, outside the corner that is farthest from all others."""
+    numbers, places = [], [np.zeros(2)]
+    for number, field in fields.groupby("field_id"):
+        corners = field[["x_arcmin", "y_arcmin"]].to_numpy(dtype=float)
+        to_others = np.hypot(*(corners[:, None] - np.array(places)).transpose(2, 0, 1))
+        places.append(corners[to_others.min(axis=1).argmax()])
+        numbers.append(f"{number:.0f}")
+    x, y = np.array(places[1:]).reshape(-1, 2).T
     return texts(
         1.03 * x,
         1.03 * y,
-        [f"field {corner['field_id']:.0f}" for corner in corners],
-        name="field names",
-        size="12px",
+        numbers,
+        name="field numbers",
+        size="13px",
         is_bold=True,
         align=By("side", {"left": "right", "right": "left"}),
         baseline=By("end", {"top": "bottom", "bottom": "top"}),

@@ -67,7 +67,7 @@ def test_footprint_outlines_and_names_every_field(drawings, instrument):
     dashes, counts = np.unique(frame["outlines"].columns["dash"].astype(str), return_counts=True)
     assert len(dashes) == 4
     assert set(counts) == {len(instrument.detectors)}
-    assert set(frame["field names"].values("text")) == {f"field {k}" for k in range(4)}
+    assert set(frame["field numbers"].values("text")) == {"0", "1", "2", "3"}
 
 
 def test_distortion_arrows_are_drawn_to_the_stated_scale(drawings):

@@ -133,4 +133,4 @@ def _outcome(job: Job, run: Run) -> str:
     failures = run.failures()
     if failures:
         return f"plateviz fitted all orbits but {len(failures)}: {next(iter(failures.values()))}"
-    return "plateviz has fitted all orbits: load the page again to see the whole survey"
+    return "plateviz has fitted all orbits: the Survey view shows them"

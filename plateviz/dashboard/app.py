@@ -15,9 +15,12 @@ from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.selection_bar import SelectionBar
+from plateviz.dashboard.views.system_theme import SystemTheme
 from plateviz.solving.solution_store import SolutionStore
 
 _TICK_MILLISECONDS = 30
+# Milliseconds between two looks at a run that is not complete.
+_LOOK = 2000
 _SIDEBAR_WIDTH = 300
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
@@ -26,12 +29,12 @@ def build_app(store: SolutionStore) -> pmui.Page:
     """Return the page of one session over `store`."""
     navigation, ticker, pages = _pages(store)
     session, title = navigation.session, f"plateviz · {store.title}"
-    bar = SelectionBar(navigation)
+    bar, system = SelectionBar(navigation), SystemTheme()
     page = pmui.Page(
         title=title,
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
-        header=[bar, Keyboard(navigation)],
+        header=[bar, Keyboard(navigation), system],
         sidebar=[pages.sidebar],
         main=[pages, bar.windows],
         sidebar_width=_SIDEBAR_WIDTH,
@@ -45,6 +48,7 @@ def build_app(store: SolutionStore) -> pmui.Page:
         page.busy = False
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     _set_theme(session, page.dark_theme)
+    system.param.watch(lambda event: page.param.update(dark_theme=event.new), "is_dark")
     _write_address(navigation)
     ticker.follow(navigation, pages)
     return page
@@ -100,7 +104,7 @@ def _write_address(navigation: Navigation) -> None:
 
 
 class _Ticker:
-    """Polls the job, draws the figures that are due and completes the page, while there is need.
+    """Polls job and run, draws figures that are due and completes the page, while there is need.
 
     The page polls because a job belongs to the server and may outlive the page.
     """
@@ -109,6 +113,7 @@ class _Ticker:
         self._callback = pn.state.add_periodic_callback(
             self._tick, period=_TICK_MILLISECONDS, start=False
         )
+        self._looks = pn.state.add_periodic_callback(self._look, period=_LOOK, start=False)
         self._navigation: Navigation | None = None
         self._pages: Pages | None = None
 
@@ -117,11 +122,14 @@ class _Ticker:
         session = navigation.session
         session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
         session.selection.param.watch(self.wake, ["field", "plates", "detector", "sources"])
-        navigation.param.watch(self.wake, ["view", *WORKSPACES.values(), "run_name", "found"])
+        names = ["view", *WORKSPACES.values(), "run_name", "written", "found"]
+        navigation.param.watch(self.wake, names)
+        navigation.param.watch(self._follow_run, "run_name")
 
         def begin() -> None:
             self._navigation, self._pages = navigation, pages
             self.wake()
+            self._follow_run()
 
         pn.state.onload(begin)
 
@@ -132,6 +140,15 @@ class _Ticker:
             if pn.state.curdoc is not None:
                 # The first figures follow at once, not after the first interval.
                 pn.state.curdoc.add_next_tick_callback(self._tick)
+
+    def _follow_run(self, *_: object) -> None:
+        """Look again and again what a run has that is not complete."""
+        if self._navigation is not None and self._navigation.growth and not self._looks.running:
+            self._looks.start()
+
+    def _look(self) -> None:
+        if self._navigation is None or not self._navigation.look_again():
+            self._looks.stop()
 
     def _tick(self) -> None:
         if self._navigation is None or self._pages is None:

@@ -10,6 +10,7 @@ import pandas as pd
 import param
 
 from plateviz.dashboard.exploration import Exploration
+from plateviz.dashboard.growth import Growth
 from plateviz.dashboard.session import Session
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.queries import SurveyRun
@@ -62,6 +63,8 @@ class Navigation(param.Parameterized):
     orbit_workspace = param.Selector(objects=list(OrbitWorkspace), doc="of the Orbit view")
     source_workspace = param.Selector(objects=list(SourceWorkspace), doc="of the Source view")
     run_name = param.Selector(default=None, objects=[None], doc="run of the survey")
+    written = param.Parameter(default=None, doc="what the run has, see `SurveyRun.written`")
+    growth = param.String(default="", doc="how far the run is; empty once it is complete")
     found = param.ClassSelector(class_=FoundSource, default=None, allow_None=True)
     message = param.String(default="", doc="why no source is shown")
 
@@ -71,6 +74,7 @@ class Navigation(param.Parameterized):
         self.session = session
         self.exploration = Exploration(list(EXPLORABLE))
         self._source_text = ""
+        self._growth: tuple[SurveyRun, Growth] | None = None
         self._runs = {run.name: run for run in session.store.runs()}
         if self._runs:
             self.param["run_name"].objects = list(self._runs)
@@ -78,7 +82,8 @@ class Navigation(param.Parameterized):
             self.run_name = (whole or list(self._runs))[0]
             if self._runs[self.run_name].is_gathered:
                 self.view = View.SURVEY
-        self.param.watch(lambda *_: self._look(), "run_name")
+        self.look_again()
+        self.param.watch(self._begin_run, "run_name")
 
     @property
     def workspace(self) -> Workspace:
@@ -105,12 +110,31 @@ class Navigation(param.Parameterized):
             return (
                 "This survey has not been fitted as a whole. "
                 f"`plateviz survey {origin.directory}` fits all its orbits; "
-                "then reload this page."
+                "reload this page once it has begun."
             )
         return (
             "These are the files of one orbit. For a survey directory, `plateviz survey DIR` "
             "fits all orbits, and `plateviz serve DIR` shows them here."
         )
+
+    def look_again(self) -> bool:
+        """Look what the run on the screen has by now; return whether more may be added to it."""
+        run = self.run
+        if run is None:
+            return False
+        if self._growth is None or self._growth[0] is not run:
+            self._growth = run, Growth(run.survey, run.name)
+        try:
+            written = run.written()
+        except InputError:
+            # A file is being replaced, or the run is: the next look tells.
+            return True
+        with param.parameterized.batch_call_watchers(self):
+            self.growth = self._growth[1].look(written)
+            if written != self.written:
+                self.written = written
+                self._look()
+        return bool(self.growth)
 
     def begin(self, address: Mapping[str, str]) -> None:
         """Show what a page's address requests; invalid values are ignored.
@@ -193,6 +217,10 @@ class Navigation(param.Parameterized):
         if self.run is None or orbit is None or not self.run.has_fitted(orbit):
             return None
         return self.run.result(orbit)
+
+    def _begin_run(self, *_: object) -> None:
+        self.written = None
+        self.look_again()
 
     def _look(self) -> None:
         found, message = None, ""

@@ -136,22 +136,23 @@ def turn_dark(page, figures):
 
 @pytest.fixture
 def open_page(browser):
-    """Open a page of a size; what it complains of fails the test."""
+    """Open a page of a size and colour scheme; what it complains of fails the test."""
     with opening_pages(browser) as open_at:
         yield open_at
 
 
 @contextmanager
 def opening_pages(browser):
-    """Give the function that opens a page of a size; fail in the end if one has complained."""
+    """Give the function that opens a page; fail in the end if one has complained."""
     complaints, contexts = [], []
 
     def complain(message):
         if message.type in ("error", "warning") and not _HARMLESS.search(message.text):
             complaints.append(f"{message.type}: {message.text}")
 
-    def open_at(address, width=1500, height=1000):
-        context = browser.new_context(viewport={"width": width, "height": height})
+    def open_at(address, width=1500, height=1000, colours="light"):
+        viewport = {"width": width, "height": height}
+        context = browser.new_context(viewport=viewport, color_scheme=colours)
         contexts.append(context)
         page = context.new_page()
         page.set_default_timeout(90_000)

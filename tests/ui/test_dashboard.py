@@ -1,15 +1,19 @@
 """The Orbit page in a real Chromium: its figures, what-ifs, fits, theme and address."""
 
 import re
+from xml.etree import ElementTree as ET
+from zipfile import ZipFile
 
 import pytest
 from playwright.sync_api import expect
 
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace
+from solver.io.formats import read_tables
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 from tests.ui.conftest import (
+    BACKGROUNDS,
     VIEWS,
     opening_pages,
     see,
@@ -216,6 +220,30 @@ def test_code_of_the_solution_on_the_screen_is_shown(walked):
     walked.wait_for_url("**workspace=verdict**plates=0-0**")
 
 
+def download(page, menu, label, folder):
+    """Choose what to save in a menu and return the path of the file."""
+    button(page, f"Save: {menu}").click()
+    with page.expect_download() as started:
+        page.get_by_role("menuitem", name=label, exact=True).filter(visible=True).click()
+    path = folder / started.value.suggested_filename
+    started.value.save_as(path)
+    return path
+
+
+def test_a_figure_is_saved_as_pictures_and_data(walked, tmp_path):
+    turn_to_workspace(walked, OrbitWorkspace.VERDICT)
+    picture = download(walked, "Residual map", "PNG", tmp_path)
+    assert picture.name == "orbit-0-residual-map.png"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    drawing = download(walked, "Residual map", "SVG", tmp_path).read_text("utf-8")
+    assert ET.fromstring(drawing).tag.endswith("svg")
+    assert "Residuals on detector 0" in drawing
+    tables = read_tables(download(walked, "Residual map", "Data as FITS", tmp_path))
+    assert len(tables["TAILS"]) == len(set(tables["TAILS"]["id"])) > 10
+    # The picture was drawn in a document of its own, which is gone.
+    assert walked.evaluate("Bokeh.documents.length") == 1
+
+
 def test_figures_have_both_themes(walked):
     turn_dark(walked, diagnostics())
 
@@ -238,7 +266,7 @@ def drag(page, name, start, end):
     page.mouse.up()
 
 
-def test_sources_are_selected_in_one_figure_shown_in_all_and_left_out(page):
+def test_sources_are_selected_in_one_figure_shown_in_all_saved_and_left_out(page, tmp_path):
     page.locator(".figure-footprint:visible canvas").first.wait_for(state="attached")
     bar = page.get_by_text(re.compile(r"^[\d,]+ sources? selected$"))
     # A drag that begins beside the frame selects nothing, and is no error.
@@ -254,6 +282,12 @@ def test_sources_are_selected_in_one_figure_shown_in_all_and_left_out(page):
     expect(window.locator(".tabulator-row").first).to_contain_text(re.compile("reference|artif"))
     page.keyboard.press("Escape")
     expect(window).to_be_hidden()
+    with ZipFile(download(page, "selected sources", "CSV", tmp_path)) as archive:
+        archive.extractall(tmp_path)
+    (sources,) = read_tables(tmp_path / "sources.csv").values()
+    assert len(sources) == n_selected
+    (measurements,) = read_tables(tmp_path / "measurements.csv").values()
+    assert set(measurements["source_id"]) == set(sources["source_id"])
     page.get_by_role("button", name="Leave out of the fit").click()
     expect(shown(page)).to_contain_text("without ")
     until(page, lambda: selected(page, "footprint")[1] == n_sources - n_selected)
@@ -391,7 +425,8 @@ def test_keys_do_what_their_list_says(page):
     assert "detector=0" in page.url
 
 
-def test_an_address_of_nonsense_opens_the_page(served, open_page):
-    page = open_page(f"{served}?field=%FF&plates=1e9-x&detector=none&orbit=%00")
+def test_an_address_of_nonsense_opens_the_page_in_the_theme_of_the_system(served, open_page):
+    page = open_page(f"{served}?field=%FF&plates=1e9-x&detector=none&orbit=%00", colours="dark")
     page.locator(".figure-footprint canvas").first.wait_for(state="attached")
     expect(page.get_by_role("combobox", name="Field")).to_have_text("all")
+    until(page, lambda: set(page.evaluate(BACKGROUNDS).values()) == {"#121212"})

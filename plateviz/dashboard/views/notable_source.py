@@ -21,7 +21,7 @@ class NotableSourceLink(pn.viewable.Viewer):
             variant="text", icon="insights", size="small", margin=(4, 2), sx=_STYLE
         )
         self._button.on_click(lambda _: navigation.open_source(self._source_id))
-        navigation.param.watch(self._read, "run_name")
+        navigation.param.watch(self._read, ["run_name", "written"])
         self._read()
 
     def __panel__(self) -> pn.viewable.Viewable:

@@ -6,7 +6,9 @@ from functools import partial
 import pandas as pd
 import panel as pn
 import panel_material_ui as pmui
+from astropy.table import Table
 
+from plateviz.dashboard.downloads import described
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
@@ -22,6 +24,8 @@ from plateviz.dashboard.views.markup import (
 from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.run_selector import run_selector
+from plateviz.dashboard.views.save_button import SaveButton
+from plateviz.dashboard.views.save_choices import Saved, table_choices
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.table import DataTable
 from plateviz.dashboard.views.workspace import workspace
@@ -40,14 +44,13 @@ from plateviz.tables import (
 from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE, SOURCES_OF_RUN, in_words
 from plateviz.tables.survey_tables import SourceTables
 from plateviz.tables.verdict import source_verdict
+from solver.data.survey_schema import HISTORY, MOTIONS
 
 _INVITATION = (
     "Write a source's id on the left, choose one below, or tap its point in a figure of the "
     "Survey or the Orbit view and open it."
 )
-_NO_SOURCES = (
-    "No orbit of this run was fitted when this page was loaded. Load it again to see its sources."
-)
+_NO_SOURCES = "No orbit of this run is fitted yet. Its sources are listed here once one is."
 
 
 class SourcePage(pn.viewable.Viewer):
@@ -67,6 +70,9 @@ class SourcePage(pn.viewable.Viewer):
         self._invitation = _INVITATION
         self._head, self._strip, self._motion = markup_pane(), markup_pane(), markup_pane()
         self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row)
+        self._save = SaveButton(
+            "Orbits and motion", table_choices(self._subject, self._source_tables)
+        )
         self._list = DataTable(SOURCES_OF_RUN, self._open_source, page_size=20)
         self.figures = FigureGrid([self._figure_view(f) for f in source_figures()], wake)
         self._stack = Stack(
@@ -96,8 +102,8 @@ class SourcePage(pn.viewable.Viewer):
             margin=0,
         )
         self._entry.param.watch(lambda event: navigation.find_source(event.new), "value")
-        navigation.param.watch(self._list_sources, "run_name")
-        navigation.param.watch(self._show, ["run_name", "found", "message"])
+        navigation.param.watch(self._list_sources, ["run_name", "written"])
+        navigation.param.watch(self._show, ["run_name", "written", "found", "message"])
         navigation.param.watch(self._show_workspace, "source_workspace")
         self._session.param.watch(self._show, "theme")
         self._show_workspace()
@@ -114,14 +120,29 @@ class SourcePage(pn.viewable.Viewer):
             self._motion,
             heading("Orbits"),
             self._orbits,
+            self._save,
             sizing_mode="stretch_width",
         )
+
+    def _subject(self) -> str:
+        found = self._navigation.found
+        return "" if found is None else f"source-{found.source_id}"
+
+    def _source_tables(self) -> dict[str, Table]:
+        found = self._navigation.found
+        if found is None:
+            return {}
+        tables = {"orbits": described(found.history, HISTORY)}
+        if found.motion is not None:
+            tables["motion"] = described(found.motion.to_frame().T.infer_objects(), MOTIONS)
+        return tables
 
     def _figure_view(self, figure: SourceFigure) -> FigureView:
         return FigureView(
             figure,
             partial(self._plot, figure),
             actions=PointActions({"orbit_id": self._open_orbit}),
+            saved=Saved(self._subject),
             theme=self._session.theme,
         )
 
@@ -141,6 +162,7 @@ class SourcePage(pn.viewable.Viewer):
 
     def _show(self, *_: object) -> None:
         theme, found = self._session.theme, self._navigation.found
+        self._save.theme = theme
         self._rest.visible = found is not None
         self._choice.visible = found is None and self._navigation.run is not None
         if found is None:

@@ -6,7 +6,9 @@ from functools import partial
 import pandas as pd
 import panel as pn
 import panel_material_ui as pmui
+from astropy.table import Table
 
+from plateviz.dashboard.downloads import described
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
@@ -21,6 +23,8 @@ from plateviz.dashboard.views.markup import (
 from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.run_selector import run_selector
+from plateviz.dashboard.views.save_button import SaveButton
+from plateviz.dashboard.views.save_choices import Saved, table_choices
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.table import DataTable
 from plateviz.dashboard.views.workspace import workspace
@@ -32,14 +36,9 @@ from plateviz.reports.summary_strip import strip
 from plateviz.runs.load_tables import survey_tables
 from plateviz.tables import orbit_list, orbit_states, run_strip
 from plateviz.tables.headings import ORBITS_OF_RUN
-from plateviz.tables.run_health import MISSING
 from plateviz.tables.survey_tables import SurveyTables
 from plateviz.tables.verdict import run_verdict
-
-_INCOMPLETE = (
-    "This run is not complete. Orbits that have been fitted since this page was loaded appear when "
-    "it is loaded again."
-)
+from solver.data.survey_schema import MOTIONS, RUN_ORBITS
 
 
 class SurveyPage(pn.viewable.Viewer):
@@ -62,13 +61,17 @@ class SurveyPage(pn.viewable.Viewer):
         self._orbits = self._motions = pd.DataFrame()
         self._head, self._strip = markup_pane(), markup_pane()
         self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=8)
+        self._save = SaveButton(
+            "Orbits and motions", table_choices(self._subject, self._run_tables)
+        )
         self._stack = Stack({one: partial(self._workspace, one) for one in SurveyWorkspace})
         self._below = pmui.Column(self._stack, sizing_mode="stretch_width", margin=0)
         self._column = pmui.Column(self._head, self._below, sizing_mode="stretch_width", margin=0)
         self.sidebar = pmui.Column(
             heading("Shown"), *run_selector(navigation), sizing_mode="stretch_width", margin=0
         )
-        navigation.param.watch(self._read, "run_name")
+        navigation.param.watch(self._read, ["run_name", "written"])
+        navigation.param.watch(self._show_head, "growth")
         navigation.param.watch(self._show_workspace, "survey_workspace")
         self._session.param.watch(self._show, "theme")
         self._session.selection.param.watch(self._show_selected, "sources")
@@ -90,8 +93,17 @@ class SurveyPage(pn.viewable.Viewer):
         grid = FigureGrid(views, self._wake, columns=1 if is_first else 2)
         self._grids[one] = grid
         self._show_selected()
-        above = [self._strip, NotableSourceLink(self._navigation), self._table]
+        above = [self._strip, NotableSourceLink(self._navigation), self._table, self._save]
         return workspace(grid, *(above if is_first else ()))
+
+    def _subject(self) -> str:
+        return f"run-{self._navigation.run_name}"
+
+    def _run_tables(self) -> dict[str, Table]:
+        tables = {"orbits": described(self._orbits, RUN_ORBITS)}
+        if len(self._motions):
+            tables["motions"] = described(self._motions, MOTIONS)
+        return tables
 
     def _figure_view(self, figure: SurveyFigure) -> FigureView:
         session = self._session
@@ -99,6 +111,7 @@ class SurveyPage(pn.viewable.Viewer):
             figure,
             partial(self._plot, figure),
             actions=PointActions({"orbit_id": self._open_orbit}, session.select_sources),
+            saved=Saved(self._subject),
             theme=session.theme,
         )
 
@@ -120,20 +133,25 @@ class SurveyPage(pn.viewable.Viewer):
 
     def _show(self, *_: object) -> None:
         theme, words = self._session.theme, self._navigation.why_no_run
+        self._save.theme = theme
         self._below.visible = not words
         if words:
             self._head.object = paragraph(words, "empty", theme)
             return
-        title = titled("Run", self._navigation.run_name)
-        verdict = judged(run_verdict(self._orbits, self._motions))
-        head = f"<div class='head'>{verdict}{title}</div>"
+        self._show_head()
         self._strip.object = themed(strip(run_strip(self._orbits, self._motions)), theme)
-        if (self._orbits["status"] == MISSING).any():
-            head += paragraph(_INCOMPLETE, "caption", theme)
-        self._head.object = themed(head, theme)
         self._table.show(orbit_list(self._orbits), theme, orbit_states(self._orbits))
         for grid in self._grids.values():
             grid.change(theme)
+
+    def _show_head(self, *_: object) -> None:
+        if self._navigation.run is None:
+            return
+        title = titled("Run", self._navigation.run_name)
+        head = f"<div class='head'>{judged(run_verdict(self._orbits, self._motions))}{title}</div>"
+        if self._navigation.growth:
+            head += paragraph(self._navigation.growth, "caption", self._session.theme)
+        self._head.object = themed(head, self._session.theme)
 
     def _show_selected(self, *_: object) -> None:
         for grid in self._grids.values():

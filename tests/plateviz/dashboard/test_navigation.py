@@ -9,6 +9,7 @@ import pytest
 from plateviz.dashboard.navigation import Navigation, View
 from plateviz.dashboard.session import Session, Stage
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
+from plateviz.runs.queries import Written
 from plateviz.solving.origin import OrbitFiles, SurveyFolder
 from plateviz.solving.solution_store import SolutionStore
 from solver.data.settings import FitSettings
@@ -24,7 +25,12 @@ class FakeRun:
         self.is_gathered = is_complete
         self._survey = survey
         self._result = replace(result, settings=settings or FitSettings())
+        self.survey = Path("sky")
+        self.n_fitted = 2 if is_complete else 1
         self.read = []
+
+    def written(self):
+        return Written(2, self.n_fitted, 0, self.is_gathered, self.is_complete)
 
     def has_fitted(self, orbit):
         return orbit == 0
@@ -260,3 +266,17 @@ def test_source_of_a_damaged_run_is_reported(navigation, run):
     navigation.begin({"source": "17"})
     assert navigation.found is None
     assert navigation.message == "history.parquet: expected the file that was written"
+
+
+def test_what_is_added_to_a_run_is_seen_at_the_next_look(fit_result, survey):
+    run = FakeRun("default", survey, fit_result, is_complete=False)
+    navigation = Navigation(Session(SurveyStore(fit_result, [run])))
+    changed = []
+    navigation.param.watch(lambda event: changed.append(event.new), "written")
+    assert navigation.growth.startswith("1 of 2 orbits are done")
+    assert navigation.look_again()
+    assert changed == []
+    run.n_fitted, run.is_complete, run.is_gathered = 2, True, True
+    assert not navigation.look_again()
+    assert changed == [run.written()]
+    assert navigation.growth == ""

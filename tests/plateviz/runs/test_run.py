@@ -3,11 +3,12 @@
 import pytest
 
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.queries import SurveyRun, Written
 from plateviz.runs.run import runs_of
 from plateviz.tables import source_list
 from solver.data.settings import FitSettings
 from solver.errors import InputError
+from solver.io.survey import survey_orbits
 
 ODD = FitSettings(
     prior_widths={"position_angle": float("inf")}, prior_shifts={"detector_x[2]": -5.0}
@@ -64,6 +65,15 @@ def test_failure_is_recorded_until_the_orbit_is_fitted(survey_folder, fit_result
     run.keep(1, fit_result, fit_result.sources)
     assert run.failures() == {}
     assert run.complete_orbits() == [1]
+
+
+def test_what_is_written_is_counted(survey_folder, fit_result):
+    run = begin_run(survey_folder, "counted", FitSettings())
+    n_orbits = len(survey_orbits(survey_folder))
+    assert SurveyRun(run).written() == Written(n_orbits, 0, 0, False, False)
+    run.keep_failure(1, "orbit 1: no light")
+    run.keep(0, fit_result, fit_result.sources)
+    assert SurveyRun(run).written() == Written(n_orbits, 1, 1, False, False)
 
 
 def test_incomplete_orbit_is_not_listed(survey_folder):

@@ -1,0 +1,62 @@
+"""Growth of a run that is being fitted: how far it is, and when the rest will be done."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from shlex import quote
+
+from plateviz.runs.queries import Written
+
+# After so many seconds without another orbit, nobody seems to fit the rest.
+_PATIENCE = 120.0
+# Number of new orbits from which their rate is stated.
+_FEW = 2
+
+
+class Growth:
+    """What has been seen of one run, look by look."""
+
+    def __init__(
+        self, directory: Path, run: str, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Begin without a look.
+
+        Parameters
+        ----------
+        directory : of the survey
+        run : name of the run
+        clock : returns a time in seconds
+        """
+        self._command = f"`plateviz survey {quote(str(directory))} --run {quote(run)}`"
+        self._clock = clock
+        self._first: tuple[float, int] | None = None
+        self._last: tuple[float, Written] | None = None
+
+    def look(self, written: Written) -> str:
+        """Take what the run has now; return how far it is, or "" if nothing is to come."""
+        now, done = self._clock(), written.n_fitted + written.n_failed
+        if self._first is None:
+            self._first = now, done
+        if self._last is None or self._last[1] != written:
+            self._last = now, written
+        is_over = done >= written.n_orbits
+        if written.is_complete or (is_over and written.is_gathered):
+            return ""
+        if is_over:
+            words = f"All {done:,} orbits are done; the tables over all of them are missing yet."
+        else:
+            words = f"{done:,} of {written.n_orbits:,} orbits are done{self._rest(now, written)}."
+        if now - self._last[0] > _PATIENCE:
+            return f"{words} Nothing has been added for some minutes: {self._command} continues it."
+        return f"{words} This page follows by itself."
+
+    def _rest(self, now: float, written: Written) -> str:
+        """Return the rate and the time that the rest takes at that rate."""
+        started, before = self._first or (now, 0)
+        done = written.n_fitted + written.n_failed
+        if done - before < _FEW or self._last is None:
+            return ""
+        per_second = (done - before) / (self._last[0] - started)
+        seconds = (written.n_orbits - done) / per_second
+        left = f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+        return f", {60 * per_second:.2g} per minute, about {left} left"

@@ -430,3 +430,5 @@ def test_an_address_of_nonsense_opens_the_page_in_the_theme_of_the_system(served
     page.locator(".figure-footprint canvas").first.wait_for(state="attached")
     expect(page.get_by_role("combobox", name="Field")).to_have_text("all")
     until(page, lambda: set(page.evaluate(BACKGROUNDS).values()) == {"#121212"})
+    background = "getComputedStyle(document.body).backgroundColor"
+    until(page, lambda: page.evaluate(background) == "rgb(18, 18, 18)")

@@ -136,7 +136,7 @@ class SaveButton(pn.custom.JSComponent):
                  font: 14px Helvetica, Arial, sans-serif; color: var(--muted); cursor: pointer; }
         .save > button { height: 24px; padding: 0 6px; }
         .corner > button { width: 24px; padding: 0; }
-        .bar > button { height: 30px; padding: 0 5px; font: 500 12px inherit;
+        .bar > button { height: 30px; padding: 0 5px; font-size: 12px; font-weight: 500;
                         font-family: inherit; }
         .bar > button, .bar > button:hover, .bar > button:focus-visible { color: #ffffff; }
         .bar > button:hover, .bar > button:focus-visible { background: rgb(255 255 255 / 15%); }

@@ -36,7 +36,7 @@ class SelectionBar(pn.viewable.Viewer):
         self._parts: list[pn.viewable.Viewable] = []
         self._session.selection.param.watch(self._show, "sources")
         self._session.choices.param.watch(self._show, "exclusions")
-        self._session.param.watch(self._show, "shown")
+        self._session.param.watch(self._show, ["shown", "theme"])
         navigation.param.watch(self._show, "view")
         self._show()
 
@@ -51,6 +51,8 @@ class SelectionBar(pn.viewable.Viewer):
         self._open = self._button("Open", self._open_source)
         self._leave_out = self._button("Leave out of the fit", session.leave_out_selection)
         self._put_back = self._button("Put back into the fit", session.put_back_selection)
+        choices = table_choices(self._subject, self._tables)
+        self._save = SaveButton("selected sources", choices, place="bar")
         self._invert = self._button("Invert", session.invert_selection)
         self._parts = [
             self._words,
@@ -59,7 +61,7 @@ class SelectionBar(pn.viewable.Viewer):
             self._leave_out,
             self._put_back,
             self._invert,
-            SaveButton("selected sources", table_choices(self._subject, self._tables), place="bar"),
+            self._save,
             self._button("Clear", self._clear),
         ]
         self.windows.append(self._list)
@@ -84,6 +86,7 @@ class SelectionBar(pn.viewable.Viewer):
         self._leave_out.visible = is_orbit and not session.is_selection_left_out
         self._put_back.visible = is_orbit and session.is_selection_left_out
         self._invert.visible = is_orbit
+        self._save.theme = session.theme
         self._list.show()
         if list(self._row) != self._parts:
             self._row[:] = self._parts

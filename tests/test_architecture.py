@@ -39,7 +39,6 @@ FOLDERS = {
         "reports",
         "dashboard",
         "notebook",
-        "gaia",
         "cli",
     ),
 }

@@ -1,4 +1,4 @@
-"""The command line: one module per command, with the options and the output they share.
+"""The command line: one module per command, with what several commands or only one of them need.
 
 Imports everything below.
 """

@@ -52,8 +52,8 @@ def gaia(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
 ) -> None:
     """Fetch stars of Gaia DR3 for a simulation; later calls read them from the cache."""
+    from plateviz.cli.gaia_archive import fetch_stars, require_new_table, star_query, write_stars
     from plateviz.cli.output import print_json
-    from plateviz.gaia.archive import fetch_stars, require_new_table, star_query, write_stars
     from plateviz.solving.progress import reporting
 
     start = time.perf_counter()

@@ -11,7 +11,7 @@ from astropy.io import fits, votable
 from astropy.table import Table
 from astroquery.utils.tap import TapPlus
 
-from plateviz.gaia.archive import ARCHIVE, StarQuery, cached_file, star_query
+from plateviz.cli.gaia_archive import ARCHIVE, StarQuery, cached_file, star_query
 from solver.errors import InputError
 from solver.io.read_orbit import find_catalogue
 from solver.io.survey import read_survey_orbit
@@ -19,7 +19,7 @@ from solver.model.correlation import CORRELATIONS
 from solver.simulate.catalogue import truth_catalogue
 from solver.simulate.gaia import GAIA, gaia_stars
 from solver.simulate.settings import SurveySettings
-from tests.plateviz.gaia.tap_service import Service, archive_table, serving
+from tests.plateviz.cli.tap_service import Service, archive_table, serving
 
 SURVEY = SurveySettings(n_stars=600, n_reference=400, n_artificial=0, seed=3)
 FORMATS = (".fits", ".ecsv", ".vot", ".parquet")
@@ -272,7 +272,7 @@ def test_unwritable_cache_is_reported_before_the_query(run, url, service, tmp_pa
 
 
 def test_answer_at_the_row_limit_is_refused(run, url, tmp_path, monkeypatch):
-    monkeypatch.setattr("plateviz.gaia.archive.MOST_STARS", 300)
+    monkeypatch.setattr("plateviz.cli.gaia_archive.MOST_STARS", 300)
     assert_refused(run, tmp_path, ["--url", url], "expected from 1 to 299 stars, found 300")
 
 

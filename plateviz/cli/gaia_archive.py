@@ -10,7 +10,7 @@ import numpy as np
 from astropy.table import Column, Table
 
 from plateviz.cache import cache_directory
-from plateviz.gaia.tap_query import answer_to, service_name
+from plateviz.cli.tap_query import answer_to, service_name
 from solver.data import columns
 from solver.errors import InputError
 from solver.io.atomic import require_writable, write_atomically

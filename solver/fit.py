@@ -289,7 +289,7 @@ def _result(
         "fit": solved - prepared,
         "diagnose": time.perf_counter() - solved,
     }
-    summary = {**summarise(solution, settings, seconds), **estimate.figures}
+    summary = {**summarise(solution, settings, seconds), **estimate.entries}
     if places is not None:
         summary["truth"] = truth_summary(sources, places)
     result = FitResult(

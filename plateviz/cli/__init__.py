@@ -1,4 +1,4 @@
-"""The command line: one module per command, with what several commands or only one of them need.
+"""The commands, one module each, and the modules that only commands need.
 
 Imports everything below.
 """

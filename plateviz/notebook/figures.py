@@ -23,7 +23,7 @@ PlotFigure = Callable[[], "Figure"]
 """Returns a figure."""
 
 _THEMES = ("light", "dark")
-# Width of most figures, screen pixels.
+# Width of a caption, which is that of most figures, screen pixels.
 _CAPTION_WIDTH = 560
 
 
@@ -55,7 +55,7 @@ class NotebookFigure(Displayed):
     """
 
     def __init__(self, name: str, title: str, caption: str, plot: PlotFigure, theme: str) -> None:
-        """Describe the figure; `plot` is called when it is displayed."""
+        """Store the description; displaying the figure calls `plot`."""
         self.name, self.title, self.caption = name, title, caption
         self._plot, self._theme = plot, theme
 

@@ -36,7 +36,7 @@ def open(
     path : a survey directory, a result file of `plateviz fit`, or, with `reference`, the
         measurements and exposures of an orbit, as for `plateviz fit`
     reference : the reference catalogue of the measurements
-    truth : the true catalogue of a simulation, with measurements only
+    truth : the true catalogue of a simulation; accepted only with the files of an orbit
     instrument : a TOML file, with measurements or a solution; the mini-mock's by default
     orbit : id of the orbit, with measurements of several orbits
     run : name of a run of the survey; the first complete run by default

@@ -156,7 +156,7 @@ class OpenOrbit(HasSolver):
         result = run.result(self._data.orbit_id)
         origin = f"{self._solver.origin.title}, run {run.name}"
         return OpenSolution(
-            result, self._instrument, origin, f"{self._call}.solution", refits=_Refits(self)
+            result, self._instrument, origin, f"{self._call}.solution", what_ifs=_WhatIfs(self)
         )
 
     def _solve(self, settings: FitSettings, base: OpenSolution | None) -> OpenSolution:
@@ -167,7 +167,7 @@ class OpenOrbit(HasSolver):
         )
         call = f"{self._call}.{'what_if' if base else 'fit'}(...)"
         return OpenSolution(
-            result, self._instrument, self.origin, call, other=base, refits=_Refits(self)
+            result, self._instrument, self.origin, call, other=base, what_ifs=_WhatIfs(self)
         )
 
     def _tables(self) -> dict[str, OpenTable]:
@@ -179,8 +179,8 @@ class OpenOrbit(HasSolver):
         }
 
 
-class _Refits:
-    """The refits of an orbit, for its solutions."""
+class _WhatIfs:
+    """Computes the what-ifs of the solutions of an orbit."""
 
     def __init__(self, orbit: OpenOrbit) -> None:
         self._orbit = orbit

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
 
 
-class Refits(Protocol):
-    """Fits the orbit of a solution again."""
+class WhatIfs(Protocol):
+    """Computes what-ifs of a solution."""
 
     def what_if(self, base: "OpenSolution", changes: Mapping[str, object]) -> "OpenSolution":
         """Return the what-if of `base` with some settings changed, by keyword."""
@@ -51,7 +51,7 @@ class OpenSolution(HasFigures):
     origin : name of its origin
     call : Python code that returns this object, for reports
     other : solution to compare with, or None
-    refits : fits the orbit again; None for a solution without measurements
+    what_ifs : computes what-ifs of the orbit; None for a solution without measurements
     """
 
     result: FitResult
@@ -59,7 +59,7 @@ class OpenSolution(HasFigures):
     origin: str
     call: str
     other: "OpenSolution | None" = None
-    refits: Refits | None = None
+    what_ifs: WhatIfs | None = None
 
     @property
     def settings(self) -> FitSettings:
@@ -178,12 +178,12 @@ class OpenSolution(HasFigures):
         InputError
             If a setting is invalid, or the solution has no measurements.
         """
-        if self.refits is None:
+        if self.what_ifs is None:
             raise InputError(
                 f"{self.origin}: expected the measurements of an orbit to fit again, found a "
                 "solution alone; plateviz.open(OBS, REF) opens the orbit"
             )
-        return self.refits.what_if(self, settings)
+        return self.what_ifs.what_if(self, settings)
 
     def report(self, path: str | PathLike[str], overwrite: bool = False) -> Path:
         """Write the solution, with any comparison, as one self-contained HTML file.

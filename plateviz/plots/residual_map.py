@@ -30,7 +30,7 @@ def plot_residual_map(
     arrow_scale: float | None = None,
     width: int = FRAME_WIDTH,
 ) -> Figure:
-    """Draw residual vectors to a stated scale; above 2,000, their means in bins.
+    """Draw residual vectors to a stated scale, or their means in bins if there are over 2,000.
 
     Parameters
     ----------

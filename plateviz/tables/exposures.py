@@ -1,4 +1,4 @@
-"""The exposures of a result: the selected ones, and their times."""
+"""Measurements of selected exposures and detectors, and the times of exposures."""
 
 from collections.abc import Iterable
 
@@ -15,7 +15,7 @@ _MINUTES_PER_DAY = 1440.0
 def selected(
     result: FitResult, exposures: Iterable[ExposureKey] | None, detector_id: int | None
 ) -> np.ndarray:
-    """Return whether each measurement is of selected exposures and of a detector, shape (n,).
+    """Return which measurements are of the selected exposures and of a detector, shape (n,).
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ class Estimate(NamedTuple):
     conditional, marginal : covariance of each source, mas^2, if the engine computes it
     calibration : marginal covariance of the calibration, if the engine computes it
     losses : loss of every step, if the engine has a loss
-    figures : further entries of the summary, specific to the engine
+    entries : further entries of the summary, specific to the engine
     """
 
     mode: Mode
@@ -26,4 +26,4 @@ class Estimate(NamedTuple):
     marginal: Float[np.ndarray, "src 2 2"] | None = None
     calibration: Float[np.ndarray, "calib calib"] | None = None
     losses: Float[np.ndarray, " step"] | None = None
-    figures: Mapping[str, object] = {}
+    entries: Mapping[str, object] = {}

@@ -15,7 +15,7 @@ _NEAR = 0.5
 _TIGHTENED = 1e4
 
 
-class _Figures(NamedTuple):
+class _Numbers(NamedTuple):
     residual_pix: float
     sigma_pix: float
     half_width_pix: float
@@ -28,21 +28,21 @@ def likely_cause(problem: Problem, mode: Mode) -> str:
     ----------
     mode : from an engine, without a reduced system
     """
-    figures = _figures(problem, mode)
-    if mode.status is FitStatus.NOT_FINITE or not np.isfinite(figures.residual_pix):
+    numbers = _numbers(problem, mode)
+    if mode.status is FitStatus.NOT_FINITE or not np.isfinite(numbers.residual_pix):
         return (
             "Some estimate of an exposure, or a measurement, is likely no number or in a wrong "
             "unit: check obstime (MJD), ra_est, dec_est and pa_est (deg), focal_length (um)."
         )
-    if figures.residual_pix > _NEAR * figures.half_width_pix:
+    if numbers.residual_pix > _NEAR * numbers.half_width_pix:
         return (
-            f"The stars are predicted some {figures.residual_pix:.0f} pixels from where they were "
+            f"The stars are predicted some {numbers.residual_pix:.0f} pixels from where they were "
             "measured, so an estimate of the exposures is likely wrong: check ra_est, dec_est and "
             "pa_est (deg), focal_length (um), and that source_id means the same in both files."
         )
     if _tight_priors_hold_it(problem, mode):
         return (
-            f"The measurements have uncertainties sx, sy of {figures.sigma_pix:.2g} pixel (median) "
+            f"The measurements have uncertainties sx, sy of {numbers.sigma_pix:.2g} pixel (median) "
             "and outweigh the priors so far that rounding hides these: check the unit of sx and "
             "sy, or narrow the priors that were widened."
         )
@@ -53,12 +53,12 @@ def likely_cause(problem: Problem, mode: Mode) -> str:
     )
 
 
-def _figures(problem: Problem, mode: Mode) -> _Figures:
+def _numbers(problem: Problem, mode: Mode) -> _Numbers:
     measurements = problem.measurements
     sigma = float(np.median(measurements.sigma))
     chi2 = mode.equations.gradient.chi2
     in_sigmas = np.sqrt(chi2 / (2 * problem.n_obs))
-    return _Figures(in_sigmas * sigma, sigma, float(np.abs(measurements.measured).max()))
+    return _Numbers(in_sigmas * sigma, sigma, float(np.abs(measurements.measured).max()))
 
 
 def _tight_priors_hold_it(problem: Problem, mode: Mode) -> bool:

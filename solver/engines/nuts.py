@@ -54,7 +54,7 @@ class Chains(NamedTuple):
 
 
 class _Mixing(NamedTuple):
-    """Worst mixing figures of all parameters, and the library that computed them.
+    """Worst mixing numbers of all parameters, and the library that computed them.
 
     `of_sigmas` is the effective sample size of the standard deviations.
     """
@@ -79,7 +79,7 @@ def sample(
     Returns
     -------
     The mean of the samples with their covariances; conditional covariances come from the
-    problem linearised there. `figures` has divergences, R-hat and effective sample size.
+    problem linearised there. `entries` has divergences, R-hat and effective sample size.
     """
     begin, options = time.perf_counter(), settings.nuts
     start = find_mode(problem, settings)
@@ -105,7 +105,7 @@ def sample(
         Mode(*at, eliminate_sources(equations, problem.priors), status, trace, equations),
         marginal=np.einsum("nsa,nsb->sab", residual, residual) / (len(residual) - 1),
         calibration=np.cov(theta, rowvar=False),
-        figures=_figures(chains, mixing, options),
+        entries=_entries(chains, mixing, options),
     )
 
 
@@ -198,7 +198,7 @@ def _mixing(chains: Chains) -> _Mixing:
     )
 
 
-def _figures(chains: Chains, mixing: _Mixing, options: NutsSettings) -> dict[str, object]:
+def _entries(chains: Chains, mixing: _Mixing, options: NutsSettings) -> dict[str, object]:
     return {
         "chains": options.chains,
         "samples": options.chains * options.samples,

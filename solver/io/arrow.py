@@ -1,4 +1,4 @@
-"""Tables of Apache Arrow, as which CSV and Parquet are read, as tables of astropy."""
+"""Convert tables of Apache Arrow, which the readers of CSV and Parquet return, to astropy."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Checks of the files that a command is to write, made before any work."""
+"""Checks of the output files of a command, before the command starts its work."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -25,8 +25,8 @@ def check_output(
     Raises
     ------
     InputError
-        If the suffix is another, the folder cannot be written, `path` is one of the inputs under
-        this or another name, or it exists and must not be replaced.
+        If the suffix is not one of `suffixes`, the folder cannot be written, `path` is one of the
+        inputs under this or another name, or it exists and must not be replaced.
     """
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError(

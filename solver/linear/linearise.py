@@ -2,8 +2,9 @@
 
 Each measurement depends on one source, exposure and detector, so the derivative with respect to
 a whole group is one forward-mode pass with every element of the group moved at once.
-The distortion coefficients are shared by all measurements, but act only through the
-displacement they add, so its derivative and the basis replace theirs.
+All measurements share the distortion coefficients, which act only through a displacement on the
+focal plane. The derivative by this displacement and the values of the basis are kept, instead of
+one derivative per coefficient.
 """
 
 from collections.abc import Callable

@@ -10,13 +10,13 @@ from solver.data.result import FitResult
 
 # Limits for svi: of the shifts in marginal sigmas, and of relative changes of conditional sigmas.
 _MEANS, _SIGMAS = 0.05, 0.02
-# Probability that a figure with Monte-Carlo errors exceeds its limit by chance.
+# Probability that a number with Monte-Carlo errors exceeds its limit by chance.
 _CHANCE = 1e-3
 _AXES = ("ra", "dec")
 
 
 class Comparison(NamedTuple):
-    """One figure that compares an engine with gauss-newton, and its limit."""
+    """One number that compares an engine with gauss-newton, and its limit."""
 
     engine: str
     what: str
@@ -25,7 +25,7 @@ class Comparison(NamedTuple):
 
     @property
     def agrees(self) -> bool:
-        """Whether the figure is within its limit."""
+        """Whether the number is within its limit."""
         return bool(self.found <= self.limit)
 
 

@@ -4,8 +4,8 @@ Every order is fitted as the highest one with the coefficients above it fixed at
 one compiled model and one set of tiles serve all orders. The solution of each order is the warm
 start of the next lower one.
 
-With H the Hessian of half the posterior's chi2 and X its value at the mode, both over the
-same measurements and priors for every order, the log evidence in Laplace's approximation is
+Let X be the posterior's chi2 at the mode and H the Hessian of X / 2, both over the same
+measurements and priors for every order. The log evidence in Laplace's approximation is
 
     log Z = log prior density at its centre - sum log(sigma sqrt(2 pi)) - (X + log |H / 2 pi|) / 2.
 
@@ -21,9 +21,9 @@ subscripts of all measurements and of those of the other sources,
 which are identities of a linear model that do not need M. The position of every reserved source
 is free within its catalogue errors, and correlations of the reserved sources through the
 calibration are included. If model and sigmas are right, chi2 has twice as many degrees of
-freedom as there are reserved measurements, for every order: too low an order raises it, but a
-needless term does not, since M includes the uncertainty that it adds to the prediction. The
-density penalises this uncertainty by log |M|, so it is highest for the order that predicts best.
+freedom as there are reserved measurements, for every order. Too low an order raises chi2. A
+needless term does not, because M includes the uncertainty that the term adds to the prediction;
+log |M| in the density penalises it. The order that predicts best has the highest density.
 """
 
 from collections.abc import Callable
@@ -95,8 +95,8 @@ def compare_orders(
             lower = at_order(problem, order)
             mode = _solve_from(mode, current, lower, settings, progress)
             current = lower
-        held_out = judge_reserved(current, mode, reserved, settings, progress)
-        rows.append({"order": order, **_figures(current, mode, settings), **_columns(held_out)})
+        prediction = judge_reserved(current, mode, reserved, settings, progress)
+        rows.append({"order": order, **_numbers(current, mode, settings), **_columns(prediction)})
         rows[-1]["n_reserved"] = int(reserved.sum())
     table = pd.DataFrame(rows[::-1])
     return table[ORDERS.names].astype({column.name: column.dtype for column in ORDERS})
@@ -180,26 +180,26 @@ def _log_evidence(problem: Problem, mode: Mode) -> float:
     return log_evidence(mode, problem.priors, log_sigma, 2 * problem.n_obs)
 
 
-def _figures(problem: Problem, mode: Mode, settings: FitSettings) -> dict[str, object]:
+def _numbers(problem: Problem, mode: Mode, settings: FitSettings) -> dict[str, object]:
     """Return the columns of `schema.ORDERS` that describe the fit of all measurements."""
-    figures: dict[str, object] = {
+    numbers: dict[str, object] = {
         "n_terms": int(2 * problem.layout.n_coef - _n_fixed(problem.priors.width)),
         "converged": mode.status.is_solution,
         **dict.fromkeys(("chi2", "dof", "effective_parameters", "log_evidence"), np.nan),
     }
     if mode.reduced is None or not mode.status.is_solution:
-        return figures
+        return numbers
     prior_hessian = problem.priors.hessian_diagonal(mode.theta)
     parameters = effective_parameters(problem.priors, prior_hessian, covariances(mode.reduced))
-    figures |= {
+    numbers |= {
         "chi2": mode.trace[-1].chi2,
         "dof": 2 * problem.n_obs - parameters,
         "effective_parameters": parameters,
     }
     # A flat prior has no density: each of its terms would make the evidence depend on the unit.
     if all(np.isfinite(settings.width(group.name)) for group in PER_COEFFICIENT):
-        figures["log_evidence"] = _log_evidence(problem, mode)
-    return figures
+        numbers["log_evidence"] = _log_evidence(problem, mode)
+    return numbers
 
 
 def _n_fixed(width: Float[np.ndarray, " calib"]) -> int:

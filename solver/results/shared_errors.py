@@ -1,9 +1,10 @@
 """Shared errors: shifts of the sources due to catalogue errors, which all orbits share.
 
 The catalogue has the same errors in all orbits, so their effect does not average out. How
-closely the shifts of a source in two orbits agree depends on the fields of both. Catalogue
-errors are therefore drawn, the same for a source in every orbit, and the resulting shifts are
-stored: any mean or fit over orbits of these shifts gives its own catalogue error.
+closely the shifts of a source in two orbits agree depends on the fields of both. Therefore the
+catalogue errors of each source are drawn once, the same draws serve all orbits, and each orbit
+stores the shifts that they cause. The mean of these shifts over orbits, or a fit to them, is the
+catalogue error of that mean or fit.
 """
 
 import numpy as np

@@ -53,7 +53,7 @@ def summarise(
         ),
         "residual_rms_x": float(scatter[0]),
         "residual_rms_y": float(scatter[1]),
-        **_reference_figures(solution, is_reference),
+        **_reference_numbers(solution, is_reference),
         **_common_error(solution, ~is_reference),
         "seconds": seconds,
     }
@@ -69,7 +69,7 @@ def truth_summary(sources: pd.DataFrame, places: pd.DataFrame) -> dict[str, dict
 
     Returns
     -------
-    class -> figures; means and rms in mas, pulls with the marginal sigmas. `induced_*` is
+    class -> numbers; means and rms in mas, pulls with the marginal sigmas. `induced_*` is
     the mean shift due to errors of the reference sources.
     """
     joined = sources.merge(places, on="source_id", suffixes=("", "_true"))
@@ -81,7 +81,7 @@ def truth_summary(sources: pd.DataFrame, places: pd.DataFrame) -> dict[str, dict
     )
     joined["deviation_dec"] = (joined["dec"] - joined["dec_true"]) * 3.6e6
     return {
-        name: _deviation_figures(joined[member])
+        name: _deviation_numbers(joined[member])
         for name, member in class_members(joined).items()
         if member.any()
     }
@@ -101,21 +101,21 @@ def class_members(sources: pd.DataFrame) -> dict[str, pd.Series]:
     }
 
 
-def _deviation_figures(rows: pd.DataFrame) -> dict[str, float | int]:
-    figures: dict[str, float] = {"n": len(rows)}
+def _deviation_numbers(rows: pd.DataFrame) -> dict[str, float | int]:
+    numbers: dict[str, float] = {"n": len(rows)}
     for axis in ("ra", "dec"):
         deviation = rows[f"deviation_{axis}"]
         pull = deviation / rows[f"sigma_{axis}_marginal"]
-        figures |= {
+        numbers |= {
             f"mean_{axis}": float(deviation.mean()),
             f"rms_{axis}": float(np.sqrt((deviation**2).mean())),
             f"pull_sd_{axis}": float(pull.std(ddof=0)),
             f"induced_{axis}": float(rows[f"induced_{axis}"].mean()),
         }
-    return figures
+    return numbers
 
 
-def _reference_figures(solution: SolvedProblem, is_reference: np.ndarray) -> dict[str, float]:
+def _reference_numbers(solution: SolvedProblem, is_reference: np.ndarray) -> dict[str, float]:
     variances = np.diagonal(np.linalg.inv(solution.problem.priors.precision), axis1=1, axis2=2)
     marginal = np.diagonal(solution.covariance.source, axis1=1, axis2=2)
     deviation = normalised_deviation(solution.mode.sources, variances, marginal, is_reference)

@@ -95,8 +95,8 @@ def _errors_of(
     sigma = 0.5 * spread / np.sqrt(expected)
     root = np.sqrt(measured)
     floor = float(np.sqrt(floors.mean()))
-    figures = (root, max(root - sigma, 0.0), root + sigma, np.sqrt(expected), np.sqrt(noise_square))
-    return (count, int((groups > 0).sum()), *map(float, figures), floor)
+    numbers = (root, max(root - sigma, 0.0), root + sigma, np.sqrt(expected), np.sqrt(noise_square))
+    return (count, int((groups > 0).sum()), *map(float, numbers), floor)
 
 
 def _parameter_columns(fit: MotionFit) -> dict[str, Float[np.ndarray, " src"]]:

@@ -127,7 +127,7 @@ def reference_catalogue(truth: pd.DataFrame, settings: SurveySettings) -> pd.Dat
 def _correlated(
     pulls: dict[str, Float[np.ndarray, " src"]], catalogue: pd.DataFrame
 ) -> dict[str, Float[np.ndarray, " src"]]:
-    """Return normal deviates with the catalogue's correlations from independent ones."""
+    """Correlate independent normal deviates as the catalogue specifies."""
     # Rows without correlations are skipped, so that their deviates remain bit-identical.
     chosen = (catalogue[list(CORRELATIONS)] != 0.0).any(axis=1).to_numpy()
     roots = square_roots(correlation_matrices(catalogue[chosen]))

@@ -1,1 +1,4 @@
-"""Views: connect the session to tables and figures, without computations of their own."""
+"""Views connect the session to widgets and figures, and compute nothing; only Panel is theirs.
+
+Imports `plateviz.dashboard` and below.
+"""

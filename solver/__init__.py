@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from solver.io.read_orbit import read_orbit as read_orbit
     from solver.io.result import read_result as read_result
     from solver.io.result import write_result as write_result
+    from solver.io.survey_growth import append_orbit as append_orbit
     from solver.simulate.settings import SurveySettings as SurveySettings
     from solver.simulate.survey import simulate_survey as simulate_survey
 
@@ -48,6 +49,7 @@ _PUBLIC = {
     "OrbitData": "solver.data.orbit",
     "PARAMETERS": "solver.data.parameters",
     "SurveySettings": "solver.simulate.settings",
+    "append_orbit": "solver.io.survey_growth",
     "fit_orbit": "solver.fit",
     "inspect_files": "solver.io.inspect",
     "read_orbit": "solver.io.read_orbit",
@@ -64,6 +66,7 @@ __all__ = [
     "Instrument",
     "OrbitData",
     "SurveySettings",
+    "append_orbit",
     "fit_orbit",
     "inspect_files",
     "read_orbit",

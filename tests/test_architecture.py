@@ -63,7 +63,11 @@ NEVER = {
 JAX = ("jax", "jaxlib", "equinox", "numpyro", "optax")
 WITHOUT_JAX = ("solver.data", "solver.io", "plateviz")
 # The process that fits, and what `plateviz survey` imports once it fits.
-WITH_JAX = ("plateviz.solving.solver_process", "plateviz.runs.fit_survey")
+WITH_JAX = (
+    "plateviz.solving.solver_process",
+    "plateviz.runs.fit_survey",
+    "plateviz.runs.watch",
+)
 
 
 def _within(name: str, parents: tuple[str, ...]) -> bool:

@@ -1,4 +1,4 @@
-"""The command line: `plateviz simulate | gaia | inspect | fit | survey | serve | report | ...`.
+"""The command line: `plateviz simulate | inspect | fit | survey | watch | serve | report | ...`.
 
 A user's mistake ends with exit code 2 and one message; a fit that has no solution, or has not
 converged, with exit code 1; one whose solution should not be trusted with exit code 3. Each
@@ -21,6 +21,7 @@ from plateviz.cli.inspect import inspect
 from plateviz.cli.report import report
 from plateviz.cli.reproduce import reproduce
 from plateviz.cli.serve import open_endpoint, run_server, serve
+from plateviz.cli.watch import watch
 from plateviz.runs.run import DEFAULT_RUN
 from solver.data.settings import ENGINES
 from solver.errors import DistrustError, FitError, InputError
@@ -200,6 +201,7 @@ def survey(
     run_survey(directory, run, chosen, numbers, workers, scheduler, repair, accept, as_json)
 
 
+app.command()(watch)
 app.command()(serve)
 app.command()(report)
 app.command()(reproduce)

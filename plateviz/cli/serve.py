@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from plateviz.cli import options
+from solver.errors import InputError
 
 if TYPE_CHECKING:
     from plateviz.dashboard.server import Endpoint
@@ -57,7 +58,11 @@ def serve(
     endpoint = endpoint._replace(origins=origins, prefix=check_prefix(prefix))
     if reference is None:
         origin: OrbitFiles | SurveyFolder = SurveyFolder(str(path))
-        origin.orbits()
+        if not origin.orbits():
+            raise InputError(
+                f"{path}: expected a survey with an orbit, found none yet; `plateviz watch` fits "
+                "the first one when it arrives"
+            )
     else:
         origin = OrbitFiles(str(path), str(reference), _text(truth), orbit, _text(instrument))
         # Read once here, so that problems in the files are reported before a page opens.

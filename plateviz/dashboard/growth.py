@@ -9,6 +9,7 @@ from plateviz.runs.queries import Written
 
 # After so many seconds without another orbit, nobody seems to fit the rest.
 _PATIENCE = 120.0
+_OPEN = "All orbits that have arrived are done. This page follows when another one arrives."
 # Number of new orbits from which their rate is stated.
 _FEW = 2
 
@@ -27,7 +28,7 @@ class Growth:
         run : name of the run
         clock : returns a time in seconds
         """
-        self._command = f"`plateviz survey {quote(str(directory))} --run {quote(run)}`"
+        self._arguments = f"{quote(str(directory))} --run {quote(run)}"
         self._clock = clock
         self._first: tuple[float, int] | None = None
         self._last: tuple[float, Written] | None = None
@@ -40,14 +41,17 @@ class Growth:
         if self._last is None or self._last[1] != written:
             self._last = now, written
         is_over = done >= written.n_orbits
-        if written.is_complete or (is_over and written.is_gathered):
+        if written.is_complete:
             return ""
+        if is_over and written.is_gathered:
+            return _OPEN if written.grows else ""
         if is_over:
             words = f"All {done:,} orbits are done; the tables over all of them are missing yet."
         else:
             words = f"{done:,} of {written.n_orbits:,} orbits are done{self._rest(now, written)}."
         if now - self._last[0] > _PATIENCE:
-            return f"{words} Nothing has been added for some minutes: {self._command} continues it."
+            command = f"`plateviz {'watch' if written.grows else 'survey'} {self._arguments}`"
+            return f"{words} Nothing has been added for some minutes: {command} continues it."
         return f"{words} This page follows by itself."
 
     def _rest(self, now: float, written: Written) -> str:

@@ -48,7 +48,7 @@ def _turn_to_next_view(navigation: Navigation) -> None:
 
 def _step_orbit(navigation: Navigation, step: int) -> None:
     session = navigation.session
-    orbits = session.store.orbits
+    orbits = session.selection.param["orbit"].objects
     place = orbits.index(session.selection.orbit) + step
     if 0 <= place < len(orbits):
         navigation.choose_orbit(orbits[place])

@@ -133,6 +133,7 @@ class Navigation(param.Parameterized):
             self.growth = self._growth[1].look(written)
             if written != self.written:
                 self.written = written
+                self.session.know_orbits()
                 self._look()
         return bool(self.growth)
 

@@ -46,8 +46,8 @@ class Session(param.Parameterized):
         self.store = store
         self.selection = Selection()
         self.choices = FitChoices()
-        self.selection.param["orbit"].objects = store.orbits
-        self.selection.orbit = store.orbits[0]
+        self.know_orbits()
+        self.selection.orbit = self.selection.param["orbit"].objects[0]
         self._job: Job | None = None
         self._requested: FitSettings = FitSettings()
         self._requested_what_if = False
@@ -62,6 +62,12 @@ class Session(param.Parameterized):
     def job(self) -> Job | None:
         """The waiting or running job; None if there is none."""
         return self._job
+
+    def know_orbits(self) -> None:
+        """Offer the orbits that the store has by now, those among them that were added lately."""
+        orbits = list(self.store.orbits)
+        if orbits != list(self.selection.param["orbit"].objects):
+            self.selection.param["orbit"].objects = orbits
 
     def show_orbit(self, orbit: int | None) -> None:
         """Request an orbit with the settings of the solution on the screen."""

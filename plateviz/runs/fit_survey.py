@@ -112,16 +112,23 @@ def fit_survey(
             run.remove_damaged()
         else:
             refuse(run.changes())
-        return _fit_missing(run, wanted, workers, scheduler, progress)
+        return fit_missing(run, wanted, workers, scheduler, progress)
 
 
-def _fit_missing(
+def fit_missing(
     run: Run,
     wanted: list[int],
     workers: int | None,
     scheduler: str | None,
     progress: Callable[[Progress], None],
+    closes: bool = True,
 ) -> Report:
+    """Fit those of some orbits that a locked run does not contain, and write the tables over all.
+
+    Parameters
+    ----------
+    closes : whether the run becomes complete if no orbit of the survey is missing
+    """
     start = time.perf_counter()
     run.remove_abandoned()
     remove_worker_scratch()
@@ -137,6 +144,8 @@ def _fit_missing(
                         failed[outcome.orbit] = outcome.message
                     progress(Progress(done, len(missing), outcome))
         _gather(run)
+        if closes:
+            close_run(run)
     except DiskError as error:
         raise DiskError(f"{error}{_needed(run, missing)}") from error
     finally:
@@ -182,17 +191,21 @@ def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:
     return sorted(set(orbits))
 
 
-def _gather(run: Run) -> None:
-    """Write the tables over all orbits, and mark the run if it is complete."""
+def close_run(run: Run) -> None:
+    """Mark a run as complete if every orbit of the survey is fitted and gathered."""
     complete = run.complete_orbits()
-    if run.is_complete or not complete:
-        return
-    if run.gathered_orbits() != complete:
-        run.begin_gathering()
-        _write_tables(run)
-        run.mark_gathered(complete)
-    if complete == survey_orbits(run.survey):
+    if not run.is_complete and complete and complete == survey_orbits(run.survey):
         run.mark_complete()
+
+
+def _gather(run: Run) -> None:
+    """Write the tables over all orbits, unless they are there."""
+    complete = run.complete_orbits()
+    if run.is_complete or not complete or run.gathered_orbits() == complete:
+        return
+    run.begin_gathering()
+    _write_tables(run)
+    run.mark_gathered(complete)
 
 
 def _write_tables(run: Run) -> None:

@@ -131,6 +131,15 @@ def read_summary(directory: Path) -> dict[str, Any]:
         return {**head["summary"], "seconds": timings["seconds"]}
 
 
+def read_provenance(directory: Path) -> dict[str, str]:
+    """Return name -> SHA-256 of the inputs of a complete fitted orbit; raises as `read_summary`."""
+    wanted = read_manifest(directory / _COMPLETE).get(_HEAD)
+    require_unchanged(directory / _HEAD, wanted, _REMEDY)
+    head = _read_json(directory / _HEAD)
+    with reading(str(directory), "the inputs of a fitted orbit"):
+        return {str(name): str(digest) for name, digest in head["provenance"].items()}
+
+
 def kept_table(directory: Path, name: str, unchanged: UnchangedFiles) -> Path:
     """Return the file of one table of a fitted orbit, after checking that it is unchanged.
 

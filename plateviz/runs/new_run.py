@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from plateviz.runs.run import RUN_FILE, Run
+from plateviz.runs.run import GROWS, RUN_FILE, Run
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
@@ -27,35 +27,48 @@ PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 
-def begin_run(survey: Path, name: str, settings: FitSettings) -> Run:
+def begin_run(survey: Path, name: str, settings: FitSettings, grows: bool = False) -> Run:
     """Create a run, or return an existing one with the same settings.
+
+    Parameters
+    ----------
+    grows : whether orbits may be added to the survey while the run is fitted; a run that exists
+        stays what it is
 
     Raises
     ------
     InputError
         If the directory is not a survey, the name is not a valid folder name, or a run of that
-        name exists with other settings, versions or inputs.
+        name exists with other settings, versions or inputs, or has to grow and does not.
     """
     survey_orbits(survey)
     if not _NAME.fullmatch(name):
         raise InputError(
             f"--run: expected a name of letters, digits, '.', '-' and '_', found {name!r}"
         )
-    run, content = Run(Path(survey), name), _content(Path(survey), settings)
+    run = Run(Path(survey), name)
     path = run.directory / RUN_FILE
     if path.is_file():
-        _check_same(path, read_header(run.directory, RUN_FILE), content)
+        _check_same(path, run, _content(run.survey, settings, run.grows))
+        if grows and not run.grows:
+            raise InputError(
+                f"{path}: expected a run that `plateviz watch` began, found one of the orbits that "
+                "the survey had when `plateviz survey` began it; give another --run NAME"
+            )
         return run
     if run.directory.is_dir() and not all(is_scratch(p.name) for p in run.directory.iterdir()):
         raise InputError(f"{run.directory}: expected a run, found a folder without {RUN_FILE}")
     with writing(run.directory, "to create the folder"):
         run.directory.mkdir(parents=True, exist_ok=True)
-    write_header(run.directory, content, RUN_FILE)
+    content = _content(run.survey, settings, grows)
+    write_header(run.directory, {GROWS: True, **content} if grows else content, RUN_FILE)
     return run
 
 
-def _content(survey: Path, settings: FitSettings) -> dict[str, object]:
-    inputs = [survey / name for name in (HEADER, REFERENCE, TRUTH_FILE, EXPOSURES)]
+def _content(survey: Path, settings: FitSettings, grows: bool) -> dict[str, object]:
+    # The exposures change with each orbit that is added.
+    names = (HEADER, REFERENCE, TRUTH_FILE) if grows else (HEADER, REFERENCE, TRUTH_FILE, EXPOSURES)
+    inputs = [survey / name for name in names]
     return {
         "versions": versions_of(PACKAGES),
         "inputs": {path.name: sha256_of(path) for path in inputs if path.is_file()},
@@ -63,7 +76,8 @@ def _content(survey: Path, settings: FitSettings) -> dict[str, object]:
     }
 
 
-def _check_same(path: Path, found: Mapping[str, object], wanted: Mapping[str, object]) -> None:
+def _check_same(path: Path, run: Run, wanted: Mapping[str, object]) -> None:
+    found = read_header(run.directory, RUN_FILE)
     different = [
         f"{title} ({name})"
         for title in wanted

@@ -7,7 +7,6 @@ gathered into one file sorted by source, from which one source can be read witho
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import duckdb
 import numpy as np
@@ -16,7 +15,7 @@ from pyarrow.compute import Expression
 from pyarrow.compute import field as col
 
 from plateviz.runs.fitted_orbit import kept_table, read_fitted_orbit, read_summary
-from plateviz.runs.run import ERRORS_FILE, HISTORY_FILE, MOTIONS_FILE, Run, runs_of
+from plateviz.runs.run import ERRORS_FILE, HISTORY_FILE, MOTIONS_FILE, Run, Written, runs_of
 from solver.data.result import FitResult
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from solver.errors import InputError
@@ -47,24 +46,6 @@ SELECT source_class,
     median(sigma_ra_marginal) FILTER (n_orbits > ?) AS sigma_often
 FROM rows GROUP BY source_class ORDER BY source_class
 """
-
-
-class Written(NamedTuple):
-    """What a run has so far.
-
-    Attributes
-    ----------
-    n_orbits : number of orbits of the survey
-    n_fitted, n_failed : number of those with a solution, and of those that have none for a reason
-    is_gathered : whether the tables over all orbits are there
-    is_complete : whether nothing is missing
-    """
-
-    n_orbits: int
-    n_fitted: int
-    n_failed: int
-    is_gathered: bool
-    is_complete: bool
 
 
 class SurveyRun:
@@ -98,19 +79,11 @@ class SurveyRun:
     @property
     def is_gathered(self) -> bool:
         """Whether the tables over all orbits are there: of all orbits or of those not failed."""
-        return self.is_complete or (self.directory / MOTIONS_FILE).is_file()
+        return self._run.is_gathered
 
     def written(self) -> Written:
         """Return what the run has now; takes a millisecond for each hundred orbits."""
-        # The other way round, an orbit that is being written could be missing in a complete run.
-        is_complete, is_gathered = self.is_complete, self.is_gathered
-        return Written(
-            len(survey_orbits(self.survey)),
-            len(self._run.complete_orbits()),
-            len(self._run.failures()),
-            is_gathered,
-            is_complete,
-        )
+        return self._run.written()
 
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""

@@ -10,6 +10,9 @@
     runs/NAME/COMPLETE                    written last, when every orbit of the survey is fitted: a
                                           manifest of the files that belong to no orbit
 
+A run that `plateviz watch` began has `grows = true` in its `run.toml`: orbits are added to the
+survey while it is fitted, and it becomes complete when it is closed.
+
 No user interface and no JAX. Existing files of orbits are never changed: an interrupted run is
 continued with the missing orbits, and only with the settings with which it was created.
 """
@@ -38,12 +41,12 @@ from solver.io.failures import reading
 from solver.io.manifest import changes, manifest_of, read_manifest, require_unchanged
 from solver.io.scratch import remove_abandoned
 from solver.io.settings import parse_settings
-from solver.io.survey import (
-    read_header,
-)
+from solver.io.survey import read_header, survey_orbits
 
 DEFAULT_RUN = "default"
 RUN_FILE = "run.toml"
+# In the header of a run whose survey may grow while it is fitted.
+GROWS = "grows"
 _COMPLETE = "COMPLETE"
 _GATHERED = "gathered.json"
 _FAILED = "failed"
@@ -60,6 +63,28 @@ _ORBIT = re.compile(r"orbit=(\d{4,})")
 
 # Given a file, its SHA-256 if that is known, and a remedy; InputError if the file is another one.
 Check = Callable[[Path, str | None, str], None]
+
+
+class Written(NamedTuple):
+    """What a run has so far.
+
+    Attributes
+    ----------
+    n_orbits : number of orbits of the survey
+    n_fitted, n_failed : number of those with a solution, and of those that have none for a reason
+    is_gathered : whether the tables over all orbits are there
+    is_complete : whether nothing is missing
+    gathered : the orbits in these tables
+    grows : whether orbits may be added to the survey while the run is fitted
+    """
+
+    n_orbits: int
+    n_fitted: int
+    n_failed: int
+    is_gathered: bool
+    is_complete: bool
+    gathered: tuple[int, ...] = ()
+    grows: bool = False
 
 
 @dataclass(frozen=True)
@@ -81,9 +106,33 @@ class Run:
         return self.survey / "runs" / self.name
 
     @property
+    def grows(self) -> bool:
+        """Whether orbits may be added to the survey while the run is fitted."""
+        return read_header(self.directory, RUN_FILE).get(GROWS) is True
+
+    @property
     def is_complete(self) -> bool:
         """Whether every orbit of the survey is fitted, and the tables over all are written."""
         return (self.directory / _COMPLETE).is_file()
+
+    @property
+    def is_gathered(self) -> bool:
+        """Whether the tables over all orbits are there: of all orbits or of those not failed."""
+        return self.is_complete or (self.directory / MOTIONS_FILE).is_file()
+
+    def written(self) -> Written:
+        """Return what the run has now; takes a millisecond for each hundred orbits."""
+        # The other way round, an orbit that is being written could be missing in a complete run.
+        is_complete, is_gathered = self.is_complete, self.is_gathered
+        return Written(
+            len(survey_orbits(self.survey)),
+            len(self.complete_orbits()),
+            len(self.failures()),
+            is_gathered,
+            is_complete,
+            tuple(self.gathered_orbits()),
+            self.grows,
+        )
 
     def orbit_directory(self, orbit: int) -> Path:
         """Return the directory of a fitted orbit."""

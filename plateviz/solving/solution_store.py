@@ -8,6 +8,7 @@ next one.
 import hashlib
 import json
 import threading
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from plateviz.solving.solver_queue import SolverQueue
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.data.settings import ENGINES, FitSettings
+from solver.errors import InputError
 from solver.io.disk import writing
 from solver.io.scratch import ScratchFolder, temporary_folder
 
@@ -29,7 +31,7 @@ class SolutionStore:
     def __init__(self, origin: Origin, solver: SolverQueue) -> None:
         """Solve orbits of `origin` with `solver`, which is closed with the store."""
         self.origin = origin
-        self.orbits = origin.orbits()
+        self._orbits = origin.orbits()
         self.instrument: Instrument = origin.read_instrument()
         self._solver = solver
         self._lock = threading.Lock()
@@ -44,6 +46,13 @@ class SolutionStore:
     def title(self) -> str:
         """Name of the origin."""
         return self.origin.title
+
+    @property
+    def orbits(self) -> list[int | None]:
+        """The orbits that the origin has by now; those known before while it cannot be read."""
+        with suppress(InputError, OSError):
+            self._orbits = self.origin.orbits()
+        return self._orbits
 
     def runs(self) -> list[SurveyRun]:
         """Return the current runs of the survey; none if the origin is files."""

@@ -1,6 +1,6 @@
 """The verdict on a solution, a run or a source as text: whether to trust it, and why."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -36,12 +36,14 @@ class Verdict(NamedTuple):
     headline : the judgement in one sentence
     reasons : sentences that give the reasons
     notable : sentences on what stands out; may be empty
+    faults : what speaks against the solution of an orbit, in short sentences
     """
 
     state: State
     headline: str
     reasons: list[str]
     notable: list[str]
+    faults: Sequence[str] = ()
 
 
 def with_verdict(result: FitResult) -> FitResult:
@@ -55,7 +57,9 @@ def orbit_verdict(result: FitResult) -> Verdict:
     items = summary_strip(result)
     state = worst(item.state for item in items)
     reasons = [_converged(result), *map(_sentence, _judged(items)), _common_error(result)]
-    return Verdict(state, _HEADLINES[state], reasons, _notable(result))
+    faults = [] if items[0].state == "good" else [_converged(result)]
+    faults += [_judgement(item) for item in _judged(items) if item.state != "good"]
+    return Verdict(state, _HEADLINES[state], reasons, _notable(result), faults)
 
 
 def _judged(items: list[SummaryItem]) -> list[SummaryItem]:
@@ -161,13 +165,17 @@ def _converged(result: FitResult) -> str:
 
 
 def _sentence(item: SummaryItem) -> str:
+    return f"{_judgement(item)} {item.hint}"
+
+
+def _judgement(item: SummaryItem) -> str:
     meaning = {
         "good": "as expected",
         "warn": "significantly different from the expected value, but by little",
         "bad": "far from the expected value",
         "neutral": "not judged",
     }[item.state]
-    return f"{item.label}: {item.value}, {meaning}. {item.hint}"
+    return f"{item.label}: {item.value}, {meaning}."
 
 
 def _common_error(result: FitResult) -> str:

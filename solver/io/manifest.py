@@ -2,7 +2,7 @@
 
 import re
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from solver.errors import InputError
@@ -25,7 +25,12 @@ def manifest_of(folder: Path, names: Iterable[str]) -> str:
     InputError
         If a file cannot be read.
     """
-    return "".join(f"{sha256_of(folder / name)}  {name}\n" for name in sorted(names))
+    return manifest_text({name: sha256_of(folder / name) for name in sorted(names)})
+
+
+def manifest_text(digests: Mapping[str, str]) -> str:
+    """Return the manifest of file name -> SHA-256, a line each."""
+    return "".join(f"{digest}  {name}\n" for name, digest in digests.items())
 
 
 def read_manifest(path: Path) -> dict[str, str]:

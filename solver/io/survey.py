@@ -7,11 +7,13 @@
     measurements/orbit=0000.parquet    `schema.MEASUREMENT` of one orbit
     manifest.sha256                    SHA-256 of every other file, checked when it is read
 
-A directory without `survey.toml` is not read: it is unfinished or not a survey.
+A directory without `survey.toml` is not read: it is unfinished or not a survey. A survey grows
+by orbits that `solver.io.survey_growth` adds.
 """
 
 import hashlib
 import re
+import time
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -49,7 +51,9 @@ REMEDY = (
     f"{MANIFEST}"
 )
 
-_ORBIT_FILE = re.compile(r"orbit=(\d{4,})\.parquet")
+_ORBIT_FILE = re.compile(r"orbit=(\d{4}|[1-9]\d{4,})\.parquet")
+# An orbit that is added replaces the exposures a moment before the manifest.
+_ADDING_SECONDS = 0.1
 
 
 def measurement_path(directory: Path, orbit_id: int) -> Path:
@@ -68,14 +72,14 @@ def survey_orbits(directory: Path) -> list[int]:
     read_header(directory)
     folder = Path(directory) / MEASUREMENTS
     names = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    listed = (name.partition("/") for name in _listed(Path(directory)))
+    listed = (name.partition("/") for name in listed_files(Path(directory)))
     names |= {name for parent, _, name in listed if parent == MEASUREMENTS}
     return sorted(int(found[1]) for name in names if (found := _ORBIT_FILE.fullmatch(name)))
 
 
 def has_survey_table(directory: Path, name: str) -> bool:
     """Return whether a survey has a table, be its file missing or not."""
-    return (directory / name).is_file() or name in _listed(directory)
+    return (directory / name).is_file() or name in listed_files(directory)
 
 
 def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
@@ -140,6 +144,18 @@ def write_manifest(directory: Path, content: Mapping[str, object]) -> None:
         path.write_text(f"{manifest_of(directory, names)}{header}  {HEADER}\n", encoding="utf-8")
 
 
+def listed_files(directory: Path) -> dict[str, str]:
+    """Return name -> SHA-256 of the files that the manifest lists; none without a manifest.
+
+    Raises
+    ------
+    InputError
+        If the manifest cannot be read.
+    """
+    manifest = directory / MANIFEST
+    return read_manifest(manifest) if manifest.is_file() else {}
+
+
 def survey_changes(directory: Path) -> list[str]:
     """Return a message for each file of a survey that is not as it was written."""
     manifest = directory / MANIFEST
@@ -148,7 +164,15 @@ def survey_changes(directory: Path) -> list[str]:
 
 def _require_unchanged(directory: Path, paths: list[Path]) -> dict[str, str]:
     """Return name -> SHA-256 of files; InputError if a manifest has others."""
-    wanted, found = _listed(directory), {}
+    try:
+        return _unchanged(directory, paths)
+    except InputError:
+        time.sleep(_ADDING_SECONDS)
+        return _unchanged(directory, paths)
+
+
+def _unchanged(directory: Path, paths: list[Path]) -> dict[str, str]:
+    wanted, found = listed_files(directory), {}
     for path in paths:
         name = path.relative_to(directory).as_posix()
         if not path.is_file():
@@ -156,12 +180,6 @@ def _require_unchanged(directory: Path, paths: list[Path]) -> dict[str, str]:
         found[name] = sha256_of(path)
         require_digest(path, found[name], wanted.get(name), REMEDY)
     return found
-
-
-def _listed(directory: Path) -> dict[str, str]:
-    """Return name -> SHA-256 of the files that the manifest lists; none without a manifest."""
-    manifest = directory / MANIFEST
-    return read_manifest(manifest) if manifest.is_file() else {}
 
 
 def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:

@@ -1,5 +1,7 @@
 """SelectionView: controls for the orbit, exposures and detector on the screen."""
 
+from typing import Any
+
 import panel as pn
 import panel_material_ui as pmui
 
@@ -27,21 +29,31 @@ class SelectionView(pn.viewable.Viewer):
             # Panel waits 50 ms for further changes; a hand on the slider sends some ten a second.
             control._debounce = 0  # type: ignore[misc]
         self._column = pmui.Column(field, plates, detector, sizing_mode="stretch_width", margin=0)
-        if len(session.store.orbits) > 1:
-            orbit = pmui.Select(
-                label="Orbit", options=session.store.orbits, value=selection.orbit, **wide
-            )
-            self._column.insert(0, orbit)
-
-            def choose(event: object) -> None:
-                if event.new != selection.orbit:  # type: ignore[attr-defined]
-                    navigation.choose_orbit(event.new)  # type: ignore[attr-defined]
-                    # An orbit that cannot be read is not selected.
-                    orbit.value = selection.orbit
-
-            orbit.param.watch(choose, "value")
-            selection.param.watch(lambda _: orbit.param.update(value=selection.orbit), "orbit")
+        self._column.insert(0, _orbit_control(navigation, **wide))
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the controls."""
         return self._column
+
+
+def _orbit_control(navigation: Navigation, **style: Any) -> pmui.Select:  # noqa: ANN401
+    """Return the control of the orbit, which is seen if there are several."""
+    selection = navigation.session.selection
+
+    def offered() -> dict[str, Any]:
+        orbits = list(selection.param["orbit"].objects)
+        return {"options": orbits, "visible": len(orbits) > 1}
+
+    orbit = pmui.Select(label="Orbit", value=selection.orbit, **offered(), **style)
+
+    def choose(event: object) -> None:
+        if event.new != selection.orbit:  # type: ignore[attr-defined]
+            navigation.choose_orbit(event.new)  # type: ignore[attr-defined]
+            # An orbit that cannot be read is not selected.
+            orbit.value = selection.orbit
+
+    orbit.param.watch(choose, "value")
+    selection.param.watch(lambda _: orbit.param.update(value=selection.orbit), "orbit")
+    # Orbits may be added to the survey while it is shown.
+    selection.param.watch(lambda _: orbit.param.update(**offered()), "orbit", what="objects")
+    return orbit

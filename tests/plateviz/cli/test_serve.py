@@ -4,6 +4,7 @@ import pytest
 
 from plateviz.dashboard.server import check_origin, check_prefix
 from solver.errors import InputError
+from tests.solver.growing_survey import GrowingSurvey
 
 
 @pytest.mark.parametrize(
@@ -20,6 +21,13 @@ def test_invalid_proxy_option_is_refused(run, tmp_path, options, message):
     code, _, err = run("serve", tmp_path, "--port", "0", "--no-open", *options)
     assert code == 2
     assert message in err
+
+
+def test_survey_without_an_orbit_is_refused(run, made_survey, tmp_path):
+    GrowingSurvey(made_survey, tmp_path / "empty", 0)
+    code, _, err = run("serve", tmp_path / "empty", "--port", "0", "--no-open")
+    assert code == 2
+    assert "expected a survey with an orbit, found none yet" in err
 
 
 def test_host_is_normalised_as_browsers_send_it():

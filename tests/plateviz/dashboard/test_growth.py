@@ -64,3 +64,13 @@ def test_tables_are_the_last_to_be_written(growth):
 )
 def test_nothing_is_said_when_nothing_is_to_come(growth, last):
     assert growth.look(last) == ""
+
+
+def test_run_of_a_watched_survey_waits_for_the_next_orbit(growth, clock):
+    done = Written(4, 4, 0, True, False, (0, 1, 2, 3), grows=True)
+    assert growth.look(done).startswith("All orbits that have arrived are done.")
+    assert growth.look(done._replace(n_orbits=5)).startswith("4 of 5 orbits are done.")
+    clock.now = 121.0
+    words = growth.look(done._replace(n_orbits=5))
+    assert words.endswith("`plateviz watch 'a sky' --run default` continues it.")
+    assert growth.look(done._replace(n_orbits=5, n_fitted=5, is_complete=True)) == ""

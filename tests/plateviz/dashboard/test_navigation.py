@@ -6,8 +6,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from plateviz.dashboard.keys import press
 from plateviz.dashboard.navigation import Navigation, View
 from plateviz.dashboard.session import Session, Stage
+from plateviz.dashboard.views.selection import SelectionView
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.runs.queries import Written
 from plateviz.solving.origin import OrbitFiles, SurveyFolder
@@ -28,9 +30,11 @@ class FakeRun:
         self.survey = Path("sky")
         self.n_fitted = 2 if is_complete else 1
         self.read = []
+        self.also_written = {}
 
     def written(self):
-        return Written(2, self.n_fitted, 0, self.is_gathered, self.is_complete)
+        found = Written(2, self.n_fitted, 0, self.is_gathered, self.is_complete)
+        return found._replace(**self.also_written)
 
     def has_fitted(self, orbit):
         return orbit == 0
@@ -280,3 +284,35 @@ def test_what_is_added_to_a_run_is_seen_at_the_next_look(fit_result, survey):
     assert not navigation.look_again()
     assert changed == [run.written()]
     assert navigation.growth == ""
+
+
+def test_orbit_that_is_added_to_the_survey_is_offered(fit_result, survey):
+    run = FakeRun("watched", survey, fit_result, is_complete=False)
+    run.is_gathered, run.n_fitted, run.also_written = True, 2, {"grows": True}
+    store = SurveyStore(fit_result, [run])
+    navigation = Navigation(Session(store))
+    selection = navigation.session.selection
+    control = SelectionView(navigation).__panel__()[0]
+    assert navigation.look_again()
+    assert list(control.options) == [0, 1]
+    store.orbits = (0, 1, 2)
+    run.also_written["n_orbits"] = 3
+    assert navigation.look_again()
+    assert list(selection.param["orbit"].objects) == list(control.options) == [0, 1, 2]
+    control.value = 2
+    assert selection.orbit == 2
+    navigation.turn_to(View.ORBIT)
+    press(navigation, "[")
+    assert (selection.orbit, control.value) == (1, 1)
+
+
+def test_tables_that_are_written_again_are_read_again(fit_result, survey):
+    run = FakeRun("watched", survey, fit_result, is_complete=False)
+    run.is_gathered, run.also_written = True, {"grows": True, "gathered": (0,)}
+    navigation, seen = Navigation(Session(SurveyStore(fit_result, [run]))), []
+    navigation.param.watch(seen.append, "written")
+    navigation.look_again()
+    assert seen == []
+    run.also_written["gathered"] = (0, 1)
+    navigation.look_again()
+    assert len(seen) == 1

@@ -13,6 +13,7 @@ from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.errors import InputError
+from tests.solver.growing_survey import GrowingSurvey
 
 LONG = 120
 
@@ -110,6 +111,19 @@ def test_closing_cancels_jobs_and_removes_solutions(small_survey):
     store.close()
     assert job.status is JobStatus.CANCELLED
     assert not scratch.exists()
+
+
+def test_orbits_are_those_that_the_survey_has_by_now(small_survey, tmp_path):
+    growing = GrowingSurvey(small_survey, tmp_path / "survey", 1)
+    store = SolutionStore(SurveyFolder(str(growing.directory)), SolverQueue())
+    try:
+        assert store.orbits == [0]
+        growing.append(1)
+        assert store.orbits == [0, 1]
+        (growing.directory / "survey.toml").unlink()
+        assert store.orbits == [0, 1]
+    finally:
+        store.close()
 
 
 def test_unexpected_exception_does_not_block_the_queue(small_survey):

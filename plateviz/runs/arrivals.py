@@ -1,0 +1,258 @@
+"""Orbits that arrive in a survey: which can be fitted, which wait, and which have changed.
+
+A file is whole if it is the one that the survey's manifest lists. In a survey without a manifest it
+is whole if it did not change between two looks and has the end of a Parquet file. No look reads an
+orbit's measurements except to compute their SHA-256, and that once for each time they are written.
+"""
+
+import hashlib
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+
+from plateviz.runs.fitted_orbit import read_provenance
+from plateviz.runs.run import Run
+from solver.data.schema import ENVIRONMENT
+from solver.errors import InputError
+from solver.io.atomic import sha256_of
+from solver.io.parquet import count_rows
+from solver.io.survey import (
+    EXPOSURES,
+    HEADER,
+    MANIFEST,
+    MEASUREMENTS,
+    listed_files,
+    measurement_path,
+    read_header,
+    read_survey_table,
+    survey_orbits,
+)
+
+_NUMBERED = re.compile(r"orbit=(\d+)\.parquet")
+
+
+class Remark(NamedTuple):
+    """What is to be said of an orbit that is not fitted now.
+
+    Attributes
+    ----------
+    kind : "waiting" for files that are not whole yet, "damaged" for one that is not what it should
+        be, "changed" for an orbit that was fitted with other measurements or exposures
+    orbit : its id; None if it is about the survey
+    message : in words
+    """
+
+    kind: str
+    orbit: int | None
+    message: str
+
+
+class Look(NamedTuple):
+    """What a survey has at one moment.
+
+    Attributes
+    ----------
+    ready : orbits that are whole and have not been tried as they are
+    remarks : on the others that are not fitted, or not as they are
+    is_settled : whether no orbit waits because it was just written
+    """
+
+    ready: list[int]
+    remarks: list[Remark]
+    is_settled: bool
+
+
+class _State(NamedTuple):
+    """State of a file, which changes when it is written."""
+
+    size: int
+    modified: int
+    number: int
+
+
+_Signature = tuple[_State | None, str | None, str | None]
+
+
+class Arrivals:
+    """The orbits of a growing survey, look by look."""
+
+    def __init__(self, run: Run) -> None:
+        """Begin without a look.
+
+        Parameters
+        ----------
+        run : contains the orbits that are fitted
+        """
+        self._run, self._survey = run, run.survey
+        self._listed: dict[str, str] = {}
+        # States of the files that are not fitted, at this look and at the one before.
+        self._states: dict[Path, _State | None] = {}
+        self._before: dict[Path, _State | None] = {}
+        self._digests: dict[Path, tuple[_State | None, str]] = {}
+        self._exposures: dict[int, str] = {}
+        self._exposures_read: object = None
+        self._first_exposures: dict[int, str] = {}
+        # Of fitted orbits: the SHA-256 that was fitted, and the state at the first look.
+        self._fitted: dict[int, tuple[str, _State | None]] = {}
+        self._tried: dict[int, _Signature] = {}
+
+    def look(self) -> Look:
+        """Look at the files of the survey.
+
+        Raises
+        ------
+        InputError
+            If the survey is gone.
+        """
+        if not (self._survey / HEADER).is_file():
+            raise InputError(
+                f"{self._survey}: expected the survey that is watched, found none there any more"
+            )
+        try:
+            orbits = self._read()
+        except InputError as error:
+            # An orbit may be being added.
+            return Look([], [Remark("waiting", None, f"{error}")], is_settled=False)
+        fitted = set(self._run.complete_orbits())
+        files = {one: measurement_path(self._survey, one) for one in orbits if one not in fitted}
+        self._before, self._states = self._states, {p: _state_of(p) for p in files.values()}
+        ready, remarks = [], self._misnamed()
+        for orbit in orbits:
+            found = self._changed(orbit) if orbit in fitted else self._unfit(orbit)
+            if found is not None:
+                remarks.append(found)
+            elif orbit not in fitted and self._tried.get(orbit) != self._signature(orbit):
+                ready.append(orbit)
+        waiting = {one.orbit for one in remarks if one.kind == "waiting"}
+        return Look(
+            ready, remarks, all(self._has_settled(files[one]) for one in files if one in waiting)
+        )
+
+    def try_orbits(self, orbits: Iterable[int]) -> None:
+        """Record that orbits are fitted as they are; one is ready again once it has changed."""
+        self._tried |= {orbit: self._signature(orbit) for orbit in orbits}
+
+    def is_as_tried(self, orbit: int) -> bool:
+        """Return whether the files of an orbit are those that it was tried with."""
+        try:
+            self._read()
+        except InputError:
+            return False
+        return self._tried.get(orbit) == self._signature(orbit)
+
+    def _read(self) -> list[int]:
+        """Read what all orbits share, and return their ids; InputError if that is not whole."""
+        read_header(self._survey)
+        self._listed = listed_files(self._survey)
+        path = self._survey / EXPOSURES
+        state = _state_of(path), self._listed.get(EXPOSURES)
+        # A survey may begin without exposures.
+        if state != self._exposures_read and state != (None, None):
+            table = read_survey_table(path, ENVIRONMENT)
+            self._exposures = {
+                int(one): _digest_of(rows) for one, rows in table.groupby("orbit_id")
+            }
+            self._exposures_read = state
+            self._first_exposures = {**self._exposures, **self._first_exposures}
+        return survey_orbits(self._survey)
+
+    def _unfit(self, orbit: int) -> Remark | None:
+        """Return why an orbit that is not fitted cannot be fitted yet; None if it can."""
+        path = measurement_path(self._survey, orbit)
+        name = _name_of(path)
+        if self._states[path] is None:
+            return Remark("waiting", orbit, f"{MANIFEST} lists {name}, which is not there yet")
+        damage = self._damage(path)
+        if damage and not self._has_settled(path):
+            return Remark("waiting", orbit, f"{name} is being written")
+        if damage:
+            return Remark("damaged", orbit, damage)
+        if self._listed and name not in self._listed:
+            return Remark("waiting", orbit, f"{MANIFEST} does not list {name} yet")
+        if orbit not in self._exposures:
+            return Remark("waiting", orbit, f"{EXPOSURES} has no exposures of it yet")
+        return None
+
+    def _damage(self, path: Path) -> str:
+        """Return why a file is not known to be whole; empty if it is."""
+        name = _name_of(path)
+        try:
+            if not self._listed:
+                count_rows(str(path))
+                return "" if self._has_settled(path) else "it may still be written"
+            is_listed = name not in self._listed or self._digest(path) == self._listed[name]
+        except InputError as error:
+            return str(error)
+        return "" if is_listed else f"{path} is not the file that {MANIFEST} lists"
+
+    def _changed(self, orbit: int) -> Remark | None:
+        """Return how the files of a fitted orbit differ from those that were fitted, or None."""
+        path = measurement_path(self._survey, orbit)
+        name = _name_of(path)
+        state = _state_of(path)
+        if orbit not in self._fitted:
+            inputs = read_provenance(self._run.orbit_directory(orbit))
+            self._fitted[orbit] = inputs.get(name, ""), state
+        digest, first = self._fitted[orbit]
+        is_known = state == first and name in self._listed
+        if state is None:
+            found = f"{name} is gone"
+        elif digest != (self._listed[name] if is_known else self._digest(path)):
+            found = f"{name} is another file"
+        elif self._exposures.get(orbit) != self._first_exposures.get(orbit):
+            found = f"its exposures in {EXPOSURES} are others"
+        else:
+            return None
+        return Remark(
+            "changed",
+            orbit,
+            f"{found} since it was fitted; the run keeps its solution, and another --run NAME fits "
+            "it as it is now",
+        )
+
+    def _misnamed(self) -> list[Remark]:
+        folder = self._survey / MEASUREMENTS
+        found = []
+        for path in sorted(folder.glob("orbit=*.parquet")):
+            match = _NUMBERED.fullmatch(path.name)
+            wanted = measurement_path(self._survey, int(match[1])) if match else path
+            if wanted != path:
+                message = f"{_name_of(path)} is not read, since its name is not {wanted.name}"
+                found.append(Remark("damaged", None, message))
+        return found
+
+    def _has_settled(self, path: Path) -> bool:
+        """Return whether a file has not been written since the look before."""
+        return self._before.get(path) == self._states[path]
+
+    def _digest(self, path: Path) -> str:
+        state = _state_of(path)
+        if path not in self._digests or self._digests[path][0] != state:
+            self._digests[path] = state, sha256_of(path)
+        return self._digests[path][1]
+
+    def _signature(self, orbit: int) -> _Signature:
+        """Return what changes when an orbit's measurements or exposures are written."""
+        path = measurement_path(self._survey, orbit)
+        return _state_of(path), self._listed.get(_name_of(path)), self._exposures.get(orbit)
+
+
+def _state_of(path: Path) -> _State | None:
+    """Return the state of a file; None if there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return _State(found.st_size, found.st_mtime_ns, found.st_ino)
+
+
+def _name_of(path: Path) -> str:
+    return f"{MEASUREMENTS}/{path.name}"
+
+
+def _digest_of(rows: pd.DataFrame) -> str:
+    values = pd.util.hash_pandas_object(rows, index=False).to_numpy()
+    return hashlib.sha256(values.tobytes()).hexdigest()

@@ -1,0 +1,327 @@
+"""A watched survey: orbits that arrive, are being written, damaged or changed; its ends."""
+
+import json
+import shutil
+from contextlib import nullcontext
+from dataclasses import replace
+
+import pytest
+
+from plateviz.runs import dask_workers, fit_survey, watch
+from plateviz.runs.new_run import begin_run
+from plateviz.runs.run import Run
+from plateviz.runs.watch import Ends, Watch
+from plateviz.tables.verdict import with_verdict
+from solver.data.schema import ENVIRONMENT
+from solver.data.settings import FitSettings
+from solver.errors import FitError, InputError
+from solver.io.lock import locked
+from solver.io.survey import (
+    EXPOSURES,
+    MANIFEST,
+    REFERENCE,
+    read_survey_orbit,
+    read_survey_table,
+    write_survey_table,
+)
+from tests.solver.growing_survey import GrowingSurvey
+
+ONCE = Ends(at_once=True)
+
+
+@pytest.fixture(autouse=True)
+def _without_workers(monkeypatch):
+    """Fit in this process, in which a test may replace functions."""
+
+    def fit(_, run, orbits):
+        return (dask_workers.fit_survey_orbit(str(run.survey), run.name, one) for one in orbits)
+
+    monkeypatch.setattr(fit_survey, "dask_client", lambda *_: nullcontext())
+    monkeypatch.setattr(fit_survey, "fit_on_workers", fit)
+    monkeypatch.setattr(dask_workers, "use_one_thread", lambda: None)
+
+
+@pytest.fixture
+def growing(made_survey, tmp_path):
+    return GrowingSurvey(made_survey, tmp_path / "survey", 1)
+
+
+@pytest.fixture
+def fits(monkeypatch, fit_result):
+    """Replace the fit of an orbit by one that reads it, or is refused: id -> reason."""
+    refused = {}
+
+    def fit(run, orbit):
+        read = read_survey_orbit(run.survey, orbit)
+        if orbit in refused:
+            reason = refused[orbit]
+            raise FitError(reason() if callable(reason) else reason)
+        result = with_verdict(replace(fit_result, provenance=read.provenance))
+        run.keep(orbit, result, fit_result.sources[["source_id"]])
+
+    monkeypatch.setattr(dask_workers, "_fit", fit)
+    monkeypatch.setattr(fit_survey, "_gather", lambda _: None)
+    return refused
+
+
+@pytest.fixture
+def watched(growing, monkeypatch):
+    """Return the function that watches: at each pause it takes a step, after the last Ctrl-C."""
+
+    def call(*steps, name="watched", ends=None, settings=None):
+        said, left = [], iter(steps)
+
+        def pause(_):
+            step = next(left, None)
+            if step is None:
+                raise KeyboardInterrupt
+            step()
+
+        monkeypatch.setattr(watch, "sleep", pause)
+        watcher = Watch(growing.directory, name, settings or FitSettings(), 1, said.append)
+        try:
+            watcher.run(1.0, ends or Ends())
+        except KeyboardInterrupt:
+            assert ends is None
+        finally:
+            watcher.end()
+        return [(event.kind, event.orbit, event.message) for event in said]
+
+    return call
+
+
+def nothing():
+    pass
+
+
+def kinds(said):
+    return [(kind, orbit) for kind, orbit, _ in said if kind not in ("watching", "ended")]
+
+
+def message(said, kind):
+    (found,) = [words for one, _, words in said if one == kind]
+    return found
+
+
+@pytest.mark.usefixtures("fits")
+def test_orbits_are_fitted_as_they_arrive_and_a_restart_goes_on(growing, watched):
+    said = watched(lambda: growing.append(1))
+    assert kinds(said) == [("fitted", 0), ("fitted", 1)]
+    assert "ended; 2 orbits fitted" in message(said, "ended")
+    said = watched(lambda: growing.append(2))
+    assert "2 orbits are fitted already" in message(said, "watching")
+    assert kinds(said) == [("fitted", 2)]
+    run = Run(growing.directory, "watched")
+    assert run.complete_orbits() == [0, 1, 2]
+    assert (run.grows, run.is_complete) == (True, False)
+
+
+@pytest.mark.usefixtures("fits")
+def test_file_that_is_being_copied_waits_for_its_line_of_the_manifest(growing, watched):
+    whole = growing.content(1)
+    said = watched(
+        lambda: growing.file(1).write_bytes(whole[:5000]),
+        lambda: growing.file(1).write_bytes(whole),
+        nothing,
+        growing.file(1).unlink,
+        lambda: growing.append(1),
+    )
+    assert kinds(said) == [("fitted", 0), ("waiting", 1), ("fitted", 1)]
+    assert "manifest.sha256 does not list measurements/orbit=0001.parquet" in message(
+        said, "waiting"
+    )
+
+
+@pytest.mark.usefixtures("fits")
+def test_without_a_manifest_a_file_is_whole_once_it_rests(made_survey, growing, watched):
+    (growing.directory / MANIFEST).unlink()
+    shutil.copy(made_survey / EXPOSURES, growing.directory / EXPOSURES)
+    whole = growing.content(1)
+    said = watched(
+        nothing,
+        lambda: growing.file(1).write_bytes(whole[:5000]),
+        lambda: growing.file(1).write_bytes(whole[:9000]),
+        nothing,
+        lambda: growing.file(1).write_bytes(whole),
+        nothing,
+    )
+    assert kinds(said) == [
+        ("waiting", 0),
+        ("fitted", 0),
+        ("waiting", 1),
+        ("damaged", 1),
+        ("waiting", 1),
+        ("fitted", 1),
+    ]
+
+
+@pytest.mark.usefixtures("fits")
+def test_damaged_orbit_is_told_once_and_fitted_when_it_is_mended(growing, watched):
+    def damage():
+        growing.append(1)
+        growing.file(1).write_bytes(growing.content(1)[:-1] + b"?")
+
+    said = watched(
+        damage, nothing, nothing, lambda: growing.file(1).write_bytes(growing.content(1))
+    )
+    assert kinds(said)[1:] == [("waiting", 1), ("damaged", 1), ("fitted", 1)]
+    assert "orbit=0001.parquet is not the file that manifest.sha256 lists" in message(
+        said, "damaged"
+    )
+
+
+def test_orbit_without_a_solution_is_told_once_and_tried_again_when_it_changes(
+    growing, watched, fits
+):
+    fits[1] = "the fit has no solution"
+
+    def change():
+        fits.clear()
+        growing.file(1).touch()
+
+    said = watched(lambda: growing.append(1), nothing, nothing, change)
+    assert kinds(said) == [("fitted", 0), ("failed", 1), ("fitted", 1)]
+    assert message(said, "failed") == "the fit has no solution"
+
+
+def test_failure_of_an_orbit_that_is_written_meanwhile_is_not_told(growing, watched, fits):
+    def write():
+        fits.clear()
+        growing.file(0).touch()
+        return "read while it was written"
+
+    fits[0] = write
+    assert kinds(watched(nothing)) == [("fitted", 0)]
+
+
+@pytest.mark.usefixtures("fits")
+def test_changed_orbit_is_named_and_keeps_its_solution(growing, watched):
+    watched(lambda: growing.append(1))
+    run = Run(growing.directory, "watched")
+    before = {path: path.stat().st_mtime_ns for path in run.directory.glob("orbit=*/*")}
+    whole = growing.file(0).read_bytes()
+
+    def exchange():
+        growing.file(0).write_bytes(growing.content(1))
+        growing.write_manifest()
+
+    said = watched(nothing, exchange, nothing)
+    assert kinds(said) == [("changed", 0)]
+    assert "another --run NAME fits it as it is now" in message(said, "changed")
+    # A new watch knows it too, and the same bytes are no change.
+    assert kinds(watched(nothing)) == [("changed", 0)]
+    growing.file(0).write_bytes(whole)
+    growing.write_manifest()
+    assert kinds(watched(lambda: growing.file(0).touch(), growing.file(1).unlink)) == [
+        ("changed", 1)
+    ]
+    assert {p: p.stat().st_mtime_ns for p in run.directory.glob("orbit=*/*")} == before
+
+
+@pytest.mark.usefixtures("fits")
+def test_exposures_that_change_are_named(growing, watched):
+    def change():
+        path = growing.directory / EXPOSURES
+        table = read_survey_table(path, ENVIRONMENT)
+        write_survey_table(table.assign(ra_est=table["ra_est"] + 1e-6), ENVIRONMENT, path)
+        growing.write_manifest()
+
+    said = watched(change, nothing)
+    assert kinds(said) == [("fitted", 0), ("changed", 0)]
+    assert "its exposures in exposures.parquet are others" in message(said, "changed")
+
+
+@pytest.mark.usefixtures("fits")
+def test_table_of_all_orbits_that_is_being_written_lets_the_survey_wait(growing, watched):
+    path = growing.directory / EXPOSURES
+    whole = path.read_bytes()
+    said = watched(
+        lambda: path.write_bytes(whole[:100]),
+        nothing,
+        lambda: path.write_bytes(whole),
+        lambda: growing.append(2),
+    )
+    assert kinds(said) == [("fitted", 0), ("waiting", None), ("fitted", 2)]
+
+
+@pytest.mark.usefixtures("fits")
+def test_listed_file_that_is_not_there_and_a_wrong_name_are_told(growing, watched):
+    def step():
+        growing.append(1)
+        growing.file(1).rename(growing.file(1).with_name("orbit=01.parquet"))
+
+    said = watched(step)
+    assert kinds(said) == [("fitted", 0), ("damaged", None), ("waiting", 1)]
+    assert "its name is not orbit=0001.parquet" in message(said, "damaged")
+    assert "which is not there yet" in message(said, "waiting")
+
+
+@pytest.mark.usefixtures("fits")
+def test_run_is_completed_when_the_awaited_orbits_are_done(growing, watched):
+    said = watched(lambda: growing.append(1), ends=Ends(until=2))
+    assert kinds(said) == [("fitted", 0), ("fitted", 1), ("complete", None)]
+    run = Run(growing.directory, "watched")
+    assert run.is_complete
+    assert kinds(watched(ends=Ends(until=2))) == [("complete", None)]
+    growing.append(2)
+    with pytest.raises(InputError, match="found a complete one, which is not changed; orbit 2"):
+        watched()
+    assert run.complete_orbits() == [0, 1]
+
+
+@pytest.mark.usefixtures("fits")
+def test_open_run_is_closed_by_a_fit_of_the_whole_survey(growing, watched):
+    watched(ends=ONCE)
+    growing.append(1)
+    report = fit_survey.fit_survey(growing.directory, "watched", FitSettings(), workers=1)
+    assert (report.fitted, report.kept) == ([1], [0])
+    assert report.run.is_complete
+
+
+@pytest.mark.usefixtures("fits")
+def test_run_of_the_orbits_that_there_were_is_refused(growing, watched):
+    begin_run(growing.directory, "default", FitSettings())
+    with pytest.raises(InputError, match="expected a run that `plateviz watch` began"):
+        watched(name="default")
+
+
+@pytest.mark.usefixtures("fits")
+def test_second_watch_of_a_run_is_refused(growing, watched):
+    run = begin_run(growing.directory, "watched", FitSettings(), grows=True)
+    with (
+        locked(run.directory),
+        pytest.raises(InputError, match="that another process is fitting; wait for it"),
+    ):
+        watched()
+
+
+@pytest.mark.usefixtures("fits")
+def test_survey_that_vanishes_ends_the_watch_in_words(growing, watched):
+    with pytest.raises(InputError, match="expected the survey that is watched, found none there"):
+        watched(lambda: shutil.rmtree(growing.directory), nothing, ends=Ends(until=9))
+
+
+@pytest.mark.usefixtures("fits")
+def test_other_catalogue_ends_the_watch_in_words(growing, watched):
+    def change():
+        growing.append(1)
+        with (growing.directory / REFERENCE).open("ab") as file:
+            file.write(b" ")
+
+    with pytest.raises(InputError, match=r"found other inputs \(reference.parquet\)"):
+        watched(change, nothing, ends=Ends(until=9))
+
+
+@pytest.mark.slow
+def test_watched_run_has_the_tables_of_a_run_of_all_orbits(growing, watched):
+    assert kinds(watched(ends=ONCE)) == [("fitted", 0)]
+    for orbit in (1, 2):
+        growing.append(orbit)
+    watched(ends=Ends(until=3))
+    whole = fit_survey.fit_survey(growing.directory, "whole", FitSettings(), workers=1).run
+    run = Run(growing.directory, "watched")
+    assert run.is_complete
+    assert run.changes() == []
+    for name in ("history.parquet", "motions.parquet", "orbit=0001/sources.parquet"):
+        assert (run.directory / name).read_bytes() == (whole.directory / name).read_bytes()
+    assert json.loads((run.directory / "gathered.json").read_text())["orbits"] == [0, 1, 2]

@@ -45,6 +45,17 @@ def serve(
     ] = "",
     password_file: options.PasswordFile = None,
     no_password: options.NoPassword = False,
+    pages: Annotated[
+        int, typer.Option(help="Most pages that are open at once.", min=1, metavar="N")
+    ] = 100,
+    pages_per_address: Annotated[
+        int,
+        typer.Option(
+            help="Most of them that are open from one address on the network.",
+            min=1,
+            metavar="N",
+        ),
+    ] = 40,
     open_browser: options.OpenBrowser = True,
 ) -> None:
     """Show a survey, or the files of one orbit, in the dashboard."""
@@ -55,7 +66,12 @@ def serve(
 
     origins = tuple(map(check_origin, allow_origin or []))
     endpoint = open_endpoint(port, address, password_file, no_password)
-    endpoint = endpoint._replace(origins=origins, prefix=check_prefix(prefix))
+    endpoint = endpoint._replace(
+        origins=origins,
+        prefix=check_prefix(prefix),
+        pages=pages,
+        pages_per_address=pages_per_address,
+    )
     if reference is None:
         origin: OrbitFiles | SurveyFolder = SurveyFolder(str(path))
         if not origin.orbits():

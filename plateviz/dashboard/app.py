@@ -12,6 +12,7 @@ from panel.io.resources import get_dist_path
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.views.figure import Part
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.selection_bar import SelectionBar
@@ -28,20 +29,14 @@ _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 def build_app(store: SolutionStore) -> pmui.Page:
     """Return the page of one session over `store`."""
     navigation, ticker, pages = _pages(store)
-    session, title = navigation.session, f"plateviz · {store.title}"
+    session = navigation.session
     bar, system = SelectionBar(navigation), SystemTheme()
-    page = pmui.Page(
-        title=title,
-        # The page's template puts it into an attribute as it is.
-        meta_title=escape(title, quote=True),
+    page = empty_page(
+        store,
         header=[bar, Keyboard(navigation), system],
         sidebar=[pages.sidebar],
         main=[pages, bar.windows],
-        sidebar_width=_SIDEBAR_WIDTH,
-        theme_config={"typography": {"fontSize": 13}},
     )
-    if pn.state.curdoc is not None:
-        _prepare(pn.state.curdoc)
     # The page's busy indicator changes with every event, and each change makes Panel walk all
     # models of all figures, which takes half a second. The refit panel shows progress instead.
     with param.edit_constant(page):
@@ -50,8 +45,24 @@ def build_app(store: SolutionStore) -> pmui.Page:
     _set_theme(session, page.dark_theme)
     system.param.watch(lambda event: page.param.update(dark_theme=event.new), "is_dark")
     _write_address(navigation)
+    if pn.state.curdoc is not None:
+        # After the page's address is known, with which Panel makes a path from the host's root.
+        _prepare(pn.state.curdoc)
     ticker.follow(navigation, pages)
     return page
+
+
+def empty_page(store: SolutionStore, **contents: list[Part]) -> pmui.Page:
+    """Return the page of `store` with its title and style, and with `contents` by their place."""
+    title = f"plateviz · {store.title}"
+    return pmui.Page(
+        title=title,
+        # The page's template puts it into an attribute as it is.
+        meta_title=escape(title, quote=True),
+        sidebar_width=_SIDEBAR_WIDTH,
+        theme_config={"typography": {"fontSize": 13}},
+        **contents,
+    )
 
 
 def build_part(store: SolutionStore) -> pn.Row:
@@ -74,8 +85,8 @@ def _prepare(document: Document) -> None:
     # The figures are already styled, in both themes. A theme that lists these models prevents
     # the page's own theme from restyling them.
     document.theme = Theme(json={"attrs": {name: {} for name in _STYLED}})
-    # If a browser loads so slowly that its session has expired and is created again, Panel has
-    # not set this yet, and the page would load its style sheets from another host.
+    # Panel sets this when it writes the page, which is before there is a session; without it the
+    # page would load its style sheets from another host.
     document.template_variables["dist_url"] = get_dist_path()
 
 

@@ -9,21 +9,26 @@ from typing import Any, NamedTuple
 
 import panel as pn
 
-from plateviz.dashboard.app import build_app
+from plateviz.dashboard.app import build_app, empty_page
 from plateviz.dashboard.closed_pages import silence_closed_pages
 from plateviz.dashboard.headers import NotebookHeaders, SecurityHeaders
+from plateviz.dashboard.limits import Limits, PageLimit
+from plateviz.dashboard.page_request import send_empty_pages
 from plateviz.dashboard.password import PasswordLogin
-from plateviz.dashboard.refused_requests import check_websockets, refuse_paths
+from plateviz.dashboard.refused_requests import refuse_floods, refuse_paths
 from plateviz.dashboard.waiting_messages import send_waiting_messages
+from plateviz.dashboard.websocket import LIMITS, check_websockets
 from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 
-# Time for a page to load its scripts before its session is discarded.
-_LOAD_TIMEOUT_MILLISECONDS = 120_000
+# Time for a page that has lost its connection to come back to its session.
+_LOST_MILLISECONDS = 60_000
 # A page sends events and a few properties; a selection of 8000 sources takes 60 kB.
 _MESSAGE_BYTES = 2**20
 _HOST = re.compile(r"[a-z0-9]([a-z0-9.-]*[a-z0-9])?(:\d{1,5})?")
 _PATH = re.compile(r"[A-Za-z0-9._~-]+(/[A-Za-z0-9._~-]+)*")
+# Each open page takes some 10 MB.
+PAGES, PAGES_PER_ADDRESS = 100, 40
 
 
 class Endpoint(NamedTuple):
@@ -38,6 +43,8 @@ class Endpoint(NamedTuple):
     prefix : URL path of the page, as from `check_prefix`
     password : asked for before the page opens, if there is one
     in_notebook : whether notebooks of this machine show the page in a frame
+    pages : most pages that are open at once
+    pages_per_address : most of them from one address on the network
     """
 
     port: int
@@ -46,6 +53,8 @@ class Endpoint(NamedTuple):
     prefix: str = ""
     password: str | None = None
     in_notebook: bool = False
+    pages: int = PAGES
+    pages_per_address: int = PAGES_PER_ADDRESS
 
 
 def serve(store: SolutionStore, endpoint: Endpoint, ready: Callable[[str], None]) -> None:
@@ -93,7 +102,7 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
         show=False,
         start=False,
         verbose=False,
-        unused_session_lifetime_milliseconds=_LOAD_TIMEOUT_MILLISECONDS,
+        unused_session_lifetime_milliseconds=_LOST_MILLISECONDS,
         # A client cannot choose its session, nor have a payload of its own decompressed.
         sign_sessions=True,
         secret_key=secrets.token_bytes(),
@@ -102,6 +111,10 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
         **_login(endpoint.password),
     )
     application = server._tornado  # noqa: SLF001 it has no public name
+    pages = PageLimit(endpoint.pages, endpoint.pages_per_address)
+    limits = application.settings[LIMITS] = Limits(pages, is_proxied=bool(endpoint.origins))
+    send_empty_pages(application, empty_page(store), limits)
+    refuse_floods(application, limits)
     refuse_paths(application)
     application.add_transform(NotebookHeaders if endpoint.in_notebook else SecurityHeaders)
     return server

@@ -1,0 +1,204 @@
+"""A served dashboard without a browser: what makes a session, and what one client may ask for."""
+
+import asyncio
+import re
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager, suppress
+
+import pytest
+from bokeh.protocol import Protocol
+from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
+from tornado.websocket import WebSocketClosedError, websocket_connect
+
+from plateviz.dashboard import limits
+from plateviz.dashboard.limits import Rate
+from plateviz.dashboard.server import Endpoint, begin, check_address
+from tests.plateviz.dashboard.test_navigation import SurveyStore
+
+
+@pytest.fixture
+def store(fit_result, run):
+    made = SurveyStore(fit_result, [run])
+    made.orbits = [0, 1]
+    return made
+
+
+def with_server(store, scenario, **options):
+    """Serve a store, and run a coroutine function with its address and its server."""
+
+    async def scene():
+        endpoint = Endpoint(check_address("127.0.0.1", 0), "127.0.0.1", **options)
+        server = begin(store, endpoint)
+        try:
+            path = f"{endpoint.prefix}/" if endpoint.prefix else ""
+            await scenario(f"http://127.0.0.1:{endpoint.port}/{path}", server)
+        finally:
+            server.stop()
+
+    # Playwright, in the process of other tests, has an event loop in this thread.
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, scene()).result()
+
+
+async def get(address, **options):
+    """Return the status and the text of an answer."""
+    answer = await AsyncHTTPClient().fetch(address, raise_error=False, **options)
+    return answer.code, answer.body.decode()
+
+
+def token_of(page):
+    return re.search(r'"token":"([^"]+)"', page)[1]
+
+
+@asynccontextmanager
+async def opened(address, query=""):
+    """Get the page and open its websocket as the page does; give the connection."""
+    token = token_of((await get(address + query))[1])
+    request = HTTPRequest(f"{address.replace('http', 'ws', 1)}ws{query}")
+    connection = await websocket_connect(request, subprotocols=["bokeh", token])
+    for _ in range(3):
+        # The parts of the message that says that the session is there.
+        await connection.read_message()
+    try:
+        yield connection
+    finally:
+        connection.close()
+
+
+async def send(connection, message):
+    for part in (message.header_json, message.metadata_json, message.content_json):
+        await connection.write_message(part)
+
+
+async def ended(connection):
+    """Wait for the end of a connection; return its status code."""
+    while await asyncio.wait_for(connection.read_message(), 20) is not None:
+        pass
+    return connection.close_code
+
+
+def test_request_of_the_page_makes_no_session(store):
+    async def scenario(address, server):
+        for _ in range(20):
+            status, page = await get(address)
+            assert status == 200
+            assert "<title>plateviz · " in page
+        assert (await get(f"{address}autoload.js?bokeh-autoload-element=1"))[0] == 404
+        assert server.get_sessions() == []
+        tokens = {token_of((await get(address))[1]) for _ in range(3)}
+        assert len(tokens) == 3
+
+    with_server(store, scenario)
+
+
+@pytest.mark.parametrize("prefix", ["", "stars/plateviz"])
+def test_websocket_makes_the_session_that_the_address_requests(store, prefix):
+    async def scenario(address, server):
+        async with opened(address, "?view=orbit&orbit=1"):
+            (session,) = server.get_sessions()
+            # Orbit 1 is not in the run.
+            assert [orbit for orbit, *_ in store.requested] == [1]
+            location = next(m for m in session.document.roots if hasattr(m, "pathname"))
+            assert location.pathname == (f"/{prefix}/" if prefix else "/")
+            assert "orbit=1" in location.search
+            # Relative to the page, also behind a proxy that does not hand on the host's name.
+            dist = session.document.template_variables["dist_url"]
+            assert dist == "static/extensions/panel/"
+
+    with_server(store, scenario, prefix=prefix)
+
+
+def test_page_without_its_last_slash_is_sent_to_its_path(store):
+    async def scenario(address, server):
+        answer = await AsyncHTTPClient().fetch(
+            f"{address.removesuffix('/')}?orbit=1", raise_error=False, follow_redirects=False
+        )
+        assert (answer.code, answer.headers["Location"]) == (302, "/stars/?orbit=1")
+
+    with_server(store, scenario, prefix="stars")
+
+
+def test_one_page_too_many_is_told_so_until_another_is_closed(store):
+    async def scenario(address, server):
+        async with opened(address) as first, opened(address):
+            token = token_of((await get(f"{address}"))[1])
+            async with opened(address):
+                status, page = await get(address)
+                assert status == 503
+                assert "shows 3 pages at once to one address" in page
+                request = HTTPRequest(f"{address.replace('http', 'ws', 1)}ws")
+                with pytest.raises(HTTPClientError, match="503"):
+                    await websocket_connect(request, subprotocols=["bokeh", token])
+                first.close()
+                await ended(first)
+                assert (await get(address))[0] == 200
+
+    with_server(store, scenario, pages_per_address=3)
+
+
+def test_behind_a_proxy_the_clients_are_those_that_it_states(store):
+    async def scenario(address, server):
+        async with opened(address):
+            for client, status in (("192.0.2.1", 200), (None, 200)):
+                headers = {} if client is None else {"X-Real-IP": client}
+                assert (await get(address, headers=headers))[0] == status
+        server._tornado.settings["plateviz_limits"].pages.enter("192.0.2.1")
+        for client, status in (("192.0.2.1", 503), ("192.0.2.2", 200)):
+            assert (await get(address, headers={"X-Real-IP": client}))[0] == status
+
+    with_server(store, scenario, pages_per_address=1, origins=("astro.example.org",))
+
+
+def test_flood_of_requests_is_refused_and_then_forgiven(store, monkeypatch):
+    monkeypatch.setattr(limits, "REQUESTS", Rate(at_once=30, per_second=20))
+
+    async def scenario(address, server):
+        answers = await asyncio.gather(*(get(address) for _ in range(60)))
+        refused = [status for status, _ in answers if status == 429]
+        assert 10 < len(refused) < 40
+        assert {status for status, _ in answers} == {200, 429}
+        await asyncio.sleep(0.2)
+        assert (await get(address))[0] == 200
+
+    with_server(store, scenario)
+
+
+def test_messages_that_are_wrong_end_their_connection_only(store):
+    async def scenario(address, server):
+        async with opened(address) as good, opened(address) as bad:
+            with suppress(WebSocketClosedError):
+                for _ in range(1000):
+                    await bad.write_message('{"msgtype": "no such message"}')
+            await ended(bad)
+            await send(good, Protocol().create("SERVER-INFO-REQ"))
+            answer = await asyncio.wait_for(good.read_message(), 20)
+            assert '"SERVER-INFO-REPLY"' in answer
+
+    with_server(store, scenario)
+
+
+def test_client_that_sends_too_much_is_cut_off(store, monkeypatch):
+    monkeypatch.setattr(limits, "MESSAGES", Rate(at_once=60, per_second=1))
+
+    async def scenario(address, server):
+        async with opened(address) as busy:
+            for _ in range(30):
+                await send(busy, Protocol().create("SERVER-INFO-REQ"))
+            assert await ended(busy) == 1008
+
+    with_server(store, scenario)
+
+
+def test_messages_that_cannot_be_carried_out_end_the_connection_in_the_end(store, caplog):
+    async def scenario(address, server):
+        async with opened(address) as bad:
+            events = [{"kind": "ModelChanged", "model": {"id": "none"}, "attr": "x", "new": 1}]
+            for _ in range(100):
+                message = Protocol().create("SERVER-INFO-REQ")
+                message.header["msgtype"] = "PATCH-DOC"
+                message.content = {"events": events}
+                await send(bad, message)
+            assert await ended(bad) == 1008
+
+    with_server(store, scenario)
+    assert caplog.text.count("none") < 200

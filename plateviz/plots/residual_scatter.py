@@ -102,11 +102,11 @@ DIAGNOSTICS = (
     Diagnostic(
         "residual-scatter",
         "Residual scatter",
-        "Residuals of the selected exposures and detector, x against y. Good: a round cloud "
+        "Residuals of the shown exposures and detector, x against y. Good: a round cloud "
         "about zero, as wide as the measurement errors predict.",
         OrbitWorkspace.RESIDUALS,
         30,
         _plot,
-        follows_selection=True,
+        follows_shown=True,
     ),
 )

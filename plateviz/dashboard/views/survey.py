@@ -10,6 +10,7 @@ from astropy.table import Table
 
 from plateviz.dashboard.downloads import described
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import (
@@ -74,7 +75,7 @@ class SurveyPage(pn.viewable.Viewer):
         navigation.param.watch(self._show_head, "growth")
         navigation.param.watch(self._show_workspace, "survey_workspace")
         self._session.param.watch(self._show, "theme")
-        self._session.selection.param.watch(self._show_selected, "sources")
+        self._session.selection.param.watch(self._show_selected, [*KINDS])
         self._show_workspace()
         self._read()
 

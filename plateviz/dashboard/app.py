@@ -99,6 +99,7 @@ def _write_address(navigation: Navigation) -> None:
     navigation.param.watch(write, ["view", *WORKSPACES.values(), "run_name", "found"])
     navigation.exploration.param.watch(write, list(navigation.exploration.param.values()))
     navigation.session.param.watch(write, "shown")
+    navigation.session.units.param.watch(write, "unit")
     navigation.session.selection.param.watch(
         write, ["orbit", "field", "plates", "detector", *KINDS, "kept"]
     )
@@ -123,6 +124,7 @@ class _Ticker:
         session = navigation.session
         session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
         session.selection.param.watch(self.wake, ["field", "plates", "detector", *KINDS])
+        session.units.param.watch(self.wake, "unit")
         names = ["view", *WORKSPACES.values(), "run_name", "written", "found"]
         navigation.param.watch(self.wake, names)
         navigation.param.watch(self._follow_run, "run_name")

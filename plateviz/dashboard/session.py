@@ -10,6 +10,7 @@ import param
 from plateviz.dashboard.selected import SelectedIds
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices, Selection
+from plateviz.dashboard.units import Units
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.solution_store import SolutionStore
 from solver.data.result import FitResult
@@ -46,6 +47,7 @@ class Session(param.Parameterized):
         self.store = store
         self.selection = Selection()
         self.choices = FitChoices()
+        self.units = Units(store.instrument)
         self.selection.param["orbit"].objects = store.orbits
         self.selection.orbit = store.orbits[0]
         self._job: Job | None = None

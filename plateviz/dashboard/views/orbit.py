@@ -20,6 +20,7 @@ from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.summary import HeadView, StripView
+from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
 from plateviz.plots.diagnostic import Chosen, Diagnostic
@@ -49,6 +50,7 @@ class OrbitPage(pn.viewable.Viewer):
         self.sidebar = pmui.Column(
             heading("Shown"),
             SelectionView(navigation),
+            unit_selector(session),
             heading("Refit"),
             sizing_mode="stretch_width",
             margin=0,
@@ -58,6 +60,7 @@ class OrbitPage(pn.viewable.Viewer):
         )
         session.param.watch(self._change, ["shown", "other", "theme"])
         session.param.watch(self._mark_stale, ["stage"])
+        session.units.param.watch(self._change, "unit")
         session.selection.param.watch(self._show_selected, [*KINDS])
         session.selection.param.watch(self._change_shown, ["field", "plates", "detector"])
         navigation.param.watch(self._show_workspace, "orbit_workspace")
@@ -130,7 +133,7 @@ class OrbitPage(pn.viewable.Viewer):
             detector=session.selection.detector_id,
             other=session.other.result if session.other else None,
         )
-        return diagnostic.plot(chosen)
+        return session.units.figure(diagnostic.plot(chosen))
 
     def _show_workspace(self, *_: object) -> None:
         self._stack.show(self._navigation.orbit_workspace)

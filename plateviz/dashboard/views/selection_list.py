@@ -82,7 +82,8 @@ class SelectionList(pn.viewable.Viewer):
     def _table(self, kind: str) -> DataTable:
         opens = kind == "sources" and self._navigation.run is not None
         on_row: Callable[[pd.Series], object] | None = self._open_source if opens else None
-        return DataTable(_PARTS[kind].headings, on_row, page_size=_PAGE_SIZE)
+        units = self._navigation.session.units
+        return DataTable(_PARTS[kind].headings, on_row, page_size=_PAGE_SIZE, units=units)
 
     def _fill(self) -> None:
         session = self._navigation.session

@@ -11,6 +11,7 @@ from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.figure import Part
 from plateviz.dashboard.views.keyboard import Keyboard
@@ -109,8 +110,9 @@ def _write_address(navigation: Navigation) -> None:
     navigation.param.watch(write, ["view", *WORKSPACES.values(), "run_name", "found"])
     navigation.exploration.param.watch(write, list(navigation.exploration.param.values()))
     navigation.session.param.watch(write, "shown")
+    navigation.session.units.param.watch(write, "unit")
     navigation.session.selection.param.watch(
-        write, ["orbit", "field", "plates", "detector", "sources"]
+        write, ["orbit", "field", "plates", "detector", *KINDS, "kept"]
     )
 
 
@@ -132,7 +134,8 @@ class _Ticker:
         """Begin once the page has loaded; drawing before would delay it."""
         session = navigation.session
         session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
-        session.selection.param.watch(self.wake, ["field", "plates", "detector", "sources"])
+        session.selection.param.watch(self.wake, ["field", "plates", "detector", *KINDS])
+        session.units.param.watch(self.wake, "unit")
         names = ["view", *WORKSPACES.values(), "run_name", "written", "found"]
         navigation.param.watch(self.wake, names)
         navigation.param.watch(self._follow_run, "run_name")

@@ -12,6 +12,7 @@ import param
 from plateviz.dashboard.exploration import Exploration
 from plateviz.dashboard.growth import Growth
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.units import NAMES, OWN
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.queries import SurveyRun
 from plateviz.solving.origin import SurveyFolder
@@ -147,6 +148,8 @@ class Navigation(param.Parameterized):
         """
         self.session.selection.restore(address)
         self.exploration.restore(address)
+        if address.get("unit") in NAMES.values():
+            self.session.units.unit = address["unit"]
         views = {view.value: view for view in View}
         if address.get("run") in self._runs:
             self.run_name = address["run"]
@@ -166,6 +169,8 @@ class Navigation(param.Parameterized):
             query["run"] = self.run_name
         if self.found is not None:
             query["source"] = str(self.found.source_id)
+        if self.session.units.unit != OWN:
+            query["unit"] = self.session.units.unit
         if self.workspace is OrbitWorkspace.EXPLORE:
             query |= self.exploration.address()
         return query

@@ -3,13 +3,14 @@
 The last solution stays on the screen until the next one is complete; then both can be compared.
 """
 
-from dataclasses import replace
 from enum import Enum
 
 import param
 
+from plateviz.dashboard.selected import SelectedIds
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices, Selection
+from plateviz.dashboard.units import Units
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.solution_store import SolutionStore
 from solver.data.result import FitResult
@@ -46,6 +47,7 @@ class Session(param.Parameterized):
         self.store = store
         self.selection = Selection()
         self.choices = FitChoices()
+        self.units = Units(store.instrument)
         self.know_orbits()
         self.selection.orbit = self.selection.param["orbit"].objects[0]
         self._job: Job | None = None
@@ -154,60 +156,18 @@ class Session(param.Parameterized):
         """Return the orbit on the screen as it is named in files, such as "orbit-3"."""
         return f"orbit-{self.selection.orbit}"
 
-    @property
-    def selected_ids(self) -> frozenset[str]:
-        """The selected sources as tables of figures name them."""
-        return frozenset(map(str, self.selection.sources))
+    def select_exposures(self, exposures: frozenset[tuple[int, int]]) -> None:
+        """Select exposures, (field_id, plate_id), in place of those selected before."""
+        self.selection.exposures = exposures
+
+    def select_detectors(self, detectors: frozenset[int]) -> None:
+        """Select detectors by their ids, in place of those selected before."""
+        self.selection.detectors = detectors
 
     @property
-    def selected_in_orbit(self) -> frozenset[int]:
-        """The selected sources among those that the orbit on the screen has measured."""
-        return self.selection.sources & self._measured
-
-    @property
-    def is_selection_left_out(self) -> bool:
-        """Whether the next fit uses none of the selected sources, though some are measured."""
-        selected = self.selected_in_orbit
-        return bool(selected) and selected <= self._left_out
-
-    def invert_selection(self) -> None:
-        """Select the other sources of the orbit on the screen."""
-        self.selection.sources = self._measured - self.selection.sources
-
-    def leave_out_selection(self) -> None:
-        """Exclude the selected sources from the next fit, which shows a what-if."""
-        if not self.selected_in_orbit:
-            self.refuse("The orbit on the screen has measured none of the selected sources.")
-            return
-        self._exclude(self._left_out | self.selected_in_orbit)
-
-    def put_back_selection(self) -> None:
-        """Include the selected sources in the next fit, which shows a what-if."""
-        self._exclude(self._left_out - self.selection.sources)
-
-    @property
-    def _measured(self) -> frozenset[int]:
-        """Sources of the orbit on the screen, those among them that are left out."""
-        if self.shown is None:
-            return frozenset()
-        excluded = self.shown.settings.exclusions.sources
-        return excluded.union(self.shown.result.sources["source_id"].tolist())
-
-    @property
-    def _left_out(self) -> frozenset[int]:
-        try:
-            return self.choices.settings().exclusions.sources
-        except InputError:
-            return frozenset()
-
-    def _exclude(self, sources: frozenset[int]) -> None:
-        try:
-            settings = self.choices.settings()
-        except InputError as error:
-            # Other settings than exclusions may be invalid; nothing is changed for them.
-            self.refuse(str(error))
-            return
-        self.choices.load(settings.with_(exclusions=replace(settings.exclusions, sources=sources)))
+    def selected_ids(self) -> SelectedIds:
+        """The selected sources, exposures and detectors as the marks of figures name them."""
+        return self.selection.selected.ids()
 
     def cancel(self) -> None:
         """Cancel the waiting or running job."""

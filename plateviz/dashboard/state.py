@@ -6,25 +6,26 @@ from typing import Any
 
 import param
 
+from plateviz.dashboard.selected import KINDS, Selected, checked_name, parsed
 from solver.data.parameters import PARAMETERS
 from solver.data.prior_text import format_width
 from solver.data.result import FitResult
 from solver.data.setting_kinds import Change, Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import PriorWidths, Texts
+from solver.errors import InputError
 
 ALL = "all"
 _PLATES = re.compile(r"(-?\d+)-(-?\d+)")
-_SOURCES = re.compile(r"-?\d{1,19}(,-?\d{1,19})*")
-# Maximum number of sources in an address.
-_FEW = 20
-_LARGEST_ID = 2**63 - 1
 
 
 class Selection(param.Parameterized):
-    """The exposures, the detector and the sources that every view of the session shows.
+    """What every view of the session shows, and what is selected in it.
 
-    Sources are selected by id, and stay selected in an orbit that has not measured them.
+    `field`, `plates` and `detector` are the shown measurements: some figures draw no others.
+    `sources`, `exposures` and `detectors` are selected: figures let them stand out among what is
+    shown, and they can be left out of the fit. They are selected by id, and stay selected in an
+    orbit that has not measured them.
     """
 
     orbit = param.Selector(doc="orbit on the screen")
@@ -36,6 +37,13 @@ class Selection(param.Parameterized):
     sources = param.ClassSelector(
         class_=frozenset, default=frozenset(), doc="ids of the selected sources"
     )
+    exposures = param.ClassSelector(
+        class_=frozenset, default=frozenset(), doc="(field_id, plate_id) of those selected"
+    )
+    detectors = param.ClassSelector(
+        class_=frozenset, default=frozenset(), doc="ids of the selected detectors"
+    )
+    kept = param.Dict(default={}, doc="name -> `Selected` that is kept; replaced, not changed")
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
         """Start without options."""
@@ -74,35 +82,60 @@ class Selection(param.Parameterized):
         if plates:
             requested["plates"] = tuple(sorted(int(number) for number in plates.groups()))
         self._requested = requested
-        if _SOURCES.fullmatch(address.get("sources", "")):
-            ids = map(int, address["sources"].split(",")[:_FEW])
-            self.sources = frozenset(one for one in ids if abs(one) <= _LARGEST_ID)
+        self._restore_selected(address)
         orbits = {str(orbit): orbit for orbit in self.param["orbit"].objects}
         self.orbit = orbits.get(address.get("orbit", ""), self.orbit)
 
     def address(self) -> dict[str, str]:
         """Return the selection as the query of the page's address; `restore` reads it back.
 
-        More than a few selected sources are left out.
+        Kinds of which more than a few are selected are left out.
         """
         first, last = self.plates
         query = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
-        if 0 < len(self.sources) <= _FEW:
-            query["sources"] = ",".join(map(str, sorted(self.sources)))
+        selected = self.selected.address()
+        if parsed(selected) == self.selected and (name := self.name_of_selected) is not None:
+            selected["selection"] = name
+        query |= selected
         return query if self.orbit is None else {"orbit": str(self.orbit), **query}
 
     @property
+    def selected(self) -> Selected:
+        """The selected sources, exposures and detectors."""
+        return Selected(self.sources, self.exposures, self.detectors)
+
+    def select(self, selected: Selected) -> None:
+        """Select sources, exposures and detectors in place of those selected before."""
+        self.param.update(**selected.by_kind())
+
+    @property
+    def name_of_selected(self) -> str | None:
+        """Name under which the selection is kept, None if it is not."""
+        return next((name for name, kept in self.kept.items() if kept == self.selected), None)
+
+    def _restore_selected(self, address: Mapping[str, str]) -> None:
+        if not any(kind in address for kind in KINDS):
+            return
+        self.select(parsed(address))
+        try:
+            name = checked_name(address.get("selection", ""))
+        except InputError:
+            return
+        if self.selected:
+            self.kept = {**self.kept, name: self.selected}
+
+    @property
     def detector_id(self) -> int | None:
-        """The selected detector, None for all."""
+        """The shown detector, None for all."""
         return None if self.detector == ALL else int(self.detector)
 
     def exposures_of(self, result: FitResult) -> list[tuple[int, int]]:
-        """Return (field_id, plate_id) of the selected exposures of a solution."""
+        """Return (field_id, plate_id) of the shown exposures of a solution."""
         table = result.exposures
-        selected = table["plate_id"].between(*self.plates)
+        is_shown = table["plate_id"].between(*self.plates)
         if self.field != ALL:
-            selected &= table["field_id"] == int(self.field)
-        pairs = table.loc[selected, ["field_id", "plate_id"]]
+            is_shown &= table["field_id"] == int(self.field)
+        pairs = table.loc[is_shown, ["field_id", "plate_id"]]
         return [(int(f), int(p)) for f, p in pairs.itertuples(index=False)]
 
 

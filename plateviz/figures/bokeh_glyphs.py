@@ -37,8 +37,10 @@ _DASHES: Mapping[str, str] = MappingProxyType(
 _TRANSPARENT = "rgba(0, 0, 0, 0)"
 # Maximum number of glyphs that one hover describes.
 _HOVER_LIMIT = 3
-# Rows of these kinds are selected by a column; the others are faded while some are.
-SELECTED_BY, _SELECTABLE = "id", ("points", "segments")
+# Columns by which rows are selected: the first one that they have.
+SELECTED_BY = ("id", "detector_id", "exposure")
+# Rows of these kinds are selected; the others are faded while some are.
+_SELECTABLE = ("points", "segments")
 
 
 class BokehGlyphs:

@@ -16,6 +16,8 @@ _LARGEST_HEAD = 0.018
 _HEAD_ANGLE = math.radians(26.0)
 _KEY_STRIP = 0.11
 _STEPS = (1.0, 2.0, 5.0, 10.0)
+# Columns by which an arrow is selected.
+_KEYS = ("id", "exposure", "detector_id")
 
 
 class Field(NamedTuple):
@@ -71,7 +73,7 @@ def arrows(
     Parameters
     ----------
     table : tails `x`, `y` and vectors `u`, `v` in the units of the axes, columns of the hover,
-        and `id` where an arrow is of one source
+        and `id`, `exposure` and `detector_id` where an arrow is of one of them
     scale : drawn length over true length
     field : the area drawn on; limits the size of the heads
     colour : of the arrows
@@ -86,7 +88,7 @@ def arrows(
     u, v = (scale * table[name].to_numpy(dtype=float) for name in "uv")
     strokes = _strokes(x, y, x + u, y + v, field)
     # An arrow is selected with its tail.
-    kept = {name: table[name].to_numpy(dtype=object) for name in ("id",) if name in table}
+    kept = {name: table[name].to_numpy(dtype=object) for name in _KEYS if name in table}
     of_strokes = {name: np.concatenate([ids, np.repeat(ids, 2)]) for name, ids in kept.items()}
     tails = points(
         table, "x", "y", name="tails", color=colour, size=3.5, alpha=0.6, hover=hover, keep=[*kept]

@@ -101,7 +101,7 @@ def _subtitle(statistics: pd.Series, unit: str, factor: float, hidden: int) -> s
     )
     pulls = f"{statistics['pull_rms_ra']:.2f}, {statistics['pull_rms_dec']:.2f}"
     return (
-        f"mean {mean}; rms {spread} {unit} (α, δ)\n"
+        f"mean {mean} {unit}; rms {spread} {unit} (α, δ)\n"
         f"n = {statistics['n']:,.0f}; rms of deviation / σ: {pulls}\n"
         f"ellipse: mean marginal 1σ; {f'{hidden:,} beyond' if hidden else 'all within'} the frame"
     )

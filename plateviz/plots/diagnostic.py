@@ -16,14 +16,14 @@ from solver.data.result import FitResult
 
 @dataclass(frozen=True)
 class Chosen:
-    """The solution and the selection that a diagnostic shows.
+    """The solution and the part of it that a diagnostic shows.
 
     Attributes
     ----------
     result : the solution
     instrument : that took the orbit
-    exposures : selected exposures as (field_id, plate_id)
-    detector : selected detector_id, or None for all
+    exposures : shown exposures as (field_id, plate_id)
+    detector : shown detector_id, or None for all
     other : solution to compare with, or None
     """
 
@@ -50,7 +50,7 @@ class Diagnostic:
     workspace : part of the Orbit page that shows the figure
     order : sort key on the page
     plot : function of a `Chosen` that returns the figure
-    follows_selection : whether the figure depends on the selected exposures and detector
+    follows_shown : whether the figure depends on the shown exposures and detector
     is_wide : whether it takes the whole width of its workspace, or of a report
     has_data : whether there is anything to draw, such as a truth or another solution
     is_key : whether the Verdict workspace shows it, small
@@ -62,7 +62,7 @@ class Diagnostic:
     workspace: OrbitWorkspace
     order: int
     plot: Callable[[Chosen], Figure]
-    follows_selection: bool = False
+    follows_shown: bool = False
     is_wide: bool = False
     has_data: Callable[[Chosen], bool] = _always
     is_key: bool = False

@@ -110,8 +110,8 @@ def _subtitle(rows: pd.DataFrame, unit: str, prior: float) -> str:
     )
     width = f"± {_number(prior)} {unit}" if math.isfinite(prior) else "flat"
     return (
-        f"mean {_number(mean)}, scatter {_number(scatter)} {unit}; prior {width}\n"
-        f"σ conditional {conditional}, marginal {marginal} {unit}"
+        f"mean {_number(mean)} {unit}, scatter {_number(scatter)} {unit}; prior {width}\n"
+        f"σ conditional {conditional} {unit}, marginal {marginal} {unit}"
     )
 
 

@@ -144,13 +144,13 @@ DIAGNOSTICS = (
     Diagnostic(
         "residual-map",
         "Residual map",
-        "Measured minus predicted position on the detector, for the selected exposures and "
+        "Measured minus predicted position on the detector, for the shown exposures and "
         "detector. Good: directions without a pattern. Neighbouring arrows with a common "
         "direction mean distortion that the order does not describe.",
         OrbitWorkspace.RESIDUALS,
         20,
         _plot,
-        follows_selection=True,
+        follows_shown=True,
         is_key=True,
     ),
 )

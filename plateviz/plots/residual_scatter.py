@@ -88,8 +88,8 @@ def _subtitle(statistics: ScatterStatistics) -> str:
     count = statistics.n_exposures
     return (
         f"n = {statistics.n:,} in {count} exposure{'s' if count > 1 else ''}; "
-        f"rms x {statistics.rms_x:.2f}, y {statistics.rms_y:.2f} mpix; "
-        f"expected x {statistics.expected_x:.2f}, y {statistics.expected_y:.2f} mpix"
+        f"rms x, y {statistics.rms_x:.2f}, {statistics.rms_y:.2f} mpix; "
+        f"expected {statistics.expected_x:.2f}, {statistics.expected_y:.2f} mpix"
     )
 
 
@@ -102,11 +102,11 @@ DIAGNOSTICS = (
     Diagnostic(
         "residual-scatter",
         "Residual scatter",
-        "Residuals of the selected exposures and detector, x against y. Good: a round cloud "
+        "Residuals of the shown exposures and detector, x against y. Good: a round cloud "
         "about zero, as wide as the measurement errors predict.",
         OrbitWorkspace.RESIDUALS,
         30,
         _plot,
-        follows_selection=True,
+        follows_shown=True,
     ),
 )

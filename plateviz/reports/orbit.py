@@ -87,7 +87,7 @@ def failed_orbit_report(data: OrbitData, message: str, facts: Facts) -> Report:
 
 
 def _figure(diagnostic: Diagnostic, whole: Chosen, has_choices: bool) -> ReportFigure:
-    has_choices = has_choices and diagnostic.follows_selection
+    has_choices = has_choices and diagnostic.follows_shown
     selections = _selections(whole) if has_choices else {"All": whole}
     return ReportFigure(
         diagnostic.name,

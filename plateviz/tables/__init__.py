@@ -49,6 +49,7 @@ from plateviz.tables.residuals import (
     scatter_statistics,
 )
 from plateviz.tables.run_health import orbit_list, orbit_states, run_strip
+from plateviz.tables.selected_exposures import selected_detectors, selected_exposures
 from plateviz.tables.selected_sources import selected_sources
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
@@ -132,6 +133,8 @@ __all__ = [
     "run_strip",
     "scatter_cells",
     "scatter_statistics",
+    "selected_detectors",
+    "selected_exposures",
     "selected_sources",
     "shift_statistics",
     "sky_density",

@@ -1,4 +1,4 @@
-"""Measurements of selected exposures and detectors, and the times of exposures."""
+"""Measurements of the shown exposures and detectors, and the times of exposures."""
 
 from collections.abc import Iterable
 
@@ -12,14 +12,14 @@ ExposureKey = tuple[int, int]
 _MINUTES_PER_DAY = 1440.0
 
 
-def selected(
+def is_shown(
     result: FitResult, exposures: Iterable[ExposureKey] | None, detector_id: int | None
 ) -> np.ndarray:
-    """Return which measurements are of the selected exposures and of a detector, shape (n,).
+    """Return which measurements are of the shown exposures and of a detector, shape (n,).
 
     Parameters
     ----------
-    exposures : the selected exposures; None for all
+    exposures : the shown exposures; None for all
     detector_id : the detector, or None for all
     """
     keep = np.ones(len(result.residuals), dtype=bool)

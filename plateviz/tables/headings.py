@@ -8,6 +8,7 @@ import pandas as pd
 _ALPHA, _DELTA = "Reference sources, α", "Reference sources, δ"
 _CATALOGUE, _TRUTH, _SIGMA = "minus catalogue, mas", "minus truth, mas", "marginal σ, mas"
 _PRIOR = "minus prior, mas"
+_STANDARDISED = "rms residual over its σ"
 
 
 class Heading(NamedTuple):
@@ -68,6 +69,19 @@ SELECTED_SOURCES: Mapping[str, Heading] = {
     "sigma_ra_marginal": Heading("α cos δ", "0.000", _SIGMA),
     "sigma_dec_marginal": Heading("δ", "0.000", _SIGMA),
     "chi2_per_dof": Heading("χ²/dof", "0.00"),
+}
+SELECTED_EXPOSURES: Mapping[str, Heading] = {
+    "field_id": Heading("field", "0"),
+    "plate_id": Heading("exposure", "0"),
+    "minutes": Heading("since the first (min)", "0.00"),
+    "n_obs": Heading("measurements", "0,0"),
+    "chi2_per_dof": Heading("χ²/dof", "0.00"),
+}
+SELECTED_DETECTORS: Mapping[str, Heading] = {
+    "detector_id": Heading("detector", "0"),
+    "n_obs": Heading("measurements", "0,0"),
+    "rms_x": Heading("x", "0.000", _STANDARDISED),
+    "rms_y": Heading("y", "0.000", _STANDARDISED),
 }
 SOURCES_OF_RUN: Mapping[str, Heading] = {
     "id": Heading("source"),

@@ -1,7 +1,10 @@
 """Text for exposures, ids, units and dates, the same in every plot and table."""
 
+import re
+
 import pandas as pd
 
+_EXPOSURE = re.compile(r"field (-?\d+), exposure (-?\d+)")
 _MJD_UNIX_EPOCH = 40587.0
 _MINUTE = "%Y-%m-%d %H:%M"
 
@@ -10,6 +13,17 @@ def exposure_labels(table: pd.DataFrame) -> pd.Series:
     """Return "field 0, exposure 3" for each row, from `field_id` and `plate_id`."""
     field, plate = table["field_id"].astype(str), table["plate_id"].astype(str)
     return "field " + field + ", exposure " + plate
+
+
+def exposure_label(field_id: int, plate_id: int) -> str:
+    """Return the label of one exposure."""
+    return f"field {field_id}, exposure {plate_id}"
+
+
+def labelled_exposure(label: str) -> tuple[int, int] | None:
+    """Return `field_id` and `plate_id` of an exposure's label; None if it is none."""
+    match = _EXPOSURE.fullmatch(label)
+    return (int(match[1]), int(match[2])) if match else None
 
 
 def id_strings(ids: pd.Series) -> pd.Series:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.exposures import ExposureKey, selected
+from plateviz.tables.exposures import ExposureKey, is_shown
 from plateviz.tables.labels import exposure_labels, id_strings
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
@@ -23,13 +23,13 @@ def residual_map(
     exposures: Iterable[ExposureKey] | None = None,
     detector_id: int | None = None,
 ) -> pd.DataFrame:
-    """Return the residual vectors of selected exposures, on one detector or on all.
+    """Return the residual vectors of the shown exposures, on one detector or on all.
 
     Parameters
     ----------
     result : the fit
     instrument : of the fit; gives the order of the detectors
-    exposures : (field_id, plate_id) of each selected exposure; None for all
+    exposures : (field_id, plate_id) of each shown exposure; None for all
     detector_id : the detector, or None for all detectors on the focal plane
 
     Returns
@@ -40,7 +40,7 @@ def residual_map(
     on the detector in `residual_x_mpix`, `residual_y_mpix`, `residual_x_mas`,
     `residual_y_mas`
     """
-    keep = selected(result, exposures, detector_id)
+    keep = is_shown(result, exposures, detector_id)
     rows = result.residuals[keep]
     fitted = result.values_on("det").loc[instrument.index_of(rows["detector_id"].to_numpy())]
     focal_lengths = result.values_on("exp")["focal_length"].to_numpy()
@@ -83,12 +83,12 @@ def residual_scatter(
     exposures: Iterable[ExposureKey] | None = None,
     detector_id: int | None = None,
 ) -> pd.DataFrame:
-    """Return residual x against y of selected exposures, with the expected scatter.
+    """Return residual x against y of the shown exposures, with the expected scatter.
 
     Parameters
     ----------
     result : the fit
-    exposures : (field_id, plate_id) of each selected exposure; None for all
+    exposures : (field_id, plate_id) of each shown exposure; None for all
     detector_id : the detector, or None for all
 
     Returns
@@ -97,7 +97,7 @@ def residual_scatter(
     and `expected_x_mpix`, `expected_y_mpix`: the measurement uncertainty reduced by what the
     fit absorbs (half the leverage in each axis)
     """
-    rows = result.residuals[selected(result, exposures, detector_id)]
+    rows = result.residuals[is_shown(result, exposures, detector_id)]
     kept = np.sqrt(np.clip(1.0 - 0.5 * rows["leverage"], 0.0, None))
     return pd.DataFrame(
         {

@@ -63,11 +63,11 @@ def _separation(motion: pd.Series, other: str) -> SummaryItem:
 def _scatter(motion: pd.Series, axis: str, symbol: str) -> SummaryItem:
     found, expected = motion[f"scatter_{axis}"], motion[f"expected_scatter_{axis}"]
     hint = (
-        "Standard deviation in mas of the orbits' positions about the fitted motion, and the "
+        "Standard deviation of the orbits' positions about the fitted motion, and the "
         "value that their noise predicts."
     )
-    value = "–" if math.isnan(found) else f"{found:.3f} (expected {expected:.3f})"
-    return _plain(f"Scatter in {symbol}, mas", value, hint)
+    value = "–" if math.isnan(found) else f"{found:.3f} mas (expected {expected:.3f} mas)"
+    return _plain(f"Scatter in {symbol}", value, hint)
 
 
 def _chi2(motion: pd.Series) -> SummaryItem:

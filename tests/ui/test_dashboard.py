@@ -33,10 +33,10 @@ ROWS = """() => Object.fromEntries(
     .map(f => [f.above.concat(f.title ? [f.title] : []).map(t => t.text ?? '').join(' | '),
                Math.max(0, ...f.renderers.map(r => r.data_source?.get_length() ?? 0))]))"""
 
-SELECTED = f"""name => {{ {VIEWS}
+SELECTED = f"""([name, by]) => {{ {VIEWS}
   const one = figures.find(figure => card(figure) === name);
-  const source = one.model.renderers.map(r => r.data_source).find(s => column(s, 'id'));
-  return [source.selected.indices.length, column(source, 'id').length]; }}"""
+  const source = one.model.renderers.map(r => r.data_source).find(s => column(s, by));
+  return [source.selected.indices.length, column(source, by).length]; }}"""
 
 
 @pytest.fixture(scope="module")
@@ -248,9 +248,9 @@ def test_figures_have_both_themes(walked):
     turn_dark(walked, diagnostics())
 
 
-def selected(page, name):
-    """Numbers of selected and of all rows of a figure that shows sources."""
-    return page.evaluate(SELECTED, name)
+def selected(page, name, column="id"):
+    """Numbers of selected and of all rows of a figure whose rows are selected by a column."""
+    return page.evaluate(SELECTED, [name, column])
 
 
 def drag(page, name, start, end):
@@ -282,7 +282,7 @@ def test_sources_are_selected_in_one_figure_shown_in_all_saved_and_left_out(page
     expect(window.locator(".tabulator-row").first).to_contain_text(re.compile("reference|artif"))
     page.keyboard.press("Escape")
     expect(window).to_be_hidden()
-    with ZipFile(download(page, "selected sources", "CSV", tmp_path)) as archive:
+    with ZipFile(download(page, "selection", "CSV", tmp_path)) as archive:
         archive.extractall(tmp_path)
     (sources,) = read_tables(tmp_path / "sources.csv").values()
     assert len(sources) == n_selected
@@ -294,8 +294,34 @@ def test_sources_are_selected_in_one_figure_shown_in_all_saved_and_left_out(page
     page.get_by_role("button", name="Put back into the fit").click()
     expect(shown(page)).not_to_contain_text("without ")
     until(page, lambda: selected(page, "footprint") == [n_selected, n_sources])
-    page.get_by_role("button", name="Clear", exact=True).click()
+    select_exposures_too(page)
+    button(page, "Clear").click()
     until(page, lambda: selected(page, "footprint") == [0, n_sources])
+    button(page, "Kept selections").click()
+    page.get_by_role("dialog").get_by_role("button", name="Select again").click()
+    page.keyboard.press("Escape")
+    until(page, lambda: selected(page, "footprint") == [n_selected, n_sources])
+
+
+def select_exposures_too(page):
+    """Select exposures in a figure and a table besides sources, and keep both under a name."""
+    turn_to_workspace(page, OrbitWorkspace.CALIBRATION)
+    box = page.locator(".tabulator-row:visible input[type=checkbox]")
+    box.nth(1).click()
+    expect(page.get_by_text(re.compile(r"sources?, exposure 0/1 selected$"))).to_be_visible()
+    expect(box.nth(1)).to_be_checked()
+    page.wait_for_url("**exposures=0%2F1**")
+    see(page, "exposure-tracks")
+    drag(page, "exposure-tracks", (0.25, 0.55), (0.95, 0.95))
+    expect(page.get_by_text(re.compile(r"sources?, .*exposures .*selected$"))).to_be_visible()
+    until(page, lambda: selected(page, "exposure-tracks", "exposure")[0] > 0)
+    button(page, "Keep").click()
+    window = page.get_by_role("dialog")
+    window.get_by_role("textbox", name="Name").fill("<b>odd</b> corner")
+    window.get_by_role("button", name="Keep", exact=True).click()
+    expect(window.get_by_text("<b>odd</b> corner (")).to_be_visible()
+    page.keyboard.press("Escape")
+    turn_to_workspace(page, OrbitWorkspace.VERDICT)
 
 
 def test_a_change_is_tried_at_once_kept_and_fitted(page):

@@ -67,7 +67,9 @@ class ExploreView(pn.viewable.Viewer):
             self._plot,
             waiting="The first solution is being computed.",
             actions=PointActions(
-                select=self._session.select_sources, select_area=self._select_area
+                select=self._session.select_sources,
+                select_area=self._select_area,
+                select_exposures=self._session.select_exposures,
             ),
             zoom=self._zoom,
             saved=Saved(self._session.subject, self._rows),

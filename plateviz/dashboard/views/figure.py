@@ -8,6 +8,7 @@ import panel as pn
 import panel_material_ui as pmui
 from bokeh.events import Event, RangesUpdate, Reset
 
+from plateviz.dashboard.selected import NO_IDS, SelectedIds
 from plateviz.dashboard.views.card_tools import CardTools
 from plateviz.dashboard.views.figure_text import FigureText
 from plateviz.dashboard.views.markup import markup_pane, paragraph
@@ -79,7 +80,7 @@ class FigureView(pn.viewable.Viewer):
         self.is_wide = figure.is_wide
         self._name, self._plot_figure = figure.name, plot_figure
         self._actions, self._zoom = actions or PointActions(), zoom
-        self._selected = self._shown_selected = frozenset[str]()
+        self._selected = self._shown_selected = NO_IDS
         self._figure: Figure | None = None
         self._drawn: BokehFigure | None = None
         self._pane: pn.pane.Bokeh | None = None
@@ -125,12 +126,12 @@ class FigureView(pn.viewable.Viewer):
         if not self.visibility.is_near:
             self._fade()
 
-    def show_selected(self, ids: frozenset[str]) -> None:
-        """Show which sources are selected when the figure is drawn next."""
+    def show_selected(self, ids: SelectedIds) -> None:
+        """Show what is selected when the figure is drawn next."""
         self._selected = ids
 
     def draw(self) -> None:
-        """Draw the figure from the current data, with the selected sources."""
+        """Draw the figure from the current data, with what is selected."""
         if self._needs_drawing or self._drawn is None:
             self._draw()
         self._shown_selected = self._selected

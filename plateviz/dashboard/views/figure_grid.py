@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import panel as pn
 import panel_material_ui as pmui
 
+from plateviz.dashboard.selected import SelectedIds
 from plateviz.dashboard.views.figure import FigureView, Part
 
 # Figures that are drawn for the first time at once.
@@ -75,8 +76,8 @@ class FigureGrid(pn.viewable.Viewer):
         for view in self._views:
             view.change(theme)
 
-    def show_selected(self, ids: frozenset[str]) -> None:
-        """Show which sources are selected in all figures."""
+    def show_selected(self, ids: SelectedIds) -> None:
+        """Show what is selected in all figures."""
         for view in self._views:
             view.show_selected(ids)
 

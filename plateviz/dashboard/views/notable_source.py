@@ -22,6 +22,7 @@ class NotableSourceLink(pn.viewable.Viewer):
         )
         self._button.on_click(lambda _: navigation.open_source(self._source_id))
         navigation.param.watch(self._read, ["run_name", "written"])
+        navigation.session.units.param.watch(self._read, "unit")
         self._read()
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -34,4 +35,5 @@ class NotableSourceLink(pn.viewable.Viewer):
         self._button.visible = found is not None
         if found is not None:
             self._source_id = str(found.source_id)
-            self._button.label = f"Most significant motion: source {found.source_id} {found.text}"
+            text = self._navigation.session.units.text(found.text)
+            self._button.label = f"Most significant motion: source {found.source_id} {text}"

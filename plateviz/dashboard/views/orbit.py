@@ -7,6 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.explore import ExploreView
@@ -19,6 +20,7 @@ from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.summary import HeadView, StripView
+from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
 from plateviz.plots.diagnostic import Chosen, Diagnostic
@@ -42,12 +44,13 @@ class OrbitPage(pn.viewable.Viewer):
         self._navigation, self._wake = navigation, wake
         self._session = session = navigation.session
         self._grids: dict[OrbitWorkspace, FigureGrid] = {}
-        self._selected: list[FigureView] = []
+        self._following: list[FigureView] = []
         self._is_complete = False
         self._stack = Stack({one: partial(self._workspace, one) for one in OrbitWorkspace})
         self.sidebar = pmui.Column(
             heading("Shown"),
             SelectionView(navigation),
+            unit_selector(session),
             heading("Refit"),
             sizing_mode="stretch_width",
             margin=0,
@@ -57,8 +60,9 @@ class OrbitPage(pn.viewable.Viewer):
         )
         session.param.watch(self._change, ["shown", "other", "theme"])
         session.param.watch(self._mark_stale, ["stage"])
-        session.selection.param.watch(self._show_selected, "sources")
-        session.selection.param.watch(self._change_selected, ["field", "plates", "detector"])
+        session.units.param.watch(self._change, "unit")
+        session.selection.param.watch(self._show_selected, [*KINDS])
+        session.selection.param.watch(self._change_shown, ["field", "plates", "detector"])
         navigation.param.watch(self._show_workspace, "orbit_workspace")
         self._show_workspace()
 
@@ -91,7 +95,7 @@ class OrbitPage(pn.viewable.Viewer):
         is_first = one is OrbitWorkspace.VERDICT
         among = [d for d in diagnostics() if (d.is_key if is_first else d.workspace is one)]
         views = {d: self._figure_view(d) for d in among}
-        self._selected += [view for d, view in views.items() if d.follows_selection]
+        self._following += [view for d, view in views.items() if d.follows_shown]
         others, above = [], []
         if one is OrbitWorkspace.CALIBRATION:
             others = [card(CalibrationView(self._session), "tables")]
@@ -109,7 +113,11 @@ class OrbitPage(pn.viewable.Viewer):
             diagnostic,
             partial(self._plot, diagnostic),
             waiting="The first solution is being computed.",
-            actions=PointActions(select=self._session.select_sources),
+            actions=PointActions(
+                select=self._session.select_sources,
+                select_exposures=self._session.select_exposures,
+                select_detectors=self._session.select_detectors,
+            ),
             saved=Saved(self._session.subject),
             theme=self._session.theme,
         )
@@ -125,7 +133,7 @@ class OrbitPage(pn.viewable.Viewer):
             detector=session.selection.detector_id,
             other=session.other.result if session.other else None,
         )
-        return diagnostic.plot(chosen)
+        return session.units.figure(diagnostic.plot(chosen))
 
     def _show_workspace(self, *_: object) -> None:
         self._stack.show(self._navigation.orbit_workspace)
@@ -134,8 +142,8 @@ class OrbitPage(pn.viewable.Viewer):
         for grid in self._grids.values():
             grid.change(self._session.theme)
 
-    def _change_selected(self, *_: object) -> None:
-        for view in self._selected:
+    def _change_shown(self, *_: object) -> None:
+        for view in self._following:
             view.change(self._session.theme)
 
     def _show_selected(self, *_: object) -> None:

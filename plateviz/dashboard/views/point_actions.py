@@ -1,21 +1,24 @@
-"""PointActions: a tap on a point opens its orbit; a tap, box or lasso selects sources."""
+"""PointActions: a tap opens an orbit; a tap, box or lasso selects what the points are of."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from bokeh import models
 from bokeh.events import Event, SelectionGeometry
 
+from plateviz.dashboard.selected import NO_IDS, SelectedIds
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.bokeh_frame import BokehFrame
 from plateviz.figures.bokeh_glyphs import SELECTED_BY, BokehGlyphs
+from plateviz.tables.labels import labelled_exposure
 
 Links = Mapping[str, Callable[[str], object]]
 """Column of a point's data -> function that is called with its value as text."""
-Select = Callable[[frozenset[int]], object]
-"""Called with the ids of the sources that a person has selected."""
+Select = Callable[[frozenset[Any]], object]
+"""Called with what a person has selected: ids of sources or detectors, or pairs of exposures."""
 
 SelectArea = Callable[[np.ndarray], object]
 """Called with the corners, (n, 2), of an area where a person has drawn one and there are no points.
@@ -28,7 +31,7 @@ NO_LINKS: Links = MappingProxyType({})
 class PointActions:
     """What the points of one drawn figure do; the first link whose column they have is followed.
 
-    Points with a source's `id` are selected instead, if there is a function for that.
+    Points of sources, detectors or exposures are selected instead, if there is a function for that.
     """
 
     def __init__(
@@ -36,20 +39,26 @@ class PointActions:
         links: Links = NO_LINKS,
         select: Select | None = None,
         select_area: SelectArea | None = None,
+        *,
+        select_exposures: Select | None = None,
+        select_detectors: Select | None = None,
     ) -> None:
-        """Begin without a figure."""
-        self._links, self._select, self._select_area = links, select, select_area
+        """Begin without a figure; `select` is for points of sources."""
+        self._links, self._select_area = links, select_area
+        selects = zip(SELECTED_BY, (select, select_detectors, select_exposures), strict=True)
+        self._selects = {column: one for column, one in selects if one is not None}
         self._followed: set[str] = set()
         self._frames: dict[str, _FrameTools] = {}
-        self._of_sources: list[list[BokehGlyphs]] = []
+        self._selectable: list[list[BokehGlyphs]] = []
+        self._selected: SelectedIds = NO_IDS
         self._is_showing = False
 
     def follow(self, drawn: BokehFigure) -> None:
         """Make the points of a figure act, those among them that are new."""
-        self._of_sources = []
+        self._selectable = []
         for frame in drawn.frames:
-            of_sources = [one for one in frame.glyphs() if SELECTED_BY in one.source.data]
-            self._of_sources.append(of_sources)
+            selectable = [one for one in frame.glyphs() if selected_column(one) is not None]
+            self._selectable.append(selectable)
             if self._select_area is not None and frame.plot.id not in self._frames:
                 self._tools_of(frame).select_anywhere()
                 take_area = partial(self._take_area, frame)
@@ -57,20 +66,19 @@ class PointActions:
             for glyphs in frame.glyphs():
                 if glyphs.source.id in self._followed:
                     continue
-                if self._select is not None and glyphs in of_sources:
+                if selected_column(glyphs) in self._selects:
                     self._followed.add(glyphs.source.id)
                     self._select_from(frame, glyphs)
                 elif column := next((c for c in self._links if c in glyphs.source.data), None):
                     self._followed.add(glyphs.source.id)
                     self._open_on_tap(frame, glyphs, column)
 
-    def show(self, selected: frozenset[str]) -> None:
-        """Show which sources are selected, by their ids."""
-        self._is_showing = True
+    def show(self, selected: SelectedIds) -> None:
+        """Show what is selected: rows of a selected source, exposure or detector stand out."""
+        self._selected, self._is_showing = selected, True
         try:
-            for glyphs in (one for frame in self._of_sources for one in frame):
-                ids = glyphs.source.data[SELECTED_BY] if selected else ()
-                rows = [row for row, one in enumerate(ids) if one in selected]
+            for glyphs in (one for frame in self._selectable for one in frame):
+                rows = sorted(_rows(glyphs, selected))
                 if glyphs.source.selected.indices != rows:
                     glyphs.source.selected.indices = rows
         finally:
@@ -79,20 +87,42 @@ class PointActions:
     def _select_from(self, frame: BokehFrame, glyphs: BokehGlyphs) -> None:
         def take(name: str, old: list[int], new: list[int]) -> None:
             # The tables of a frame answer one after the other; the last one completes the answer.
-            among = next((one for one in self._of_sources if glyphs in one), None)
-            if self._is_showing or self._select is None or among is None:
+            among = next((one for one in self._selectable if glyphs in one), None)
+            column = selected_column(glyphs)
+            if self._is_showing or among is None or column not in self._selects:
                 return
-            self._select(frozenset(int(one) for part in among for one in _chosen_ids(part)))
+            same = [one for one in among if selected_column(one) == column]
+            chosen = frozenset(text for one in same for text in self._chosen(one))
+            if chosen == self._selected.get(column):
+                # Nothing else will show the other rows of what is chosen again.
+                self.show(self._selected)
+            items = (_item(column, text) for text in chosen)
+            self._selects[column](frozenset(item for item in items if item is not None))
 
         glyphs.source.selected.on_change("indices", take)
         if glyphs.kind == "points":
             self._tools_of(frame).select_among(glyphs.renderer)
 
+    def _chosen(self, glyphs: BokehGlyphs) -> Iterable[str]:
+        """Return the ids that a person has chosen among points; other glyphs only follow them."""
+        if glyphs.kind != "points" or not glyphs.renderer.visible:
+            return ()
+        column = selected_column(glyphs) or ""
+        ids, rows = glyphs.source.data[column], set(glyphs.source.selected.indices)
+        before = _rows(glyphs, self._selected)
+        if before <= rows:
+            # Rows are added to those that stand out, some of which may do so for another reason:
+            # a measurement of a selected exposure has not been chosen for its source.
+            own = {column: self._selected.get(column, frozenset())}
+            rows -= before - _rows(glyphs, own)
+        # They come from the browser.
+        return (str(ids[row]) for row in rows if 0 <= row < len(ids))
+
     def _take_area(self, frame: BokehFrame, event: Event) -> None:
         if not isinstance(event, SelectionGeometry) or self._select_area is None:
             return
         has_points = any(
-            one.kind == "points" and one.renderer.visible and SELECTED_BY in one.source.data
+            one.kind == "points" and one.renderer.visible and selected_column(one) is not None
             for one in frame.glyphs()
         )
         corners = _corners(event.geometry or {})
@@ -151,13 +181,25 @@ class _FrameTools:
         tool.renderers = [*before, renderer]
 
 
-def _chosen_ids(glyphs: BokehGlyphs) -> Iterable[str]:
-    """Return the ids that a person has chosen among points; other glyphs only follow them."""
-    if glyphs.kind != "points" or not glyphs.renderer.visible:
-        return ()
-    ids = glyphs.source.data[SELECTED_BY]
-    # They come from the browser.
-    return (ids[row] for row in glyphs.source.selected.indices if 0 <= row < len(ids))
+def selected_column(glyphs: BokehGlyphs) -> str | None:
+    """Return the column by which rows are selected; None if they are not."""
+    return next((column for column in SELECTED_BY if column in glyphs.source.data), None)
+
+
+def _rows(glyphs: BokehGlyphs, selected: SelectedIds) -> set[int]:
+    """Return the rows of any selected source, exposure or detector."""
+    data = glyphs.source.data
+    return {
+        row
+        for column, ids in selected.items()
+        if column in data and ids
+        for row, one in enumerate(data[column])
+        if str(one) in ids
+    }
+
+
+def _item(column: str, text: str) -> int | tuple[int, int] | None:
+    return labelled_exposure(text) if column == "exposure" else int(text)
 
 
 def _corners(geometry: Mapping[str, object]) -> np.ndarray | None:

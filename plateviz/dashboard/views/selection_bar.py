@@ -1,4 +1,4 @@
-"""SelectionBar: which sources are selected, and what can be done with them."""
+"""SelectionBar: what is selected, and what can be done with it."""
 
 from collections.abc import Callable
 
@@ -9,32 +9,40 @@ from astropy.table import Table
 
 from plateviz.dashboard.downloads import described, rows_of
 from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.selected import KINDS, Selected
+from plateviz.dashboard.selection_actions import SelectionActions
+from plateviz.dashboard.views.kept_selections import KeptSelections
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices
-from plateviz.dashboard.views.source_list import SourceList
-from plateviz.tables.explore import explorable_measurements, explorable_sources
+from plateviz.dashboard.views.selection_list import SelectionList
+from plateviz.tables.explore import (
+    explorable_exposures,
+    explorable_measurements,
+    explorable_sources,
+)
 from solver.data.survey_schema import MOTIONS
 
 _IN_THE_BAR = {"color": "inherit", "textTransform": "none", "whiteSpace": "nowrap", "minWidth": 0}
 
 
 class SelectionBar(pn.viewable.Viewer):
-    """A line of words and buttons; empty while no source is selected.
+    """A line of words and buttons; empty while nothing is selected and nothing kept.
 
     Attributes
     ----------
-    windows : place of the window with the list; elsewhere on the page, since a window has the
-        colours of what it is in
+    windows : place of the windows; elsewhere on the page, since a window has the colours of what
+        it is in
     """
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow the selection of the session of `navigation`."""
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
+        self._actions = SelectionActions(navigation.session)
         self._row = pmui.Row(margin=0, sx={"alignItems": "center"})
         self.windows = pmui.Column(margin=0)
         self._parts: list[pn.viewable.Viewable] = []
-        self._session.selection.param.watch(self._show, "sources")
+        self._session.selection.param.watch(self._show, [*KINDS, "kept"])
         self._session.choices.param.watch(self._show, "exclusions")
         self._session.param.watch(self._show, ["shown", "theme"])
         navigation.param.watch(self._show, "view")
@@ -45,15 +53,17 @@ class SelectionBar(pn.viewable.Viewer):
         return self._row
 
     def _make(self) -> None:
-        session = self._session
+        actions = self._actions
         self._words = pmui.Typography("", variant="body2", margin=(0, 8), sx=_IN_THE_BAR)
-        self._list = SourceList(self._navigation)
+        self._list, self._kept = SelectionList(self._navigation), KeptSelections(self._navigation)
         self._open = self._button("Open", self._open_source)
-        self._leave_out = self._button("Leave out of the fit", session.leave_out_selection)
-        self._put_back = self._button("Put back into the fit", session.put_back_selection)
-        choices = table_choices(self._subject, self._tables)
-        self._save = SaveButton("selected sources", choices, place="bar")
-        self._invert = self._button("Invert", session.invert_selection)
+        self._leave_out = self._button("Leave out of the fit", actions.leave_out)
+        self._put_back = self._button("Put back into the fit", actions.put_back)
+        self._save = SaveButton(
+            "selection", table_choices(self._subject, self._tables), place="bar"
+        )
+        self._invert = self._button("Invert", actions.invert)
+        self._keep = self._button("Keep", self._kept.open)
         self._parts = [
             self._words,
             self._button("List", self._list.open),
@@ -62,9 +72,10 @@ class SelectionBar(pn.viewable.Viewer):
             self._put_back,
             self._invert,
             self._save,
-            self._button("Clear", self._clear),
+            self._keep,
+            self._button("Clear", actions.clear),
         ]
-        self.windows.append(self._list)
+        self.windows[:] = [self._list, self._kept]
 
     def _button(self, label: str, act: Callable[[], None]) -> pmui.Button:
         button = pmui.Button(
@@ -74,22 +85,26 @@ class SelectionBar(pn.viewable.Viewer):
         return button
 
     def _show(self, *_: object) -> None:
-        session, selected = self._session, self._session.selection.sources
-        if not selected:
+        session, selected = self._session, self._session.selection.selected
+        if not selected and not session.selection.kept:
             self._row.clear()
             return
         if not self._parts:
             self._make()
-        is_orbit = self._is_of_orbit
-        self._words.object = words(len(selected), len(session.selected_in_orbit), is_orbit)
-        self._open.visible = len(selected) == 1 and self._navigation.run is not None
-        self._leave_out.visible = is_orbit and not session.is_selection_left_out
-        self._put_back.visible = is_orbit and session.is_selection_left_out
+        is_orbit, is_left_out = self._is_of_orbit, self._actions.is_left_out
+        in_orbit = self._actions.in_orbit if is_orbit else None
+        self._words.object = words(selected, in_orbit)
+        is_source = selected.kinds == ["sources"] and len(selected.sources) == 1
+        self._open.visible = is_source and self._navigation.run is not None
+        self._leave_out.visible = is_orbit and not is_left_out
+        self._put_back.visible = is_orbit and is_left_out
         self._invert.visible = is_orbit
+        self._keep.label = "Keep" if selected else "Kept selections"
         self._save.theme = session.theme
         self._list.show()
-        if list(self._row) != self._parts:
-            self._row[:] = self._parts
+        shown = self._parts if selected else [self._keep]
+        if list(self._row) != shown:
+            self._row[:] = shown
 
     def _open_source(self) -> None:
         (source,) = self._session.selection.sources
@@ -104,38 +119,38 @@ class SelectionBar(pn.viewable.Viewer):
         return f"{of}-selection"
 
     def _tables(self) -> dict[str, Table]:
-        """Return the selected sources and their measurements, or their motions in the run."""
+        """Return what is selected and its measurements, or the motions of sources in the run."""
         shown, run = self._session.shown, self._navigation.run
-        selected = list(self._session.selection.sources)
+        selected = self._session.selection.selected
         if self._is_of_orbit and shown is not None:
             result = shown.result
+            sources, exposures = explorable_sources(result), explorable_exposures(result)
+            is_selected = np.isin(sources.read("source_id"), list(selected.sources))
             tables = {
-                "sources": explorable_sources(result),
-                "measurements": explorable_measurements(result),
+                "sources": rows_of(sources, is_selected),
+                "exposures": rows_of(exposures, selected.chosen(result.exposures)),
+                "measurements": rows_of(
+                    explorable_measurements(result), selected.chosen(result.residuals)
+                ),
             }
-            return {
-                name: rows_of(table, np.isin(table.read("source_id"), selected))
-                for name, table in tables.items()
-            }
+            return {name: table for name, table in tables.items() if len(table)}
         if run is None:
             return {}
         rows = run.motions() if run.is_gathered else run.counts()
-        return {"sources": described(rows[rows["source_id"].isin(selected)], MOTIONS)}
-
-    def _clear(self) -> None:
-        self._session.select_sources(frozenset())
+        return {"sources": described(rows[rows["source_id"].isin(selected.sources)], MOTIONS)}
 
 
-def words(n_selected: int, n_in_orbit: int, is_orbit: bool) -> str:
+def words(selected: Selected, in_orbit: Selected | None) -> str:
     """Return the selection in words.
 
     Parameters
     ----------
-    n_selected : number of selected sources
-    n_in_orbit : number of those that the orbit on the screen has measured
-    is_orbit : whether an orbit is on the screen
+    selected : the selection
+    in_orbit : the part that the orbit on the screen has measured; None if no orbit is shown
     """
-    text = f"{n_selected:,} source{'s' if n_selected > 1 else ''} selected"
-    if is_orbit and n_in_orbit < n_selected:
-        text += f", {n_in_orbit:,} of them in this orbit" if n_in_orbit else ", none in this orbit"
-    return text
+    text = f"{selected.words()} selected"
+    if in_orbit is None or in_orbit == selected:
+        return text
+    return (
+        f"{text}, {in_orbit.words()} in this orbit" if in_orbit else f"{text}, none in this orbit"
+    )

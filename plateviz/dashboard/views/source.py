@@ -28,6 +28,7 @@ from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import Saved, table_choices
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.table import DataTable
+from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
 from plateviz.plots.gallery import source_figures
@@ -69,7 +70,7 @@ class SourcePage(pn.viewable.Viewer):
         self._navigation, self._session = navigation, navigation.session
         self._invitation = _INVITATION
         self._head, self._strip, self._motion = markup_pane(), markup_pane(), markup_pane()
-        self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row)
+        self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row, units=self._session.units)
         self._save = SaveButton(
             "Orbits and motion", table_choices(self._subject, self._source_tables)
         )
@@ -98,6 +99,7 @@ class SourcePage(pn.viewable.Viewer):
             heading("Shown"),
             *run_selector(navigation),
             self._entry,
+            unit_selector(self._session),
             sizing_mode="stretch_width",
             margin=0,
         )
@@ -106,6 +108,7 @@ class SourcePage(pn.viewable.Viewer):
         navigation.param.watch(self._show, ["run_name", "written", "found", "message"])
         navigation.param.watch(self._show_workspace, "source_workspace")
         self._session.param.watch(self._show, "theme")
+        self._session.units.param.watch(self._show, "unit")
         self._show_workspace()
         self._list_sources()
         self._show()
@@ -151,7 +154,10 @@ class SourcePage(pn.viewable.Viewer):
 
     def _plot(self, figure: SourceFigure) -> Figure | None:
         found = self._navigation.found
-        return None if found is None else figure.plot(SourceTables(found.history, found.motion))
+        if found is None:
+            return None
+        tables = SourceTables(found.history, found.motion)
+        return self._session.units.figure(figure.plot(tables))
 
     def _list_sources(self, *_: object) -> None:
         run = self._navigation.run
@@ -162,6 +168,7 @@ class SourcePage(pn.viewable.Viewer):
 
     def _show(self, *_: object) -> None:
         theme, found = self._session.theme, self._navigation.found
+        units = self._session.units
         self._save.theme = theme
         self._rest.visible = found is not None
         self._choice.visible = found is None and self._navigation.run is not None
@@ -172,15 +179,15 @@ class SourcePage(pn.viewable.Viewer):
         self._entry.value = str(found.source_id)
         kind = source_class(found.history)
         title = titled(f"{kind.capitalize()} source", str(found.source_id))
-        verdict = judged(source_verdict(found.history, found.motion))
+        verdict = units.text(judged(source_verdict(found.history, found.motion)))
         self._head.object = themed(f"<div class='head'>{verdict}{title}</div>", theme)
-        items = strip(source_strip(found.history, found.motion))
+        items = units.text(strip(source_strip(found.history, found.motion)))
         self._strip.object = themed(items, theme)
         if found.motion is None:
             words = "Motions are fitted once all orbits of the run are fitted."
             self._motion.object = paragraph(words, "caption", theme)
         else:
-            table = motion_table(found.motion)
+            table = units.rows(motion_table(found.motion))
             self._motion.object = themed(numbers(in_words(table, MOTION)), theme)
         self._orbits.show(source_orbits(found.history), theme)
         self.figures.change(theme)

@@ -26,6 +26,7 @@ class HeadView(pn.viewable.Viewer):
         self._head = markup_pane()
         self._judged: tuple[FitResult, Verdict] | None = None
         self._session.param.watch(self._write, ["shown", "other", "stage", "theme"])
+        self._session.units.param.watch(self._write, "unit")
         navigation.param.watch(self._write, "orbit_workspace")
         self._write()
 
@@ -45,9 +46,9 @@ class HeadView(pn.viewable.Viewer):
         if other is not None:
             names.append(_name(other, "(A) Compared with solution"))
         stale = " stale" if session.stage is Stage.STALE else ""
+        verdict = session.units.text(judged(self._verdict(shown.result), is_open=is_open))
         self._head.object = (
-            f"<div class='head {session.theme}{stale}'>"
-            f"{judged(self._verdict(shown.result), is_open=is_open)}{''.join(names)}</div>"
+            f"<div class='head {session.theme}{stale}'>{verdict}{''.join(names)}</div>"
         )
 
     def _verdict(self, result: FitResult) -> Verdict:
@@ -65,6 +66,7 @@ class StripView(pn.viewable.Viewer):
         self._session = session
         self._strip = markup_pane()
         session.param.watch(self._write, ["shown", "other", "stage", "theme"])
+        session.units.param.watch(self._write, "unit")
         self._write()
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -85,7 +87,8 @@ class StripView(pn.viewable.Viewer):
                 for letter, shown in (("B", items), ("A", others))
             ]
         stale = " stale" if session.stage is Stage.STALE else ""
-        self._strip.object = f"<div class='{session.theme}{stale}'>{''.join(strips)}</div>"
+        markup = session.units.text("".join(strips))
+        self._strip.object = f"<div class='{session.theme}{stale}'>{markup}</div>"
 
 
 def _name(solution: Solution, role: str) -> str:

@@ -10,6 +10,7 @@ from astropy.table import Table
 
 from plateviz.dashboard.downloads import described
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import (
@@ -27,6 +28,7 @@ from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import Saved, table_choices
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.table import DataTable
+from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
 from plateviz.plots.gallery import survey_figures
@@ -68,13 +70,18 @@ class SurveyPage(pn.viewable.Viewer):
         self._below = pmui.Column(self._stack, sizing_mode="stretch_width", margin=0)
         self._column = pmui.Column(self._head, self._below, sizing_mode="stretch_width", margin=0)
         self.sidebar = pmui.Column(
-            heading("Shown"), *run_selector(navigation), sizing_mode="stretch_width", margin=0
+            heading("Shown"),
+            *run_selector(navigation),
+            unit_selector(self._session),
+            sizing_mode="stretch_width",
+            margin=0,
         )
         navigation.param.watch(self._read, ["run_name", "written"])
         navigation.param.watch(self._show_head, "growth")
         navigation.param.watch(self._show_workspace, "survey_workspace")
         self._session.param.watch(self._show, "theme")
-        self._session.selection.param.watch(self._show_selected, "sources")
+        self._session.units.param.watch(self._show, "unit")
+        self._session.selection.param.watch(self._show_selected, [*KINDS])
         self._show_workspace()
         self._read()
 
@@ -121,7 +128,7 @@ class SurveyPage(pn.viewable.Viewer):
             return None
         if self._tables is None:
             self._tables = survey_tables(run)
-        return figure.plot(self._tables)
+        return self._session.units.figure(figure.plot(self._tables))
 
     def _read(self, *_: object) -> None:
         # The tables of the figures take longer, and are read when the first figure is drawn.
@@ -139,7 +146,8 @@ class SurveyPage(pn.viewable.Viewer):
             self._head.object = paragraph(words, "empty", theme)
             return
         self._show_head()
-        self._strip.object = themed(strip(run_strip(self._orbits, self._motions)), theme)
+        items = self._session.units.text(strip(run_strip(self._orbits, self._motions)))
+        self._strip.object = themed(items, theme)
         self._table.show(orbit_list(self._orbits), theme, orbit_states(self._orbits))
         for grid in self._grids.values():
             grid.change(theme)
@@ -148,7 +156,8 @@ class SurveyPage(pn.viewable.Viewer):
         if self._navigation.run is None:
             return
         title = titled("Run", self._navigation.run_name)
-        head = f"<div class='head'>{judged(run_verdict(self._orbits, self._motions))}{title}</div>"
+        verdict = self._session.units.text(judged(run_verdict(self._orbits, self._motions)))
+        head = f"<div class='head'>{verdict}{title}</div>"
         if self._navigation.growth:
             head += paragraph(self._navigation.growth, "caption", self._session.theme)
         self._head.object = themed(head, self._session.theme)

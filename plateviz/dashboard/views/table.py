@@ -6,8 +6,10 @@ from typing import Any
 
 import pandas as pd
 import panel as pn
+import panel_material_ui as pmui
 from bokeh.models.widgets.tables import NumberFormatter
 
+from plateviz.dashboard.units import OWN, Units
 from plateviz.tables.headings import Heading
 from plateviz.tables.summary import State
 
@@ -32,6 +34,7 @@ class DataTable(pn.viewable.Viewer):
         on_row: Callable[[pd.Series], object] | None = None,
         *,
         page_size: int = 12,
+        units: Units | None = None,
         **params: object,
     ) -> None:
         """Show the columns of `headings`.
@@ -40,40 +43,18 @@ class DataTable(pn.viewable.Viewer):
         ----------
         headings : column -> its heading and format; other columns are not shown
         on_row : called with the row that is clicked
+        units : of the session, in which angles are shown
         """
         super().__init__(**params)
-        self._headings, self._on_row = headings, on_row
+        self._headings, self._on_row, self._page_size = headings, on_row, page_size
+        self._units, self._unit = units, OWN
         self._states, self._theme = pd.DataFrame(), "light"
-        groups: dict[str, list[str]] = {}
-        for name, heading in headings.items():
-            if heading.group:
-                groups.setdefault(heading.group, []).append(name)
-        self._table = pn.widgets.Tabulator(
-            pd.DataFrame(columns=list(headings)),
-            titles={name: heading.title for name, heading in headings.items()},
-            formatters={
-                name: NumberFormatter(format=heading.format, nan_format="–")
-                for name, heading in headings.items()
-                if heading.format
-            },
-            text_align={name: "right" for name, heading in headings.items() if heading.format},
-            groups=groups,
-            disabled=True,
-            show_index=False,
-            selectable=False,
-            pagination="remote",
-            page_size=page_size,
-            layout="fit_data_table",
-            margin=(4, 2),
-            stylesheets=[TABLE_STYLE, *([_CLICKABLE] if on_row is not None else [])],
-        )
-        styler: Any = self._table.style
-        styler.apply(self._colours, axis=None)
-        self._table.on_click(self._open)
+        self._table = self._make(headings)
+        self._place = pmui.Column(self._table, margin=0)
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the table."""
-        return self._table
+        return self._place
 
     def show(
         self, table: pd.DataFrame, theme: str = "light", states: pd.DataFrame | None = None
@@ -87,8 +68,44 @@ class DataTable(pn.viewable.Viewer):
         self._theme = theme
         self._states = pd.DataFrame() if states is None else states.reset_index(drop=True)
         shown = table[list(self._headings)].reset_index(drop=True)
+        if self._units is not None:
+            shown = self._units.columns(shown, self._headings)
+            if self._units.unit != self._unit:
+                # Titles of groups of columns are made with the table.
+                self._unit = self._units.unit
+                self._table = self._make(self._units.headings(self._headings))
+                self._place[:] = [self._table]
         empty = [name for name in shown if (shown[name].isna() | (shown[name] == "")).all()]
         self._table.param.update(value=shown, hidden_columns=empty)
+
+    def _make(self, headings: Mapping[str, Heading]) -> pn.widgets.Tabulator:
+        groups: dict[str, list[str]] = {}
+        for name, heading in headings.items():
+            if heading.group:
+                groups.setdefault(heading.group, []).append(name)
+        table = pn.widgets.Tabulator(
+            pd.DataFrame(columns=list(headings)),
+            titles={name: heading.title for name, heading in headings.items()},
+            formatters={
+                name: NumberFormatter(format=heading.format, nan_format="–")
+                for name, heading in headings.items()
+                if heading.format
+            },
+            text_align={name: "right" for name, heading in headings.items() if heading.format},
+            groups=groups,
+            disabled=True,
+            show_index=False,
+            selectable=False,
+            pagination="remote",
+            page_size=self._page_size,
+            layout="fit_data_table",
+            margin=(4, 2),
+            stylesheets=[TABLE_STYLE, *([_CLICKABLE] if self._on_row is not None else [])],
+        )
+        styler: Any = table.style
+        styler.apply(self._colours, axis=None)
+        table.on_click(self._open)
+        return table
 
     def _colours(self, rows: pd.DataFrame) -> pd.DataFrame:
         # Rows arrive in the sorted order, with the index of the table.

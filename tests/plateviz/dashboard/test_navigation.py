@@ -18,6 +18,8 @@ from solver.data.settings import FitSettings
 from solver.errors import InputError
 from tests.plateviz.dashboard.test_session import FakeStore
 
+SOURCE_COUNTS = ("source_id", "is_reference", "is_artificial", "n_orbits", "n_obs")
+
 
 class FakeRun:
     """A run of two orbits, the second not fitted; `settings` are those of the first."""
@@ -46,6 +48,12 @@ class FakeRun:
     def history(self, source_id):
         rows = self._survey.history
         return rows[rows["source_id"] == source_id].reset_index(drop=True)
+
+    def motions(self):
+        return self._survey.motions
+
+    def counts(self):
+        return self._survey.motions[list(SOURCE_COUNTS)]
 
     def motion(self, source_id):
         rows = self._survey.motions

@@ -78,7 +78,7 @@ def test_tracks_without_times_are_in_order(tracked):
 
 def test_tracks_state_both_sigmas(tracked):
     frame = plot_exposure_tracks(tables.exposure_tracks(tracked))[3]
-    assert "σ conditional 0.0100, marginal 0.0200 µm" in subtitle_of(frame)
+    assert "σ conditional 0.0100 µm, marginal 0.0200 µm" in subtitle_of(frame)
 
 
 def test_differences_are_drawn_to_the_stated_scale(differences, instrument):

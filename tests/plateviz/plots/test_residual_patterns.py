@@ -122,4 +122,4 @@ def test_diagnostics_are_in_the_gallery(fit_result, instrument, name):
 
 
 def test_patterns_are_of_the_whole_orbit():
-    assert not any(d.follows_selection for d in diagnostics() if d.name in NAMES)
+    assert not any(d.follows_shown for d in diagnostics() if d.name in NAMES)

@@ -59,7 +59,7 @@ def test_scatter_circles_are_as_high_as_the_noise_expected_along_y(scatter):
 def test_scatter_states_its_statistics_and_units(scatter):
     (frame,) = plot_residual_scatter(scatter)
     rms = np.sqrt(np.mean(scatter["residual_x_mpix"] ** 2))
-    assert f"rms x {rms:.2f}" in subtitle_of(frame)
+    assert f"rms x, y {rms:.2f}" in subtitle_of(frame)
     assert f"n = {len(scatter)}" in subtitle_of(frame)
     assert frame.x.label == "residual x (mpix)"
     assert frame.width == frame.frame_height

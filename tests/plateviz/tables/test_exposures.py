@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plateviz.tables.exposures import minutes_since_first, selected
+from plateviz.tables.exposures import is_shown, minutes_since_first
 
 KEYS = ["field_id", "plate_id"]
 
@@ -23,7 +23,7 @@ def test_each_measurement_has_its_exposure(fit_result):
 
 def test_selection_keeps_these_exposures_and_this_detector(fit_result):
     rows = fit_result.residuals
-    found = rows[selected(fit_result, [(1, 2), (3, 0), (9, 9)], 2)]
+    found = rows[is_shown(fit_result, [(1, 2), (3, 0), (9, 9)], 2)]
     expected = rows.query(
         "detector_id == 2 and (field_id == 1 and plate_id == 2 or field_id == 3 and plate_id == 0)"
     )
@@ -33,7 +33,7 @@ def test_selection_keeps_these_exposures_and_this_detector(fit_result):
 
 @pytest.mark.parametrize(("exposures", "share"), [(None, 1.0), ([], 0.0)])
 def test_nothing_said_is_all_and_an_empty_selection_is_nothing(fit_result, exposures, share):
-    assert selected(fit_result, exposures, None).mean() == share
+    assert is_shown(fit_result, exposures, None).mean() == share
 
 
 def test_times_begin_with_the_first_exposure(fit_result):

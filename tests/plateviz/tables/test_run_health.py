@@ -102,7 +102,7 @@ def test_source_with_few_orbits_has_no_chi2_of_the_motion(survey):
     few = motion.copy()
     few[["chi2", "dof", "scatter_ra", "rms_truth_2d"]] = [np.nan, 0, np.nan, np.nan]
     found = values(source_strip(history, few))
-    assert (found["χ² of the motion"], found["Scatter in α, mas"]) == ("–", "–")
+    assert (found["χ² of the motion"], found["Scatter in α"]) == ("–", "–")
     assert "Rms from the truth, 2-D" not in found
 
 

@@ -128,7 +128,7 @@ def test_sources_are_selected_and_shown_as_selected_when_drawn_next():
     source = plot(view).renderers[0].data_source
     source.selected.indices = [1, 2]
     assert chosen == [frozenset({7, 8})]
-    view.show_selected(frozenset({"7", "8"}))
+    view.show_selected({"id": frozenset({"7", "8"})})
     assert view.is_due
     view.draw()
     assert not view.is_due
@@ -138,7 +138,7 @@ def test_sources_are_selected_and_shown_as_selected_when_drawn_next():
     view.change("dark")
     view.draw()
     assert source.selected.indices == [1, 2, 3]
-    view.show_selected(frozenset())
+    view.show_selected({})
     view.draw()
     assert source.selected.indices == []
     assert len(chosen) == 1
@@ -159,7 +159,7 @@ def test_next_selection_in_a_map_of_arrows_replaces_the_first():
     view.draw()
     shafts, tails = (renderer.data_source for renderer in plot(view).renderers)
     tails.selected.indices = [0]
-    view.show_selected(frozenset({"7"}))
+    view.show_selected({"id": frozenset({"7"})})
     view.draw()
     # The shaft and both strokes of the head.
     assert shafts.selected.indices == [0, 2, 3]
@@ -167,6 +167,64 @@ def test_next_selection_in_a_map_of_arrows_replaces_the_first():
     assert chosen == [frozenset({7}), frozenset({8})]
     tails.selected.indices = [0, 99]
     assert chosen[-1] == frozenset({7})
+
+
+def selecting(table, hover):
+    """A drawn figure of points, and what has been selected in it, by the kind."""
+    chosen = []
+    marks = points(table, "x", "y", name="marks", color="mark", hover=hover)
+    axes = {"x": Axis("x (mm)", (0.0, 9.0)), "y": Axis("y (mm)", (0.0, 2.0))}
+    actions = PointActions(
+        select=lambda items: chosen.append(("sources", items)),
+        select_exposures=lambda items: chosen.append(("exposures", items)),
+        select_detectors=lambda items: chosen.append(("detectors", items)),
+    )
+    figure = framed([marks], title="Marks", width=200, height=100, **axes)
+    view = FigureView(diagnostics()[0], lambda: figure, actions=actions)
+    come_near(view)
+    view.draw()
+    return view, plot(view).renderers[0].data_source, chosen
+
+
+EXPOSURES = ["field 0, exposure 3", "field 0, exposure 4", "field 0, exposure 3"]
+
+
+def measurements(**columns):
+    return pd.DataFrame({"x": [0.0, 1.0, 2.0], "y": 1.0, "exposure": EXPOSURES, **columns})
+
+
+def test_points_without_sources_select_exposures_or_detectors():
+    _, source, chosen = selecting(measurements(), [("exposure", "@{exposure}")])
+    source.selected.indices = [0, 1]
+    assert chosen == [("exposures", frozenset({(0, 3), (0, 4)}))]
+    hover = [("exposure", "@{exposure}"), ("detector", "@{detector_id}")]
+    _, source, chosen = selecting(measurements(detector_id=[2, 2, 1]), hover)
+    source.selected.indices = [0, 1]
+    assert chosen == [("detectors", frozenset({2}))]
+
+
+def test_measurement_stands_out_for_its_source_exposure_or_detector():
+    hover = [(name, f"@{{{name}}}") for name in ("id", "exposure", "detector_id")]
+    table = measurements(id=["7", "8", "9"], detector_id=[0, 1, 2])
+    view, source, chosen = selecting(table, hover)
+    view.show_selected({"exposure": frozenset({EXPOSURES[0]}), "detector_id": frozenset({"1"})})
+    view.draw()
+    assert source.selected.indices == [0, 1, 2]
+    view.show_selected({"exposure": frozenset({EXPOSURES[0]})})
+    view.draw()
+    assert source.selected.indices == [0, 2]
+    # A row that is added does not select the sources of those that stand out for their exposure.
+    source.selected.indices = [0, 1, 2]
+    assert chosen == [("sources", frozenset({8}))]
+
+
+def test_other_rows_of_what_is_selected_again_stay_marked():
+    view, source, chosen = selecting(measurements(), [("exposure", "@{exposure}")])
+    view.show_selected({"exposure": frozenset({EXPOSURES[0]})})
+    view.draw()
+    source.selected.indices = [2]
+    assert chosen == [("exposures", frozenset({(0, 3)}))]
+    assert source.selected.indices == [0, 2]
 
 
 def test_stale_figure_is_faded(view):

@@ -1,19 +1,84 @@
-"""SelectionBar: the selection in words."""
+"""SelectionBar: the selection in words, what is saved of it, and what it offers."""
 
+import numpy as np
 import pytest
 
-from plateviz.dashboard.views.selection_bar import words
+from plateviz.dashboard.navigation import View
+from plateviz.dashboard.selected import NOTHING, Selected
+from plateviz.dashboard.views.calibration import CalibrationView
+from plateviz.dashboard.views.selection_bar import SelectionBar, words
+
+SOURCES = Selected(frozenset(range(132)))
+MIXED = Selected(frozenset(range(132)), frozenset({(0, 3)}))
 
 
 @pytest.mark.parametrize(
-    ("n_selected", "n_in_orbit", "is_orbit", "text"),
+    ("in_orbit", "text"),
     [
-        (1, 1, True, "1 source selected"),
-        (1320, 1320, True, "1,320 sources selected"),
-        (132, 57, True, "132 sources selected, 57 of them in this orbit"),
-        (132, 0, True, "132 sources selected, none in this orbit"),
-        (132, 0, False, "132 sources selected"),
+        (SOURCES, "132 sources selected"),
+        (Selected(frozenset(range(57))), "132 sources selected, 57 sources in this orbit"),
+        (NOTHING, "132 sources selected, none in this orbit"),
+        (None, "132 sources selected"),
     ],
 )
-def test_selection_in_words(n_selected, n_in_orbit, is_orbit, text):
-    assert words(n_selected, n_in_orbit, is_orbit) == text
+def test_selection_in_words(in_orbit, text):
+    assert words(SOURCES, in_orbit) == text
+
+
+def test_kinds_are_named_one_after_the_other():
+    text = "132 sources, exposure 0/3 selected, exposure 0/3 in this orbit"
+    assert words(MIXED, Selected(exposures=MIXED.exposures)) == text
+
+
+@pytest.fixture
+def session(navigation):
+    """A session with the solution of an orbit on the screen."""
+    navigation.open_orbit(0)
+    assert navigation.view is View.ORBIT
+    return navigation.session
+
+
+def shown(bar):
+    return [part.label for part in bar.__panel__() if getattr(part, "label", "") and part.visible]
+
+
+def test_bar_offers_what_can_be_done(navigation, session):
+    bar = SelectionBar(navigation)
+    assert len(bar.__panel__()) == 0
+    session.select_exposures(frozenset({(0, 1)}))
+    assert shown(bar) == ["List", "Leave out of the fit", "Invert", "Keep", "Clear"]
+    session.choices.exclusions = "exposure=0/1"
+    assert "Put back into the fit" in shown(bar)
+    session.selection.kept = {"one": session.selection.selected}
+    session.selection.select(NOTHING)
+    assert shown(bar) == ["Kept selections"]
+
+
+def test_all_measurements_of_what_is_selected_are_saved(navigation, session, fit_result):
+    bar = SelectionBar(navigation)
+    source = int(fit_result.sources["source_id"].iloc[3])
+    session.selection.select(Selected(frozenset({source}), frozenset({(0, 1)}), frozenset({2})))
+    tables = bar._tables()
+    rows = fit_result.residuals
+    expected = (
+        (rows["source_id"] == source)
+        | ((rows["field_id"] == 0) & (rows["plate_id"] == 1))
+        | (rows["detector_id"] == 2)
+    )
+    assert len(tables["measurements"]) == expected.sum()
+    assert tables["sources"]["source_id"].tolist() == [source]
+    assert tables["exposures"]["plate_id"].tolist() == [1]
+
+
+def test_rows_of_the_calibration_tables_select_and_are_selected(session, fit_result):
+    view = CalibrationView(session)
+    exposures, detectors = (rows.table for rows in view._rows)
+    exposures.selection = [0, 2]
+    keys = fit_result.exposures[["field_id", "plate_id"]].to_numpy()[[0, 2]]
+    assert session.selection.exposures == frozenset(map(tuple, keys.tolist()))
+    session.select_detectors(frozenset({3}))
+    assert detectors.selection == [3]
+    assert exposures.selection == [0, 2]
+    label = exposures.value["element"].iloc[2]
+    assert label == "field {} plate {}".format(*keys[1])
+    assert np.all(detectors.value["element"] == [f"detector {n}" for n in range(4)])

@@ -1,0 +1,111 @@
+"""SelectionActions: what can be done with the selection of a session, without Panel."""
+
+from plateviz.dashboard.selected import NOTHING, Selected, checked_name
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.solution import Solution
+from solver.errors import InputError
+
+# Selections that a session keeps.
+_MOST_KEPT = 50
+
+
+class SelectionActions:
+    """Invert, leave out, put back, keep and take up the selection of a session."""
+
+    def __init__(self, session: Session) -> None:
+        """Act on `session`."""
+        self._session, self._selection = session, session.selection
+        self._known: tuple[Solution | None, Selected] = (None, NOTHING)
+
+    @property
+    def in_orbit(self) -> Selected:
+        """The part of the selection that the orbit on the screen has measured."""
+        return self._selection.selected & self._measured
+
+    @property
+    def is_left_out(self) -> bool:
+        """Whether the next fit uses nothing of the selection, though some is measured."""
+        return bool(self.in_orbit) and self.in_orbit <= self._left_out
+
+    def clear(self) -> None:
+        """Select nothing."""
+        self._selection.select(NOTHING)
+
+    def invert(self) -> None:
+        """Select the others of the orbit on the screen, of each kind that is selected."""
+        selected = self._selection.selected
+        self._selection.select(self._measured.of_kinds(selected.kinds) - selected)
+
+    def leave_out(self) -> None:
+        """Exclude the selection from the next fit, which shows a what-if."""
+        if not self.in_orbit:
+            self._session.refuse(
+                "The orbit on the screen has measured nothing of the selection. Open an orbit that "
+                "has, or select something else."
+            )
+            return
+        self._exclude(self._left_out | self.in_orbit)
+
+    def put_back(self) -> None:
+        """Include the selection in the next fit, which shows a what-if."""
+        self._exclude(self._left_out - self._selection.selected)
+
+    def keep(self, name: str) -> None:
+        """Keep the selection under a name, in place of one that has that name.
+
+        Raises
+        ------
+        InputError
+            If the name is invalid, nothing is selected, or too many are kept.
+        """
+        name, kept = checked_name(name), self._selection.kept
+        if not self._selection.selected:
+            raise InputError("nothing is selected that could be kept")
+        if name not in kept and len(kept) >= _MOST_KEPT:
+            raise InputError(f"{_MOST_KEPT} selections are kept; forget one first")
+        self._selection.kept = {**kept, name: self._selection.selected}
+
+    def take_up(self, name: str) -> None:
+        """Select again what is kept under a name; nothing happens if there is none."""
+        if name in self._selection.kept:
+            self._selection.select(self._selection.kept[name])
+
+    def forget(self, name: str) -> None:
+        """Keep nothing under a name any more; what is selected stays selected."""
+        kept = self._selection.kept
+        self._selection.kept = {one: items for one, items in kept.items() if one != name}
+
+    @property
+    def _measured(self) -> Selected:
+        """What the orbit on the screen has measured, that which is left out included."""
+        shown = self._session.shown
+        if self._known[0] is not shown:
+            self._known = (shown, NOTHING if shown is None else _measured(shown))
+        return self._known[1]
+
+    @property
+    def _left_out(self) -> Selected:
+        try:
+            return Selected.of(self._session.choices.settings().exclusions)
+        except InputError:
+            return NOTHING
+
+    def _exclude(self, left_out: Selected) -> None:
+        choices = self._session.choices
+        try:
+            settings = choices.settings()
+        except InputError as error:
+            # Other settings than exclusions may be invalid; nothing is changed for them.
+            self._session.refuse(str(error))
+            return
+        choices.load(settings.with_(exclusions=left_out.exclusions))
+
+
+def _measured(solution: Solution) -> Selected:
+    result = solution.result
+    exposures = result.exposures[["field_id", "plate_id"]].itertuples(index=False)
+    return Selected(
+        frozenset(result.sources["source_id"].tolist()),
+        frozenset((int(field), int(plate)) for field, plate in exposures),
+        frozenset(result.residuals["detector_id"].unique().tolist()),
+    ) | Selected.of(solution.settings.exclusions)

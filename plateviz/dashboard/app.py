@@ -1,7 +1,6 @@
 """The dashboard: one page per browser session, over a shared solution store."""
 
 from html import escape
-from urllib.parse import urlencode
 
 import panel as pn
 import panel_material_ui as pmui
@@ -10,8 +9,9 @@ from bokeh.document import Document
 from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
 
-from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.views.address_bar import AddressBar
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.selection_bar import SelectionBar
@@ -34,7 +34,7 @@ def build_app(store: SolutionStore) -> pmui.Page:
         title=title,
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
-        header=[bar, Keyboard(navigation), system],
+        header=[bar, Keyboard(navigation), system, AddressBar(navigation)],
         sidebar=[pages.sidebar],
         main=[pages, bar.windows],
         sidebar_width=_SIDEBAR_WIDTH,
@@ -49,7 +49,6 @@ def build_app(store: SolutionStore) -> pmui.Page:
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     _set_theme(session, page.dark_theme)
     system.param.watch(lambda event: page.param.update(dark_theme=event.new), "is_dark")
-    _write_address(navigation)
     ticker.follow(navigation, pages)
     return page
 
@@ -82,25 +81,6 @@ def _prepare(document: Document) -> None:
 def _arguments() -> dict[str, str]:
     # Invalid UTF-8 is replaced; the result is no valid selection and is ignored.
     return {k: v[0].decode("utf-8", "replace") for k, v in pn.state.session_args.items()}
-
-
-def _write_address(navigation: Navigation) -> None:
-    """Update the page's address when the view or the selection changes."""
-    location = pn.state.location
-    if location is None:
-        return
-
-    def write(*_: object) -> None:
-        if navigation.view is not View.ORBIT or navigation.session.shown is not None:
-            # As a whole: what is no longer selected is not in it.
-            location.search = f"?{urlencode(navigation.address(), safe=',')}"
-
-    navigation.param.watch(write, ["view", *WORKSPACES.values(), "run_name", "found"])
-    navigation.exploration.param.watch(write, list(navigation.exploration.param.values()))
-    navigation.session.param.watch(write, "shown")
-    navigation.session.selection.param.watch(
-        write, ["orbit", "field", "plates", "detector", "sources"]
-    )
 
 
 class _Ticker:

@@ -6,19 +6,24 @@ from typing import Any
 
 import param
 
+from plateviz.dashboard.address_parts import in_words
 from solver.data.parameters import PARAMETERS
 from solver.data.prior_text import format_width
 from solver.data.result import FitResult
 from solver.data.setting_kinds import Change, Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import PriorWidths, Texts
+from solver.errors import InputError
 
 ALL = "all"
-_PLATES = re.compile(r"(-?\d+)-(-?\d+)")
-_SOURCES = re.compile(r"-?\d{1,19}(,-?\d{1,19})*")
+MANY = "many"
+"""Stands for more selected sources than an address has room for."""
+_PLATES = re.compile(r"(-?[0-9]{1,9})-(-?[0-9]{1,9})")
+_SOURCES = re.compile(r"-?[0-9]{1,19}(,-?[0-9]{1,19})*")
 # Maximum number of sources in an address.
 _FEW = 20
 _LARGEST_ID = 2**63 - 1
+_TOO_MANY = f"sources: an address has room for {_FEW}, and more were selected"
 
 
 class Selection(param.Parameterized):
@@ -42,8 +47,13 @@ class Selection(param.Parameterized):
         super().__init__(**values)
         self._requested: dict[str, Any] = {}
 
-    def limit_to(self, result: FitResult, detectors: list[int]) -> None:
-        """Limit the options to those of a solution; a selection that is no option is reset."""
+    def limit_to(self, result: FitResult, detectors: list[int]) -> list[str]:
+        """Limit the options to those of a solution; a selection that is no option is reset.
+
+        Returns
+        -------
+        What of the last address is no option, in words.
+        """
         exposures = result.exposures
         fields = [ALL, *(str(f) for f in sorted(exposures["field_id"].unique().tolist()))]
         plates = (int(exposures["plate_id"].min()), int(exposures["plate_id"].max()))
@@ -52,43 +62,91 @@ class Selection(param.Parameterized):
         self.param["field"].objects = fields
         self.param["detector"].objects = numbers
         self.param["plates"].bounds = plates
+        requested, self._requested = self._requested, {}
         selected: dict[str, Any] = self.address() | {"plates": self.plates}
         if is_first:
-            selected |= {"field": fields[1], "detector": numbers[1], **self._requested}
+            selected |= {"field": fields[1], "detector": numbers[1]}
+        selected |= requested
         lowest, highest = (min(max(p, plates[0]), plates[1]) for p in selected["plates"])
-        self.param.update(
-            field=selected["field"] if selected["field"] in fields else ALL,
-            detector=selected["detector"] if selected["detector"] in numbers else ALL,
-            plates=(lowest, highest),
-        )
+        found = {
+            "field": selected["field"] if selected["field"] in fields else ALL,
+            "detector": selected["detector"] if selected["detector"] in numbers else ALL,
+            "plates": (lowest, highest),
+        }
+        self.param.update(**found)
+        options = {
+            "field": ", ".join(fields),
+            "detector": ", ".join(numbers),
+            "plates": f"exposures from {plates[0]} to {plates[1]}",
+        }
+        return [
+            f"{name}: expected {options[name]}, found {in_words(value)}"
+            for name, value in requested.items()
+            if found[name] != value
+        ]
 
-    def restore(self, address: Mapping[str, str]) -> None:
+    def restore(self, address: Mapping[str, str]) -> list[str]:
         """Select what a page's address requests, once a solution is there; ignore invalid values.
 
         Parameters
         ----------
-        address : query of the address, as from `address`; other keys are ignored
+        address : query of the address, as from `address`; other keys, and the orbit, are ignored
+
+        Returns
+        -------
+        The invalid values, in words.
         """
+        problems = []
         requested: dict[str, Any] = {k: address[k] for k in ("field", "detector") if k in address}
         plates = _PLATES.fullmatch(address.get("plates", ""))
         if plates:
             requested["plates"] = tuple(sorted(int(number) for number in plates.groups()))
+        elif "plates" in address:
+            problems.append(f"plates: expected FIRST-LAST, found {in_words(address['plates'])}")
         self._requested = requested
-        if _SOURCES.fullmatch(address.get("sources", "")):
-            ids = map(int, address["sources"].split(",")[:_FEW])
-            self.sources = frozenset(one for one in ids if abs(one) <= _LARGEST_ID)
+        problems += self._restore_sources(address.get("sources"))
+        return problems
+
+    def orbit_of(self, address: Mapping[str, str]) -> int | None:
+        """Return the orbit that an address names, by default the selected one.
+
+        Raises
+        ------
+        InputError
+            If there is no such orbit.
+        """
+        if "orbit" not in address:
+            return self.orbit
         orbits = {str(orbit): orbit for orbit in self.param["orbit"].objects}
-        self.orbit = orbits.get(address.get("orbit", ""), self.orbit)
+        if address["orbit"] not in orbits:
+            raise InputError(
+                f"orbit: expected one of this page, found {in_words(address['orbit'])}"
+            )
+        return orbits[address["orbit"]]
+
+    def _restore_sources(self, text: str | None) -> list[str]:
+        if text is None:
+            self.sources = frozenset()
+            return []
+        if text == MANY:
+            # Going back within a session keeps them; another session never had them.
+            return [] if len(self.sources) > _FEW else [_TOO_MANY]
+        ids = _SOURCES.fullmatch(text) and [int(one) for one in text.split(",")[: _FEW + 1]]
+        if not ids or len(ids) > _FEW or any(abs(one) > _LARGEST_ID for one in ids):
+            return [f"sources: expected {_FEW} ids or fewer, found {in_words(text)}"]
+        self.sources = frozenset(ids)
+        return []
 
     def address(self) -> dict[str, str]:
         """Return the selection as the query of the page's address; `restore` reads it back.
 
-        More than a few selected sources are left out.
+        Of more than a few selected sources it says only that there are many.
         """
         first, last = self.plates
         query = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
-        if 0 < len(self.sources) <= _FEW:
-            query["sources"] = ",".join(map(str, sorted(self.sources)))
+        if self.sources:
+            few = ",".join(map(str, sorted(self.sources))) if len(self.sources) <= _FEW else MANY
+            query["sources"] = few
         return query if self.orbit is None else {"orbit": str(self.orbit), **query}
 
     @property
@@ -120,16 +178,21 @@ class FitChoices(param.Parameterized):
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
         """Start from the paper's priors."""
         super().__init__(**values)
+        self._loaded = FitSettings()
         self.prior_widths = default_widths()
 
     def settings(self) -> FitSettings:
-        """Return the settings; InputError names an invalid one."""
-        return FitSettings(
+        """Return the settings; InputError names an invalid one.
+
+        Those without a control are as of the last `load`.
+        """
+        return self._loaded.with_(
             **{name: _setting_value(one, getattr(self, name)) for name, one in CONTROLS.items()}
         )
 
     def load(self, settings: FitSettings) -> None:
         """Set the parameters to the values of `settings`."""
+        self._loaded = settings
         values = {name: _control_value(one, settings, name) for name, one in CONTROLS.items()}
         self.param.update(**values)
 

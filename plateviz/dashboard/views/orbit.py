@@ -7,7 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.session import Stage
+from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.explore import ExploreView
 from plateviz.dashboard.views.figure import FigureView, card

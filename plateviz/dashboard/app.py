@@ -1,7 +1,6 @@
 """The dashboard: one page per browser session, over a shared solution store."""
 
 from html import escape
-from urllib.parse import urlencode
 
 import panel as pn
 import panel_material_ui as pmui
@@ -10,9 +9,10 @@ from bokeh.document import Document
 from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
 
-from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.views.address_bar import AddressBar
 from plateviz.dashboard.views.figure import Part
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
@@ -34,7 +34,7 @@ def build_app(store: SolutionStore) -> pmui.Page:
     bar, system = SelectionBar(navigation), SystemTheme()
     page = empty_page(
         store,
-        header=[bar, Keyboard(navigation), system],
+        header=[bar, Keyboard(navigation), system, AddressBar(navigation)],
         sidebar=[pages.sidebar],
         main=[pages, bar.windows],
     )
@@ -45,9 +45,9 @@ def build_app(store: SolutionStore) -> pmui.Page:
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     _set_theme(session, page.dark_theme)
     system.param.watch(lambda event: page.param.update(dark_theme=event.new), "is_dark")
-    _write_address(navigation)
-    if pn.state.curdoc is not None:
-        # After the page's address is known, with which Panel makes a path from the host's root.
+    if pn.state.curdoc is not None and pn.state.location is not None:
+        # Panel reads the location when it is first asked for, and with it writes a path from the
+        # host's root into the template; this replaces it.
         _prepare(pn.state.curdoc)
     ticker.follow(navigation, pages)
     return page
@@ -94,26 +94,6 @@ def _prepare(document: Document) -> None:
 def _arguments() -> dict[str, str]:
     # Invalid UTF-8 is replaced; the result is no valid selection and is ignored.
     return {k: v[0].decode("utf-8", "replace") for k, v in pn.state.session_args.items()}
-
-
-def _write_address(navigation: Navigation) -> None:
-    """Update the page's address when the view or the selection changes."""
-    location = pn.state.location
-    if location is None:
-        return
-
-    def write(*_: object) -> None:
-        if navigation.view is not View.ORBIT or navigation.session.shown is not None:
-            # As a whole: what is no longer selected is not in it.
-            location.search = f"?{urlencode(navigation.address(), safe=',')}"
-
-    navigation.param.watch(write, ["view", *WORKSPACES.values(), "run_name", "found"])
-    navigation.exploration.param.watch(write, list(navigation.exploration.param.values()))
-    navigation.session.param.watch(write, "shown")
-    navigation.session.units.param.watch(write, "unit")
-    navigation.session.selection.param.watch(
-        write, ["orbit", "field", "plates", "detector", *KINDS, "kept"]
-    )
 
 
 class _Ticker:

@@ -1,28 +1,25 @@
 """Navigation: view, run and source on the screen of one browser session, without Panel."""
 
-import re
 from collections.abc import Mapping
 from enum import StrEnum
 from types import MappingProxyType
-from typing import NamedTuple
 
-import pandas as pd
 import param
 
+from plateviz.dashboard.address_parts import chosen
 from plateviz.dashboard.exploration import Exploration
+from plateviz.dashboard.found_source import FoundSource, find_source
 from plateviz.dashboard.growth import Growth
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.solution import Request, Solution
+from plateviz.dashboard.solution_address import find_solution, solution_query
 from plateviz.dashboard.units import NAMES, OWN
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.queries import SurveyRun
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables.explore import EXPLORABLE
-from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-
-_ID = re.compile(r"-?[0-9]{1,19}")
-_LARGEST_ID = 2**63 - 1
 
 
 class View(StrEnum):
@@ -33,6 +30,8 @@ class View(StrEnum):
     SOURCE = "source"
 
 
+# Parts of an address that name solutions.
+_NAMED = ("solution", "against")
 # Each view keeps its own workspace while others are on the screen.
 WORKSPACES: Mapping[View, str] = MappingProxyType(
     {
@@ -41,14 +40,6 @@ WORKSPACES: Mapping[View, str] = MappingProxyType(
         View.SOURCE: "source_workspace",
     }
 )
-
-
-class FoundSource(NamedTuple):
-    """One source of a run: a row per orbit and, once the run is complete, its motion."""
-
-    source_id: int
-    history: pd.DataFrame
-    motion: pd.Series | None
 
 
 class Navigation(param.Parameterized):
@@ -75,6 +66,7 @@ class Navigation(param.Parameterized):
         self.session = session
         self.exploration = Exploration(list(EXPLORABLE))
         self._source_text = ""
+        self._named: dict[str, str] = {}
         self._growth: tuple[SurveyRun, Growth] | None = None
         self._runs = {run.name: run for run in session.store.runs()}
         if self._runs:
@@ -139,27 +131,39 @@ class Navigation(param.Parameterized):
         return bool(self.growth)
 
     def begin(self, address: Mapping[str, str]) -> None:
-        """Show what a page's address requests; invalid values are ignored.
+        """Show what an address requests; a notice says what of it is invalid or gone.
 
         Parameters
         ----------
         address : query of the address, as from `address`; a selection without a view opens the
             Orbit view
         """
-        self.session.selection.restore(address)
+        session, problems = self.session, []
+        session.notice = ""
         self.exploration.restore(address)
         if address.get("unit") in NAMES.values():
-            self.session.units.unit = address["unit"]
-        views = {view.value: view for view in View}
-        if address.get("run") in self._runs:
-            self.run_name = address["run"]
+            session.units.unit = address["unit"]
+        self.run_name = chosen("run", address, self._runs, self.run_name, problems)
         if "source" in address:
             self.find_source(address["source"])
-        selectable = self.session.selection.param.values()
+        problems += session.selection.restore(address)
+        try:
+            orbit = session.selection.orbit_of(address)
+        except InputError as error:
+            problems.append(str(error))
+            orbit = session.selection.orbit
+        views = {view.value: view for view in View}
+        selectable = session.selection.param.values()
         default = View.ORBIT if any(name in selectable for name in address) else self.view
-        self.turn_to(views.get(address.get("view", ""), default))
-        known = {workspace.value: workspace for workspace in self.workspaces_of_view}
-        self.turn_to_workspace(known.get(address.get("workspace", ""), self.workspace))
+        view = views[chosen("view", address, views, default.value, problems)]
+        session.note(problems)
+        self._named = {name: address[name] for name in _NAMED if name in address}
+        if view is View.ORBIT or session.shown is not None:
+            self._open(orbit)
+        else:
+            session.selection.orbit = orbit
+        self.view = view
+        self._begin_workspace(address)
 
     def address(self) -> dict[str, str]:
         """Return what is on the screen as the query of the page's address."""
@@ -173,14 +177,20 @@ class Navigation(param.Parameterized):
             query["unit"] = self.session.units.unit
         if self.workspace is OrbitWorkspace.EXPLORE:
             query |= self.exploration.address()
-        return query
+        return query | self._solution_query()
+
+    def _solution_query(self) -> dict[str, str]:
+        session = self.session
+        if session.shown is None or session.is_opening:
+            return self._named
+        return solution_query(session.shown, session.other, self.run_name)
 
     def turn_to(self, view: View) -> None:
         """Show a view; the Orbit view requests its orbit when it is first shown."""
         self.view = view
         session = self.session
         if view is View.ORBIT and session.shown is None and session.job is None:
-            self.choose_orbit(session.selection.orbit)
+            self._open(session.selection.orbit)
 
     def turn_to_workspace(self, workspace: Workspace) -> None:
         """Show a workspace of the view on the screen."""
@@ -208,21 +218,56 @@ class Navigation(param.Parameterized):
             self.view = View.SOURCE
 
     def _show_orbit(self, orbit: int | None, settings: FitSettings | None) -> None:
+        session = self.session
         try:
-            result = self._result(orbit)
+            found = self._default(orbit)
         except InputError as error:
-            self.session.refuse(str(error))
+            session.refuse(str(error))
             return
-        if result is None or settings not in (None, result.settings):
-            self.session.show_orbit(orbit)
+        if isinstance(found, Request) or settings not in (None, found.settings):
+            session.show_orbit(orbit)
         else:
-            self.session.show_result(orbit, result)
+            session.show_result(found)
 
-    def _result(self, orbit: int | None) -> FitResult | None:
-        """Return the solution of an orbit in the run, None if it has none."""
-        if self.run is None or orbit is None or not self.run.has_fitted(orbit):
+    def _open(self, orbit: int | None) -> None:
+        """Show the solution that the address names."""
+        session = self.session
+        shown = session.shown
+        is_there = shown is not None and shown.orbit == session.selection.orbit == orbit
+        if is_there and self._solution_query() == self._named:
+            session.limit_selection()
+            return
+        try:
+            solution = self._find("solution", orbit) or self._default(orbit)
+            other = self._find("against", orbit)
+            if other is None and isinstance(solution, Request) and solution.is_what_if:
+                # It is a change of that solution, to which the controls lead back.
+                other = self._default(orbit)
+        except InputError as error:
+            session.refuse(str(error))
+            return
+        session.open(solution, other)
+
+    def _default(self, orbit: int | None) -> Solution | Request:
+        """Return the solution of the run; InputError if it cannot be read."""
+        return find_solution(None, orbit, self.run, self._runs)
+
+    def _find(self, name: str, orbit: int | None) -> Solution | Request | None:
+        """Return a solution that the address names; a notice says why there is none."""
+        if name not in self._named:
             return None
-        return self.run.result(orbit)
+        try:
+            return find_solution(self._named[name], orbit, self.run, self._runs)
+        except InputError as error:
+            self.session.note([f"{name}: {error}"])
+            return None
+
+    def _begin_workspace(self, address: Mapping[str, str]) -> None:
+        problems: list[str] = []
+        known = {workspace.value: workspace for workspace in self.workspaces_of_view}
+        name = chosen("workspace", address, known, self.workspace.value, problems)
+        self.turn_to_workspace(known[name])
+        self.session.note(problems)
 
     def _begin_run(self, *_: object) -> None:
         self.written = None
@@ -232,18 +277,7 @@ class Navigation(param.Parameterized):
         found, message = None, ""
         if self.run is not None and self._source_text:
             try:
-                found, message = _find(self.run, self._source_text)
+                found, message = find_source(self.run, self._source_text)
             except InputError as error:
                 message = str(error)
         self.param.update(found=found, message=message)
-
-
-def _find(run: SurveyRun, text: str) -> tuple[FoundSource | None, str]:
-    """Return a source of a run, or a message on why there is none."""
-    if not _ID.fullmatch(text) or abs(int(text)) > _LARGEST_ID:
-        return None, f"Expected the id of a source, a whole number, found {text[:40]!r}."
-    source_id = int(text)
-    history = run.history(source_id)
-    if history.empty:
-        return None, f"Run {run.name!r} has no source {source_id}."
-    return FoundSource(source_id, history, run.motion(source_id)), ""

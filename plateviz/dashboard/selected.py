@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from plateviz.dashboard.address_parts import in_words
 from plateviz.tables.labels import exposure_label
 from solver.data.exclusions import Exclusions
 from solver.errors import InputError
@@ -22,12 +23,14 @@ NO_IDS: SelectedIds = MappingProxyType({})
 
 # Maximum number of items of a kind in an address.
 FEW = 20
+MANY = "many"
+"""Stands for more selected items of a kind than an address has room for."""
 # Runs of exposures and detectors that are named one by one.
 _FEW_NAMED = 3
 _LONGEST_NAME = 60
 _LARGEST_ID = 2**63 - 1
-_NUMBERS = re.compile(r"-?\d{1,19}(,-?\d{1,19})*")
-_PAIRS = re.compile(r"-?\d{1,9}/-?\d{1,9}(,-?\d{1,9}/-?\d{1,9})*")
+_NUMBERS = re.compile(r"-?[0-9]{1,19}(,-?[0-9]{1,19})*")
+_PAIRS = re.compile(r"-?[0-9]{1,9}/-?[0-9]{1,9}(,-?[0-9]{1,9}/-?[0-9]{1,9})*")
 
 
 @dataclass(frozen=True)
@@ -113,14 +116,16 @@ class Selected:
         return found
 
     def address(self) -> dict[str, str]:
-        """Return the kinds with few items as parts of an address; `parsed` reads them back."""
+        """Return the selection as parts of an address; `parsed` reads few items of a kind back."""
         texts = {
             "sources": map(str, sorted(self.sources)),
             "exposures": (f"{field}/{plate}" for field, plate in sorted(self.exposures)),
             "detectors": map(str, sorted(self.detectors)),
         }
         return {
-            k: ",".join(texts[k]) for k, items in self.by_kind().items() if 0 < len(items) <= FEW
+            kind: ",".join(texts[kind]) if len(items) <= FEW else MANY
+            for kind, items in self.by_kind().items()
+            if items
         }
 
     def words(self) -> str:
@@ -144,15 +149,28 @@ KINDS = tuple(field.name for field in fields(Selected))
 NOTHING = Selected()
 
 
-def parsed(address: Mapping[str, str]) -> Selected:
-    """Return what an address selects; invalid parts are ignored."""
-    pairs = address.get("exposures", "")
-    exposures = pairs.split(",")[:FEW] if _PAIRS.fullmatch(pairs) else []
-    return Selected(
-        frozenset(_numbers(address.get("sources", ""))),
-        frozenset((int(f), int(p)) for f, p in (pair.split("/") for pair in exposures)),
-        frozenset(_numbers(address.get("detectors", ""))),
-    )
+def parsed(address: Mapping[str, str], before: Selected = NOTHING) -> tuple[Selected, list[str]]:
+    """Return what an address selects, and the invalid parts in words; these select nothing.
+
+    Parameters
+    ----------
+    before : the selection so far; going back within a session keeps what is too large for an
+        address
+    """
+    found, problems = {}, []
+    for kind, read in _READERS.items():
+        text = address.get(kind)
+        if text == MANY and len(before.by_kind()[kind]) > FEW:
+            found[kind] = before.by_kind()[kind]
+        elif text == MANY:
+            problems.append(f"{kind}: an address has room for {FEW}, and more were selected")
+        elif text is not None:
+            items = read(text) if text.count(",") < FEW else None
+            if items is None:
+                problems.append(f"{kind}: expected {FEW} ids or fewer, found {in_words(text)}")
+            else:
+                found[kind] = items
+    return Selected(**found), problems
 
 
 def checked_name(text: str) -> str:
@@ -173,9 +191,23 @@ def checked_name(text: str) -> str:
     return name
 
 
-def _numbers(text: str) -> Iterator[int]:
-    ids = map(int, text.split(",")[:FEW]) if _NUMBERS.fullmatch(text) else ()
-    return (one for one in ids if abs(one) <= _LARGEST_ID)
+def _numbers(text: str) -> frozenset[int] | None:
+    if not _NUMBERS.fullmatch(text):
+        return None
+    ids = frozenset(map(int, text.split(",")))
+    return ids if all(abs(one) <= _LARGEST_ID for one in ids) else None
+
+
+def _pairs(text: str) -> frozenset[Exposure] | None:
+    if not _PAIRS.fullmatch(text):
+        return None
+    pairs = (pair.split("/") for pair in text.split(","))
+    return frozenset((int(field), int(plate)) for field, plate in pairs)
+
+
+_READERS: Mapping[str, Callable[[str], frozenset[Any] | None]] = MappingProxyType(
+    {"sources": _numbers, "exposures": _pairs, "detectors": _numbers}
+)
 
 
 def _runs(exposures: Collection[Exposure]) -> Iterator[str]:

@@ -3,35 +3,28 @@
 The last solution stays on the screen until the next one is complete; then both can be compared.
 """
 
-from enum import Enum
+from collections.abc import Iterable
 
 import param
 
-from plateviz.dashboard.selected import SelectedIds
-from plateviz.dashboard.solution import Solution
+from plateviz.dashboard.solution import Request, Solution, what_if_settings
+from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices, Selection
 from plateviz.dashboard.units import Units
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.solution_store import SolutionStore
-from solver.data.result import FitResult
 from solver.data.settings import ENGINES, FitSettings
 from solver.errors import InputError
 
-
-class Stage(Enum):
-    """State of the solution on the screen."""
-
-    LOADING = "the first solution is being computed"
-    READY = "the solution is the requested one"
-    STALE = "another solution is being computed"
-    FAILED = "the last request failed"
+_NOTICE = "Not all that was asked for can be shown: "
 
 
 class Session(param.Parameterized):
     """State of one browser session.
 
     `shown` is the solution on the screen, `other` the one that it is compared with; either may
-    be None. `stage` and `message` are the state of the last request.
+    be None. `stage` and `message` are the state of the last request. `notice` says what of the
+    last address, or saved view, cannot be shown.
     """
 
     shown = param.ClassSelector(class_=Solution, default=None, allow_None=True)
@@ -39,6 +32,7 @@ class Session(param.Parameterized):
     solutions = param.List(default=[], item_type=Solution)
     stage = param.ClassSelector(class_=Stage, default=Stage.LOADING)
     message = param.String(default="")
+    notice = param.String(default="")
     theme = param.Selector(default="light", objects=["light", "dark"])
 
     def __init__(self, store: SolutionStore) -> None:
@@ -51,9 +45,14 @@ class Session(param.Parameterized):
         self.know_orbits()
         self.selection.orbit = self.selection.param["orbit"].objects[0]
         self._job: Job | None = None
-        self._requested: FitSettings = FitSettings()
-        self._requested_what_if = False
+        self._requested = Request(store.orbits[0], FitSettings())
         self._next_what_if: FitSettings | None = None
+        # What is put on the screen after the requested solution, one after the other.
+        self._later: list[Solution | Request] = []
+        self._is_opening = False
+        self._fitted: Solution | None = None
+        # What all solutions are compared with, in place of the one before each.
+        self._chosen: Solution | None = None
         self._unprepared: Solution | None = None
         self.choices.param.watch(
             lambda *_: self.ask_what_if(),
@@ -71,25 +70,57 @@ class Session(param.Parameterized):
         if orbits != list(self.selection.param["orbit"].objects):
             self.selection.param["orbit"].objects = orbits
 
-    def show_orbit(self, orbit: int | None) -> None:
-        """Request an orbit with the settings of the solution on the screen."""
-        self.selection.orbit = orbit
-        settings = self.shown.settings if self.shown else self._requested
-        self.param.update(solutions=[], other=None)
-        self._request(settings)
+    @property
+    def is_opening(self) -> bool:
+        """Whether a solution that was asked for by `open` is not on the screen yet."""
+        return self._job is not None and self._is_opening
 
-    def show_result(self, orbit: int | None, result: FitResult) -> None:
-        """Show an orbit with an existing result, without a request."""
+    def show_orbit(self, orbit: int | None, settings: FitSettings | None = None) -> None:
+        """Request an orbit with some settings; by default with those of the last solution."""
+        last = self.shown.settings if self.shown else self._requested.settings
+        self._begin([Request(orbit, settings or last)])
+
+    def show_result(self, solution: Solution) -> None:
+        """Show a solution that is there, such as that of a run, without a request."""
         self._cancel_job()
-        self.selection.orbit = orbit
-        solution = Solution(orbit, result.settings, result)
-        if self.shown is not None and self.shown._replace(result=result) == solution:
+        self.selection.orbit = solution.orbit
+        if self.shown is not None and self.shown.equals(solution):
             self.param.update(stage=Stage.READY, message="")
             return
-        self.param.update(solutions=[], other=None)
-        self._put_on_screen(solution)
-        self.choices.load(result.settings)
-        self._unprepared = solution
+        self.open(solution)
+
+    def open(self, solution: Solution | Request, other: Solution | Request | None = None) -> None:
+        """Show a solution beside another one; what is not there yet is computed first."""
+        before: list[Solution | Request] = []
+        if other is not None and other[0] == solution[0] and other[1] != solution[1]:
+            before = [other]
+        self._begin([*before, solution], is_opening=True)
+        if isinstance(other, Solution) and not before:
+            self.compare_with(other)
+        # Without a job, all of it is on the screen.
+        self.choices.load(solution.settings)
+        if self._job is None and isinstance(solution, Solution):
+            self._unprepared = solution
+
+    def _begin(self, solutions: list[Solution | Request], is_opening: bool = False) -> None:
+        self._cancel_job()
+        self._is_opening = is_opening
+        orbit = solutions[-1].orbit
+        self.selection.orbit = orbit
+        if self.shown is None or self.shown.orbit != orbit:
+            self.solutions = []
+        self._chosen = self.other = None
+        self._later = solutions
+        self._show_next()
+
+    def _show_next(self) -> None:
+        """Show what is to be shown next, up to what has to be computed."""
+        while self._later and self._job is None:
+            first = self._later.pop(0)
+            if isinstance(first, Request):
+                self._request(first)
+            else:
+                self._put_on_screen(first)
 
     def prepare_what_ifs(self) -> None:
         """Let the solver fit what the what-ifs of an existing result start from, once.
@@ -111,7 +142,8 @@ class Session(param.Parameterized):
         except InputError as error:
             self.refuse(str(error))
             return
-        self._request(settings)
+        self._cancel_job()
+        self._request(Request(self.selection.orbit, settings))
 
     def ask_what_if(self) -> None:
         """Request a what-if with the settings of the controls; the fitted solution is kept.
@@ -123,7 +155,7 @@ class Session(param.Parameterized):
         if not self.choices.what_if_at_once or fitted is None:
             return
         try:
-            settings = _what_if_settings(self.choices.settings(), fitted.settings)
+            settings = what_if_settings(self.choices.settings(), fitted.settings)
         except InputError as error:
             self.refuse(str(error))
             return
@@ -131,16 +163,16 @@ class Session(param.Parameterized):
             return
         known = next((s for s in self.solutions if s.settings == settings), None)
         if self._job is not None:
-            self._next_what_if = settings if self._requested_what_if else None
+            self._next_what_if = settings if self._requested.is_what_if else None
         elif known is not None:
             self._return_to(known)
         elif self.shown is None or settings != self.shown.settings:
-            self._request(settings, what_if=True)
+            self._request(Request(self.selection.orbit, settings, is_what_if=True))
 
     @property
     def fitted(self) -> Solution | None:
-        """The solution on the screen, or the one that a what-if is compared with."""
-        return self.other if self.shown is not None and self.shown.is_what_if else self.shown
+        """The solution on the screen, or the one before the what-ifs on the screen."""
+        return self._fitted if self.shown is not None and self.shown.is_what_if else self.shown
 
     def keep(self) -> None:
         """Keep the what-if on the screen."""
@@ -148,30 +180,13 @@ class Session(param.Parameterized):
             kept = self.shown._replace(is_what_if=False)
             self.param.update(solutions=[*self.solutions, kept], shown=kept)
 
-    def select_sources(self, sources: frozenset[int]) -> None:
-        """Select sources by their ids, in place of those selected before."""
-        self.selection.sources = sources
-
     def subject(self) -> str:
         """Return the orbit on the screen as it is named in files, such as "orbit-3"."""
         return f"orbit-{self.selection.orbit}"
 
-    def select_exposures(self, exposures: frozenset[tuple[int, int]]) -> None:
-        """Select exposures, (field_id, plate_id), in place of those selected before."""
-        self.selection.exposures = exposures
-
-    def select_detectors(self, detectors: frozenset[int]) -> None:
-        """Select detectors by their ids, in place of those selected before."""
-        self.selection.detectors = detectors
-
-    @property
-    def selected_ids(self) -> SelectedIds:
-        """The selected sources, exposures and detectors as the marks of figures name them."""
-        return self.selection.selected.ids()
-
     def cancel(self) -> None:
         """Cancel the waiting or running job."""
-        self._next_what_if = None
+        self._next_what_if, self._later = None, []
         if self._job is not None:
             self.store.cancel(self._job)
 
@@ -183,12 +198,13 @@ class Session(param.Parameterized):
         if status is JobStatus.DONE:
             self._job = None
             self._show_finished(self._requested)
-            if self._next_what_if is not None:
+            self._show_next()
+            if self._next_what_if is not None and self._job is None:
                 self._next_what_if = None
                 self.ask_what_if()
         elif status.is_over:
             reason = self._job.message or "The fit was cancelled; the last solution stays."
-            self._job = None
+            self._job, self._later = None, []
             self.refuse(reason)
         else:
             self.message = self._job.progress_text
@@ -196,59 +212,88 @@ class Session(param.Parameterized):
     def bring_up(self, solution: Solution) -> None:
         """Show an earlier solution; the fitted one on the screen becomes the other."""
         if solution is not self.shown:
-            self.param.update(shown=solution, other=self.fitted)
+            self.param.update(shown=solution, other=self._beside(solution, self.fitted))
             self.choices.load(solution.settings)
+
+    def compare_with(self, solution: Solution | None) -> None:
+        """Compare what is on the screen with a solution; None for the one before each.
+
+        Parameters
+        ----------
+        solution : may be of another run or orbit
+        """
+        self._chosen = solution
+        if self.shown is not None:
+            self.other = self._beside(self.shown, self.fitted)
 
     def exchange(self) -> None:
         """Exchange the solution on the screen with the one that it is compared with, if any."""
         shown, other = self.shown, self.other
-        if shown is not None and other is not None:
-            self.param.update(shown=other, other=shown)
-            self.choices.load(other.settings)
+        if shown is None or other is None:
+            return
+        if self._chosen is not None:
+            self._chosen = shown
+        if shown.orbit != other.orbit:
+            self._cancel_job()
+            self.param.update(solutions=[] if other.is_what_if else [other])
+            self.selection.orbit = other.orbit
+        self.param.update(shown=other, other=shown)
+        self.choices.load(other.settings)
+
+    def _beside(self, solution: Solution, before: Solution | None) -> Solution | None:
+        """Return what a solution is compared with, given the one before it of the same orbit."""
+        if self._chosen is not None:
+            return None if self._chosen.equals(solution) else self._chosen
+        return None if before is None or before.settings == solution.settings else before
 
     def _return_to(self, solution: Solution) -> None:
         """Return from a what-if to a kept solution, alone if the what-if was compared with it."""
         if solution is not self.shown:
-            other = self.fitted if self.fitted is not solution else None
+            other = self._beside(solution, self.fitted)
             self.param.update(shown=solution, other=other, stage=Stage.READY, message="")
 
-    def _request(self, settings: FitSettings, what_if: bool = False) -> None:
-        self._cancel_job()
-        self._requested, self._requested_what_if = settings, what_if
-        self._job = self.store.request(self.selection.orbit, settings, what_if)
+    def _request(self, request: Request) -> None:
+        self._requested = request
+        self._job = self.store.request(*request)
         stage = Stage.STALE if self.shown else Stage.LOADING
         self.param.update(stage=stage, message=self._job.progress_text)
         self.poll()
 
     def _cancel_job(self) -> None:
-        if self._job is not None:
-            self.store.cancel(self._job)
-        self._job, self._next_what_if = None, None
+        self.cancel()
+        self._job, self._is_opening = None, False
 
-    def _show_finished(self, settings: FitSettings) -> None:
-        orbit = self.selection.orbit
-        result = self.store.result(orbit, settings, self._requested_what_if)
+    def _show_finished(self, request: Request) -> None:
+        result = self.store.result(*request)
         if result is None:
             self.refuse("The result of the fit was removed.")
-            return
-        self._put_on_screen(Solution(orbit, settings, result, self._requested_what_if))
+        else:
+            orbit, settings, is_step = request
+            self._put_on_screen(Solution(orbit, settings, result, is_step, is_step))
 
     def _put_on_screen(self, solution: Solution) -> None:
-        numbers = [d.detector_id for d in self.store.instrument.detectors]
-        self.selection.limit_to(solution.result, numbers)
-        orbit, settings = solution.orbit, solution.settings
-        before = self.fitted if self.fitted and self.fitted.orbit == orbit else None
-        kept = [s for s in self.solutions if s.settings != settings]
+        ids = self.store.instrument.detector_ids
+        problems = self.selection.limit_to(solution.result, ids)
+        before = self.fitted if self.fitted and self.fitted.orbit == solution.orbit else None
+        self._fitted = before or solution
+        kept = [s for s in self.solutions if s.settings != solution.settings]
         self.param.update(
             solutions=self.solutions if solution.is_what_if else [*kept, solution],
-            other=before if before and before.settings != settings else None,
+            other=self._beside(solution, before),
             shown=solution,
             stage=Stage.READY,
             message="",
         )
+        self.note(problems)
 
+    def limit_selection(self) -> None:
+        """Limit the selection to the solution on the screen, after an address changed it."""
+        if self.shown is not None:
+            ids = self.store.instrument.detector_ids
+            self.note(self.selection.limit_to(self.shown.result, ids))
 
-def _what_if_settings(settings: FitSettings, fitted: FitSettings) -> FitSettings:
-    """Return the settings of a what-if; it keeps a comparison of orders only if still valid."""
-    is_still_valid = settings.with_(order=fitted.order, compare_orders=True) == fitted
-    return settings.with_(compare_orders=is_still_valid)
+    def note(self, problems: Iterable[str]) -> None:
+        """Add what of an address cannot be shown to the notice."""
+        before = self.notice.removeprefix(_NOTICE).rstrip(".")
+        told = "; ".join(filter(None, [before, *problems]))
+        self.notice = f"{_NOTICE}{told}." if told else ""

@@ -1,25 +1,59 @@
-"""Solution: one solution of a browser session."""
+"""Solution: one solution of a browser session; Request: one that is to be computed."""
 
 from typing import NamedTuple
 
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 
+_OF_WHAT_IF = "what if: {}"
+
+
+class Request(NamedTuple):
+    """A solution that is to be computed, unless the store has it already.
+
+    Attributes
+    ----------
+    orbit : orbit_id, or None for files of one orbit
+    settings : of the fit
+    is_what_if : whether a step from the last fit is enough
+    """
+
+    orbit: int | None
+    settings: FitSettings
+    is_what_if: bool = False
+
 
 class Solution(NamedTuple):
     """One solution of the session, with the orbit and settings requested.
 
-    A what-if is requested by a change of a control, and replaced by the next one unless kept.
+    Attributes
+    ----------
+    orbit, settings : as of `Request`
+    result : of the fit
+    is_what_if : whether the next what-if replaces it
+    is_step : whether it was computed by a step from a fit, kept or not
+    run : name of the run that it was read from; empty for none
     """
 
     orbit: int | None
     settings: FitSettings
     result: FitResult
     is_what_if: bool = False
+    is_step: bool = False
+    run: str = ""
 
     @property
     def label(self) -> str:
         """Short description of the solution."""
-        return (
-            f"what if: {self.settings.describe()}" if self.is_what_if else self.settings.describe()
-        )
+        text = self.settings.describe()
+        return _OF_WHAT_IF.format(text) if self.is_what_if else text
+
+    def equals(self, other: "Solution") -> bool:
+        """Whether both are the same solution of the same orbit."""
+        return self[:2] == other[:2] and self[4:] == other[4:]
+
+
+def what_if_settings(settings: FitSettings, fitted: FitSettings) -> FitSettings:
+    """Return the settings of a what-if; it keeps a comparison of orders only if still valid."""
+    is_still_valid = settings.with_(order=fitted.order, compare_orders=True) == fitted
+    return settings.with_(compare_orders=is_still_valid)

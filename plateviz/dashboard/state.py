@@ -6,7 +6,8 @@ from typing import Any
 
 import param
 
-from plateviz.dashboard.selected import KINDS, Selected, checked_name, parsed
+from plateviz.dashboard.address_parts import in_words
+from plateviz.dashboard.selected import MANY, Selected, SelectedIds, checked_name, parsed
 from solver.data.parameters import PARAMETERS
 from solver.data.prior_text import format_width
 from solver.data.result import FitResult
@@ -16,7 +17,7 @@ from solver.data.text_setting import PriorWidths, Texts
 from solver.errors import InputError
 
 ALL = "all"
-_PLATES = re.compile(r"(-?\d+)-(-?\d+)")
+_PLATES = re.compile(r"(-?[0-9]{1,9})-(-?[0-9]{1,9})")
 
 
 class Selection(param.Parameterized):
@@ -50,8 +51,13 @@ class Selection(param.Parameterized):
         super().__init__(**values)
         self._requested: dict[str, Any] = {}
 
-    def limit_to(self, result: FitResult, detectors: list[int]) -> None:
-        """Limit the options to those of a solution; a selection that is no option is reset."""
+    def limit_to(self, result: FitResult, detectors: list[int]) -> list[str]:
+        """Limit the options to those of a solution; a selection that is no option is reset.
+
+        Returns
+        -------
+        What of the last address is no option, in words.
+        """
         exposures = result.exposures
         fields = [ALL, *(str(f) for f in sorted(exposures["field_id"].unique().tolist()))]
         plates = (int(exposures["plate_id"].min()), int(exposures["plate_id"].max()))
@@ -60,41 +66,77 @@ class Selection(param.Parameterized):
         self.param["field"].objects = fields
         self.param["detector"].objects = numbers
         self.param["plates"].bounds = plates
+        requested, self._requested = self._requested, {}
         selected: dict[str, Any] = self.address() | {"plates": self.plates}
         if is_first:
-            selected |= {"field": fields[1], "detector": numbers[1], **self._requested}
+            selected |= {"field": fields[1], "detector": numbers[1]}
+        selected |= requested
         lowest, highest = (min(max(p, plates[0]), plates[1]) for p in selected["plates"])
-        self.param.update(
-            field=selected["field"] if selected["field"] in fields else ALL,
-            detector=selected["detector"] if selected["detector"] in numbers else ALL,
-            plates=(lowest, highest),
-        )
+        found = {
+            "field": selected["field"] if selected["field"] in fields else ALL,
+            "detector": selected["detector"] if selected["detector"] in numbers else ALL,
+            "plates": (lowest, highest),
+        }
+        self.param.update(**found)
+        options = {
+            "field": ", ".join(fields),
+            "detector": ", ".join(numbers),
+            "plates": f"exposures from {plates[0]} to {plates[1]}",
+        }
+        return [
+            f"{name}: expected {options[name]}, found {in_words(value)}"
+            for name, value in requested.items()
+            if found[name] != value
+        ]
 
-    def restore(self, address: Mapping[str, str]) -> None:
+    def restore(self, address: Mapping[str, str]) -> list[str]:
         """Select what a page's address requests, once a solution is there; ignore invalid values.
 
         Parameters
         ----------
-        address : query of the address, as from `address`; other keys are ignored
+        address : query of the address, as from `address`; other keys, and the orbit, are ignored
+
+        Returns
+        -------
+        The invalid values, in words.
         """
+        problems = []
         requested: dict[str, Any] = {k: address[k] for k in ("field", "detector") if k in address}
         plates = _PLATES.fullmatch(address.get("plates", ""))
         if plates:
             requested["plates"] = tuple(sorted(int(number) for number in plates.groups()))
+        elif "plates" in address:
+            problems.append(f"plates: expected FIRST-LAST, found {in_words(address['plates'])}")
         self._requested = requested
-        self._restore_selected(address)
+        problems += self._restore_selected(address)
+        return problems
+
+    def orbit_of(self, address: Mapping[str, str]) -> int | None:
+        """Return the orbit that an address names, by default the selected one.
+
+        Raises
+        ------
+        InputError
+            If there is no such orbit.
+        """
+        if "orbit" not in address:
+            return self.orbit
         orbits = {str(orbit): orbit for orbit in self.param["orbit"].objects}
-        self.orbit = orbits.get(address.get("orbit", ""), self.orbit)
+        if address["orbit"] not in orbits:
+            raise InputError(
+                f"orbit: expected one of this page, found {in_words(address['orbit'])}"
+            )
+        return orbits[address["orbit"]]
 
     def address(self) -> dict[str, str]:
         """Return the selection as the query of the page's address; `restore` reads it back.
 
-        Kinds of which more than a few are selected are left out.
+        Of a kind of which more than a few are selected, it says only that there are many.
         """
         first, last = self.plates
         query = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
         selected = self.selected.address()
-        if parsed(selected) == self.selected and (name := self.name_of_selected) is not None:
+        if MANY not in selected.values() and (name := self.name_of_selected) is not None:
             selected["selection"] = name
         query |= selected
         return query if self.orbit is None else {"orbit": str(self.orbit), **query}
@@ -108,21 +150,38 @@ class Selection(param.Parameterized):
         """Select sources, exposures and detectors in place of those selected before."""
         self.param.update(**selected.by_kind())
 
+    def select_sources(self, sources: frozenset[int]) -> None:
+        """Select sources by their ids, in place of those selected before."""
+        self.sources = sources
+
+    def select_exposures(self, exposures: frozenset[tuple[int, int]]) -> None:
+        """Select exposures, (field_id, plate_id), in place of those selected before."""
+        self.exposures = exposures
+
+    def select_detectors(self, detectors: frozenset[int]) -> None:
+        """Select detectors by their ids, in place of those selected before."""
+        self.detectors = detectors
+
+    @property
+    def ids(self) -> SelectedIds:
+        """The selected sources, exposures and detectors as the marks of figures name them."""
+        return self.selected.ids()
+
     @property
     def name_of_selected(self) -> str | None:
         """Name under which the selection is kept, None if it is not."""
         return next((name for name, kept in self.kept.items() if kept == self.selected), None)
 
-    def _restore_selected(self, address: Mapping[str, str]) -> None:
-        if not any(kind in address for kind in KINDS):
-            return
-        self.select(parsed(address))
-        try:
-            name = checked_name(address.get("selection", ""))
-        except InputError:
-            return
-        if self.selected:
-            self.kept = {**self.kept, name: self.selected}
+    def _restore_selected(self, address: Mapping[str, str]) -> list[str]:
+        selected, problems = parsed(address, self.selected)
+        self.select(selected)
+        if selected and "selection" in address and not problems:
+            try:
+                name = checked_name(address["selection"])
+            except InputError as error:
+                return [str(error)]
+            self.kept = {**self.kept, name: selected}
+        return problems
 
     @property
     def detector_id(self) -> int | None:
@@ -153,16 +212,21 @@ class FitChoices(param.Parameterized):
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
         """Start from the paper's priors."""
         super().__init__(**values)
+        self._loaded = FitSettings()
         self.prior_widths = default_widths()
 
     def settings(self) -> FitSettings:
-        """Return the settings; InputError names an invalid one."""
-        return FitSettings(
+        """Return the settings; InputError names an invalid one.
+
+        Those without a control are as of the last `load`.
+        """
+        return self._loaded.with_(
             **{name: _setting_value(one, getattr(self, name)) for name, one in CONTROLS.items()}
         )
 
     def load(self, settings: FitSettings) -> None:
         """Set the parameters to the values of `settings`."""
+        self._loaded = settings
         values = {name: _control_value(one, settings, name) for name, one in CONTROLS.items()}
         self.param.update(**values)
 

@@ -4,8 +4,9 @@ import shlex
 from collections.abc import Iterator
 
 from plateviz.solving.origin import OrbitFiles, Origin, SurveyFolder
-from solver.data.engine_settings import engine_options
-from solver.data.setting_kinds import Setting, Switch
+from solver.data.engine_settings import ENGINE_OPTIONS, engine_options
+from solver.data.setting_kinds import Setting
+from solver.data.setting_words import options_of
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import LeftOut, Texts
 
@@ -67,19 +68,12 @@ def _changed(settings: FitSettings) -> Iterator[tuple[str, Setting]]:
 
 def _options(settings: FitSettings, command: str) -> list[list[str]]:
     """Return the options of all settings that are not the paper's, each with its value."""
-    options: list[list[str]] = []
-    for name, one in _changed(settings):
-        value = getattr(settings, name)
-        if not one.option or command not in one.commands:
-            continue
-        if isinstance(one, Texts):
-            options += [[f"--{one.option}", text] for text in one.texts(value)]
-        elif isinstance(one, Switch):
-            options.append([f"--{'' if value else 'no-'}{one.option}"])
-        else:
-            options.append([f"--{one.option}", str(value)])
-    engines = engine_options(settings.svi, settings.nuts)
-    return options + [[f"--{name}", str(value)] for name, value in engines.items()]
+    return [
+        [f"--{one.name}"] if one.value is None else [f"--{one.name}", one.value]
+        for one in options_of(settings)
+        # The engines' options are given to both commands: one that lacks them says so.
+        if command in one.commands or one.name in ENGINE_OPTIONS
+    ]
 
 
 def _python_value(one: Setting, value: object) -> object:

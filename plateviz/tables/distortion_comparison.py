@@ -53,7 +53,7 @@ def distortion_comparison(
     moved = focal * (places_a / focal - places_b / _focal_length(result_b))
     scale = instrument.distortion_scale_um
     by_optics = _displaced(result_b, places_a, scale) - _displaced(result_a, places_a, scale)
-    ids = np.array([d.detector_id for d in instrument.detectors])[numbers]
+    ids = np.array(instrument.detector_ids)[numbers]
     parts = [
         _part(name, ids, places_a, difference, focal)
         for name, difference in ((ALONE, by_optics), (TOGETHER, moved))

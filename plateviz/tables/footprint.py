@@ -89,7 +89,7 @@ def _outline(
         east, north = offsets_deg(*apparent, observed["ra"].to_numpy(), observed["dec"].to_numpy())
         dec = dec - north.mean()
         ra = (ra - east.mean() / np.cos(np.radians(dec))) % 360.0
-    ids = [d.detector_id for d in instrument.detectors]
+    ids = instrument.detector_ids
     return pd.DataFrame(
         {
             "detector_id": np.repeat(ids, 5),

@@ -10,7 +10,9 @@ import pandas as pd
 from solver.data.orbit import OrbitData
 from solver.errors import InputError
 
-_EXCLUSION = re.compile(r"(source|detector)=(-?\d+)|(exposure)=(-?\d+)/(-?\d+)")
+_LARGEST_ID = 2**63 - 1
+_ID = r"(-?[0-9]{1,19})"
+_EXCLUSION = re.compile(rf"(source|detector)={_ID}|(exposure)={_ID}/{_ID}")
 # Number of excluded items of a kind that a short description names one by one.
 _FEW = 4
 
@@ -158,6 +160,8 @@ def parse_exclusions(texts: Iterable[str]) -> Exclusions:
                 "exclusion: expected source=ID, detector=ID or exposure=FIELD/PLATE, "
                 f"found {text!r}"
             )
+        if any(abs(int(number)) > _LARGEST_ID for number in match.group(2, 4, 5) if number):
+            raise InputError(f"exclusion: expected an id of 64 bits, found {text!r}")
         if match[3]:
             exposures.add((int(match[4]), int(match[5])))
         else:

@@ -64,6 +64,11 @@ class Instrument:
     distortion_scale_um: float
     detectors: tuple[Detector, ...]
 
+    @property
+    def detector_ids(self) -> list[int]:
+        """The ids of the detectors, in their order."""
+        return [detector.detector_id for detector in self.detectors]
+
     def index_of(self, detector_ids: np.ndarray) -> np.ndarray:
         """Return the index of each id along the detector axis; -1 if unknown."""
         known = {d.detector_id: i for i, d in enumerate(self.detectors)}

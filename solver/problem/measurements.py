@@ -96,7 +96,7 @@ def sort_measurements(
     detector = instrument.index_of(measurements["detector_id"].to_numpy())
     if (detector < 0).any():
         unknown = sorted(set(measurements["detector_id"].to_numpy()[detector < 0].tolist()))
-        known = [d.detector_id for d in instrument.detectors]
+        known = instrument.detector_ids
         raise InputError(
             f"column detector_id of the measurements: expected detectors of the instrument "
             f"{instrument.name!r} ({known}), found {unknown}"

@@ -78,7 +78,7 @@ def measure_orbit(
             "orbit_id": taken["orbit_id"].to_numpy(),
             "field_id": taken["field_id"].to_numpy(),
             "plate_id": taken["plate_id"].to_numpy(),
-            "detector_id": np.array([d.detector_id for d in instrument.detectors])[detector],
+            "detector_id": np.array(instrument.detector_ids)[detector],
             "source_id": near["source_id"].to_numpy()[source[row]],
             "nx": measured[:, 0],
             "ny": measured[:, 1],

@@ -417,14 +417,33 @@ def test_any_column_is_drawn_against_any_other_and_selects(page, open_page):
     expect(again.get_by_role("combobox", name="Limit by")).to_have_text("is_reference")
 
 
-def test_the_address_carries_the_selection(page, open_page):
+def test_the_address_is_what_is_shown_and_the_browser_goes_back(page, open_page):
     choose(page, "Detector", "3")
     choose(page, "Field", "all")
-    page.wait_for_url("**detector=3**")
-    page.wait_for_url("**field=all**")
+    page.wait_for_url("**field=all**detector=3**")
+    steps = page.evaluate("history.length")
+    set_order(page, 4)
+    expect(shown(page)).to_contain_text("what if: order 4")
+    page.wait_for_url("**solution=order=4+what-if&against=order=5")
+    # What a hand changes little by little is one step.
+    assert page.evaluate("history.length") == steps
     again = open_page(page.url)
     expect(again.get_by_role("combobox", name="Detector")).to_have_text("3")
     expect(again.get_by_role("combobox", name="Field")).to_have_text("all")
+    expect(shown(again)).to_contain_text("what if: order 4")
+    again.close()
+    turn_to_workspace(page, OrbitWorkspace.SKY)
+    page.wait_for_url("**workspace=sky**")
+    assert page.evaluate("history.length") == steps + 1
+    page.go_back()
+    expect(page.get_by_role("button", name="Verdict", exact=True)).to_have_attribute(
+        "aria-pressed", "true"
+    )
+    assert "solution=order=4+what-if" in page.url
+    page.go_forward()
+    expect(page.get_by_role("button", name="Sky", exact=True)).to_have_attribute(
+        "aria-pressed", "true"
+    )
 
 
 def test_keys_do_what_their_list_says(page):
@@ -455,6 +474,10 @@ def test_an_address_of_nonsense_opens_the_page_in_the_theme_of_the_system(served
     page = open_page(f"{served}?field=%FF&plates=1e9-x&detector=none&orbit=%00", colours="dark")
     page.locator(".figure-footprint canvas").first.wait_for(state="attached")
     expect(page.get_by_role("combobox", name="Field")).to_have_text("all")
+    notice = page.get_by_role("alert").filter(has_text="Not all that was asked for can be shown")
+    expect(notice).to_contain_text("plates: expected FIRST-LAST, found '1e9-x'")
+    notice.get_by_role("button", name="Close").click()
+    expect(notice).to_have_count(0)
     until(page, lambda: set(page.evaluate(BACKGROUNDS).values()) == {"#121212"})
     background = "getComputedStyle(document.body).backgroundColor"
     until(page, lambda: page.evaluate(background) == "rgb(18, 18, 18)")

@@ -67,9 +67,9 @@ class ExploreView(pn.viewable.Viewer):
             self._plot,
             waiting="The first solution is being computed.",
             actions=PointActions(
-                select=self._session.select_sources,
+                select=self._session.selection.select_sources,
                 select_area=self._select_area,
-                select_exposures=self._session.select_exposures,
+                select_exposures=self._session.selection.select_exposures,
             ),
             zoom=self._zoom,
             saved=Saved(self._session.subject, self._rows),
@@ -168,7 +168,9 @@ class ExploreView(pn.viewable.Viewer):
         # An exposure has all sources, so that an area of exposures selects none.
         if table is not None and table.has_sources:
             kept = kept_rows(table, chosen)
-            self._session.select_sources(sources_within(table, chosen.x, chosen.y, corners, kept))
+            self._session.selection.select_sources(
+                sources_within(table, chosen.x, chosen.y, corners, kept)
+            )
 
     def _show_limits(self, *_: object) -> None:
         """Let the slider span the values of the column that limits the rows."""

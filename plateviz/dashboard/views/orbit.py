@@ -8,7 +8,7 @@ import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.selected import KINDS
-from plateviz.dashboard.session import Stage
+from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.explore import ExploreView
 from plateviz.dashboard.views.figure import FigureView, card
@@ -114,9 +114,9 @@ class OrbitPage(pn.viewable.Viewer):
             partial(self._plot, diagnostic),
             waiting="The first solution is being computed.",
             actions=PointActions(
-                select=self._session.select_sources,
-                select_exposures=self._session.select_exposures,
-                select_detectors=self._session.select_detectors,
+                select=self._session.selection.select_sources,
+                select_exposures=self._session.selection.select_exposures,
+                select_detectors=self._session.selection.select_detectors,
             ),
             saved=Saved(self._session.subject),
             theme=self._session.theme,
@@ -148,7 +148,7 @@ class OrbitPage(pn.viewable.Viewer):
 
     def _show_selected(self, *_: object) -> None:
         for grid in self._grids.values():
-            grid.show_selected(self._session.selected_ids)
+            grid.show_selected(self._session.selection.ids)
 
     def _mark_stale(self, *_: object) -> None:
         for grid in self._grids.values():

@@ -6,6 +6,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.views.notice import NoticeView
 from plateviz.dashboard.views.orbit import OrbitPage
 from plateviz.dashboard.views.source import SourcePage
 from plateviz.dashboard.views.stack import Stack
@@ -52,6 +53,7 @@ class Pages(pn.viewable.Viewer):
             pmui.FlexBox(
                 self._view_switch(), self._workspace_switch(), sizing_mode="stretch_width", margin=0
             ),
+            NoticeView(navigation.session),
             self._stack,
             sizing_mode="stretch_width",
             margin=(0, 12, 8, 12),

@@ -5,8 +5,9 @@ from html import escape
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.session import Session, Stage
+from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
+from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.state import CONTROLS, FitChoices, default_widths
 from plateviz.dashboard.views.code_window import CodeWindow
 from solver.data.parameters import PARAMETERS, Group

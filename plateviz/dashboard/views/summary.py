@@ -3,8 +3,9 @@
 import panel as pn
 
 from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.session import Session, Stage
+from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
+from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.markup import judged, markup_pane, paragraph, titled
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.reports.summary_strip import strip

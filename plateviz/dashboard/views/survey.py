@@ -117,7 +117,7 @@ class SurveyPage(pn.viewable.Viewer):
         return FigureView(
             figure,
             partial(self._plot, figure),
-            actions=PointActions({"orbit_id": self._open_orbit}, session.select_sources),
+            actions=PointActions({"orbit_id": self._open_orbit}, session.selection.select_sources),
             saved=Saved(self._subject),
             theme=session.theme,
         )
@@ -164,7 +164,7 @@ class SurveyPage(pn.viewable.Viewer):
 
     def _show_selected(self, *_: object) -> None:
         for grid in self._grids.values():
-            grid.show_selected(self._session.selected_ids)
+            grid.show_selected(self._session.selection.ids)
 
     def _show_workspace(self, *_: object) -> None:
         self._stack.show(self._navigation.survey_workspace)

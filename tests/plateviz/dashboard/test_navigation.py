@@ -8,7 +8,8 @@ import pytest
 
 from plateviz.dashboard.keys import press
 from plateviz.dashboard.navigation import Navigation, View
-from plateviz.dashboard.session import Session, Stage
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.runs.queries import Written
@@ -28,11 +29,15 @@ class FakeRun:
         self.name, self.is_complete = name, is_complete
         self.is_gathered = is_complete
         self._survey = survey
-        self._result = replace(result, settings=settings or FitSettings())
+        self._settings = settings or FitSettings()
+        self._result = replace(result, settings=self._settings)
         self.survey = Path("sky")
         self.n_fitted = 2 if is_complete else 1
         self.read = []
         self.also_written = {}
+
+    def header(self):
+        return {"settings": self._settings.to_dict()}
 
     def written(self):
         found = Written(2, self.n_fitted, 0, self.is_gathered, self.is_complete)
@@ -248,9 +253,15 @@ def test_address_restores_the_workspace(navigation):
     assert navigation.workspace is OrbitWorkspace.WEAK_DIRECTIONS
 
 
-def test_invalid_address_is_ignored(navigation):
+def test_invalid_address_is_reported_in_one_notice_and_shows_the_rest(navigation):
     wrong = {"view": "moon", "workspace": "sky", "run": "../../etc", "source": "\x00", "who": "me"}
     navigation.begin(wrong)
+    notice = navigation.session.notice
+    assert notice.startswith("Not all that was asked for can be shown: run: expected default,")
+    assert "view: expected survey, orbit, source, found 'moon'" in notice
+    assert "workspace: expected verdict, accuracy, catalogue, found 'sky'" in notice
+    # Proxies add parts of their own.
+    assert "who" not in notice
     assert (navigation.view, navigation.run_name) == (View.SURVEY, "default")
     assert navigation.workspace is SurveyWorkspace.VERDICT
     assert navigation.found is None
@@ -324,3 +335,147 @@ def test_tables_that_are_written_again_are_read_again(fit_result, survey):
     run.also_written["gathered"] = (0, 1)
     navigation.look_again()
     assert len(seen) == 1
+
+
+def end_job(navigation):
+    navigation.session.job.take({"event": "done"})
+    navigation.session.poll()
+
+
+def again(navigation):
+    """Another page that was opened by the address of a page."""
+    other = Navigation(Session(navigation.session.store))
+    other.begin(navigation.address())
+    return other
+
+
+def test_address_of_the_solution_of_the_run_has_no_settings(navigation):
+    navigation.open_orbit(0)
+    assert "solution" not in navigation.address()
+    assert again(navigation).session.shown.run == "default"
+
+
+def test_address_of_files_with_the_papers_settings_has_none(fit_result):
+    navigation = Navigation(Session(SurveyStore(fit_result, [])))
+    navigation.begin({})
+    end_job(navigation)
+    assert "solution" not in navigation.address()
+
+
+def test_address_has_the_settings_of_a_fit_and_of_the_solution_before_it(navigation):
+    navigation.open_orbit(0)
+    session = navigation.session
+    session.choices.what_if_at_once = False
+    session.choices.param.update(order=3, exclusions="detector=1", aberration=False)
+    session.refit()
+    end_job(navigation)
+    address = navigation.address()
+    assert address["solution"] == "order=3 no-aberration exclude=detector=1"
+    assert address["against"] == "run=default"
+    opened = again(navigation)
+    assert opened.session.shown.run == "default"
+    # While it is fitted, the address is that of what is to come.
+    assert opened.address() == address
+    end_job(opened)
+    assert opened.session.shown.settings == session.shown.settings
+    assert opened.session.other.run == "default"
+    assert opened.session.choices.settings() == session.shown.settings
+    assert opened.address() == address
+    assert len(opened.session.store.requested) == 2
+
+
+def test_address_of_a_what_if_shows_a_what_if_of_the_same_solution(navigation):
+    navigation.open_orbit(0)
+    navigation.session.choices.order = 4
+    end_job(navigation)
+    address = navigation.address()
+    assert address["solution"] == "order=4 what-if"
+    opened = again(navigation)
+    end_job(opened)
+    shown = opened.session.shown
+    assert (shown.is_what_if, shown.settings.order) == (True, 4)
+    assert opened.address() == address
+    opened.session.choices.order = 5
+    assert opened.session.shown.run == "default"
+
+
+def test_address_of_a_kept_what_if_still_says_so(navigation):
+    navigation.open_orbit(0)
+    navigation.session.choices.order = 4
+    end_job(navigation)
+    navigation.session.keep()
+    assert navigation.address()["solution"] == "order=4 what-if"
+
+
+def test_settings_of_the_run_are_read_from_it(fit_result, survey):
+    run = FakeRun("third", survey, fit_result, FitSettings(order=3))
+    navigation = Navigation(Session(SurveyStore(fit_result, [run])))
+    navigation.begin({"orbit": "0", "solution": "order=3"})
+    assert (navigation.session.shown.run, requested(navigation)) == ("third", [])
+
+
+def test_orbit_that_the_run_lacks_is_fitted_with_its_settings(fit_result, survey):
+    run = FakeRun("third", survey, fit_result, FitSettings(order=3))
+    navigation = Navigation(Session(SurveyStore(fit_result, [run])))
+    navigation.begin({"orbit": "1"})
+    assert requested(navigation) == [(1, FitSettings(order=3))]
+
+
+def test_address_compares_with_another_run_and_another_orbit(fit_result, survey):
+    runs = [FakeRun("a", survey, fit_result), FakeRun("b", survey, fit_result)]
+    navigation = Navigation(Session(SurveyStore(fit_result, runs)))
+    navigation.begin({"orbit": "0", "run": "a", "against": "run=b"})
+    assert (navigation.session.shown.run, navigation.session.other.run) == ("a", "b")
+    assert navigation.address()["against"] == "run=b"
+
+
+@pytest.mark.parametrize(
+    ("part", "text", "told"),
+    [
+        ("solution", "order=12", "solution: expected a distortion order from 0 to 9, found 12"),
+        ("solution", "spline=3", "solution: expected settings of a fit such as order=3, found"),
+        ("solution", "too-long", "solution: the settings were too many for the address"),
+        ("solution", "x" * 5000, "solution: expected 4,000 characters or fewer, found 5,000"),
+        ("solution", "run=gone", "solution: expected a run that has orbit 0, found 'gone'"),
+        ("against", "run=default orbit=1", "against: expected a run that has orbit 1, found 'def"),
+        ("orbit", "77", "orbit: expected one of this page, found '77'"),
+    ],
+    ids=["value", "setting", "long", "longer", "run", "orbit-of-run", "orbit"],
+)
+def test_solution_that_is_not_there_is_told_and_the_default_is_shown(navigation, part, text, told):
+    navigation.begin({"view": "orbit", part: text})
+    assert told in navigation.session.notice
+    assert navigation.session.shown.run == "default"
+    assert requested(navigation) == []
+    navigation.begin({"view": "orbit"})
+    assert navigation.session.notice == ""
+
+
+def test_going_back_restores_what_was_on_the_screen(navigation):
+    navigation.open_orbit(0)
+    navigation.session.selection.detector = "2"
+    navigation.turn_to_workspace(OrbitWorkspace.SKY)
+    before, shown = navigation.address(), navigation.session.shown
+    navigation.session.selection.detector = "3"
+    navigation.choose_orbit(1)
+    end_job(navigation)
+    navigation.turn_to(View.SURVEY)
+    after = navigation.address()
+    navigation.begin(before)
+    assert navigation.address() == before
+    assert navigation.session.shown.equals(shown)
+    navigation.begin(after)
+    end_job(navigation)
+    assert navigation.address() == after
+    assert navigation.session.notice == ""
+
+
+def test_going_back_within_an_orbit_leaves_its_solution_and_a_fit(navigation):
+    navigation.open_orbit(0)
+    before, shown = navigation.address(), navigation.session.shown
+    navigation.turn_to_workspace(OrbitWorkspace.SKY)
+    navigation.session.refit()
+    job = navigation.session.job
+    navigation.begin(before)
+    assert navigation.session.shown is shown
+    assert navigation.session.job is job

@@ -46,12 +46,18 @@ def test_selection_in_words(selected, text):
     ],
 )
 def test_address_of_a_few_is_read_back(selected):
-    assert parsed(selected.address()) == selected
+    assert parsed(selected.address()) == (selected, [])
 
 
-def test_address_leaves_out_the_kinds_of_which_many_are_selected():
+def test_address_says_of_which_kinds_many_are_selected():
     selected = of(range(FEW + 1), [(0, 1)], [1])
-    assert selected.address() == {"exposures": "0/1", "detectors": "1"}
+    address = selected.address()
+    assert address == {"sources": "many", "exposures": "0/1", "detectors": "1"}
+    # Who goes back keeps them; who opens the address is told.
+    assert parsed(address, selected) == (selected, [])
+    found, (told,) = parsed(address)
+    assert found == of([], [(0, 1)], [1])
+    assert "room for 20" in told
 
 
 @pytest.mark.parametrize("kind", ["sources", "exposures", "detectors"])
@@ -60,7 +66,9 @@ def test_address_leaves_out_the_kinds_of_which_many_are_selected():
     ["", "x", "1,", "0/1/2", "9" * 20, "1;2", str(LARGEST + 1), "1/", "<b>", "1/" + "9" * 30],
 )
 def test_invalid_address_selects_nothing(kind, text):
-    assert parsed({kind: text}) == NOTHING
+    found, (told,) = parsed({kind: text})
+    assert found == NOTHING
+    assert told.startswith(f"{kind}: expected {FEW} ids or fewer, found ")
 
 
 def test_rows_of_any_selected_source_exposure_or_detector_are_chosen():

@@ -4,7 +4,8 @@ import pytest
 
 from plateviz.dashboard.selected import NOTHING, Selected
 from plateviz.dashboard.selection_actions import SelectionActions
-from plateviz.dashboard.session import Session, Stage
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.state import default_widths
 from solver.data.settings import FitSettings
 from solver.errors import InputError
@@ -31,9 +32,9 @@ def ids_of(fit_result, n):
 
 def test_selection_is_left_out_and_put_back(live, actions, fit_result):
     ids = ids_of(fit_result, 2)
-    live.select_sources(ids | {-7})
-    live.select_exposures(frozenset({(0, 1), (99, 0)}))
-    live.select_detectors(frozenset({2}))
+    live.selection.select_sources(ids | {-7})
+    live.selection.select_exposures(frozenset({(0, 1), (99, 0)}))
+    live.selection.select_detectors(frozenset({2}))
     measured = Selected(ids, frozenset({(0, 1)}), frozenset({2}))
     assert actions.in_orbit == measured
     assert not actions.is_left_out
@@ -42,16 +43,16 @@ def test_selection_is_left_out_and_put_back(live, actions, fit_result):
     assert settings.exclusions == measured.exclusions
     assert job.request["what_if"]
     assert actions.is_left_out
-    live.select_detectors(frozenset({2, 3}))
+    live.selection.select_detectors(frozenset({2, 3}))
     assert not actions.is_left_out
-    live.select_detectors(frozenset())
+    live.selection.select_detectors(frozenset())
     actions.put_back()
     assert live.choices.settings().exclusions == Selected(detectors=frozenset({2})).exclusions
 
 
 def test_what_is_left_out_already_stays_out(live, actions):
     live.choices.exclusions = "detector=1"
-    live.select_exposures(frozenset({(0, 1)}))
+    live.selection.select_exposures(frozenset({(0, 1)}))
     actions.leave_out()
     assert live.choices.exclusions == "exposure=0/1, detector=1"
     actions.put_back()
@@ -60,8 +61,8 @@ def test_what_is_left_out_already_stays_out(live, actions):
 
 def test_what_the_orbit_has_not_measured_is_not_left_out(live, actions):
     before = live.choices.settings()
-    live.select_sources(frozenset({-7}))
-    live.select_exposures(frozenset({(99, 0)}))
+    live.selection.select_sources(frozenset({-7}))
+    live.selection.select_exposures(frozenset({(99, 0)}))
     assert not actions.is_left_out
     actions.leave_out()
     assert live.stage is Stage.FAILED
@@ -71,7 +72,7 @@ def test_what_the_orbit_has_not_measured_is_not_left_out(live, actions):
 
 def test_invalid_settings_refuse_to_leave_out(live, actions, fit_result):
     live.choices.prior_widths = {**default_widths(), "detector_x": "-3"}
-    live.select_sources(ids_of(fit_result, 1))
+    live.selection.select_sources(ids_of(fit_result, 1))
     actions.leave_out()
     assert "detector_x" in live.message
     assert live.choices.exclusions == ""
@@ -79,8 +80,8 @@ def test_invalid_settings_refuse_to_leave_out(live, actions, fit_result):
 
 def test_selected_kinds_are_inverted_among_what_is_measured(live, actions, fit_result):
     ids = frozenset(fit_result.sources["source_id"].tolist())
-    live.select_sources(ids_of(fit_result, 1))
-    live.select_detectors(frozenset({0, 3}))
+    live.selection.select_sources(ids_of(fit_result, 1))
+    live.selection.select_detectors(frozenset({0, 3}))
     actions.invert()
     measured = frozenset(fit_result.residuals["detector_id"].tolist())
     assert live.selection.selected == Selected(
@@ -91,14 +92,14 @@ def test_selected_kinds_are_inverted_among_what_is_measured(live, actions, fit_r
 
 
 def test_selection_is_kept_under_a_name_and_taken_up_again(live, actions):
-    live.select_exposures(frozenset({(0, 1)}))
+    live.selection.select_exposures(frozenset({(0, 1)}))
     actions.keep(" corner ")
-    live.select_exposures(frozenset())
-    live.select_sources(frozenset({5}))
+    live.selection.select_exposures(frozenset())
+    live.selection.select_sources(frozenset({5}))
     actions.take_up("corner")
     assert live.selection.selected == Selected(exposures=frozenset({(0, 1)}))
     assert live.selection.name_of_selected == "corner"
-    live.select_detectors(frozenset({1}))
+    live.selection.select_detectors(frozenset({1}))
     assert live.selection.name_of_selected is None
     actions.keep("corner")
     assert live.selection.kept == {"corner": live.selection.selected}
@@ -112,7 +113,7 @@ def test_nothing_and_too_much_is_not_kept(live, actions):
     with pytest.raises(InputError, match="nothing is selected"):
         actions.keep("empty")
     for number in range(50):
-        live.select_sources(frozenset({number}))
+        live.selection.select_sources(frozenset({number}))
         actions.keep(f"{number}")
     with pytest.raises(InputError, match="50 selections are kept; forget one"):
         actions.keep("one more")

@@ -2,7 +2,9 @@
 
 import pytest
 
-from plateviz.dashboard.session import Session, Stage
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.solution import Solution
+from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.state import (
     ALL,
     ANSWERED_AT_ONCE,
@@ -59,6 +61,10 @@ def live(session):
     return session
 
 
+def of_run(result, orbit=0):
+    return Solution(orbit, result.settings, result, run="default")
+
+
 def finish(session):
     session.job.take({"event": "done"})
     session.poll()
@@ -75,7 +81,7 @@ def test_first_orbit_is_requested_with_the_settings_of_the_paper(session):
 
 def test_solution_of_a_run_is_prepared_once_for_what_ifs(fit_result):
     session = Session(FakeStore(fit_result))
-    session.show_result(0, fit_result)
+    session.show_result(of_run(fit_result))
     assert session.store.prepared == []
     session.prepare_what_ifs()
     session.prepare_what_ifs()
@@ -84,12 +90,12 @@ def test_solution_of_a_run_is_prepared_once_for_what_ifs(fit_result):
 
 def test_nothing_is_prepared_for_what_is_no_longer_shown_or_not_wanted(fit_result):
     session = Session(FakeStore(fit_result))
-    session.show_result(0, fit_result)
+    session.show_result(of_run(fit_result))
     session.refit()
     finish(session)
     session.prepare_what_ifs()
     session.choices.what_if_at_once = False
-    session.show_result(1, fit_result)
+    session.show_result(of_run(fit_result, 1))
     session.prepare_what_ifs()
     assert session.store.prepared == []
 
@@ -368,27 +374,36 @@ def test_address_restores_the_selection(fit_result):
 
 
 @pytest.mark.parametrize(
-    "address",
+    ("address", "told"),
     [
-        {"field": "99", "detector": "none", "plates": "many", "orbit": "7", "unknown": "x"},
-        {"plates": "3", "field": ""},
+        (
+            {"field": "99", "detector": "none", "plates": "many", "unknown": "x"},
+            ["plates: expected FIRST-LAST", "field: expected all, 0, 1, 2, 3, found '99'", "detec"],
+        ),
+        ({"plates": "3", "field": ""}, ["plates: expected FIRST-LAST", "field: expected all"]),
+        ({"plates": "1-900"}, ["plates: expected exposures from 0 to 2"]),
+        ({"plates": "0-1", "field": "2"}, []),
     ],
-    ids=["nonsense", "half"],
+    ids=["nonsense", "half", "beyond", "valid"],
 )
-def test_invalid_address_is_ignored(fit_result, address):
+def test_invalid_address_is_ignored_and_told(fit_result, address, told):
     selection = Selection()
-    selection.restore(address)
-    selection.limit_to(fit_result, [1, 2])
-    assert selection.plates[0] == selection.param["plates"].bounds[0]
+    problems = selection.restore(address) + selection.limit_to(fit_result, [1, 2])
+    assert len(problems) == len(told)
+    assert all(text.startswith(words) for text, words in zip(problems, told, strict=True))
+    lowest, highest = selection.param["plates"].bounds
+    assert lowest <= selection.plates[0] <= selection.plates[1] <= highest
     assert selection.field in selection.param["field"].objects
-    assert selection.orbit is None
+    # It is told once.
+    assert selection.limit_to(fit_result, [1, 2]) == []
 
 
-def test_address_selects_an_orbit(fit_result):
-    session = Session(FakeStore(fit_result))
-    session.selection.restore({"orbit": "1"})
-    assert session.selection.orbit == 1
-    assert session.selection.address()["orbit"] == "1"
+def test_address_names_an_orbit(fit_result):
+    selection = Session(FakeStore(fit_result)).selection
+    assert selection.orbit_of({"orbit": "1"}) == 1
+    assert selection.orbit_of({}) == selection.orbit == 0
+    with pytest.raises(InputError, match="orbit: expected one of this page, found '7'"):
+        selection.orbit_of({"orbit": "7"})
 
 
 @pytest.mark.parametrize(
@@ -413,3 +428,34 @@ def test_every_setting_with_a_control_is_a_parameter():
     controls = {name for name, one in SETTINGS.items() if one.control}
     assert controls == set(CONTROLS) == set(FitChoices.param) - {"name", "what_if_at_once"}
     assert set(ANSWERED_AT_ONCE) == controls - {"engine", "compare_orders"}
+
+
+@pytest.mark.parametrize("count", [1, 20])
+def test_address_has_a_few_selected_sources(count):
+    first, second = Selection(), Selection()
+    first.sources = frozenset(range(2**63 - count, 2**63))
+    second.restore(first.address())
+    assert second.sources == first.sources
+
+
+def test_address_says_that_many_sources_are_selected(fit_result):
+    first, second = Selection(), Selection()
+    first.sources = frozenset(range(21))
+    address = first.address()
+    assert address["sources"] == "many"
+    # Who goes back keeps them; who opens the address is told.
+    assert first.restore(address) == []
+    assert len(first.sources) == 21
+    assert "room for 20" in second.restore(address)[0]
+    assert first.restore({}) == []
+    assert first.sources == frozenset()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "x", "1,", "99999999999999999999", "1;2", "9223372036854775808", "1," * 20 + "1"]
+)
+def test_invalid_selected_sources_of_an_address_are_ignored_and_told(text):
+    selection = Selection()
+    (told,) = selection.restore({"sources": text})
+    assert told.startswith("sources: expected 20 ids or fewer, found ")
+    assert selection.sources == frozenset()

@@ -75,7 +75,7 @@ def test_list_of_the_selection_is_in_the_unit(navigation, fit_result):
     navigation.open_orbit(0)
     session = navigation.session
     session.units.unit = "µas"
-    session.select_sources(frozenset(fit_result.sources["source_id"].tolist()[:1]))
+    session.selection.select_sources(frozenset(fit_result.sources["source_id"].tolist()[:1]))
     window = SelectionList(navigation)
     window.open()
     (table,) = window._tables["sources"].__panel__()

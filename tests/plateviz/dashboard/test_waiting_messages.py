@@ -1,6 +1,7 @@
 """No message to a page waits for another one to be sent."""
 
 import asyncio
+import inspect
 
 import pytest
 from bokeh.document import Document
@@ -35,7 +36,9 @@ class Connection:
 @pytest.fixture
 def connection(monkeypatch):
     monkeypatch.setitem(panel_document.extra_socket_handlers, Socket, lambda to, msg: to.write(msg))
-    monkeypatch.setattr(panel_document, "_dispatch_msgs", panel_document._dispatch_msgs)
+    # A server of another test may have replaced it.
+    of_panel = inspect.unwrap(panel_document._dispatch_msgs)
+    monkeypatch.setattr(panel_document, "_dispatch_msgs", of_panel)
     return Connection()
 
 

@@ -45,7 +45,7 @@ def shown(bar):
 def test_bar_offers_what_can_be_done(navigation, session):
     bar = SelectionBar(navigation)
     assert len(bar.__panel__()) == 0
-    session.select_exposures(frozenset({(0, 1)}))
+    session.selection.select_exposures(frozenset({(0, 1)}))
     assert shown(bar) == ["List", "Leave out of the fit", "Invert", "Keep", "Clear"]
     session.choices.exclusions = "exposure=0/1"
     assert "Put back into the fit" in shown(bar)
@@ -76,7 +76,7 @@ def test_rows_of_the_calibration_tables_select_and_are_selected(session, fit_res
     exposures.selection = [0, 2]
     keys = fit_result.exposures[["field_id", "plate_id"]].to_numpy()[[0, 2]]
     assert session.selection.exposures == frozenset(map(tuple, keys.tolist()))
-    session.select_detectors(frozenset({3}))
+    session.selection.select_detectors(frozenset({3}))
     assert detectors.selection == [3]
     assert exposures.selection == [0, 2]
     label = exposures.value["element"].iloc[2]

@@ -1,0 +1,89 @@
+"""AddressBar: the browser's address and its history."""
+
+from urllib.parse import parse_qs, urlencode
+
+import panel as pn
+import param
+
+from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.selected import KINDS
+
+# Parts of an address whose change is a step of the browser's history; others replace the last one.
+_STEPS = ("view", "workspace", "run", "orbit", "source")
+_MOST_CHARACTERS, _MOST_PARTS = 20_000, 100
+
+
+class AddressBar(pn.custom.JSComponent):
+    """Writes what is on the screen into the browser's address, and follows back and forward.
+
+    Panel's own component makes a step of the history of every change.
+    """
+
+    query = param.String(doc="of the address, without the question mark")
+    steps = param.List(item_type=str, doc="parts whose change is a step of the history")
+
+    _esm = """
+    export function render({ model }) {
+      let isFirst = true, timer = null
+      const places = search => {
+        const parts = new URLSearchParams(search)
+        return JSON.stringify(model.steps.map(name => parts.get(name)))
+      }
+      const write = () => {
+        const search = `?${model.query}`
+        if (!model.query || search === location.search) return
+        const isStep = !isFirst && places(search) !== places(location.search)
+        isFirst = false
+        const url = location.pathname + search + location.hash
+        history[isStep ? "pushState" : "replaceState"](history.state, "", url)
+      }
+      // One action changes several parts, one after the other.
+      const later = () => { clearTimeout(timer); timer = setTimeout(write, 100) }
+      const follow = () => {
+        clearTimeout(timer)
+        model.send_msg(location.search.slice(1))
+      }
+      model.on("query", later)
+      later()
+      addEventListener("popstate", follow)
+      model.on("remove", () => { clearTimeout(timer); removeEventListener("popstate", follow) })
+    }
+    """
+    _stylesheets = [":host { display: none; }"]
+
+    def __init__(self, navigation: Navigation, **params: object) -> None:
+        """Follow `navigation` and its session."""
+        super().__init__(steps=list(_STEPS), margin=0, **params)
+        self._navigation = navigation
+        session = navigation.session
+        names = ["view", *WORKSPACES.values(), "run_name", "found"]
+        navigation.param.watch(self._write, names)
+        navigation.exploration.param.watch(self._write, list(navigation.exploration.param.values()))
+        session.param.watch(self._write, ["shown", "other"])
+        session.units.param.watch(self._write, "unit")
+        names = ["orbit", "field", "plates", "detector", *KINDS, "kept"]
+        session.selection.param.watch(self._write, names)
+        self._is_following = False
+        self._write()
+
+    def _write(self, *_: object) -> None:
+        navigation = self._navigation
+        is_there = navigation.view is not View.ORBIT or navigation.session.shown is not None
+        if is_there and not self._is_following:
+            # As a whole: what is no longer selected is not in it.
+            self.query = urlencode(navigation.address(), safe=",=/[]:")
+
+    def _handle_msg(self, data: object) -> None:
+        """Show what the browser has gone back or forward to."""
+        query = str(data)[:_MOST_CHARACTERS]
+        try:
+            parts = parse_qs(query, keep_blank_values=True, max_num_fields=_MOST_PARTS)
+        except ValueError:
+            parts = {}
+        # What is between the two is no step of the history.
+        self._is_following = True
+        try:
+            self._navigation.begin({name: values[0] for name, values in parts.items()})
+        finally:
+            self._is_following = False
+        self._write()

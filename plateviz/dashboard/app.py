@@ -8,6 +8,7 @@ import param
 from bokeh.document import Document
 from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
+from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.selected import KINDS
@@ -18,9 +19,11 @@ from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.selection_bar import SelectionBar
 from plateviz.dashboard.views.system_theme import SystemTheme
+from plateviz.solving.job import Job
 from plateviz.solving.solution_store import SolutionStore
 
-_TICK_MILLISECONDS = 30
+# Milliseconds between two looks at what a running job says.
+_PROGRESS_MILLISECONDS = 250
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
 _SIDEBAR_WIDTH = 300
@@ -97,18 +100,23 @@ def _arguments() -> dict[str, str]:
 
 
 class _Ticker:
-    """Polls job and run, draws figures that are due and completes the page, while there is need.
+    """Follows job and run, draws figures that are due and completes the page, while there is need.
 
-    The page polls because a job belongs to the server and may outlive the page.
+    A job belongs to the server and may outlive the page: it calls when it is over, and what it
+    says in between is looked at now and then.
     """
 
     def __init__(self) -> None:
-        self._callback = pn.state.add_periodic_callback(
-            self._tick, period=_TICK_MILLISECONDS, start=False
+        self._progress = pn.state.add_periodic_callback(
+            self._tick, period=_PROGRESS_MILLISECONDS, start=False
         )
         self._looks = pn.state.add_periodic_callback(self._look, period=_LOOK, start=False)
         self._navigation: Navigation | None = None
         self._pages: Pages | None = None
+        self._watched: Job | None = None
+        self._document: Document | None = None
+        self._loop: IOLoop | None = None
+        self._is_to_tick = False
 
     def follow(self, navigation: Navigation, pages: Pages) -> None:
         """Begin once the page has loaded; drawing before would delay it."""
@@ -122,6 +130,7 @@ class _Ticker:
 
         def begin() -> None:
             self._navigation, self._pages = navigation, pages
+            self._document, self._loop = pn.state.curdoc, IOLoop.current()
             self.wake()
             self._follow_run()
 
@@ -129,11 +138,23 @@ class _Ticker:
 
     def wake(self, *_: object) -> None:
         """Tick until nothing is left to do."""
-        if self._pages is not None and not self._callback.running:
-            self._callback.start()
-            if pn.state.curdoc is not None:
-                # The first figures follow at once, not after the first interval.
-                pn.state.curdoc.add_next_tick_callback(self._tick)
+        if self._navigation is None or self._is_to_tick:
+            return
+        if self._document is None:
+            # Nothing calls back into a page without a document.
+            self._start_looking()
+            return
+        self._is_to_tick = True
+        self._document.add_next_tick_callback(self._tick)
+
+    def _start_looking(self) -> None:
+        if not self._progress.running:
+            self._progress.start()
+
+    def _call(self) -> None:
+        """Tick soon; called from any thread."""
+        if self._loop is not None:
+            self._loop.add_callback(self.wake)
 
     def _follow_run(self, *_: object) -> None:
         """Look again and again what a run has that is not complete."""
@@ -145,13 +166,24 @@ class _Ticker:
             self._looks.stop()
 
     def _tick(self) -> None:
+        self._is_to_tick = False
         if self._navigation is None or self._pages is None:
             return
         session = self._navigation.session
-        session.poll()
-        self._pages.draw_due()
-        if session.job is None and not self._pages.is_due and not self._pages.complete():
-            self._callback.stop()
+        # What follows from a new solution is sent as one message.
+        with pn.io.hold():
+            session.poll()
+            self._pages.draw_due()
+        job = session.job
+        if job is not None and job is not self._watched:
+            self._watched = job
+            job.watch(self._call)
+            self._start_looking()
+        if self._pages.is_due or (job is None and self._pages.complete()):
+            self.wake()
+        elif job is None:
+            if self._progress.running:
+                self._progress.stop()
             session.prepare_what_ifs()
 
 

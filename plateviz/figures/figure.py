@@ -6,6 +6,7 @@ be tested as they are, and one that is drawn can follow another (`plateviz.figur
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -99,6 +100,13 @@ class Glyphs:
     def __len__(self) -> int:
         """Return the number of rows."""
         return len(next(iter(self.columns.values()), ()))
+
+    @cached_property
+    def labels(self) -> frozenset[str]:
+        """The texts in the legend."""
+        if self.label.startswith("@"):
+            return frozenset(map(str, self.columns[self.label[1:]]))
+        return frozenset([self.label] if self.label and len(self) else [])
 
     def values(self, coordinate: str) -> np.ndarray:
         """Return the values of a coordinate of the glyphs, such as "x"."""

@@ -129,10 +129,4 @@ def _legend_rows(frame: Frame) -> int:
 
 
 def _labels(frame: Frame) -> set[str]:
-    labels: set[str] = set()
-    for glyphs in frame.glyphs:
-        if glyphs.label.startswith("@"):
-            labels.update(map(str, glyphs.columns[glyphs.label[1:]]))
-        elif glyphs.label and len(glyphs):
-            labels.add(glyphs.label)
-    return labels
+    return set().union(*(glyphs.labels for glyphs in frame.glyphs))

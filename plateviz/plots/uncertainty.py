@@ -77,7 +77,7 @@ def _panel(
     return framed(
         [_law(single, limits[0]), *marks],
         title=f"Uncertainty of {_NAMES[coordinate]} against N",
-        subtitle=f"{rows['id'].nunique():,} sources, {what}",
+        subtitle=f"{rows['source_id'].nunique():,} sources, {what}",
         x=Axis(_XLABEL, limits[0], is_log=True, ticks=log_ticks(limits[0], whole=True)),
         y=Axis(label, limits[1], is_log=True, ticks=log_ticks(limits[1])),
         width=width,

@@ -4,7 +4,8 @@ import math
 import threading
 import time
 import uuid
-from collections.abc import Mapping
+import weakref
+from collections.abc import Callable, Mapping
 from enum import Enum
 
 from solver.errors import CancelledError, FitError, InputError
@@ -41,6 +42,7 @@ class Job:
         self._message = ""
         self._is_input_error = False
         self._progress: list[Mapping[str, object]] = []
+        self._listeners: list[weakref.WeakMethod[Callable[[], object]]] = []
         self._started = time.monotonic()
         self._ended: float | None = None
 
@@ -113,6 +115,17 @@ class Job:
         if self._status is not JobStatus.DONE:
             raise CancelledError("the job was stopped; nothing was changed")
 
+    def watch(self, listener: Callable[[], object]) -> None:
+        """Call a method from another thread once the job is over, or now if it is.
+
+        The job does not keep the method's object alive, such as a page that has been closed.
+        """
+        with self._changed:
+            if not self._status.is_over:
+                self._listeners.append(weakref.WeakMethod(listener))
+                return
+        listener()
+
     def wait(self, timeout: float | None = None) -> JobStatus:
         """Wait until the job is over, for `timeout` seconds at most."""
         with self._changed:
@@ -127,6 +140,7 @@ class Job:
             )
 
     def _advance(self, status: JobStatus, event: Mapping[str, object] | None = None) -> None:
+        listeners = []
         with self._changed:
             # A job that is over does not change: a killed process may still send events.
             if not self._status.is_over:
@@ -135,4 +149,8 @@ class Job:
                     self._progress.append(event)
                 if status.is_over:
                     self._ended = time.monotonic()
+                    listeners, self._listeners = self._listeners, []
             self._changed.notify_all()
+        for reference in listeners:
+            if (listener := reference()) is not None:
+                listener()

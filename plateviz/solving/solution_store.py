@@ -12,8 +12,8 @@ from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
-from plateviz.runs.fitted_orbit import is_complete, read_fitted_orbit
 from plateviz.runs.queries import SurveyRun, survey_runs
+from plateviz.runs.scratch_result import is_written, read_scratch_result
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
 from plateviz.solving.solver_queue import SolverQueue
@@ -40,7 +40,7 @@ class SolutionStore:
         with writing(temporary, "to make a folder for the solutions"):
             self._folder = ScratchFolder(temporary, "plateviz")
         self._scratch = self._folder.path
-        self._read = lru_cache(maxsize=16)(read_fitted_orbit)
+        self._read = lru_cache(maxsize=16)(read_scratch_result)
 
     @property
     def title(self) -> str:
@@ -92,7 +92,7 @@ class SolutionStore:
     ) -> FitResult | None:
         """Return a solution that was requested before and is complete, else None."""
         directory = self._directory(orbit, settings, what_if)
-        return self._read(directory) if is_complete(directory) else None
+        return self._read(directory) if is_written(directory) else None
 
     def close(self) -> None:
         """End the solver process and remove the scratch folder."""

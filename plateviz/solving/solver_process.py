@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TextIO
 
 from plateviz.cache import keep_compilations
-from plateviz.runs.fitted_orbit import write_fitted_orbit
+from plateviz.runs.scratch_result import write_scratch_result
 from plateviz.solving.origin import origin_from_dict
 from plateviz.tables.verdict import with_verdict
 from solver.data.exclusions import Exclusions
@@ -205,7 +205,7 @@ def _fit(request: Request, progress: Callable[..., None]) -> Speculative:
     if result is None:
         result = fitter.fit(settings, on_iteration)
     progress(stage="writing the result")
-    write_fitted_orbit(Path(request["directory"]), with_verdict(result))
+    write_scratch_result(Path(request["directory"]), with_verdict(result))
     return fitter.precompute(settings.order)
 
 

@@ -49,7 +49,7 @@ def footprint_fields(result: FitResult, instrument: Instrument) -> pd.DataFrame:
     first = exposures.sort_values(["field_id", "plate_id"]).drop_duplicates("field_id")
     corners = np.concatenate([d.corners_um()[[0, 1, 2, 3, 0]] for d in instrument.detectors])
     frames = [
-        _outline(corners, optics.loc[index], instrument, _observed(result, exposures.loc[index]))
+        _outline(corners, optics.loc[index], instrument, _observed(result, index))
         for index in first.index
     ]
     if not frames:
@@ -72,12 +72,18 @@ _FIELD_COLUMNS = [
 ]
 
 
-def _observed(result: FitResult, exposure: pd.Series) -> pd.DataFrame:
-    """Return the positions of an exposure's sources on its ideal focal plane and on the sky."""
-    rows = result.residuals
-    here = (rows["field_id"] == exposure["field_id"]) & (rows["plate_id"] == exposure["plate_id"])
-    places = result.sources[["source_id", "ra", "dec"]]
-    return rows.loc[here, ["source_id", "ideal_x", "ideal_y"]].merge(places, on="source_id")
+def _observed(result: FitResult, exposure: int) -> pd.DataFrame:
+    """Return the positions of an exposure's sources on its ideal focal plane and on the sky.
+
+    Parameters
+    ----------
+    exposure : its row in `result.exposures`
+    """
+    here = np.flatnonzero(result.exposure_index == exposure)
+    rows = result.residuals.iloc[here][["source_id", "ideal_x", "ideal_y"]]
+    sources = result.sources
+    found = np.searchsorted(sources["source_id"].to_numpy(), rows["source_id"].to_numpy())
+    return rows.assign(**{name: sources[name].to_numpy()[found] for name in ("ra", "dec")})
 
 
 def _outline(

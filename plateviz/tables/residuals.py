@@ -41,7 +41,8 @@ def residual_map(
     `residual_y_mas`
     """
     keep = is_shown(result, exposures, detector_id)
-    rows = result.residuals[keep]
+    # Several times as fast as a mask, for the few rows of an exposure.
+    rows = result.residuals.iloc[np.flatnonzero(keep)]
     fitted = result.values_on("det").loc[instrument.index_of(rows["detector_id"].to_numpy())]
     focal_lengths = result.values_on("exp")["focal_length"].to_numpy()
     focal_um = focal_lengths[result.exposure_index[keep]]

@@ -35,13 +35,11 @@ def ordered_by_class(sources: pd.DataFrame) -> pd.DataFrame:
 
     A source flagged both reference and artificial counts as reference.
     """
-    names = np.select(
-        [sources["is_reference"], sources["is_artificial"]], [REFERENCE, ARTIFICIAL], NON_REFERENCE
-    )
-    table = sources.assign(source_class=names.astype(object))
-    order = table["source_class"].map(CLASSES.index)
-    ranked = table.assign(_rank=order).sort_values(["_rank", "source_id"], kind="stable")
-    return ranked.drop(columns="_rank").reset_index(drop=True)
+    ranks = [CLASSES.index(name) for name in (REFERENCE, ARTIFICIAL, NON_REFERENCE)]
+    rank = np.select([sources["is_reference"], sources["is_artificial"]], ranks[:2], ranks[2])
+    order = np.lexsort((sources["source_id"], rank))
+    names = np.array(CLASSES, dtype=object)[rank[order]]
+    return sources.iloc[order].reset_index(drop=True).assign(source_class=names)
 
 
 def chi2_per_dof(table: pd.DataFrame) -> np.ndarray:
@@ -134,12 +132,12 @@ def uncertainty(result: FitResult, instrument: Instrument) -> pd.DataFrame:
     `sigma_single_mas`, the median uncertainty of one measurement on the sky
     """
     table = ordered_by_class(result.sources)
-    single = _sigma_single_mas(result, instrument)
+    single, ids = _sigma_single_mas(result, instrument), id_strings(table["source_id"])
     frames = [
         pd.DataFrame(
             {
                 "source_id": table["source_id"],
-                "id": id_strings(table["source_id"]),
+                "id": ids,
                 "source_class": table["source_class"],
                 "kind": kind,
                 "coordinate": coordinate,

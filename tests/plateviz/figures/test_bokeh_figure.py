@@ -15,6 +15,7 @@ from bokeh.util.warnings import BokehDeprecationWarning
 
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import message
+from plateviz.figures.glyphs import points
 from plateviz.figures.theme import THEMES
 
 
@@ -114,6 +115,36 @@ def test_following_keeps_the_models_and_sends_what_differs(framed_glyphs, marks)
         "7",
         "4611686018427387904",
     ]
+
+
+def test_only_columns_that_differ_are_sent(framed_glyphs, marks):
+    table = {
+        "x": np.array([1.0, np.nan]),
+        "y": np.array([1.0, 2.0]),
+        "id": np.array(["1", "2"], dtype=object),
+    }
+
+    def figure(**others):
+        return framed_glyphs(
+            [points(table | others, "x", "y", name="p", color="mark", keep=["id"])]
+        )
+
+    drawn = BokehFigure(figure(), "light")
+    document, events = Document(), []
+    document.add_root(drawn.model)
+    document.on_change(events.append)
+    for name, values in (("y", [1.0, 2.5]), ("id", ["1", "3"]), ("x", [np.nan, 1.0])):
+        kind = object if name == "id" else float
+        table[name] = np.array(values, dtype=kind)
+        drawn.follow(figure(), "light")
+        assert [set(event.cols) for event in events] == [{name}]
+        assert renderers(drawn)["p"].data_source.data[name] is table[name]
+        events.clear()
+    longer = {name: np.concatenate([values, values]) for name, values in table.items()}
+    drawn.follow(figure(**longer), "light")
+    (event,) = events
+    assert event.cols is None
+    assert renderers(drawn)["p"].data_source.data["y"].tolist() == [1.0, 2.5] * 2
 
 
 def values_of(part, seen):

@@ -1,6 +1,7 @@
 """Jobs: progress and status, which do not change once a job is over."""
 
 import threading
+import weakref
 
 import pytest
 
@@ -78,3 +79,34 @@ def test_job_with_success_raises_nothing():
     job = Job({"do": "fit"})
     job.take({"event": "done"})
     job.require_done()
+
+
+class Page:
+    """Counts how often a job has called."""
+
+    def __init__(self):
+        self.calls = 0
+
+    def call(self):
+        self.calls += 1
+
+
+def test_job_calls_once_when_it_is_over():
+    job, page, late = Job({"do": "fit"}), Page(), Page()
+    job.watch(page.call)
+    job.take({"event": "progress", "stage": "reading"})
+    assert page.calls == 0
+    job.take({"event": "done"})
+    job.cancel()
+    assert page.calls == 1
+    job.watch(late.call)
+    assert late.calls == 1
+
+
+def test_job_does_not_keep_a_page_that_is_gone():
+    job, page = Job({"do": "fit"}), Page()
+    gone = weakref.ref(page)
+    job.watch(page.call)
+    del page
+    assert gone() is None
+    job.cancel()

@@ -1,0 +1,75 @@
+"""Results between two processes: whole or absent, and the same to the last bit."""
+
+import errno
+import json
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+from plateviz.runs import scratch_result
+from plateviz.runs.fitted_orbit import read_fitted_orbit, write_fitted_orbit
+from plateviz.runs.scratch_result import is_written, read_scratch_result, write_scratch_result
+from solver.data.schema import RESULT_TABLES
+from solver.errors import DiskError, InputError
+
+
+def same(before, after):
+    for table in RESULT_TABLES:
+        one, other = getattr(before, table.name), getattr(after, table.name)
+        assert (one is None) == (other is None), table.name
+        if one is not None:
+            pd.testing.assert_frame_equal(
+                one.reset_index(drop=True), other, check_exact=True, obj=table.name
+            )
+    assert after.settings == before.settings
+    assert after.summary == json.loads(json.dumps(before.summary))
+    assert after.provenance == before.provenance
+
+
+def test_result_is_the_same_to_the_last_bit(fit_result, compared, tmp_path):
+    for number, result in enumerate((fit_result, compared)):
+        write_scratch_result(tmp_path / f"{number}", result)
+        same(result, read_scratch_result(tmp_path / f"{number}"))
+
+
+def test_result_that_is_kept_has_all_tables(fit_result, tmp_path):
+    write_scratch_result(tmp_path / "scratch", fit_result)
+    write_fitted_orbit(tmp_path / "kept", read_scratch_result(tmp_path / "scratch"))
+    kept = read_fitted_orbit(tmp_path / "kept")
+    same(fit_result, replace(kept, trace=kept.trace.astype(fit_result.trace.dtypes)))
+
+
+def test_result_is_read_after_its_folder_was_removed(fit_result, tmp_path):
+    """As when a server removes its scratch folder while a page draws."""
+    write_scratch_result(tmp_path / "result", fit_result)
+    back = read_scratch_result(tmp_path / "result")
+    for path in (tmp_path / "result").iterdir():
+        path.unlink()
+    same(fit_result, back)
+
+
+def test_half_written_result_is_never_read(fit_result, tmp_path, monkeypatch):
+    written, write = [], scratch_result._write_table
+
+    def write_two(path, frame):
+        assert not is_written(tmp_path / "result")
+        if len(written) == 2:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        written.append(path)
+        write(path, frame)
+
+    monkeypatch.setattr(scratch_result, "_write_table", write_two)
+    with pytest.raises(DiskError, match="expected to write the result of a fit, found a full disk"):
+        write_scratch_result(tmp_path / "result", fit_result)
+    assert len(written) == 2
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(InputError, match="expected the result of a fit"):
+        read_scratch_result(tmp_path / "result")
+
+
+def test_existing_result_is_not_changed(fit_result, make_fit_result, tmp_path):
+    write_scratch_result(tmp_path / "result", fit_result)
+    write_scratch_result(tmp_path / "result", make_fit_result(2)[0])
+    same(fit_result, read_scratch_result(tmp_path / "result"))
+    assert [path.name for path in tmp_path.iterdir()] == ["result"]

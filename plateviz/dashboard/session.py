@@ -206,8 +206,15 @@ class Session(param.Parameterized):
     def cancel(self) -> None:
         """Cancel the waiting or running job."""
         self._next_what_if = None
+        if self._job is not None and not self.store.cancel(self._job):
+            self._job = None
+            self.refuse("Another page waits for this fit, which goes on; the last solution stays.")
+
+    def close(self) -> None:
+        """Leave the waiting or running job, if there is one, to other pages; it goes on."""
         if self._job is not None:
-            self.store.cancel(self._job)
+            self.store.abandon(self._job)
+        self._job = None
 
     def poll(self) -> None:
         """Update the state from the job; called periodically while there is one."""

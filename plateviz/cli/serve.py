@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from plateviz.dashboard.server import Endpoint
     from plateviz.solving.solution_store import SolutionStore
 
+MOST_SOLVERS = 16
+
 
 def serve(
     path: Annotated[
@@ -56,13 +58,23 @@ def serve(
             metavar="N",
         ),
     ] = 40,
+    solvers: Annotated[
+        int | None,
+        typer.Option(
+            help="Number of solver processes, of which the first keeps to what-ifs and fits that "
+            "take a second; as a rule two where the machine has the memory and the cores.",
+            min=1,
+            max=MOST_SOLVERS,
+            metavar="N",
+        ),
+    ] = None,
     open_browser: options.OpenBrowser = True,
 ) -> None:
     """Show a survey, or the files of one orbit, in the dashboard."""
     from plateviz.dashboard.server import check_origin, check_prefix
     from plateviz.solving.origin import OrbitFiles, SurveyFolder
     from plateviz.solving.solution_store import SolutionStore
-    from plateviz.solving.solver_queue import SolverQueue
+    from plateviz.solving.solver_pool import SolverPool, usual_solvers
 
     origins = tuple(map(check_origin, allow_origin or []))
     endpoint = open_endpoint(port, address, password_file, no_password)
@@ -83,7 +95,8 @@ def serve(
         origin = OrbitFiles(str(path), str(reference), _text(truth), orbit, _text(instrument))
         # Read once here, so that problems in the files are reported before a page opens.
         origin.read(orbit)
-    run_server(SolutionStore(origin, SolverQueue()), endpoint, open_browser)
+    solver = SolverPool(solvers or usual_solvers())
+    run_server(SolutionStore(origin, solver), endpoint, open_browser)
 
 
 def open_endpoint(

@@ -82,6 +82,7 @@ def build_part(store: SolutionStore) -> pn.Row:
 def _pages(store: SolutionStore) -> tuple[Navigation, "_Ticker", Pages]:
     navigation, ticker = Navigation(Session(store)), _Ticker()
     navigation.begin(_arguments())
+    pn.state.on_session_destroyed(lambda _: navigation.session.close())
     return navigation, ticker, Pages(navigation, ticker.wake)
 
 

@@ -126,7 +126,7 @@ class Navigation(param.Parameterized):
             self.growth = self._growth[1].look(written)
             if written != self.written:
                 self.written = written
-                self.session.know_orbits()
+                self.session.selection.offer_orbits(self.session.store.orbits)
                 self._look()
         return bool(self.growth)
 

@@ -42,8 +42,7 @@ class Session(param.Parameterized):
         self.selection = Selection()
         self.choices = FitChoices()
         self.units = Units(store.instrument)
-        self.know_orbits()
-        self.selection.orbit = self.selection.param["orbit"].objects[0]
+        self.selection.offer_orbits(store.orbits)
         self._job: Job | None = None
         self._requested = Request(store.orbits[0], FitSettings())
         self._next_what_if: FitSettings | None = None
@@ -63,12 +62,6 @@ class Session(param.Parameterized):
     def job(self) -> Job | None:
         """The waiting or running job; None if there is none."""
         return self._job
-
-    def know_orbits(self) -> None:
-        """Offer the orbits that the store has by now, those among them that were added lately."""
-        orbits = list(self.store.orbits)
-        if orbits != list(self.selection.param["orbit"].objects):
-            self.selection.param["orbit"].objects = orbits
 
     @property
     def is_opening(self) -> bool:
@@ -180,15 +173,18 @@ class Session(param.Parameterized):
             kept = self.shown._replace(is_what_if=False)
             self.param.update(solutions=[*self.solutions, kept], shown=kept)
 
-    def subject(self) -> str:
-        """Return the orbit on the screen as it is named in files, such as "orbit-3"."""
-        return f"orbit-{self.selection.orbit}"
-
     def cancel(self) -> None:
         """Cancel the waiting or running job."""
         self._next_what_if, self._later = None, []
+        if self._job is not None and not self.store.cancel(self._job):
+            self._job = None
+            self.refuse("Another page waits for this fit, which goes on; the last solution stays.")
+
+    def close(self) -> None:
+        """Leave the waiting or running job, if there is one, to other pages; it goes on."""
         if self._job is not None:
-            self.store.cancel(self._job)
+            self.store.abandon(self._job)
+        self._job = None
 
     def poll(self) -> None:
         """Update the state from the job; called periodically while there is one."""
@@ -260,8 +256,10 @@ class Session(param.Parameterized):
         self.poll()
 
     def _cancel_job(self) -> None:
-        self.cancel()
-        self._job, self._is_opening = None, False
+        if self._job is not None:
+            self.store.cancel(self._job)
+        self._job, self._next_what_if, self._later = None, None, []
+        self._is_opening = False
 
     def _show_finished(self, request: Request) -> None:
         result = self.store.result(*request)

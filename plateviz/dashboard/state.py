@@ -1,7 +1,7 @@
 """Selection and settings of one browser session; their bounds are enforced on the server."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import param
@@ -50,6 +50,19 @@ class Selection(param.Parameterized):
         """Start without options."""
         super().__init__(**values)
         self._requested: dict[str, Any] = {}
+
+    def offer_orbits(self, orbits: Iterable[int | None]) -> None:
+        """Let `orbits` be what can be selected; the first one is, at first."""
+        offered = list(orbits)
+        is_first = not self.param["orbit"].objects
+        if offered != list(self.param["orbit"].objects):
+            self.param["orbit"].objects = offered
+        if is_first:
+            self.orbit = offered[0]
+
+    def subject(self) -> str:
+        """Return the orbit on the screen as it is named in files, such as "orbit-3"."""
+        return f"orbit-{self.orbit}"
 
     def limit_to(self, result: FitResult, detectors: list[int]) -> list[str]:
         """Limit the options to those of a solution; a selection that is no option is reset.

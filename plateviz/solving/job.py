@@ -30,7 +30,8 @@ class Job:
     """One request, with its status and progress; readable from any thread.
 
     A job belongs to the server, not to a browser session: sessions that request the same work
-    share one job, and it continues when a page is closed.
+    share one job, and it continues when a page is closed. It is stopped once nobody holds it who
+    has not given it up.
     """
 
     def __init__(self, request: Mapping[str, object]) -> None:
@@ -43,7 +44,10 @@ class Job:
         self._is_input_error = False
         self._progress: list[Mapping[str, object]] = []
         self._listeners: list[weakref.WeakMethod[Callable[[], object]]] = []
+        self._holders = 0
+        self._forecast: Callable[[], str] = lambda: ""
         self._started = time.monotonic()
+        self._begun: float | None = None
         self._ended: float | None = None
 
     @property
@@ -64,20 +68,41 @@ class Job:
     @property
     def progress_text(self) -> str:
         """How far the job is, in words."""
+        forecast = self._forecast()
         if self._status is JobStatus.QUEUED:
-            return "waiting for the solver"
+            return forecast or "waiting for the solver"
         last = self._progress[-1] if self._progress else {}
         text = str(last.get("stage", "starting"))
         step = last.get("largest_step")
         # The start of a fit has no step.
         if isinstance(step, float) and math.isfinite(step):
             text += f", largest step {step:.2g} sigma"
-        return f"{text} ({self.seconds:.0f} s)"
+        return f"{text} ({self.seconds:.0f} s{forecast})"
 
     @property
     def seconds(self) -> float:
         """Seconds from the request to the end, or to now."""
         return (self._ended or time.monotonic()) - self._started
+
+    @property
+    def seconds_running(self) -> float:
+        """Seconds since the job was begun, without those before; 0 if it was not."""
+        return 0.0 if self._begun is None else (self._ended or time.monotonic()) - self._begun
+
+    def hold(self) -> None:
+        """Count one more who waits for the job."""
+        with self._changed:
+            self._holders += 1
+
+    def release(self) -> bool:
+        """Count one less; return whether nobody is left."""
+        with self._changed:
+            self._holders = max(self._holders - 1, 0)
+            return self._holders == 0
+
+    def tell_by(self, forecast: Callable[[], str]) -> None:
+        """Take the function that tells in words how long the job waits, or still runs."""
+        self._forecast = forecast
 
     def take(self, event: Mapping[str, object]) -> None:
         """Handle an event of the solver process."""
@@ -145,6 +170,8 @@ class Job:
             # A job that is over does not change: a killed process may still send events.
             if not self._status.is_over:
                 self._status = status
+                if status is JobStatus.RUNNING and self._begun is None:
+                    self._begun = time.monotonic()
                 if event is not None:
                     self._progress.append(event)
                 if status.is_over:

@@ -16,7 +16,7 @@ from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.runs.scratch_result import is_written, read_scratch_result
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
-from plateviz.solving.solver_queue import SolverQueue
+from plateviz.solving.solver_pool import Solver
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.data.settings import ENGINES, FitSettings
@@ -28,7 +28,7 @@ from solver.io.scratch import ScratchFolder, temporary_folder
 class SolutionStore:
     """Fits orbits of one origin on request and keeps the solutions."""
 
-    def __init__(self, origin: Origin, solver: SolverQueue) -> None:
+    def __init__(self, origin: Origin, solver: Solver) -> None:
         """Solve orbits of `origin` with `solver`, which is closed with the store."""
         self.origin = origin
         self._orbits = origin.orbits()
@@ -62,6 +62,8 @@ class SolutionStore:
     def request(self, orbit: int | None, settings: FitSettings, what_if: bool = False) -> Job:
         """Request an orbit fitted with `settings`; the same request returns the same job.
 
+        Who requests a job holds it until it is over, cancelled or abandoned.
+
         Parameters
         ----------
         what_if : whether a step from the last fit is enough, where it is valid
@@ -72,6 +74,7 @@ class SolutionStore:
             if job is None or job.status in (JobStatus.FAILED, JobStatus.CANCELLED):
                 job = self._solver.submit(Job(self._request(orbit, settings, what_if, directory)))
                 self._jobs[directory] = job
+            job.hold()
             return job
 
     def prepare(self, orbit: int | None, settings: FitSettings) -> None:
@@ -83,9 +86,16 @@ class SolutionStore:
         if settings.engine == ENGINES[0]:
             self._solver.prepare(self._fit_of(orbit, settings))
 
-    def cancel(self, job: Job) -> None:
-        """Cancel a waiting or running job."""
-        self._solver.cancel(job)
+    def cancel(self, job: Job) -> bool:
+        """Give up a job that was requested; stop it, and return True, if nobody else holds it."""
+        is_last = job.release()
+        if is_last:
+            self._solver.cancel(job)
+        return is_last
+
+    def abandon(self, job: Job) -> None:
+        """Leave a job that was requested to those who request it next, such as a reloaded page."""
+        job.release()
 
     def result(
         self, orbit: int | None, settings: FitSettings, what_if: bool = False

@@ -18,6 +18,7 @@ from typing import IO
 
 from plateviz.cache import keep_compilations
 from plateviz.runs.worker_scratch import remove_worker_scratch
+from plateviz.solving.forecast import Forecast, JobTimes, about
 from plateviz.solving.job import Job
 from solver.io.scratch import temporary_folder
 
@@ -25,19 +26,22 @@ from solver.io.scratch import temporary_folder
 _GRACE_SECONDS = 3.0
 # Time in which the process removes what it has not finished.
 _END_SECONDS = 5.0
+_SHORT_SECONDS = 5.0
 
 
 class SolverQueue:
     """One solver process and its queue of jobs, first in, first out."""
 
-    def __init__(self, niceness: int = 0) -> None:
+    def __init__(self, niceness: int = 0, times: JobTimes | None = None) -> None:
         """Start the process; it warms up while the caller goes on.
 
         Parameters
         ----------
         niceness : how far the process, and all that it starts, gives way to other processes
+        times : how long jobs took, if other queues have run some
         """
         keep_compilations()
+        self._times = times or JobTimes()
         self._niceness = niceness
         self._lock = threading.RLock()
         self._jobs: deque[Job] = deque()
@@ -46,11 +50,32 @@ class SolverQueue:
 
     def submit(self, job: Job) -> Job:
         """Put a job at the end of the queue and return it."""
+        job.tell_by(lambda: self._forecast(job))
         with self._lock:
             self._jobs.append(job)
             if len(self._jobs) == 1:
                 self._send(job.request)
         return job
+
+    @property
+    def jobs(self) -> list[Job]:
+        """The running job and those that wait, in order."""
+        with self._lock:
+            return list(self._jobs)
+
+    def _forecast(self, job: Job) -> str:
+        """Return in words how long a job waits, or still runs; empty if nothing tells."""
+        jobs = self.jobs
+        if job not in jobs:
+            return ""
+        place = jobs.index(job)
+        if place == 0:
+            left = self._times.left(job)
+            # A fit that is nearly over needs no forecast.
+            return "" if left is None or left < _SHORT_SECONDS else f", about {about(left)} left"
+        before = [self._times.left(one) for one in jobs[:place]]
+        known = [seconds for seconds in before if seconds is not None]
+        return Forecast(place, sum(known) if len(known) == place else None).words()
 
     def prepare(self, request: Mapping[str, object]) -> None:
         """Send a request for preparations, which give way to every job; nothing is reported."""
@@ -143,6 +168,7 @@ class SolverQueue:
                 return
             self._jobs[0].take(event)
             if self._jobs[0].status.is_over:
+                self._times.note(self._jobs[0])
                 self._start_next_job()
 
     def _start_next_job(self) -> None:

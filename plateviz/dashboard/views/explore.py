@@ -72,7 +72,7 @@ class ExploreView(pn.viewable.Viewer):
                 select_exposures=self._session.selection.select_exposures,
             ),
             zoom=self._zoom,
-            saved=Saved(self._session.subject, self._rows),
+            saved=Saved(self._session.selection.subject, self._rows),
             theme=self._session.theme,
         )
         self.grid = FigureGrid([self._figure], wake, columns=1)

@@ -118,7 +118,7 @@ class OrbitPage(pn.viewable.Viewer):
                 select_exposures=self._session.selection.select_exposures,
                 select_detectors=self._session.selection.select_detectors,
             ),
-            saved=Saved(self._session.subject),
+            saved=Saved(self._session.selection.subject),
             theme=self._session.theme,
         )
 

@@ -115,7 +115,11 @@ class SelectionBar(pn.viewable.Viewer):
         return self._navigation.view is View.ORBIT and self._session.shown is not None
 
     def _subject(self) -> str:
-        of = self._session.subject() if self._is_of_orbit else f"run-{self._navigation.run_name}"
+        of = (
+            self._session.selection.subject()
+            if self._is_of_orbit
+            else f"run-{self._navigation.run_name}"
+        )
         return f"{of}-selection"
 
     def _tables(self) -> dict[str, Table]:

@@ -28,7 +28,8 @@ class FakeStore:
 
     def __init__(self, result):
         self._result = result
-        self.requested, self.prepared, self.cancelled = [], [], []
+        self.requested, self.prepared, self.cancelled, self.abandoned = [], [], [], []
+        self.is_shared = False
 
     def request(self, orbit, settings, what_if=False):
         self.requested.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
@@ -39,7 +40,12 @@ class FakeStore:
 
     def cancel(self, job):
         self.cancelled.append(job)
-        job.cancel()
+        if not self.is_shared:
+            job.cancel()
+        return not self.is_shared
+
+    def abandon(self, job):
+        self.abandoned.append(job)
 
     def result(self, orbit, settings, what_if=False):
         return self._result
@@ -126,6 +132,23 @@ def test_cancelled_refit_leaves_the_last_solution(session):
     assert session.stage is Stage.FAILED
     assert "cancelled" in session.message
     assert session.job is None
+
+
+def test_fit_that_another_page_waits_for_is_given_up_here_only(session):
+    session.store.is_shared = True
+    job = session.job
+    session.cancel()
+    assert (session.job, session.stage) == (None, Stage.FAILED)
+    assert "Another page waits" in session.message
+    assert not job.status.is_over
+
+
+def test_closed_page_leaves_its_fit_to_others(session):
+    job = session.job
+    session.close()
+    assert (session.store.abandoned, session.store.cancelled) == ([job], [])
+    session.close()
+    assert session.store.abandoned == [job]
 
 
 def test_failed_refit_has_a_message_and_leaves_the_last_solution(session):

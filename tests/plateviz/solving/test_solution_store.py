@@ -74,6 +74,17 @@ def test_cancelled_fit_ends_and_can_be_requested_again(store):
     assert again.wait(LONG) is JobStatus.DONE
 
 
+def test_job_goes_on_until_nobody_holds_it(store):
+    settings = FitSettings(order=7, prior_widths={"sources": 3.0})
+    job = store.request(1, settings)
+    assert store.request(1, settings) is job
+    assert not store.cancel(job)
+    # The other page is closed, and loaded again.
+    store.abandon(job)
+    assert store.request(1, settings) is job
+    assert job.wait(LONG) is JobStatus.DONE
+
+
 def test_waiting_job_is_cancelled_before_it_starts(store):
     first = store.request(0, FitSettings(order=4))
     waiting = store.request(0, FitSettings(order=2))

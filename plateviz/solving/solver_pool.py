@@ -1,0 +1,128 @@
+"""SolverPool: several solver processes, so that what is quick does not wait for what is not.
+
+The first process does quick work only: fits with the first engine and what-ifs. Long fits run in
+the others, one after the other in each. A what-if goes to the process that has fitted its orbit,
+since another one would have to fit it again.
+"""
+
+import os
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Protocol
+
+from plateviz.solving.forecast import JobTimes, is_long
+from plateviz.solving.job import Job
+from plateviz.solving.solver_queue import SolverQueue
+from solver.runtime.threads import count_cores
+
+# A process keeps as many orbits ready for what-ifs.
+_WARM = 4
+# How far the processes of long fits give way to that of what-ifs.
+_NICENESS = 5
+# Memory of the machine for each process from which a second one is worth its place.
+_BYTES_PER_SOLVER = 3 * 2**30
+_USUAL = 2
+# Quick jobs that wait for one process before another is started, which takes some seconds itself.
+_FEW = 3
+
+
+class Solver(Protocol):
+    """What runs jobs: a queue or a pool of them."""
+
+    def submit(self, job: Job) -> Job:
+        """Put a job at the end of a queue and return it."""
+        ...
+
+    def prepare(self, request: Mapping[str, object]) -> None:
+        """Send a request for preparations, which give way to every job."""
+        ...
+
+    def cancel(self, job: Job) -> None:
+        """Cancel a job that waits or runs."""
+        ...
+
+    def close(self) -> None:
+        """End all processes and cancel all jobs that are not over."""
+        ...
+
+
+class SolverPool:
+    """Up to a number of queues, each with a process of its own; the others start when needed."""
+
+    def __init__(self, most: int, start: Callable[..., SolverQueue] = SolverQueue) -> None:
+        """Start the first process.
+
+        Parameters
+        ----------
+        most : number of processes
+        start : makes a queue, with the arguments of `SolverQueue`
+        """
+        times = JobTimes()
+        self._lock = threading.Lock()
+        self._most = most
+        self._start = partial(start, times=times)
+        self._queues = [self._start()]
+        # The queue that has last fitted an orbit, the latest last.
+        self._warm: OrderedDict[str, SolverQueue] = OrderedDict()
+
+    def submit(self, job: Job) -> Job:
+        """Put a job at the end of the queue that suits it best and return it."""
+        with self._lock:
+            queue = self._queue_for(job.request)
+            self._warm[_orbit(job.request)] = queue
+            self._warm.move_to_end(_orbit(job.request))
+            while len(self._warm) > _WARM * self._most:
+                self._warm.popitem(last=False)
+            return queue.submit(job)
+
+    def prepare(self, request: Mapping[str, object]) -> None:
+        """Send a request for preparations to the process that will answer what-ifs of its orbit."""
+        with self._lock:
+            queue = self._warm.get(_orbit(request), self._queues[0])
+            self._warm[_orbit(request)] = queue
+        queue.prepare(request)
+
+    def cancel(self, job: Job) -> None:
+        """Cancel a job that waits or runs."""
+        with self._lock:
+            queues = list(self._queues)
+        for queue in queues:
+            queue.cancel(job)
+
+    def close(self) -> None:
+        """End all processes and cancel all jobs that are not over."""
+        with self._lock:
+            queues = list(self._queues)
+        for queue in queues:
+            queue.close()
+
+    def _queue_for(self, request: Mapping[str, Any]) -> SolverQueue:
+        if self._most == 1:
+            return self._queues[0]
+        if is_long(request):
+            return self._least_busy(self._queues[1:], at_most=0)
+        quick = [q for q in self._queues if not any(is_long(job.request) for job in q.jobs)]
+        warm = self._warm.get(_orbit(request))
+        if warm in quick:
+            return warm
+        return self._least_busy(quick, at_most=_FEW)
+
+    def _least_busy(self, queues: list[SolverQueue], at_most: int) -> SolverQueue:
+        """Return the queue with the fewest jobs, a new one if all have more than `at_most`."""
+        best = min(queues, key=lambda queue: len(queue.jobs), default=None)
+        if best is not None and (len(best.jobs) <= at_most or len(self._queues) == self._most):
+            return best
+        self._queues.append(self._start(niceness=_NICENESS))
+        return self._queues[-1]
+
+
+def usual_solvers() -> int:
+    """Return the number of solver processes that suits this machine: two where it has room."""
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return max(1, min(_USUAL, count_cores(), memory // _BYTES_PER_SOLVER))
+
+
+def _orbit(request: Mapping[str, Any]) -> str:
+    return f"{request.get('origin')} {request.get('orbit')}"

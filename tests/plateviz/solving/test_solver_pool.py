@@ -1,0 +1,139 @@
+"""Several solver processes: which of them runs a job, and what a waiting job is told."""
+
+import pytest
+
+from plateviz.solving.forecast import JobTimes, about, is_long
+from plateviz.solving.job import Job
+from plateviz.solving.solver_pool import SolverPool
+from plateviz.solving.solver_queue import SolverQueue
+from solver.data.settings import FitSettings
+
+
+class FakeQueue(SolverQueue):
+    """A queue without a process."""
+
+    def _start(self):
+        self.sent, self._process = [], None
+
+    def _send(self, request):
+        self.sent.append(request["do"])
+
+    def finish(self):
+        self._handle({"event": "done", "job": self._jobs[0].id})
+
+
+@pytest.fixture
+def queues():
+    return []
+
+
+@pytest.fixture
+def pool(queues):
+    return made_pool(queues, 2)
+
+
+def made_pool(queues, most):
+    def start(**options):
+        queues.append(FakeQueue(**options))
+        return queues[-1]
+
+    return SolverPool(most, start)
+
+
+def fit(orbit, engine="gauss-newton", what_if=False):
+    settings = FitSettings(engine=engine).to_dict()
+    request = {"do": "fit", "origin": "sky", "orbit": orbit, "settings": settings}
+    return Job({**request, "what_if": what_if})
+
+
+def test_what_if_does_not_wait_for_a_long_fit(pool, queues):
+    long = pool.submit(fit(0, "svi"))
+    assert [queue.jobs for queue in queues] == [[], [long]]
+    quick = pool.submit(fit(0, what_if=True))
+    assert queues[0].jobs == [quick]
+
+
+def test_long_fits_wait_for_each_other(pool, queues):
+    jobs = [pool.submit(fit(orbit, engine)) for orbit, engine in enumerate(("svi", "nuts", "svi"))]
+    assert [queue.jobs for queue in queues] == [[], jobs]
+
+
+def test_second_process_is_started_only_when_many_wait(pool, queues):
+    for orbit in range(4):
+        pool.submit(fit(orbit))
+    assert len(queues) == 1
+    fifth = pool.submit(fit(4))
+    assert queues[1].jobs == [fifth]
+
+
+def test_what_if_goes_where_its_orbit_was_fitted(pool, queues):
+    for orbit in range(5):
+        pool.submit(fit(orbit))
+    queues[1].finish()
+    what_if = pool.submit(fit(4, what_if=True))
+    assert queues[1].jobs == [what_if]
+    queues[1].finish()
+    pool.submit(fit(9, "nuts"))
+    assert pool.submit(fit(4, what_if=True)) in queues[0].jobs
+
+
+def test_preparations_go_where_the_what_ifs_will(pool, queues):
+    pool.submit(fit(0, "svi"))
+    pool.prepare({"origin": "sky", "orbit": 3})
+    assert queues[0].sent == ["prepare"]
+    assert pool.submit(fit(3, what_if=True)) in queues[0].jobs
+
+
+def test_one_process_does_everything_in_order(queues):
+    pool = made_pool(queues, 1)
+    jobs = [pool.submit(fit(0, "svi")), pool.submit(fit(0, what_if=True))]
+    assert queues[0].jobs == jobs
+    pool.cancel(jobs[1])
+    assert queues[0].jobs == jobs[:1]
+
+
+def test_waiting_job_tells_its_place_and_when_it_begins(pool, queues, monkeypatch):
+    monkeypatch.setattr(Job, "seconds_running", 20.0)
+    first, second, third = [pool.submit(fit(orbit, "svi")) for orbit in range(3)]
+    assert "2 fits before it" in third.progress_text
+    assert "begins" not in third.progress_text
+    svi = FitSettings().svi
+    step = (svi.steps + svi.patience) // 5
+    first.take({"event": "progress", "stage": f"step {step}", "iteration": step})
+    assert second.progress_text == ("waiting for the solver, 1 fit before it, begins in about 80 s")
+    assert ", about 80 s left)" in first.progress_text
+    queues[1].finish()
+    assert third.progress_text == ("waiting for the solver, 1 fit before it, begins in about 1 s")
+
+
+def test_time_left_is_that_of_earlier_jobs_of_the_kind(monkeypatch):
+    times = JobTimes()
+    assert times.left(fit(0)) is None
+    for seconds in (1.0, 2.0, 9.0):
+        monkeypatch.setattr(Job, "seconds_running", seconds)
+        job = fit(0)
+        job.take({"event": "done"})
+        times.note(job)
+    monkeypatch.setattr(Job, "seconds_running", 0.5)
+    assert times.left(fit(1)) == 1.5
+    assert times.left(fit(1, what_if=True)) is None
+    failed = fit(0, what_if=True)
+    failed.fail("because")
+    times.note(failed)
+    assert times.left(fit(1, what_if=True)) is None
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0.2, "1 s"), (80.4, "80 s"), (400.0, "7 min"), (9000.0, "2 h")]
+)
+def test_times_are_rough(seconds, words):
+    assert about(seconds) == words
+
+
+def test_survey_and_slow_engines_are_long():
+    assert is_long({"do": "survey"})
+    assert [is_long(fit(0, engine).request) for engine in ("gauss-newton", "svi", "nuts")] == [
+        False,
+        True,
+        True,
+    ]

@@ -14,6 +14,7 @@ from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
+from plateviz.dashboard.views.report_button import report_button
 from plateviz.dashboard.views.selection_bar import SelectionBar
 from plateviz.dashboard.views.system_theme import SystemTheme
 from plateviz.solving.solution_store import SolutionStore
@@ -34,7 +35,7 @@ def build_app(store: SolutionStore) -> pmui.Page:
         title=title,
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
-        header=[bar, Keyboard(navigation), system],
+        header=[bar, Keyboard(navigation), report_button(navigation, "bar"), system],
         sidebar=[pages.sidebar],
         main=[pages, bar.windows],
         sidebar_width=_SIDEBAR_WIDTH,
@@ -60,7 +61,8 @@ def build_part(store: SolutionStore) -> pn.Row:
     ticker.follow(navigation, pages)
     sidebar = pn.Column(pages.sidebar, width=_SIDEBAR_WIDTH)
     bar = SelectionBar(navigation)
-    main = pn.Column(bar, pages, bar.windows, sizing_mode="stretch_width")
+    report = report_button(navigation, "line")
+    main = pn.Column(bar, report, pages, bar.windows, sizing_mode="stretch_width")
     return pn.Row(sidebar, main, sizing_mode="stretch_width")
 
 

@@ -17,6 +17,7 @@ from plateviz.dashboard.views.address_bar import AddressBar
 from plateviz.dashboard.views.figure import Part
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
+from plateviz.dashboard.views.report_button import report_button
 from plateviz.dashboard.views.selection_bar import SelectionBar
 from plateviz.dashboard.views.system_theme import SystemTheme
 from plateviz.solving.job import Job
@@ -35,9 +36,16 @@ def build_app(store: SolutionStore) -> pmui.Page:
     navigation, ticker, pages = _pages(store)
     session = navigation.session
     bar, system = SelectionBar(navigation), SystemTheme()
+    header = [
+        bar,
+        Keyboard(navigation),
+        report_button(navigation, "bar"),
+        system,
+        AddressBar(navigation),
+    ]
     page = empty_page(
         store,
-        header=[bar, Keyboard(navigation), system, AddressBar(navigation)],
+        header=header,
         sidebar=[pages.sidebar],
         main=[pages, bar.windows],
     )
@@ -75,7 +83,8 @@ def build_part(store: SolutionStore) -> pn.Row:
     ticker.follow(navigation, pages)
     sidebar = pn.Column(pages.sidebar, width=_SIDEBAR_WIDTH)
     bar = SelectionBar(navigation)
-    main = pn.Column(bar, pages, bar.windows, sizing_mode="stretch_width")
+    report = report_button(navigation, "line")
+    main = pn.Column(bar, report, pages, bar.windows, sizing_mode="stretch_width")
     return pn.Row(sidebar, main, sizing_mode="stretch_width")
 
 

@@ -4,7 +4,7 @@ import io
 import re
 import tempfile
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -29,6 +29,21 @@ class Download(NamedTuple):
 
     name: str
     content: bytes
+
+
+Progress = Callable[[int, int], None]
+"""Function that takes the number of parts that are done, and of all parts."""
+
+
+class Later(NamedTuple):
+    """A file that takes seconds to make; it is made on a thread.
+
+    Attributes
+    ----------
+    make : makes it
+    """
+
+    make: Callable[[Progress], Download]
 
 
 def as_file(tables: Mapping[str, Table], stem: str, suffix: str) -> Download:

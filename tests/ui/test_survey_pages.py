@@ -151,7 +151,7 @@ def open_the_worst_orbit(page):
     expect(heading(page, f"Solution of orbit {orbit}")).to_be_visible()
 
 
-def test_a_source_is_looked_for_and_carried_by_the_address(page, open_page):
+def test_a_source_is_looked_for_and_carried_by_the_address(page, open_page, tmp_path):
     turn_to(page, "Source")
     expect(page.locator("p.empty:visible")).to_contain_text("Write a source's id")
     entry = page.get_by_label("Source id")
@@ -164,6 +164,11 @@ def test_a_source_is_looked_for_and_carried_by_the_address(page, open_page):
     again = open_page(page.url)
     expect(heading(again, f"source: {source}")).to_be_visible()
     assert 0 not in drawn(again, source_figures()).values()
+    with again.expect_download() as started:
+        again.get_by_role("button", name="Report: the view on the screen").click()
+    assert started.value.suggested_filename == f"source-{source}-report.html"
+    started.value.save_as(tmp_path / "report.html")
+    assert f"<title>Source {source} " in (tmp_path / "report.html").read_text("utf-8")
 
 
 def test_a_survey_without_a_run_says_what_to_do(tmp_path, open_page, chromium_path):

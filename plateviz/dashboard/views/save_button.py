@@ -1,13 +1,16 @@
 """SaveButton: a menu of what a figure or a table can be saved as."""
 
 import json
+import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import panel as pn
 import param
+from bokeh.document import Document
 
-from plateviz.dashboard.downloads import Download
+from plateviz.dashboard.downloads import Download, Later
 from solver.errors import InputError
 
 
@@ -24,15 +27,17 @@ class Picture(NamedTuple):
     item: dict[str, Any]
 
 
-Choices = Mapping[str, Callable[[], Download | Picture]]
+Choices = Mapping[str, Callable[[], Download | Picture | Later]]
 
 
 class SaveButton(pn.custom.JSComponent):
     """A button with a menu; a choice is made into a file that the browser keeps.
 
-    What cannot be saved says why below the button.
+    A button with a single choice has no menu. What cannot be saved says why below the button. Of
+    the files that take seconds, one is made at a time.
     """
 
+    text = param.String(default="Save", doc="what the button says")
     title = param.String(doc="what is saved, in a few words")
     theme = param.Selector(default="light", objects=["light", "dark"])
     labels = param.List(item_type=str, doc="the choices in order")
@@ -77,28 +82,34 @@ class SaveButton(pn.custom.JSComponent):
       const menu = document.createElement("div")
       const words = document.createElement("p")
       button.type = "button"
-      button.textContent = { line: "\\u2913 Save", corner: "\\u2913", bar: "Save" }[model.place]
-      button.title = "Save"
-      button.setAttribute("aria-label", `Save: ${model.title}`)
-      button.setAttribute("aria-haspopup", "menu")
+      const { text, title, place, labels } = model
+      button.textContent = { line: `\\u2913 ${text}`, corner: "\\u2913", bar: text }[place]
+      button.title = text
+      button.setAttribute("aria-label", `${text}: ${title}`)
+      if (labels.length > 1) button.setAttribute("aria-haspopup", "menu")
       menu.setAttribute("role", "menu")
       words.setAttribute("role", "status")
       const show = isShown => {
         menu.hidden = !isShown
-        button.setAttribute("aria-expanded", String(isShown))
+        if (labels.length > 1) button.setAttribute("aria-expanded", String(isShown))
       }
       const say = text => { words.textContent = text; words.hidden = !text }
       show(false)
       say("")
-      for (const label of model.labels) {
+      const ask = label => { show(false); say("Being made \\u2026"); model.send_msg(label) }
+      for (const label of labels) {
         const entry = document.createElement("button")
         entry.type = "button"
         entry.textContent = label
         entry.setAttribute("role", "menuitem")
-        entry.onclick = () => { show(false); say("Being made \\u2026"); model.send_msg(label) }
+        entry.onclick = () => ask(label)
         menu.append(entry)
       }
-      button.onclick = () => { say(""); show(menu.hidden) }
+      button.onclick = () => {
+        if (labels.length === 1) return ask(labels[0])
+        say("")
+        show(menu.hidden)
+      }
       box.addEventListener("focusout", event => {
         if (!box.contains(event.relatedTarget)) show(false)
       })
@@ -108,9 +119,9 @@ class SaveButton(pn.custom.JSComponent):
         show(false)
         button.focus()
       })
-      model.on("msg:custom", async ({ name, content, item, error }) => {
+      model.on("msg:custom", async ({ name, content, item, words }) => {
         try {
-          if (error) return say(error)
+          if (words) return say(words)
           if (item) await draw(name, item)
           else keep(name, new Blob([content]))
           say("")
@@ -159,6 +170,7 @@ class SaveButton(pn.custom.JSComponent):
         """Offer the choices: what the menu says -> function that makes the file."""
         super().__init__(title=title, labels=list(choices), margin=0, **params)
         self._choices = choices
+        self._is_making = False
         self.css_classes = [f"save-in-{self.place}"]
 
     def _handle_msg(self, data: object) -> None:
@@ -168,9 +180,41 @@ class SaveButton(pn.custom.JSComponent):
         try:
             made = make()
         except InputError as error:
-            self._send_msg({"error": f"It could not be saved: {error}."})
+            self._send_msg({"words": f"It could not be saved: {error}."})
             return
-        if isinstance(made, Picture):
+        if isinstance(made, Later):
+            self._begin(made)
+        elif isinstance(made, Picture):
             self._send_msg({"name": made.name, "item": json.dumps(made.item)})
         else:
             self._send_msg({"name": made.name, "content": made.content})
+
+    def _begin(self, later: Later) -> None:
+        """Make a file on a thread, unless one is being made."""
+        if self._is_making:
+            self._send_msg({"words": "The one before is still being made."})
+            return
+        self._is_making = True
+        work = partial(self._make, later, pn.state.curdoc)
+        threading.Thread(target=work, daemon=True).start()
+
+    def _make(self, later: Later, document: Document | None) -> None:
+        """Make a file, and let the page say how far it is; runs on a thread."""
+
+        def send(message: dict[str, object]) -> None:
+            # The page changes on its own thread only.
+            if document is not None:
+                document.add_next_tick_callback(partial(self._send_msg, message))
+
+        def progress(done: int, total: int) -> None:
+            send({"words": f"Being made \u2026 {done} of {total}"})
+
+        message: dict[str, object] = {"words": "It could not be made; the server's log says why."}
+        try:
+            made = later.make(progress)
+            message = {"name": made.name, "content": made.content}
+        except InputError as error:
+            message = {"words": f"It could not be made: {error}."}
+        finally:
+            self._is_making = False
+            send(message)

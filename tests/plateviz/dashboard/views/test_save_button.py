@@ -1,10 +1,13 @@
 """SaveButton: a choice is made into a file, or says why not."""
 
 import json
+import threading
+import time
 
+import panel as pn
 import pytest
 
-from plateviz.dashboard.downloads import Download
+from plateviz.dashboard.downloads import Download, Later
 from plateviz.dashboard.views.save_button import Picture, SaveButton
 from solver.errors import InputError
 
@@ -32,7 +35,7 @@ def sent(monkeypatch):
     [
         ("CSV", {"name": "a.csv", "content": b"x"}),
         ("PNG", {"name": "a.png", "item": json.dumps({"doc": 1})}),
-        ("FITS", {"error": "It could not be saved: there is nothing to save yet."}),
+        ("FITS", {"words": "It could not be saved: there is nothing to save yet."}),
     ],
 )
 def test_choice_is_sent(sent, choice, message):
@@ -44,3 +47,54 @@ def test_choice_is_sent(sent, choice, message):
 def test_message_that_is_no_choice_is_ignored(sent, message):
     SaveButton("A figure", CHOICES)._handle_msg(message)
     assert sent == []
+
+
+class Page:
+    """The document of a page, whose thread runs what is asked for at once."""
+
+    session_context = None
+
+    def add_next_tick_callback(self, act):
+        act()
+
+
+def test_file_that_takes_long_is_made_on_a_thread_and_one_at_a_time(sent, monkeypatch):
+    def make(progress):
+        progress(1, 2)
+        has_begun.set()
+        assert may_end.wait(10.0)
+        threads.append(threading.current_thread())
+        return Download("a.html", b"x")
+
+    has_begun, may_end, threads = threading.Event(), threading.Event(), []
+    monkeypatch.setattr(type(pn.state), "curdoc", Page())
+    button = SaveButton("A report", {"HTML": lambda: Later(make)})
+    button._handle_msg("HTML")
+    assert has_begun.wait(10.0)
+    button._handle_msg("HTML")
+    may_end.set()
+    until(lambda: {"name": "a.html", "content": b"x"} in sent)
+    assert sent[:2] == [
+        {"words": "Being made … 1 of 2"},
+        {"words": "The one before is still being made."},
+    ]
+    assert threads[0] is not threading.main_thread()
+    until(lambda: not button._is_making)
+    button._handle_msg("HTML")
+    until(lambda: len(sent) == 5)
+
+
+def test_file_that_cannot_be_made_is_told(sent, monkeypatch):
+    def fail(_):
+        raise InputError("orbits are missing")
+
+    monkeypatch.setattr(type(pn.state), "curdoc", Page())
+    SaveButton("A report", {"HTML": lambda: Later(fail)})._handle_msg("HTML")
+    until(lambda: sent == [{"words": "It could not be made: orbits are missing."}])
+
+
+def until(holds):
+    deadline = time.monotonic() + 10.0
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)

@@ -1,0 +1,84 @@
+"""The report of what is on the screen: a solution, a source or a run, as one HTML file."""
+
+import shlex
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+from plateviz.dashboard.downloads import Download, Later, Progress, file_name
+from plateviz.dashboard.navigation import FoundSource, Navigation, View
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.solution import Solution
+from plateviz.reports.facts import facts_of
+from plateviz.reports.orbit import orbit_report
+from plateviz.reports.page import page_of
+from plateviz.reports.report import Facts, Report
+from plateviz.reports.survey import source_report, survey_report
+from plateviz.runs.queries import SurveyRun
+from plateviz.solving.as_code import as_command
+from solver.data.instrument import Instrument
+from solver.errors import InputError
+
+
+def page_report(navigation: Navigation) -> Later:
+    """Return the report of the view on the screen as it is now; it is made on a thread.
+
+    Raises
+    ------
+    InputError
+        If the view shows nothing yet.
+    """
+    if navigation.view is View.ORBIT:
+        return _of_solution(navigation.session)
+    run = navigation.run
+    if run is None:
+        raise InputError(navigation.why_no_run.rstrip("."))
+    if navigation.view is View.SURVEY:
+        return _later(f"run-{run.name}", partial(_survey, run))
+    found = navigation.found
+    if found is None:
+        raise InputError("no source is shown yet; choose one first")
+    return _later(f"source-{found.source_id}", partial(_source, run, found))
+
+
+def _of_solution(session: Session) -> Later:
+    shown, other = session.shown, session.other
+    if shown is None:
+        raise InputError("no solution is shown yet")
+    facts = facts_of(as_command(session.store.origin, shown.orbit, shown.settings))
+    facts["Report"]["Solution"] = shown.label
+    if other is not None:
+        facts["Report"]["Compared with solution"] = other.label
+    make = partial(_solution, shown, other, session.store.instrument, facts)
+    return _later(session.selection.subject() + ("-what-if" if shown.is_what_if else ""), make)
+
+
+def _later(stem: str, compose: Callable[[], Report]) -> Later:
+    def make(progress: Progress) -> Download:
+        page = page_of(compose(), progress)
+        return Download(file_name(f"{stem}-report", ".html"), page.encode())
+
+    return Later(make)
+
+
+def _solution(
+    shown: Solution, other: Solution | None, instrument: Instrument, facts: Facts
+) -> Report:
+    report = orbit_report(shown.result, instrument, facts, other.result if other else None)
+    words = [report.subtitle, shown.label]
+    words += [f"compared with {other.label}"] if other is not None else []
+    return replace(report, subtitle="; ".join(words))
+
+
+def _survey(run: SurveyRun) -> Report:
+    return survey_report(run, facts_of(_command(run, "--survey"), run.name))
+
+
+def _source(run: SurveyRun, found: FoundSource) -> Report:
+    command = _command(run, "--source", str(found.source_id))
+    return source_report(run, found.source_id, facts_of(command, run.name))
+
+
+def _command(run: SurveyRun, *options: str) -> str:
+    words = ["plateviz", "report", str(run.survey), "--run", run.name, *options]
+    return shlex.join([*words, "-o", "REPORT.html"])

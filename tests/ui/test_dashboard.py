@@ -310,7 +310,7 @@ def select_exposures_too(page):
     box.nth(1).click()
     expect(page.get_by_text(re.compile(r"sources?, exposure 0/1 selected$"))).to_be_visible()
     expect(box.nth(1)).to_be_checked()
-    page.wait_for_url("**exposures=0%2F1**")
+    page.wait_for_url("**exposures=0/1**")
     see(page, "exposure-tracks")
     drag(page, "exposure-tracks", (0.25, 0.55), (0.95, 0.95))
     expect(page.get_by_text(re.compile(r"sources?, .*exposures .*selected$"))).to_be_visible()

@@ -113,6 +113,8 @@ def test_who_uses_eigenmodes_asks_for_them_once(fit_result, partial):
     directory, finish = partial
     asked = []
     result = read_scratch_result(directory, hurry=lambda: asked.append("modes") or finish())
+    # A widget with solutions to choose from makes a text of each.
+    assert repr(result) == f"<FitResult of orbit {fit_result.orbit_id}: order 5>"
     assert not asked
     # As `keep` and every export do: all fields are read.
     same(fit_result, replace(result))

@@ -13,7 +13,6 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, find_mode
-from solver.engines.no_solution import likely_cause
 from solver.engines.robust import find_outliers, outlier_table
 from solver.engines.run_engine import Resumption, run_engine
 from solver.engines.warm_starts import WarmStart, likely, nearest
@@ -22,21 +21,9 @@ from solver.errors import FitError, InputError
 from solver.linear.leverage import Covariances
 from solver.problem.problem import Problem, orders_held, rebuilt
 from solver.problem.problem_cache import ProblemCache
-from solver.results.eigenmode_tables import eigenmode_tables
+from solver.results.orbit_result import PartialResult, partial_result
 from solver.results.orders import compare_orders
 from solver.results.source_history import history_table
-from solver.results.summary import summarise, truth_summary
-from solver.results.tables import (
-    SolvedProblem,
-    calibration_table,
-    exposure_table,
-    loss_table,
-    residual_table,
-    solved_problem,
-    source_table,
-    trace_table,
-    true_places,
-)
 from solver.runtime.device import require_device
 
 
@@ -120,15 +107,16 @@ class OrbitFitter:
             data, problem = self._cache.get(settings, outliers)
         prepared = time.perf_counter()
         estimate = run_engine(problem, settings, progress, resumption or self._resumption(settings))
-        result, solution = _result(
+        found = partial_result(
             data, self._instrument, settings, problem, estimate, (start, prepared)
         )
+        result = found.whole()
         self._stopped = None
         fitted = time.perf_counter()
         orders = self._compare_orders(problem, settings, progress)
         if estimate.mode.status.is_solution:
             self._last_fit = _LastFit(
-                settings, problem, estimate.mode, solution.covariance, outliers, orders
+                settings, problem, estimate.mode, found.solution.covariance, outliers, orders
             )
             self._starts = [WarmStart(settings, problem, estimate.mode)]
             self._attempted = [settings]
@@ -151,6 +139,11 @@ class OrbitFitter:
         The result; None if there is no fit to start from, or if a refit is needed (see
         `solver.engines.what_if.solve_what_if`).
         """
+        found = self.partial_what_if(settings)
+        return None if found is None else found.whole()
+
+    def partial_what_if(self, settings: FitSettings) -> PartialResult | None:
+        """Return the same as `what_if`, but for the eigenmodes, which can be computed later."""
         last = self._last_fit
         if last is None or not last.settings.what_if_holds(settings):
             return None
@@ -162,10 +155,13 @@ class OrbitFitter:
         if mode is None:
             return None
         estimate = Estimate(mode)
-        result, _ = _result(data, self._instrument, settings, problem, estimate, (start, prepared))
+        found = partial_result(
+            data, self._instrument, settings, problem, estimate, (start, prepared)
+        )
         same_but_order = settings == last.settings.with_(order=settings.order)
         orders = last.orders if same_but_order else None
-        return replace(_with_outliers(result, last.outliers), orders=orders)
+        result = replace(_with_outliers(found.result, last.outliers), orders=orders)
+        return found._replace(result=result)
 
     def history(self, result: FitResult) -> pd.DataFrame:
         """Return the rows that the last fit, whose result this is, adds to its sources' history.
@@ -256,43 +252,3 @@ def _with_orders(result: FitResult, orders: pd.DataFrame | None, seconds: float)
         return result
     timings = {**dict(result.summary["seconds"]), "orders": seconds}
     return replace(result, summary={**result.summary, "seconds": timings}, orders=orders)
-
-
-def _result(
-    data: OrbitData,
-    instrument: Instrument,
-    settings: FitSettings,
-    problem: Problem,
-    estimate: Estimate,
-    times: tuple[float, float],
-) -> tuple[FitResult, SolvedProblem]:
-    mode = estimate.mode
-    if mode.reduced is None:
-        raise FitError(f"orbit {data.orbit_id}: {mode.status.value}. {likely_cause(problem, mode)}")
-    start, prepared = times
-    solved = time.perf_counter()
-    solution = solved_problem(problem, estimate, mode.reduced)
-    sources, places = source_table(solution), true_places(solution, data.truth)
-    calibration = calibration_table(solution, instrument)
-    tables = {
-        "sources": sources,
-        "residuals": residual_table(solution, data.measurements),
-        "calibration": calibration,
-        "exposures": exposure_table(solution),
-        "trace": trace_table(mode),
-        "true_places": places,
-        "losses": loss_table(estimate.losses),
-        **eigenmode_tables(solution, calibration, instrument),
-    }
-    seconds = {
-        "prepare": prepared - start,
-        "fit": solved - prepared,
-        "diagnose": time.perf_counter() - solved,
-    }
-    summary = {**summarise(solution, settings, seconds), **estimate.entries}
-    if places is not None:
-        summary["truth"] = truth_summary(sources, places)
-    result = FitResult(
-        **tables, summary=summary, settings=settings, provenance=dict(data.provenance)
-    )
-    return result, solution

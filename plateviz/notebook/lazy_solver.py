@@ -2,6 +2,7 @@
 
 import weakref
 from contextlib import suppress
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
@@ -62,7 +63,8 @@ class LazySolver:
         result = store.result(orbit, settings, what_if)
         if result is None:
             raise FitError(f"{title}: expected the result of the fit, found that it was removed")
-        return result
+        # All of it is read: what is read later would go with the solver.
+        return replace(result)
 
     def close(self) -> None:
         """End the solver process; the next fit starts another."""

@@ -9,7 +9,7 @@ import hashlib
 import json
 import threading
 from contextlib import suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 from plateviz.runs.queries import SurveyRun, survey_runs
@@ -40,7 +40,7 @@ class SolutionStore:
         with writing(temporary, "to make a folder for the solutions"):
             self._folder = ScratchFolder(temporary, "plateviz")
         self._scratch = self._folder.path
-        self._read = lru_cache(maxsize=16)(read_scratch_result)
+        self._read = lru_cache(maxsize=16)(partial(read_scratch_result, hurry=solver.hurry))
 
     @property
     def title(self) -> str:
@@ -100,7 +100,10 @@ class SolutionStore:
     def result(
         self, orbit: int | None, settings: FitSettings, what_if: bool = False
     ) -> FitResult | None:
-        """Return a solution that was requested before and is complete, else None."""
+        """Return a solution that was requested before and is there, else None.
+
+        The eigenmodes of a what-if follow a moment later, and are waited for where they are used.
+        """
         directory = self._directory(orbit, settings, what_if)
         return self._read(directory) if is_written(directory) else None
 

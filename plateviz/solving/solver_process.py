@@ -8,7 +8,8 @@ on standard error; `plateviz.solving.solver_queue` reports that and starts anoth
 Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory"},
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
 "directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}, and without events
-{"do": "prepare", "origin", "orbit", "settings"}: fit while idle what a what-if starts from.
+{"do": "prepare", "origin", "orbit", "settings"}: fit while idle what a what-if starts from, and
+{"do": "hurry"}: do at once what was put off.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -26,15 +27,16 @@ from pathlib import Path
 from typing import TextIO
 
 from plateviz.cache import keep_compilations
-from plateviz.runs.scratch_result import write_scratch_result
+from plateviz.runs.scratch_result import write_eigenmodes, write_scratch_result
 from plateviz.solving.origin import origin_from_dict
+from plateviz.solving.put_off import PutOff
 from plateviz.tables.verdict import with_verdict
 from solver.data.exclusions import Exclusions
-from solver.data.result import FitResult
 from solver.data.settings import COUNTED, FitSettings
 from solver.engines.gauss_newton import Iteration
 from solver.errors import CancelledError, FitError, InputError
 from solver.fit import OrbitFitter
+from solver.results.orbit_result import PartialResult
 from solver.runtime.memory import keep_memory
 from solver.runtime.termination import EXIT_CODE, ending_on_sigterm
 from solver.simulate.settings import SurveySettings
@@ -84,22 +86,26 @@ def _serve_all() -> None:
     reader.start()
     send({"event": "ready"})
     speculative: Speculative = iter(())
-    while (request := _next_request(requests, speculative)) is not None:
-        if request["do"] == "prepare":
+    put_off = PutOff()
+    while (request := _next_request(requests, speculative, put_off)) is not None:
+        if request["do"] == "hurry":
+            put_off.finish()
+        elif request["do"] == "prepare":
             speculative = _prepare(request, requests)
         else:
-            speculative = _serve(request, send, cancellations)
+            speculative = _serve(request, send, cancellations, put_off)
 
 
 def _next_request(
-    requests: queue.Queue[Request | None], speculative: Speculative
+    requests: queue.Queue[Request | None], speculative: Speculative, put_off: PutOff
 ) -> Request | None:
-    """Wait for a request; do speculative work once the process has been idle."""
+    """Wait for a request; do what was put off and speculative work once the process is idle."""
     try:
         # At first, a page that receives a solution needs the cores, and may send a request.
         return requests.get(timeout=_IDLE_S)
     except queue.Empty:
         pass
+    put_off.finish()
     for _ in speculative:
         if not requests.empty():
             break
@@ -134,7 +140,9 @@ def _read(
     os._exit(EXIT_CODE)
 
 
-def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Speculative:
+def _serve(
+    request: Request, send: Send, cancellations: _Cancellations, put_off: PutOff
+) -> Speculative:
     job = request["job"]
     work = {"fit": _fit, "simulate": _simulate, "survey": _survey}[request["do"]]
 
@@ -144,7 +152,7 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations) -> Specu
 
     try:
         cancellations.check(job)
-        speculative = work(request, progress)
+        speculative = work(request, progress, put_off)
         send({"event": "done", "job": job})
         return speculative
     except CancelledError:
@@ -191,7 +199,7 @@ def _serves_what_ifs(fitted: FitSettings | None, settings: FitSettings) -> bool:
     )
 
 
-def _fit(request: Request, progress: Callable[..., None]) -> Speculative:
+def _fit(request: Request, progress: Callable[..., None], put_off: PutOff) -> Speculative:
     progress(stage="reading the orbit")
     fitter = _fitter_of(request)
     settings = FitSettings.from_dict(request["settings"])
@@ -201,26 +209,35 @@ def _fit(request: Request, progress: Callable[..., None]) -> Speculative:
         progress(stage=stage, **iteration._asdict())
 
     progress(stage="linearising")
-    result = _what_if(fitter, settings, on_iteration) if request["what_if"] else None
-    if result is None:
-        result = fitter.fit(settings, on_iteration)
+    found = _what_if(fitter, settings, on_iteration, put_off) if request["what_if"] else None
+    if found is None:
+        # A fit may take long, and a page may need what was put off.
+        put_off.finish()
+    result = fitter.fit(settings, on_iteration) if found is None else found.result
     progress(stage="writing the result")
-    write_scratch_result(Path(request["directory"]), with_verdict(result))
+    directory = Path(request["directory"])
+    write_scratch_result(directory, with_verdict(result), is_partial=found is not None)
+    if found is not None:
+        put_off.add(lambda: write_eigenmodes(directory, found.eigenmodes()))
     return fitter.precompute(settings.order)
 
 
 def _what_if(
-    fitter: OrbitFitter, settings: FitSettings, progress: Callable[[Iteration], None]
-) -> FitResult | None:
+    fitter: OrbitFitter,
+    settings: FitSettings,
+    progress: Callable[[Iteration], None],
+    put_off: PutOff,
+) -> PartialResult | None:
     """Return a solution by a step from a fit, or None if it needs a fit of its own."""
-    result, base = fitter.what_if(settings), _base(settings)
-    if result is not None or not settings.exclusions or fitter.fitted_settings == base:
-        return result
+    found, base = fitter.partial_what_if(settings), _base(settings)
+    if found is not None or not settings.exclusions or fitter.fitted_settings == base:
+        return found
+    put_off.finish()
     try:
         fitter.fit(base, progress)
     except FitError:
         return None
-    return fitter.what_if(settings)
+    return fitter.partial_what_if(settings)
 
 
 def _base(settings: FitSettings) -> FitSettings:
@@ -231,7 +248,7 @@ def _base(settings: FitSettings) -> FitSettings:
     return settings.with_(exclusions=Exclusions(), compare_orders=False)
 
 
-def _simulate(request: Request, progress: Callable[..., None]) -> Speculative:
+def _simulate(request: Request, progress: Callable[..., None], _: PutOff) -> Speculative:
     settings = SurveySettings.from_dict(request["settings"])
     catalogue = request.get("catalogue")
     simulate_survey(
@@ -243,7 +260,7 @@ def _simulate(request: Request, progress: Callable[..., None]) -> Speculative:
     return iter(())
 
 
-def _survey(request: Request, progress: Callable[..., None]) -> Speculative:
+def _survey(request: Request, progress: Callable[..., None], _: PutOff) -> Speculative:
     # Imported here since Dask takes half a second to import.
     from plateviz.runs.fit_survey import fit_survey
 

@@ -82,6 +82,14 @@ class SolverQueue:
         with self._lock:
             self._send({"do": "prepare", **request})
 
+    def hurry(self) -> bool:
+        """Let the process do at once what it has put off; return whether there is a process."""
+        with self._lock:
+            if self._process is None:
+                return False
+            self._send({"do": "hurry"})
+            return True
+
     def cancel(self, job: Job) -> None:
         """Cancel a job at its next progress event; kill the process if there is none in time."""
         with self._lock:

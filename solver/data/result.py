@@ -42,7 +42,7 @@ _SOLUTIONS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FitResult:
     """One fitted orbit; columns and units as in `solver.data.schema`.
 
@@ -80,6 +80,10 @@ class FitResult:
     mode_parameters: pd.DataFrame | None = None
     mode_shifts: pd.DataFrame | None = None
     orders: pd.DataFrame | None = None
+
+    def __repr__(self) -> str:
+        """Return a short text: a widget makes it of every solution that it offers."""
+        return f"<FitResult of orbit {self.orbit_id}: {self.settings.describe()}>"
 
     @property
     def orbit_id(self) -> int:

@@ -293,7 +293,7 @@ class Server(Victim):
                 urllib.request.urlopen(page, timeout=60).read()
 
     def is_done(self, process: Process, place: Place) -> bool:
-        marks = list(place.scratch.glob("plateviz-*.part/orbit=*/COMPLETE"))
+        marks = list(place.scratch.glob("plateviz-*.part/orbit=*/result.json"))
         # Before it has begun, they are those of the server that was killed.
         is_served = self.has_begun(place) and len(marks) >= 2
         return is_served or process.poll() is not None

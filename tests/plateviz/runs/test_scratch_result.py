@@ -9,9 +9,17 @@ import pytest
 
 from plateviz.runs import scratch_result
 from plateviz.runs.fitted_orbit import read_fitted_orbit, write_fitted_orbit
-from plateviz.runs.scratch_result import is_written, read_scratch_result, write_scratch_result
+from plateviz.runs.scratch_result import (
+    is_written,
+    read_scratch_result,
+    write_eigenmodes,
+    write_scratch_result,
+)
+from solver.data.eigenmode_schema import EIGENMODE_TABLES
 from solver.data.schema import RESULT_TABLES
 from solver.errors import DiskError, InputError
+
+EIGENMODES = [table.name for table in EIGENMODE_TABLES]
 
 
 def same(before, after):
@@ -25,6 +33,10 @@ def same(before, after):
     assert after.settings == before.settings
     assert after.summary == json.loads(json.dumps(before.summary))
     assert after.provenance == before.provenance
+
+
+def without_eigenmodes(result):
+    return replace(result, **dict.fromkeys(EIGENMODES))
 
 
 def test_result_is_the_same_to_the_last_bit(fit_result, compared, tmp_path):
@@ -73,3 +85,45 @@ def test_existing_result_is_not_changed(fit_result, make_fit_result, tmp_path):
     write_scratch_result(tmp_path / "result", make_fit_result(2)[0])
     same(fit_result, read_scratch_result(tmp_path / "result"))
     assert [path.name for path in tmp_path.iterdir()] == ["result"]
+
+
+@pytest.fixture
+def partial(fit_result, tmp_path):
+    """A result whose eigenmodes are to follow; and the function that writes them."""
+    write_scratch_result(tmp_path / "partial", without_eigenmodes(fit_result), is_partial=True)
+
+    def finish():
+        tables = {name: getattr(fit_result, name) for name in EIGENMODES}
+        write_eigenmodes(tmp_path / "partial", tables)
+        return True
+
+    return tmp_path / "partial", finish
+
+
+def test_eigenmodes_that_follow_are_the_same(fit_result, partial):
+    directory, finish = partial
+    early = read_scratch_result(directory)
+    assert early.sources.equals(fit_result.sources)
+    finish()
+    same(fit_result, early)
+    same(fit_result, read_scratch_result(directory))
+
+
+def test_who_uses_eigenmodes_asks_for_them_once(fit_result, partial):
+    directory, finish = partial
+    asked = []
+    result = read_scratch_result(directory, hurry=lambda: asked.append("modes") or finish())
+    # A widget with solutions to choose from makes a text of each.
+    assert repr(result) == f"<FitResult of orbit {fit_result.orbit_id}: order 5>"
+    assert not asked
+    # As `keep` and every export do: all fields are read.
+    same(fit_result, replace(result))
+    assert asked == ["modes"]
+
+
+def test_eigenmodes_that_never_come_are_an_error_at_once(partial):
+    result = read_scratch_result(partial[0], hurry=lambda: False)
+    for name in EIGENMODES:
+        with pytest.raises(InputError, match="the solver ended before it wrote them; fit again"):
+            getattr(result, name)
+    assert len(result.sources)

@@ -2,6 +2,7 @@
 
 import tempfile
 
+import pandas as pd
 import pytest
 
 from plateviz.runs.worker_scratch import worker_scratch
@@ -13,6 +14,7 @@ from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.errors import InputError
+from solver.fit import OrbitFitter
 from tests.solver.growing_survey import GrowingSurvey
 
 LONG = 120
@@ -171,7 +173,15 @@ def test_what_if_is_a_step_from_the_last_fit(store):
     job = store.request(0, settings, what_if=True)
     assert job.wait(LONG) is JobStatus.DONE, job.message
     assert store.result(0, settings) is None
-    assert store.result(0, settings, what_if=True).summary["converged"]
+    result = store.result(0, settings, what_if=True)
+    assert result.summary["converged"]
+    # They follow, and are those that the step would have given at once.
+    fitter = OrbitFitter(store.origin.read(0), store.instrument)
+    fitter.fit(FitSettings())
+    expected = fitter.what_if(settings)
+    for name in ("modes", "mode_parameters", "mode_shifts"):
+        assert len(getattr(result, name)) == len(getattr(expected, name))
+    pd.testing.assert_frame_equal(result.modes[["mode", "name"]], expected.modes[["mode", "name"]])
 
 
 def test_what_if_without_sources_starts_from_all_measurements(store):

@@ -6,6 +6,7 @@ import pytest
 
 from plateviz.solving import solver_process
 from plateviz.solving.origin import SurveyFolder, origin_to_dict
+from plateviz.solving.put_off import PutOff
 from plateviz.solving.solver_process import _fitter_of, _next_request, _prepare
 from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
@@ -21,7 +22,10 @@ def requests():
 def test_waiting_request_is_served_before_speculative_work(requests):
     done = []
     requests.put({"job": "1"})
-    assert _next_request(requests, (done.append(step) for step in range(3))) == {"job": "1"}
+    put_off = PutOff()
+    put_off.add(lambda: done.append("eigenmodes"))
+    speculative = (done.append(step) for step in range(3))
+    assert _next_request(requests, speculative, put_off) == {"job": "1"}
     assert done == []
 
 
@@ -35,8 +39,10 @@ def test_request_waits_for_one_step_at_most(requests):
                 requests.put({"job": "2"})
             yield
 
-    assert _next_request(requests, speculative()) == {"job": "2"}
-    assert done == [0, 1]
+    put_off = PutOff()
+    put_off.add(lambda: done.append("eigenmodes"))
+    assert _next_request(requests, speculative(), put_off) == {"job": "2"}
+    assert done == ["eigenmodes", 0, 1]
 
 
 def test_speculative_work_is_finished_without_requests(requests):
@@ -48,8 +54,18 @@ def test_speculative_work_is_finished_without_requests(requests):
             yield
         requests.put(None)
 
-    assert _next_request(requests, speculative()) is None
+    assert _next_request(requests, speculative(), PutOff()) is None
     assert done == [0, 1, 2]
+
+
+def test_few_results_wait_for_their_eigenmodes():
+    done, put_off = [], PutOff()
+    for number in range(4):
+        put_off.add(lambda number=number: done.append(number))
+    assert done == [0, 1]
+    put_off.finish()
+    put_off.finish()
+    assert done == [0, 1, 2, 3]
 
 
 class Fitter:

@@ -1,0 +1,102 @@
+"""The result of a fit, from the estimate of an engine."""
+
+import time
+from dataclasses import replace
+from typing import NamedTuple
+
+import pandas as pd
+
+from solver.data.instrument import Instrument
+from solver.data.orbit import OrbitData
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings
+from solver.engines.estimate import Estimate
+from solver.engines.no_solution import likely_cause
+from solver.errors import FitError
+from solver.problem.problem import Problem
+from solver.results.eigenmode_tables import eigenmode_tables
+from solver.results.summary import summarise, truth_summary
+from solver.results.tables import (
+    SolvedProblem,
+    calibration_table,
+    exposure_table,
+    loss_table,
+    residual_table,
+    solved_problem,
+    source_table,
+    trace_table,
+    true_places,
+)
+
+
+class PartialResult(NamedTuple):
+    """A result without its eigenmodes, and what they are computed from.
+
+    They take as long as a step to other settings, and most figures do without them.
+    """
+
+    result: FitResult
+    solution: SolvedProblem
+    instrument: Instrument
+
+    def eigenmodes(self) -> dict[str, pd.DataFrame]:
+        """Return `schema.MODES`, `MODE_PARAMETERS` and `MODE_SHIFTS` by name."""
+        return eigenmode_tables(self.solution, self.result.calibration, self.instrument)
+
+    def whole(self) -> FitResult:
+        """Return the result with its eigenmodes."""
+        start = time.perf_counter()
+        tables, seconds = self.eigenmodes(), dict(self.result.summary["seconds"])
+        seconds["diagnose"] += time.perf_counter() - start
+        return replace(self.result, **tables, summary={**self.result.summary, "seconds": seconds})
+
+
+def partial_result(
+    data: OrbitData,
+    instrument: Instrument,
+    settings: FitSettings,
+    problem: Problem,
+    estimate: Estimate,
+    times: tuple[float, float],
+) -> PartialResult:
+    """Return the result of an estimate, but for its eigenmodes.
+
+    Parameters
+    ----------
+    data, problem : of the orbit under `settings`
+    instrument : nominal focal plane
+    times : when the work on it and when the engine began, s
+
+    Raises
+    ------
+    FitError
+        If no solution with uncertainties exists; the message gives the reason.
+    """
+    mode = estimate.mode
+    if mode.reduced is None:
+        raise FitError(f"orbit {data.orbit_id}: {mode.status.value}. {likely_cause(problem, mode)}")
+    start, prepared = times
+    solved = time.perf_counter()
+    solution = solved_problem(problem, estimate, mode.reduced)
+    sources, places = source_table(solution), true_places(solution, data.truth)
+    tables = {
+        "sources": sources,
+        "residuals": residual_table(solution, data.measurements),
+        "calibration": calibration_table(solution, instrument),
+        "exposures": exposure_table(solution),
+        "trace": trace_table(mode),
+        "true_places": places,
+        "losses": loss_table(estimate.losses),
+    }
+    seconds = {
+        "prepare": prepared - start,
+        "fit": solved - prepared,
+        "diagnose": time.perf_counter() - solved,
+    }
+    summary = {**summarise(solution, settings, seconds), **estimate.entries}
+    if places is not None:
+        summary["truth"] = truth_summary(sources, places)
+    result = FitResult(
+        **tables, summary=summary, settings=settings, provenance=dict(data.provenance)
+    )
+    return PartialResult(result, solution, instrument)

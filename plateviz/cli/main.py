@@ -96,6 +96,24 @@ def simulate(
         Path | None,
         typer.Option(help="Gaia table to use as the true catalogue; synthetic by default."),
     ] = None,
+    defect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Defect to simulate, such as distortion-drift=0.1um or noise=10%; repeatable. "
+            "The page Defects lists them.",
+            metavar="NAME=AMPLITUDE",
+        ),
+    ] = None,
+    magnitudes: Annotated[
+        bool, typer.Option("--magnitudes", help="Add magnitudes to catalogue and measurements.")
+    ] = False,
+    noise_by_magnitude: Annotated[
+        bool,
+        typer.Option(
+            "--noise-by-magnitude",
+            help="Let uncertainties of measurements depend on magnitudes; implies --magnitudes.",
+        ),
+    ] = False,
     as_json: Annotated[bool, _JSON] = False,
 ) -> None:
     """Simulate the paper's mini-mock survey; an interrupted simulation resumes."""
@@ -107,7 +125,13 @@ def simulate(
     keep_compilations()
     from solver.simulate.survey import simulate_survey
 
-    settings = SurveySettings(orbits=orbits, seed=seed)
+    settings = SurveySettings(
+        orbits=orbits,
+        seed=seed,
+        magnitudes=magnitudes,
+        noise_by_magnitude=noise_by_magnitude,
+        defects=tuple(defect or ()),
+    )
     if stars is not None:
         settings = settings.scaled(stars)
     with reporting("simulating") as reporter:

@@ -118,6 +118,8 @@ def print_inspection(reports: list[dict[str, Any]]) -> None:
             typer.echo(f"  {table['name']}: {table['rows']} rows")
             for column in table["columns"]:
                 typer.echo(f"    {_column(column)}")
+        for defect in report["defects"]:
+            typer.echo(f"  simulated with the defect {defect}")
         for problem in report["problems"]:
             typer.echo(f"  WRONG: {problem}")
 

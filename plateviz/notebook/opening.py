@@ -1,5 +1,6 @@
 """`open` and `simulate`: open a survey, an orbit or a solution from paths, or make a survey."""
 
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
@@ -71,6 +72,9 @@ def simulate(
     seed: int = 0,
     stars: int | None = None,
     catalogue: _Path | None = None,
+    defects: Iterable[str] = (),
+    magnitudes: bool = False,
+    noise_by_magnitude: bool = False,
 ) -> OpenSurvey:
     """Simulate the paper's mini-mock survey and open it; an existing survey is only opened.
 
@@ -81,6 +85,10 @@ def simulate(
     seed : seed of the random numbers
     stars : number of stars in the extended field; the paper's 132,651 by default
     catalogue : Gaia table to use as the true catalogue; synthetic by default
+    defects : defects to simulate, such as "distortion-drift=0.1um"; the page Defects lists them
+    magnitudes : add magnitudes to catalogue and measurements
+    noise_by_magnitude : let the uncertainty of a measurement depend on the magnitude; implies
+        `magnitudes`
 
     Raises
     ------
@@ -89,7 +97,13 @@ def simulate(
         settings.
     """
     target = path_of(directory).absolute()
-    settings = SurveySettings(orbits=orbits, seed=seed)
+    settings = SurveySettings(
+        orbits=orbits,
+        seed=seed,
+        magnitudes=magnitudes,
+        noise_by_magnitude=noise_by_magnitude,
+        defects=(defects,) if isinstance(defects, str) else tuple(defects),
+    )
     if stars is not None:
         settings = settings.scaled(stars)
     table = None if catalogue is None else _existing_path(catalogue)

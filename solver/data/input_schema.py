@@ -26,6 +26,17 @@ OBSTIME = Column(
     # 1968 to 2105. Zero is a missing value, and a Julian date is larger by 2,400,000.5.
     limits=(40_000.0, 90_000.0),
 )
+# Optional and without a default: NaN where a table has none, so that it can be told from any value.
+_MAGNITUDE = Column(
+    "magnitude",
+    "float64",
+    "mag",
+    "magnitude",
+    ("phot_g_mean_mag",),
+    required=False,
+    limits=(-30.0, 50.0),
+    may_be_nan=True,
+)
 _PIXELS = (-1e6, 1e6)
 _SCATTER = (1e-7, 1e3)
 # One turn either way, so that angles about zero may be negative.
@@ -46,6 +57,7 @@ MEASUREMENT = Table(
         Column("ny", "float64", "pix", "measured y, from the detector centre", limits=_PIXELS),
         Column("sx", "float64", "pix", "uncertainty of nx", ("sx0",), limits=_SCATTER),
         Column("sy", "float64", "pix", "uncertainty of ny", ("sy0",), limits=_SCATTER),
+        _MAGNITUDE,
     ),
     key=(*EXPOSURE_KEY, "detector_id", "source_id"),
     aliases=("measurements", "obs", "observation"),
@@ -173,6 +185,7 @@ CATALOGUE = Table(
             for i, first in enumerate(_ASTROMETRY)
             for second in _ASTROMETRY[i + 1 :]
         ),
+        _MAGNITUDE,
     ),
     key=("source_id",),
     aliases=("reference", "ref", "catalog"),

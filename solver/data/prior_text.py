@@ -4,12 +4,11 @@ import math
 import re
 
 from solver.data.parameters import BY_NAME, Group
+from solver.data.quantity_text import QUANTITY, shortest, unit_factor
 from solver.errors import InputError
-from solver.units import factor_between
 
-_NUMBER = r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>%|[^\W\d]\w*)?"
-_WIDTH = re.compile(rf"(?P<flat>flat|inf)|{_NUMBER}")
-_SHIFT = re.compile(_NUMBER)
+_WIDTH = re.compile(rf"(?P<flat>flat|inf)|{QUANTITY}")
+_SHIFT = re.compile(QUANTITY)
 _SHIFTED = re.compile(r"(?P<group>\w+)\s*(?:\[\s*(?P<element>[^\[\]\s]+)\s*\])?")
 
 
@@ -89,7 +88,7 @@ def parse_width(name: str, text: str) -> float:
     if match["flat"]:
         width = math.inf
     else:
-        width = float(match["number"]) * _factor(f"prior of {name}", match["unit"], unit)
+        width = float(match["number"]) * unit_factor(f"prior of {name}", match["unit"], unit)
     check_width(name, width)
     return width
 
@@ -97,7 +96,7 @@ def parse_width(name: str, text: str) -> float:
 def format_width(name: str, width: float) -> str:
     """Return a prior width as a text that `parse_width` reads."""
     unit = BY_NAME[name].width_unit
-    return "flat" if math.isinf(width) else f"{_shortest(width)} {unit}".strip()
+    return "flat" if math.isinf(width) else f"{shortest(width)} {unit}".strip()
 
 
 def parse_shift(text: str) -> tuple[str, float]:
@@ -121,7 +120,7 @@ def parse_shift(text: str) -> tuple[str, float]:
         )
     group, element = split_name(name)
     name = group.name if element is None else f"{group.name}[{element}]"
-    shift = float(match["number"]) * _factor(f"centre of {name}", match["unit"], group.unit)
+    shift = float(match["number"]) * unit_factor(f"centre of {name}", match["unit"], group.unit)
     check_shift(name, shift)
     return name, shift
 
@@ -129,22 +128,4 @@ def parse_shift(text: str) -> tuple[str, float]:
 def format_shift(name: str, shift: float) -> str:
     """Return a shift as a text that `parse_shift` reads."""
     sign = "" if shift < 0 else "+"
-    return f"{name}={sign}{_shortest(shift)}{split_name(name)[0].unit}"
-
-
-def _shortest(number: float) -> str:
-    """Return the shortest text that is read back as the same number."""
-    text = f"{number:.6g}"
-    return text if float(text) == number else repr(float(number))
-
-
-def _factor(what: str, given: str | None, unit: str) -> float:
-    if given is None:
-        return 1.0
-    try:
-        if unit:
-            return factor_between(given, unit)
-    except ValueError:
-        pass
-    expected = f"a unit such as {unit}" if unit else "a number without unit"
-    raise InputError(f"{what}: expected {expected}, found {given!r}")
+    return f"{name}={sign}{shortest(shift)}{split_name(name)[0].unit}"

@@ -50,7 +50,9 @@ def convert(raw: RawColumn | Quantity | Time, column: Column, where: str) -> Con
     values, missing = _split(raw)
     if values.ndim != 1:
         return _refused(where, "one value per row", f"an array of shape {values.shape[1:]}")
-    if missing.any():
+    if missing.any() and column.may_be_nan and values.dtype.kind in "iuf":
+        values = np.where(missing, np.nan, values)
+    elif missing.any():
         return _refused(where, "a value in every row", _rows(missing, "without one"))
     if column.dtype == "float64":
         return _floats(values, getattr(raw, "unit", None), column, where)

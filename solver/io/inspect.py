@@ -18,7 +18,7 @@ from solver.io.fits import read_fits
 from solver.io.formats import has_reader, is_fits, place, read_tables
 from solver.io.read_orbit import names_of
 from solver.io.result import is_result, to_result
-from solver.io.survey import survey_changes
+from solver.io.survey import read_header, section, survey_changes
 from solver.io.table_check import examine, matched_names
 
 _INPUTS = (MEASUREMENT, ENVIRONMENT, CATALOGUE, TRUTH)
@@ -39,6 +39,7 @@ class _Finding:
     kind: str = "unknown"
     tables: list[dict] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
+    defects: list[str] = field(default_factory=list)
     frames: list[tuple[Table, str, pd.DataFrame]] = field(default_factory=list)
 
 
@@ -57,7 +58,8 @@ def inspect_files(paths: Iterable[Path]) -> list[dict]:
     One dictionary per path, which can be written as JSON: `file`; `kind` ("observation",
     "measurement", "environment", "catalogue", "truth", "result", "instrument", "survey" or
     "unknown"); `tables`, each with `name`, `file`, `kind`, `rows` and `columns` (`name`,
-    `unit`, `type`, `min`, `max`, and `canonical`, the name it is read as, or None); `problems`.
+    `unit`, `type`, `min`, `max`, and `canonical`, the name it is read as, or None); `defects`,
+    those that a survey was simulated with; `problems`.
     """
     findings = [_inspect(Path(path)) for path in paths]
     _cross_check(findings)
@@ -66,6 +68,7 @@ def inspect_files(paths: Iterable[Path]) -> list[dict]:
             "file": str(finding.path),
             "kind": finding.kind,
             "tables": finding.tables,
+            "defects": finding.defects,
             "problems": finding.problems,
         }
         for finding in findings
@@ -95,6 +98,7 @@ def _inspect_folder(finding: _Finding) -> None:
                 _inspect_in_folder(finding, path, _SURVEY_TABLES[path.name])
         finding.kind = "survey"
         finding.problems += survey_changes(finding.path)
+        finding.defects = _defects_of(finding.path)
         return
     for path in files:
         _inspect_in_folder(finding, path)
@@ -103,6 +107,15 @@ def _inspect_folder(finding: _Finding) -> None:
             f"{finding.path}: expected a survey or the tables of an observation, "
             "found a folder without either"
         )
+
+
+def _defects_of(survey: Path) -> list[str]:
+    """Return the defects in a survey's header; none where it is damaged."""
+    try:
+        defects = section(read_header(survey), "settings").get("defects")
+    except InputError:
+        return []
+    return [str(one) for one in defects] if isinstance(defects, list) else []
 
 
 def _inspect_file(finding: _Finding) -> None:

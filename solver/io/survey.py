@@ -5,6 +5,8 @@
     truth.parquet                      `schema.TRUTH`, if there is truth
     exposures.parquet                  `schema.ENVIRONMENT` of all orbits
     measurements/orbit=0000.parquet    `schema.MEASUREMENT` of one orbit
+    defects/orbit=0000.parquet         `defect_schema.AFFECTED`: what simulated defects changed
+    defects/reference.parquet          the same for the catalogue; no fit reads these files
     manifest.sha256                    SHA-256 of every other file, checked when it is read
 
 A directory without `survey.toml` is not read: it is unfinished or not a survey. A survey grows
@@ -21,6 +23,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from solver.data.columns import Column
 from solver.data.instrument import Instrument, parse_instrument
 from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
@@ -45,6 +48,7 @@ REFERENCE = "reference.parquet"
 TRUTH_FILE = "truth.parquet"
 EXPOSURES = "exposures.parquet"
 MEASUREMENTS = "measurements"
+DEFECTS = "defects"
 MANIFEST = "manifest.sha256"
 REMEDY = (
     f"restore it from a copy, or simulate the survey again; if it was changed on purpose, delete "
@@ -137,7 +141,8 @@ def write_manifest(directory: Path, content: Mapping[str, object]) -> None:
     InputError
         If a table cannot be read or the manifest cannot be written.
     """
-    tables = [*directory.glob("*.parquet"), *directory.glob(f"{MEASUREMENTS}/*.parquet")]
+    folders = (".", MEASUREMENTS, DEFECTS)
+    tables = [path for name in folders for path in (directory / name).glob("*.parquet")]
     names = [path.relative_to(directory).as_posix() for path in tables]
     header = hashlib.sha256(_header_text(content).encode()).hexdigest()
     with write_atomically(directory / MANIFEST) as path:
@@ -254,7 +259,7 @@ def read_survey_table(path: Path, schema: Table) -> pd.DataFrame:
         schema.
     """
     path = Path(path)
-    _require_unchanged(path.parents[path.parent.name == MEASUREMENTS], [path])
+    _require_unchanged(path.parents[path.parent.name in (MEASUREMENTS, DEFECTS)], [path])
     return _read_table(path, schema)
 
 
@@ -265,20 +270,30 @@ def _read_table(path: Path, schema: Table) -> pd.DataFrame:
 def write_survey_table(frame: pd.DataFrame, schema: Table, path: Path) -> None:
     """Write the columns of `schema` as Parquet, each with its unit.
 
+    Optional columns without a default are left out if they are absent or hold no value.
+
     Raises
     ------
     InputError
         If the file cannot be written.
     """
-    content = pa.Table.from_pandas(frame[schema.names], preserve_index=False)
+    written = [column for column in schema if not _is_without_values(frame, column)]
+    names = [column.name for column in written]
+    content = pa.Table.from_pandas(frame[names], preserve_index=False)
     fields = [
         content.schema.field(column.name).with_metadata({"unit": column.unit})
         if column.unit
         else content.schema.field(column.name)
-        for column in schema
+        for column in written
     ]
     with write_atomically(path) as temporary:
         write_parquet(content.cast(pa.schema(fields)), temporary)
+
+
+def _is_without_values(frame: pd.DataFrame, column: Column) -> bool:
+    if column.required or column.default is not None:
+        return False
+    return column.name not in frame or bool(frame[column.name].isna().all())
 
 
 def _measured(sources: pd.DataFrame, measurements: pd.DataFrame) -> pd.DataFrame:

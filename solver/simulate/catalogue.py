@@ -12,10 +12,12 @@ from solver.data.columns import numpy_dtype
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.errors import InputError
 from solver.model.correlation import ASTROMETRY, CORRELATIONS, correlation_matrices, square_roots
-from solver.simulate.gaia import gaia_stars
+from solver.simulate.gaia import gaia_magnitudes, gaia_stars
+from solver.simulate.magnitudes import draw_magnitudes
 from solver.simulate.population import Stars, draw_stars, satisfies_cuts
-from solver.simulate.settings import Stream, SurveySettings
+from solver.simulate.settings import SurveySettings
 from solver.simulate.sky import galactic_to_icrs, icrs_to_galactic
+from solver.simulate.streams import Stream
 from solver.units import MAS_PER_DEG
 
 # Gaia's ids in this part of the sky are near 4e18 and always below 6.9e18, so they cannot
@@ -35,7 +37,8 @@ def truth_catalogue(settings: SurveySettings) -> pd.DataFrame:
     Returns
     -------
     `schema.TRUTH`, sorted by id: exactly `n_stars` stars, of which exactly `n_reference`
-    satisfy the paper's cuts, and `n_artificial` sources without motion
+    satisfy the paper's cuts, and `n_artificial` sources without motion. Magnitudes are NaN
+    unless the settings ask for them
     """
     rng = settings.rng(Stream.TRUTH)
     references, others = draw_stars(settings, rng)
@@ -44,7 +47,8 @@ def truth_catalogue(settings: SurveySettings) -> pd.DataFrame:
     )
     stars = stars.iloc[rng.permutation(len(stars))]
     stars["source_id"] = FIRST_STAR_ID + np.cumsum(rng.integers(1, _MAX_ID_STEP, len(stars)))
-    return _canonical([stars, _artificial(settings, rng)])
+    truth = _canonical([stars, _artificial(settings, rng)])
+    return truth if settings.has_magnitudes else truth.assign(magnitude=np.nan)
 
 
 def truth_from_gaia(
@@ -73,6 +77,9 @@ def truth_from_gaia(
         If a column is missing or invalid, or no reference star remains.
     """
     stars = gaia_stars(table, name)
+    stars["magnitude"] = np.nan
+    if settings.has_magnitudes:
+        stars["magnitude"] = gaia_magnitudes(table, stars["source_id"], name)
     _check_ids(stars, name)
     l_deg, b_deg = icrs_to_galactic(stars["ra"].to_numpy(), stars["dec"].to_numpy())
     inside = stars["parallax"] > settings.parallax_over_error * stars["parallax_error"]
@@ -92,6 +99,8 @@ def truth_from_gaia(
     artificial = _artificial(settings, settings.rng(Stream.TRUTH)).assign(
         **dict.fromkeys(CORRELATIONS, 0.0)
     )
+    if not settings.has_magnitudes:
+        artificial["magnitude"] = np.nan
     return _canonical([stars, artificial], CORRELATIONS)
 
 
@@ -169,6 +178,7 @@ def _star_table(stars: Stars, is_reference: bool, settings: SurveySettings) -> p
             "ref_epoch": settings.reference_epoch_yr,
             "is_reference": is_reference,
             "is_artificial": False,
+            "magnitude": stars.magnitude,
         }
     )
 
@@ -188,6 +198,7 @@ def _artificial(settings: SurveySettings, rng: np.random.Generator) -> pd.DataFr
             "ref_epoch": settings.reference_epoch_yr,
             "is_reference": False,
             "is_artificial": True,
+            "magnitude": draw_magnitudes(settings.rng(Stream.MAGNITUDES), number),
         }
     )
 

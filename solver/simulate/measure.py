@@ -13,25 +13,23 @@ import pandas as pd
 from jaxtyping import Array, Bool, Float, Int
 
 from solver.data.instrument import MINI_MOCK, Instrument
-from solver.data.parameters import CALIBRATION_GROUPS, PARAMETERS
 from solver.data.schema import MEASUREMENT
-from solver.data.settings import FitSettings
 from solver.model.astrometry import frames_at, sky_position
 from solver.model.directions import tangent_frame
-from solver.model.distortion import terms
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry, Index, predict
-from solver.problem.parameter_vector import VectorLayout
-from solver.problem.prior_centres import calibration_centres
+from solver.simulate.defective import Exposed, with_defects
+from solver.simulate.defects.stages import recorded_exposures
+from solver.simulate.geometry import CHUNK, padded, true_geometry, zero_offsets
+from solver.simulate.magnitudes import noise_factor
 from solver.simulate.placement import place_detectors
 from solver.simulate.schedule import environment, orbit_attitude
-from solver.simulate.settings import Stream, SurveySettings
+from solver.simulate.settings import SurveySettings
+from solver.simulate.streams import Stream
 from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000, RAD_PER_ARCSEC, RAD_PER_MAS
 
 # Sources this far outside the detectors are also considered: aberration is up to 21 arcsec.
 _MARGIN_ARCSEC = 30.0
-_CHUNK = 65_536
-_MIN_PADDED_SOURCES = 4_096
 
 
 class MeasuredOrbit(NamedTuple):
@@ -39,12 +37,13 @@ class MeasuredOrbit(NamedTuple):
 
     `measurements` is `schema.MEASUREMENT` in random order and `exposures` is
     `schema.ENVIRONMENT`; `attitude` also has the true pointings and focal lengths, as from
-    `solver.simulate.schedule.attitude`.
+    `solver.simulate.schedule.attitude`. `affected` is `defect_schema.AFFECTED`.
     """
 
     measurements: pd.DataFrame
     exposures: pd.DataFrame
     attitude: pd.DataFrame
+    affected: pd.DataFrame
 
 
 def measure_orbit(
@@ -66,28 +65,37 @@ def measure_orbit(
     rng = settings.rng(Stream.MEASUREMENTS, orbit_id)
     near = truth[_near(truth, attitude, instrument, settings)]
     frame = _places(near, float(attitude["obstime"].mean()))
-    geometry = true_geometry(_padded(frame), attitude, instrument, settings)
+    geometry = true_geometry(padded(frame), attitude, instrument, settings)
     source, exposure = _candidates(frame[:, 0], attitude, instrument, settings)
     row, detector, pixel = _on_detectors(geometry, source, exposure, instrument)
+    index = Index(source[row], exposure[row], detector)
+    magnitude = near["magnitude"].to_numpy()[index.source]
     sigma = measurement_sigma(instrument, settings)[detector]
-    measured = pixel + sigma * rng.standard_normal(sigma.shape)
-    exposures = environment(attitude)
-    taken = attitude.iloc[exposure[row]]
+    if settings.noise_by_magnitude:
+        sigma = sigma * noise_factor(magnitude)[:, None]
+    noise = sigma * rng.standard_normal(sigma.shape)
+    taken = attitude.iloc[index.exposure]
     table = pd.DataFrame(
         {
             "orbit_id": taken["orbit_id"].to_numpy(),
             "field_id": taken["field_id"].to_numpy(),
             "plate_id": taken["plate_id"].to_numpy(),
             "detector_id": np.array(instrument.detector_ids)[detector],
-            "source_id": near["source_id"].to_numpy()[source[row]],
-            "nx": measured[:, 0],
-            "ny": measured[:, 1],
+            "source_id": near["source_id"].to_numpy()[index.source],
+            "nx": pixel[:, 0] + noise[:, 0],
+            "ny": pixel[:, 1] + noise[:, 1],
             "sx": sigma[:, 0],
             "sy": sigma[:, 1],
+            "magnitude": magnitude,
         }
     )[MEASUREMENT.names]
-    shuffled = table.iloc[rng.permutation(len(table))].reset_index(drop=True)
-    return MeasuredOrbit(shuffled, exposures, attitude)
+    order = rng.permutation(len(table))
+    exposed = Exposed(index, pixel, noise, frame, attitude)
+    table, affected = with_defects(table, exposed, instrument, settings, orbit_id)
+    # Defects may have removed rows.
+    shuffled = table.reindex(order[np.isin(order, table.index)]).reset_index(drop=True)
+    exposures = recorded_exposures(environment(attitude), settings, orbit_id)
+    return MeasuredOrbit(shuffled, exposures, attitude, affected)
 
 
 def true_places(truth: pd.DataFrame, mjd_tcb: float) -> pd.DataFrame:
@@ -116,45 +124,6 @@ def measurement_sigma(
     """
     pitch = np.array([(d.pitch_x_um, d.pitch_y_um) for d in instrument.detectors])
     return settings.measurement_mas * RAD_PER_MAS * instrument.focal_length_um / pitch
-
-
-def true_geometry(
-    source_frame: Float[np.ndarray, "src 3 3"],
-    attitude: pd.DataFrame,
-    instrument: Instrument,
-    settings: SurveySettings,
-) -> Geometry:
-    """Return the geometry with the true values as origins, so that all offsets are zero.
-
-    Parameters
-    ----------
-    source_frame : frames at the true positions
-    attitude : as from `solver.simulate.schedule.attitude`
-    instrument : the nominal instrument
-    """
-    order = max((k + j for k, j, _, _ in settings.distortion_um), default=0)
-    layout = VectorLayout(len(attitude), len(terms(order)), len(instrument.detectors))
-    true_exposures = attitude.assign(
-        ra_est=attitude["ra"],
-        dec_est=attitude["dec"],
-        pa_est=attitude["position_angle"],
-        focal_length=attitude["true_focal_length"],
-    )
-    placed = place_detectors(instrument, settings)
-    origin = calibration_centres(true_exposures, placed, layout, FitSettings(order=order))
-    for k, j, a, b in settings.distortion_um:
-        origin["distortion_x"][terms(order).index((k, j))] = a
-        origin["distortion_y"][terms(order).index((k, j))] = b
-    observer = observer_at(attitude["obstime"].to_numpy())
-    arrays = {
-        "source_frame": source_frame,
-        "pointing_frame": tangent_frame(attitude["ra"].to_numpy(), attitude["dec"].to_numpy()),
-        "origin": {g.name: origin[g.name] for g in CALIBRATION_GROUPS if "pointing" not in g.name},
-        "velocity": observer.velocity,
-        "sun_distance": observer.sun_distance,
-        "distortion_scale": instrument.distortion_scale_um,
-    }
-    return Geometry(**jax.tree.map(jnp.asarray, arrays), order=order)
 
 
 def _places(truth: pd.DataFrame, mjd_tcb: float) -> Float[np.ndarray, "src 3 3"]:
@@ -222,9 +191,9 @@ def _on_detectors(
     """Return candidates that fall on a detector, with detector index and position in pixels."""
     half = 0.5 * np.array([(d.n_x, d.n_y) for d in instrument.detectors])
     rows, detectors, pixels = [], [], []
-    for start in range(0, len(source), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        missing = (0, _CHUNK - len(source[part]))
+    for start in range(0, len(source), CHUNK):
+        part = slice(start, start + CHUNK)
+        missing = (0, CHUNK - len(source[part]))
         pairs = (np.pad(indices[part], missing) for indices in (source, exposure))
         pixel = np.asarray(_pixels(geometry, *pairs))[:, : len(source[part])]
         inside = np.all(np.abs(pixel) < half[:, None, :], axis=-1)
@@ -238,22 +207,12 @@ def _on_detectors(
     return np.concatenate(rows), np.concatenate(detectors), np.concatenate(pixels)
 
 
-def _padded(frame: Float[np.ndarray, "src 3 3"]) -> Float[np.ndarray, "padded 3 3"]:
-    """Repeat the sources up to a power of two, because each new shape is compiled anew."""
-    length = max(1 << (len(frame) - 1).bit_length(), _MIN_PADDED_SOURCES)
-    return np.resize(frame, (length, 3, 3))
-
-
 @jax.jit
 def _pixels(
     geometry: Geometry, source: Int[Array, " cand"], exposure: Int[Array, " cand"]
 ) -> Float[Array, "det cand 2"]:
     """Return the positions of the candidates in the pixels of every detector."""
-    offsets = {name: jnp.zeros_like(values) for name, values in geometry.origin.items()}
-    number = {"src": (len(geometry.source_frame), 2), "exp": (len(geometry.pointing_frame),)}
-    for group in PARAMETERS:
-        if group.name not in offsets:
-            offsets[group.name] = jnp.zeros(number[group.axis])
+    offsets = zero_offsets(geometry)
 
     def on(detector: Int[Array, ""]) -> Float[Array, "cand 2"]:
         index = Index(source, exposure, jnp.full_like(source, detector))

@@ -7,7 +7,8 @@ mission and unknown to the fit.
 from dataclasses import replace
 
 from solver.data.instrument import Instrument
-from solver.simulate.settings import Stream, SurveySettings
+from solver.simulate.settings import SurveySettings
+from solver.simulate.streams import Stream
 
 
 def place_detectors(instrument: Instrument, settings: SurveySettings) -> Instrument:

@@ -12,12 +12,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from solver.errors import InputError
+from solver.simulate.magnitudes import draw_magnitudes
 from solver.simulate.settings import SurveySettings
 from solver.simulate.sky import motion_to_icrs
-
-# Star counts grow as 10^(0.35 G) between these magnitudes.
-_MAGNITUDES = (8.0, 19.5)
-_COUNT_SLOPE = 0.35
 
 # Exponentially decreasing space density (Bailer-Jones et al. 2021), scale length, kpc.
 _SCALE_LENGTH_KPC = 1.5
@@ -47,7 +44,8 @@ class Stars(NamedTuple):
     """Stars of a population: Galactic coordinates (deg), motions, parallaxes and errors.
 
     Motions are in right ascension (times cos dec) and declination, mas/yr; `parallax` and
-    `parallax_error` are in mas. `error_of` derives the other errors from `parallax_error`.
+    `parallax_error` are in mas. `error_of` derives the other errors from `parallax_error`, and
+    `magnitude` is G.
     """
 
     l_deg: Float[np.ndarray, " n"]
@@ -56,6 +54,7 @@ class Stars(NamedTuple):
     pmdec: Float[np.ndarray, " n"]
     parallax: Float[np.ndarray, " n"]
     parallax_error: Float[np.ndarray, " n"]
+    magnitude: Float[np.ndarray, " n"]
 
     def error_of(self, name: str) -> Float[np.ndarray, " n"]:
         """Return the uncertainty of `name`, mas or mas/yr."""
@@ -116,7 +115,7 @@ def satisfies_cuts(
 
 
 def _draw(settings: SurveySettings, rng: np.random.Generator, size: int) -> Stars:
-    magnitude = _magnitudes(rng, size)
+    magnitude = draw_magnitudes(rng, size)
     distance = rng.gamma(3.0, _SCALE_LENGTH_KPC, size)
     margin = settings.field_margin_deg
     l_deg, b_deg = (
@@ -125,14 +124,10 @@ def _draw(settings: SurveySettings, rng: np.random.Generator, size: int) -> Star
     )
     pmra, pmdec = motion_to_icrs(l_deg, b_deg, *_motions(distance, rng))
     scatter = np.exp(_ERROR_SCATTER * rng.standard_normal(size))
-    stars = Stars(l_deg, b_deg, pmra, pmdec, 1.0 / distance, _parallax_error(magnitude) * scatter)
+    error = _parallax_error(magnitude) * scatter
+    stars = Stars(l_deg, b_deg, pmra, pmdec, 1.0 / distance, error, magnitude)
     dust = _DUST_PER_KPC * distance * np.exp(-0.5 * (b_deg / _DUST_HEIGHT_DEG) ** 2)
     return _select(stars, rng.random(size) < np.exp(-dust))
-
-
-def _magnitudes(rng: np.random.Generator, size: int) -> Float[np.ndarray, " n"]:
-    low, high = (10.0 ** (_COUNT_SLOPE * limit) for limit in _MAGNITUDES)
-    return np.log10(rng.uniform(low, high, size)) / _COUNT_SLOPE
 
 
 def _motions(

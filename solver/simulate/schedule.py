@@ -10,8 +10,9 @@ from jaxtyping import Float
 
 from solver.data.schema import ENVIRONMENT
 from solver.simulate.seasons import Season
-from solver.simulate.settings import Stream, SurveySettings
+from solver.simulate.settings import SurveySettings
 from solver.simulate.sky import galactic_to_icrs, position_angle_to_icrs
+from solver.simulate.streams import Stream
 from solver.units import ARCSEC_PER_DEG
 
 _SECONDS_PER_DAY = 86_400.0

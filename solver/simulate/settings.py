@@ -7,27 +7,18 @@ number that the paper does not give.
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from enum import IntEnum
 from itertools import pairwise
 
 import numpy as np
 
 from solver.data.settings import MAX_ORDER
 from solver.errors import InputError
+from solver.simulate.defects.table import BY_NAME
+from solver.simulate.defects.text import format_defect, parse_defects
 from solver.simulate.seasons import SEASONS, Season, read_season
+from solver.simulate.streams import Stream, generator
 
 _SECONDS_PER_DAY = 86_400.0
-
-
-class Stream(IntEnum):
-    """Independent random streams: the numbers of one do not depend on draws from another."""
-
-    TRUTH = 0
-    REFERENCE = 1
-    DETECTORS = 2
-    FIELDS = 3
-    ATTITUDE = 4
-    MEASUREMENTS = 5
 
 
 # Eq. (exp:distortion) as rows k, l, A_kl, B_kl, um.
@@ -43,6 +34,9 @@ _DISTORTION_UM = (
 # target; with 1,250 reference stars in the field an orbit has about 40.
 _MIN_REFERENCES = 1_250
 _MIN_ARTIFICIAL = 10
+
+# Settings that are not written at their defaults: surveys of older versions lack them.
+_LATER = ("magnitudes", "noise_by_magnitude", "defects")
 
 
 @dataclass(frozen=True)
@@ -106,6 +100,12 @@ class SurveySettings:
     vague_motion_mas_yr: float = 1.0
     vague_parallax_mas: float = 1.0
 
+    # Beyond the paper: magnitudes in all tables, and noise that depends on them.
+    magnitudes: bool = False
+    noise_by_magnitude: bool = False
+    # NAME=AMPLITUDE each, as in the table of `solver.simulate.defects`.
+    defects: tuple[str, ...] = ()
+
     def __post_init__(self) -> None:
         """Check all settings; raise `InputError` that names an invalid one."""
         for item in fields(self):
@@ -114,6 +114,8 @@ class SurveySettings:
         self._check_sky()
         self._check_time()
         self._check_distortion()
+        parsed = parse_defects(self.defects).items()
+        object.__setattr__(self, "defects", tuple(format_defect(*one) for one in parsed))
 
     def _check_counts(self) -> None:
         for name in ("orbits", "n_stars", "n_reference", "exposures_per_field"):
@@ -181,11 +183,20 @@ class SurveySettings:
         """Length of all seasons together, days."""
         return sum(season.end_mjd - season.start_mjd for season in self.seasons)
 
+    @property
+    def amplitudes(self) -> dict[str, float]:
+        """Name -> amplitude of each defect, in its unit, in the order of the table of defects."""
+        return parse_defects(self.defects)
+
+    @property
+    def has_magnitudes(self) -> bool:
+        """Whether the tables have magnitudes."""
+        needed = any(BY_NAME[name].needs_magnitudes for name in self.amplitudes)
+        return self.magnitudes or self.noise_by_magnitude or needed
+
     def rng(self, stream: Stream, *key: int) -> np.random.Generator:
         """Return the generator of a stream; different keys (such as orbits) are independent."""
-        return np.random.default_rng(
-            np.random.SeedSequence(self.seed, spawn_key=(int(stream), *key))
-        )
+        return generator(self.seed, stream, *key)
 
     def scaled(self, stars: int) -> "SurveySettings":
         """Return the same survey with `stars` stars and the other sources in proportion.
@@ -208,7 +219,8 @@ class SurveySettings:
 
     def to_dict(self) -> dict[str, object]:
         """Return the settings as numbers, text, lists and dicts; `from_dict` reads them back."""
-        return {name: _plain(value) for name, value in asdict(self).items()}
+        values = {name: _plain(value) for name, value in asdict(self).items()}
+        return {name: value for name, value in values.items() if value or name not in _LATER}
 
     @staticmethod
     def from_dict(values: Mapping[str, object]) -> "SurveySettings":
@@ -233,12 +245,14 @@ def _is_number(value: object) -> bool:
 
 def _check_kind(name: str, value: object, default: object) -> None:
     """Reject a value of another type than the default, and negative numbers."""
-    if isinstance(default, tuple):
+    if isinstance(default, bool):
+        valid, expected = isinstance(value, bool), "true or false"
+    elif isinstance(default, tuple):
         valid, expected = isinstance(value, tuple), "a sequence"
     else:
         valid = _is_number(value) and value >= 0  # type: ignore[operator]
         expected = "a number of at least 0"
-    if isinstance(default, int):
+    if isinstance(default, int) and not isinstance(default, bool):
         valid, expected = valid and isinstance(value, int), "an integer of at least 0"
     if not valid:
         raise InputError(f"expected {name} to be {expected}, found {value!r}")

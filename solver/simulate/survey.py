@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from solver.data.defect_schema import AFFECTED
 from solver.data.instrument import MINI_MOCK, Instrument, write_instrument
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
 from solver.errors import InputError
@@ -14,6 +15,7 @@ from solver.io.lock import locked
 from solver.io.read_orbit import find_catalogue
 from solver.io.scratch import is_scratch, remove_abandoned
 from solver.io.survey import (
+    DEFECTS,
     EXPOSURES,
     HEADER,
     MEASUREMENTS,
@@ -21,6 +23,7 @@ from solver.io.survey import (
     TRUTH_FILE,
     measurement_path,
     read_header,
+    read_survey_table,
     section,
     write_header,
     write_manifest,
@@ -33,6 +36,7 @@ from solver.simulate.catalogue import (
     truth_catalogue,
     truth_from_gaia,
 )
+from solver.simulate.defects.stages import defective_catalogue, none_affected, recorded_exposures
 from solver.simulate.measure import measure_orbit
 from solver.simulate.schedule import environment, orbit_attitude
 from solver.simulate.settings import SurveySettings
@@ -100,23 +104,56 @@ def _simulate(
 ) -> None:
     """Write the tables of a survey that are not there yet."""
     truth = _truth(settings, catalogue)
-    attitudes = [
-        orbit_attitude(orbit_id, settings, instrument.focal_length_um)
+    exposures = [
+        recorded_exposures(
+            environment(orbit_attitude(orbit_id, settings, instrument.focal_length_um)),
+            settings,
+            orbit_id,
+        )
         for orbit_id in range(settings.orbits)
     ]
+    reference = reference_catalogue(truth, settings)
+    reference, affected = defective_catalogue(reference, truth, settings)
     write_survey_table(truth, TRUTH, directory / TRUTH_FILE)
-    write_survey_table(reference_catalogue(truth, settings), CATALOGUE, directory / REFERENCE)
-    write_survey_table(
-        environment(pd.concat(attitudes, ignore_index=True)), ENVIRONMENT, directory / EXPOSURES
-    )
+    write_survey_table(reference, CATALOGUE, directory / REFERENCE)
+    write_survey_table(pd.concat(exposures, ignore_index=True), ENVIRONMENT, directory / EXPOSURES)
+    _write_affected(affected, directory / DEFECTS / REFERENCE)
     for orbit_id in range(settings.orbits):
         path = measurement_path(directory, orbit_id)
         if not path.exists():
-            measurements = measure_orbit(orbit_id, truth, settings, instrument).measurements
-            _check_seen(measurements, truth, orbit_id)
-            write_survey_table(measurements, MEASUREMENT, path)
+            measured = measure_orbit(orbit_id, truth, settings, instrument)
+            _check_seen(measured.measurements, truth, orbit_id)
+            # First, since an orbit with measurements is complete.
+            _write_affected(measured.affected, directory / DEFECTS / path.name)
+            write_survey_table(measured.measurements, MEASUREMENT, path)
         if progress is not None:
             progress(orbit_id + 1, settings.orbits)
+
+
+def read_affected(directory: Path) -> pd.DataFrame:
+    """Return what the defects of a simulated survey changed, all orbits and the catalogue.
+
+    It is the answer that a test of a diagnostic compares with; no fit and no verdict reads it.
+
+    Returns
+    -------
+    `defect_schema.AFFECTED`; empty without such defects
+
+    Raises
+    ------
+    InputError
+        If a file is not as it was written.
+    """
+    paths = sorted((Path(directory) / DEFECTS).glob("*.parquet"))
+    parts = [read_survey_table(path, AFFECTED) for path in paths]
+    return pd.concat([none_affected(), *parts], ignore_index=True)
+
+
+def _write_affected(affected: pd.DataFrame, path: Path) -> None:
+    if len(affected):
+        with writing(path.parent, "to make the directory"):
+            path.parent.mkdir(exist_ok=True)
+        write_survey_table(affected, AFFECTED, path)
 
 
 def _header(
@@ -137,7 +174,7 @@ def _make(directory: Path) -> None:
 
 def _claim(directory: Path, header: Mapping[str, object]) -> None:
     """Mark `directory` as this survey, unfinished; reject it if it contains anything else."""
-    for folder in (directory, directory / MEASUREMENTS):
+    for folder in (directory, directory / MEASUREMENTS, directory / DEFECTS):
         remove_abandoned(folder)
     names = [path.name for path in directory.iterdir() if not is_scratch(path.name)]
     if (directory / HEADER).exists():

@@ -10,6 +10,7 @@
 | `choices`            | the settings that a fit takes as keywords in a notebook            |
 | `fields MODULE:NAME` | plain fields of any class                                          |
 | `layout MODULE`      | the tree of files in a module's docstring                          |
+| `defects`            | the defects that a simulated survey may have                       |
 """
 
 import dataclasses
@@ -35,6 +36,8 @@ from solver.io import header
 from solver.io import published_layout as layout
 from solver.io.column_check import limits_text
 from solver.io.published_layout import Derived, PublishedTable
+from solver.simulate.defects.defect import Defect
+from solver.simulate.defects.table import DEFECTS
 
 _AXES = {"src": "source", "exp": "exposure", "coef": "distortion term", "det": "detector"}
 _DERIVED: dict[str, Callable] = {
@@ -57,6 +60,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         ("choices", choices),
         ("fields", fields),
         ("layout", files),
+        ("defects", defects),
     ):
         app.add_directive(name, _directive(make))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
@@ -161,6 +165,30 @@ def files(module: str) -> nodes.literal_block:
     text = inspect.getdoc(importlib.import_module(module)) or ""
     tree = textwrap.dedent("\n".join(line for line in text.splitlines() if line.startswith("    ")))
     return nodes.literal_block(tree, tree, language="text")
+
+
+def defects() -> nodes.table:
+    """Return the table of defects."""
+    headings = ("defect", "such as", "what it does", "acts on", "stands for", "literature")
+    return table(
+        headings,
+        (
+            (
+                f"`{d.name}`: {d.label}",
+                f"`{d.example}`",
+                _does(d),
+                d.stage.value,
+                d.stands_for,
+                d.reference,
+            )
+            for d in DEFECTS
+        ),
+    )
+
+
+def _does(defect: Defect) -> str:
+    limits = f"{defect.low:g} to {defect.high:g} {defect.unit}".rstrip()
+    return f"{defect.does} Limits: {limits}."
 
 
 def _default(value: object) -> str:

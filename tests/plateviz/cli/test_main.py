@@ -145,6 +145,24 @@ def test_simulate_writes_a_survey_whose_orbit_can_be_read(run, tmp_path):
     assert data.truth is not None
 
 
+def test_simulate_puts_defects_in_and_inspect_names_them(run, tmp_path):
+    folder = tmp_path / "survey"
+    defects = ("--defect", "noise=10 %", "--defect", "distortion-drift=100nm", "--magnitudes")
+    assert run("simulate", folder, *SMALL, *defects)[0] == 0
+    code, out, _ = run("inspect", folder)
+    assert code == 0
+    assert "  simulated with the defect distortion-drift=0.1um\n" in out
+    assert "  simulated with the defect noise=10%\n" in out
+    assert SurveyFolder(str(folder)).read(0).measurements["magnitude"].notna().all()
+
+
+def test_simulate_refuses_an_unknown_defect_and_makes_nothing(run, tmp_path):
+    code, _, err = run("simulate", tmp_path / "survey", *SMALL, "--defect", "noize=10%")
+    assert code == 2
+    assert "expected a defect out of distortion-drift, " in err
+    assert not (tmp_path / "survey").exists()
+
+
 def test_simulate_prints_the_number_of_orbits(run, tmp_path):
     code, out, _ = run("simulate", tmp_path / "survey", *SMALL)
     assert code == 0

@@ -99,11 +99,13 @@ def test_invalid_request_of_a_survey_changes_nothing(made_survey, ask, message):
 
 
 def test_existing_survey_is_opened_and_not_simulated_again(tmp_path):
-    survey = plateviz.simulate(tmp_path / "made", orbits=1, stars=4000, seed=2)
+    defects = ["outliers=1%", "noise=10%"]
+    survey = plateviz.simulate(tmp_path / "made", orbits=1, stars=4000, seed=2, defects=defects)
     written = (survey.directory / "survey.toml").stat().st_mtime_ns
-    again = plateviz.simulate(tmp_path / "made", orbits=1, stars=4000, seed=2)
+    settings = {"stars": 4000, "seed": 2, "defects": reversed(defects)}
+    again = plateviz.simulate(tmp_path / "made", orbits=1, **settings)
     assert (again.directory / "survey.toml").stat().st_mtime_ns == written
-    with pytest.raises(InputError, match="found one with other orbits, seed; plateviz.open"):
+    with pytest.raises(InputError, match="other orbits, seed, defects; plateviz.open"):
         plateviz.simulate(tmp_path / "made", orbits=2, stars=4000, seed=3)
 
 
@@ -113,8 +115,11 @@ def test_existing_survey_is_opened_and_not_simulated_again(tmp_path):
         ({"orbits": 0}, "orbits of at least 1, found 0"),
         ({"seed": 1.5}, "seed to be an integer"),
         ({"catalogue": "nowhere.fits"}, "nowhere.fits: expected a file or a folder, found none"),
+        ({"defects": ["noise=10"]}, "defect noise: expected an amplitude such as noise=10%"),
+        ({"defects": "noize=10%"}, "expected a defect out of .* found 'noize'"),
+        ({"magnitudes": "yes"}, "expected magnitudes to be true or false"),
     ],
-    ids=["orbits", "seed", "catalogue"],
+    ids=["orbits", "seed", "catalogue", "amplitude", "defect", "magnitudes"],
 )
 def test_simulation_with_an_invalid_argument_is_not_begun(tmp_path, options, message):
     with pytest.raises(InputError, match=message):

@@ -232,10 +232,27 @@ def test_stars_without_correlations_are_drawn_as_synthetic_ones(stars):
 def test_survey_stores_correlations_only_in_the_reference_catalogue(archive, tmp_path):
     table = written(archive, tmp_path / "gaia.fits")
     simulate_survey(tmp_path / "survey", SETTINGS, catalogue=table)
-    assert parquet.read_schema(tmp_path / "survey" / "truth.parquet").names == TRUTH.names
+    names = [name for name in TRUTH.names if name != "magnitude"]
+    assert parquet.read_schema(tmp_path / "survey" / "truth.parquet").names == names
     catalogue = read_survey_orbit(tmp_path / "survey", 0).catalogue
     chosen = catalogue["is_reference"]
     assert chosen.any()
     expected = with_correlations(catalogue[chosen], correlated_matrix())
     pd.testing.assert_frame_equal(catalogue[chosen], expected)
     assert (catalogue.loc[~chosen, list(CORRELATIONS)] == 0.0).all(axis=None)
+
+
+def test_magnitudes_are_those_of_the_archive_and_only_where_asked_for(archive):
+    settings = replace(SETTINGS, magnitudes=True)
+    archive["PHOT_G_MEAN_MAG"] = np.linspace(10.0, 19.0, len(archive)).astype(np.float32)
+    truth = truth_from_gaia(archive, settings)
+    own = dict(zip(archive["source_id"], archive["PHOT_G_MEAN_MAG"], strict=True))
+    stars = truth[~truth["is_artificial"]]
+    np.testing.assert_allclose(stars["magnitude"], [own[one] for one in stars["source_id"]])
+    assert truth["magnitude"].notna().all()
+    assert truth_from_gaia(archive, SETTINGS)["magnitude"].isna().all()
+
+
+def test_table_without_the_magnitudes_asked_for_is_refused(archive):
+    with pytest.raises(InputError, match="my table: expected a column phot_g_mean_mag"):
+        truth_from_gaia(archive, replace(SETTINGS, defects=("charge-transfer=5mpix",)), "my table")

@@ -47,7 +47,11 @@ def noisy(truth: pd.DataFrame) -> MeasuredOrbit:
 
 
 def independent_pixel(
-    star: pd.Series, exposure: pd.Series, epoch: float, detector: Detector
+    star: pd.Series,
+    exposure: pd.Series,
+    epoch: float,
+    detector: Detector,
+    satellite_km_s: np.ndarray | float = 0.0,
 ) -> np.ndarray:
     """The paper's observation model with ERFA, astropy's WCS and NumPy's Legendre polynomials."""
     mas = np.radians(1.0 / 3.6e6)
@@ -60,7 +64,7 @@ def independent_pixel(
         years * (star["pmra"] * east + star["pmdec"] * north) - star["parallax"] * centre
     )
     heliocentric, earth = erfa.epv00(*erfa.tcbtdb(2400000.5, exposure["obstime"]))
-    velocity = earth["v"] * AU_PER_DAY_IN_C
+    velocity = earth["v"] * AU_PER_DAY_IN_C + np.asarray(satellite_km_s) * 1e3 / erfa.CMPS
     apparent = erfa.ab(
         place / np.linalg.norm(place),
         velocity,

@@ -9,7 +9,8 @@ import pytest
 
 from solver.errors import InputError
 from solver.simulate.seasons import Season
-from solver.simulate.settings import Stream, SurveySettings
+from solver.simulate.settings import SurveySettings
+from solver.simulate.streams import Stream
 
 
 def test_defaults_agree_with_the_paper() -> None:

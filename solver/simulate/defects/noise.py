@@ -1,0 +1,25 @@
+"""Defects of the noise: its size over the stated uncertainty of each measurement."""
+
+import numpy as np
+from jaxtyping import Float
+
+from solver.simulate.defects.defect import Case, Rows
+from solver.simulate.magnitudes import MAGNITUDES
+
+
+def noise(case: Case, rows: Rows) -> Float[np.ndarray, " obs"]:
+    """Return the same factor for all measurements."""
+    return np.full(len(rows.exposure), 1.0 + case.amplitude)
+
+
+def noise_of_exposures(case: Case, rows: Rows) -> Float[np.ndarray, " obs"]:
+    """Return a factor of each exposure, whose logarithm is normal."""
+    deviates = case.orbit_rng().standard_normal(len(rows.attitude))
+    return np.exp(case.amplitude * deviates)[rows.exposure]
+
+
+def noise_of_magnitudes(case: Case, rows: Rows) -> Float[np.ndarray, " obs"]:
+    """Return a factor that grows linearly with magnitude, one in the middle of their range."""
+    low, high = MAGNITUDES
+    part = np.clip((2.0 * rows.magnitude - (low + high)) / (high - low), -1.0, 1.0)
+    return 1.0 + case.amplitude * part

@@ -1,19 +1,26 @@
 """SelectionBar: which sources are selected, and what can be done with them."""
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
-import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from astropy.table import Table
 
-from plateviz.dashboard.downloads import described, rows_of
-from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.downloads import Done, Later
+from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.same_machine import is_same_machine
+from plateviz.dashboard.selected_tables import (
+    is_of_orbit,
+    selected_places,
+    selected_tables,
+    selection_name,
+)
+from plateviz.dashboard.table_sender import TableSender
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.dashboard.views.source_list import SourceList
-from plateviz.tables.explore import explorable_measurements, explorable_sources
-from solver.data.survey_schema import MOTIONS
+from solver.errors import InputError
 
 _IN_THE_BAR = {"color": "inherit", "textTransform": "none", "whiteSpace": "nowrap", "minWidth": 0}
 
@@ -34,6 +41,9 @@ class SelectionBar(pn.viewable.Viewer):
         self._row = pmui.Row(margin=0, sx={"alignItems": "center"})
         self.windows = pmui.Column(margin=0)
         self._parts: list[pn.viewable.Viewable] = []
+        self._is_here, self._sender = is_read_here(), TableSender()
+        if pn.state.curdoc is not None:
+            pn.state.on_session_destroyed(lambda _: self._sender.close())
         self._session.selection.param.watch(self._show, "sources")
         self._session.choices.param.watch(self._show, "exclusions")
         self._session.param.watch(self._show, ["shown", "theme"])
@@ -51,8 +61,17 @@ class SelectionBar(pn.viewable.Viewer):
         self._open = self._button("Open", self._open_source)
         self._leave_out = self._button("Leave out of the fit", session.leave_out_selection)
         self._put_back = self._button("Put back into the fit", session.put_back_selection)
-        choices = table_choices(self._subject, self._tables)
+        choices = table_choices(
+            partial(selection_name, self._navigation), partial(selected_tables, self._navigation)
+        )
         self._save = SaveButton("selected sources", choices, place="bar")
+        self._send_button = SaveButton(
+            "selected sources to TOPCAT or DS9",
+            {"SAMP": self._send},
+            place="bar",
+            text="Send",
+            done="sent",
+        )
         self._invert = self._button("Invert", session.invert_selection)
         self._parts = [
             self._words,
@@ -62,6 +81,7 @@ class SelectionBar(pn.viewable.Viewer):
             self._put_back,
             self._invert,
             self._save,
+            self._send_button,
             self._button("Clear", self._clear),
         ]
         self.windows.append(self._list)
@@ -80,13 +100,13 @@ class SelectionBar(pn.viewable.Viewer):
             return
         if not self._parts:
             self._make()
-        is_orbit = self._is_of_orbit
+        is_orbit = is_of_orbit(self._navigation)
         self._words.object = words(len(selected), len(session.selected_in_orbit), is_orbit)
         self._open.visible = len(selected) == 1 and self._navigation.run is not None
         self._leave_out.visible = is_orbit and not session.is_selection_left_out
         self._put_back.visible = is_orbit and session.is_selection_left_out
         self._invert.visible = is_orbit
-        self._save.theme = session.theme
+        self._save.theme = self._send_button.theme = session.theme
         self._list.show()
         if list(self._row) != self._parts:
             self._row[:] = self._parts
@@ -95,32 +115,15 @@ class SelectionBar(pn.viewable.Viewer):
         (source,) = self._session.selection.sources
         self._navigation.open_source(str(source))
 
-    @property
-    def _is_of_orbit(self) -> bool:
-        return self._navigation.view is View.ORBIT and self._session.shown is not None
-
-    def _subject(self) -> str:
-        of = self._session.subject() if self._is_of_orbit else f"run-{self._navigation.run_name}"
-        return f"{of}-selection"
-
-    def _tables(self) -> dict[str, Table]:
-        """Return the selected sources and their measurements, or their motions in the run."""
-        shown, run = self._session.shown, self._navigation.run
-        selected = list(self._session.selection.sources)
-        if self._is_of_orbit and shown is not None:
-            result = shown.result
-            tables = {
-                "sources": explorable_sources(result),
-                "measurements": explorable_measurements(result),
-            }
-            return {
-                name: rows_of(table, np.isin(table.read("source_id"), selected))
-                for name, table in tables.items()
-            }
-        if run is None:
-            return {}
-        rows = run.motions() if run.is_gathered else run.counts()
-        return {"sources": described(rows[rows["source_id"].isin(selected)], MOTIONS)}
+    def _send(self) -> Later:
+        """Return the sending of the selected sources, as they are now."""
+        if not self._is_here:
+            raise InputError(
+                "programs are reached where plateviz runs only, and this page is read on another "
+                "machine or through a proxy; Save, VOTable is a file for them"
+            )
+        make, name = selected_places(self._navigation), selection_name(self._navigation)
+        return Later(lambda _: Done(self._sender.send(make(), name)))
 
     def _clear(self) -> None:
         self._session.select_sources(frozenset())
@@ -139,3 +142,12 @@ def words(n_selected: int, n_in_orbit: int, is_orbit: bool) -> str:
     if is_orbit and n_in_orbit < n_selected:
         text += f", {n_in_orbit:,} of them in this orbit" if n_in_orbit else ", none in this orbit"
     return text
+
+
+def is_read_here() -> bool:
+    """Return whether the page of this session is read on the machine that serves it."""
+    context: Any = getattr(pn.state.curdoc, "session_context", None)
+    if context is None or context.request is None:
+        return False
+    request = context.request
+    return is_same_machine(request.remote_ip or "", dict(request.headers))

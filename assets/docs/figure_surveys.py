@@ -17,12 +17,8 @@ from plateviz.runs.queries import SurveyRun, open_run
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from solver.data.schema import MEASUREMENT
 from solver.data.settings import FitSettings
-from solver.io.survey import (
-    MANIFEST,
-    measurement_path,
-    read_survey_table,
-    write_survey_table,
-)
+from solver.io.survey import measurement_path, read_survey_table, write_survey_table
+from solver.io.survey_manifest import MANIFEST
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey

@@ -35,15 +35,21 @@ Progress = Callable[[int, int], None]
 """Function that takes the number of parts that are done, and of all parts."""
 
 
+class Done(NamedTuple):
+    """What was done instead of making a file, in words."""
+
+    words: str
+
+
 class Later(NamedTuple):
-    """A file that takes seconds to make; it is made on a thread.
+    """A file that takes seconds to make, or something else that does; it is done on a thread.
 
     Attributes
     ----------
-    make : makes it
+    make : does it
     """
 
-    make: Callable[[Progress], Download]
+    make: Callable[[Progress], Download | Done]
 
 
 def as_file(tables: Mapping[str, Table], stem: str, suffix: str) -> Download:

@@ -22,14 +22,13 @@ from solver.io.parquet import count_rows
 from solver.io.survey import (
     EXPOSURES,
     HEADER,
-    MANIFEST,
     MEASUREMENTS,
-    listed_files,
     measurement_path,
     read_header,
     read_survey_table,
     survey_orbits,
 )
+from solver.io.survey_manifest import MANIFEST, listed_files
 
 _NUMBERED = re.compile(r"orbit=(\d+)\.parquet")
 

@@ -28,7 +28,8 @@ from solver.io.atomic import write_atomically
 from solver.io.disk import size_text
 from solver.io.lock import locked
 from solver.io.parquet import write_parquet
-from solver.io.survey import survey_changes, survey_orbits
+from solver.io.survey import survey_orbits
+from solver.io.survey_manifest import survey_changes
 from solver.io.table_check import refuse
 from solver.model.apparent_motion import julian_year
 from solver.results.time_series import errors_by_count, motion_table

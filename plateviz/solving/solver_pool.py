@@ -39,6 +39,10 @@ class Solver(Protocol):
         """Send a request for preparations, which give way to every job."""
         ...
 
+    def hurry(self) -> bool:
+        """Let processes do at once what they have put off; return whether there is a process."""
+        ...
+
     def cancel(self, job: Job) -> None:
         """Cancel a job that waits or runs."""
         ...
@@ -83,6 +87,12 @@ class SolverPool:
             queue = self._warm.get(_orbit(request), self._queues[0])
             self._warm[_orbit(request)] = queue
         queue.prepare(request)
+
+    def hurry(self) -> bool:
+        """Let processes do at once what they have put off; return whether there is a process."""
+        with self._lock:
+            queues = list(self._queues)
+        return any([queue.hurry() for queue in queues])
 
     def cancel(self, job: Job) -> None:
         """Cancel a job that waits or runs."""

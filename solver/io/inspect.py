@@ -18,7 +18,8 @@ from solver.io.fits import read_fits
 from solver.io.formats import has_reader, is_fits, place, read_tables
 from solver.io.read_orbit import names_of
 from solver.io.result import is_result, to_result
-from solver.io.survey import read_header, section, survey_changes
+from solver.io.survey import read_header, section
+from solver.io.survey_manifest import survey_changes
 from solver.io.table_check import examine, matched_names
 
 _INPUTS = (MEASUREMENT, ENVIRONMENT, CATALOGUE, TRUTH)

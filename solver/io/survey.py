@@ -15,7 +15,6 @@ by orbits that `solver.io.survey_growth` adds.
 
 import hashlib
 import re
-import time
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -29,17 +28,14 @@ from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
 from solver.data.toml import parse_toml, toml_text
 from solver.errors import InputError
-from solver.io.atomic import sha256_of, write_atomically
+from solver.io.atomic import write_atomically
 from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
 from solver.io.manifest import (
-    changes,
     manifest_of,
-    read_manifest,
-    require_digest,
-    require_unchanged,
 )
 from solver.io.parquet import write_parquet
 from solver.io.read_orbit import find_catalogue
+from solver.io.survey_manifest import MANIFEST, listed_files, require_unchanged_files
 from solver.io.table_check import conform, refuse
 
 FORMAT = 1
@@ -49,15 +45,8 @@ TRUTH_FILE = "truth.parquet"
 EXPOSURES = "exposures.parquet"
 MEASUREMENTS = "measurements"
 DEFECTS = "defects"
-MANIFEST = "manifest.sha256"
-REMEDY = (
-    f"restore it from a copy, or simulate the survey again; if it was changed on purpose, delete "
-    f"{MANIFEST}"
-)
 
 _ORBIT_FILE = re.compile(r"orbit=(\d{4}|[1-9]\d{4,})\.parquet")
-# An orbit that is added replaces the exposures a moment before the manifest.
-_ADDING_SECONDS = 0.1
 
 
 def measurement_path(directory: Path, orbit_id: int) -> Path:
@@ -109,7 +98,7 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
     paths = [measurement_path(directory, orbit_id), directory / REFERENCE, directory / EXPOSURES]
     if has_survey_table(directory, TRUTH_FILE):
         paths.append(directory / TRUTH_FILE)
-    provenance = _require_unchanged(directory, paths)
+    provenance = require_unchanged_files(directory, paths)
     measurements, catalogue, exposures = (
         _read_table(path, schema)
         for path, schema in zip(paths, (MEASUREMENT, CATALOGUE, ENVIRONMENT), strict=False)
@@ -149,44 +138,6 @@ def write_manifest(directory: Path, content: Mapping[str, object]) -> None:
         path.write_text(f"{manifest_of(directory, names)}{header}  {HEADER}\n", encoding="utf-8")
 
 
-def listed_files(directory: Path) -> dict[str, str]:
-    """Return name -> SHA-256 of the files that the manifest lists; none without a manifest.
-
-    Raises
-    ------
-    InputError
-        If the manifest cannot be read.
-    """
-    manifest = directory / MANIFEST
-    return read_manifest(manifest) if manifest.is_file() else {}
-
-
-def survey_changes(directory: Path) -> list[str]:
-    """Return a message for each file of a survey that is not as it was written."""
-    manifest = directory / MANIFEST
-    return list(changes(directory, manifest, REMEDY)) if manifest.is_file() else []
-
-
-def _require_unchanged(directory: Path, paths: list[Path]) -> dict[str, str]:
-    """Return name -> SHA-256 of files; InputError if a manifest has others."""
-    try:
-        return _unchanged(directory, paths)
-    except InputError:
-        time.sleep(_ADDING_SECONDS)
-        return _unchanged(directory, paths)
-
-
-def _unchanged(directory: Path, paths: list[Path]) -> dict[str, str]:
-    wanted, found = listed_files(directory), {}
-    for path in paths:
-        name = path.relative_to(directory).as_posix()
-        if not path.is_file():
-            require_unchanged(path, wanted.get(name), REMEDY)
-        found[name] = sha256_of(path)
-        require_digest(path, found[name], wanted.get(name), REMEDY)
-    return found
-
-
 def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
     """Return the content of a survey's header.
 
@@ -201,7 +152,7 @@ def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
     """
     path = Path(directory) / name
     if name == HEADER and path.is_file():
-        _require_unchanged(Path(directory), [path])
+        require_unchanged_files(Path(directory), [path])
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
@@ -259,7 +210,7 @@ def read_survey_table(path: Path, schema: Table) -> pd.DataFrame:
         schema.
     """
     path = Path(path)
-    _require_unchanged(path.parents[path.parent.name in (MEASUREMENTS, DEFECTS)], [path])
+    require_unchanged_files(path.parents[path.parent.name in (MEASUREMENTS, DEFECTS)], [path])
     return _read_table(path, schema)
 
 

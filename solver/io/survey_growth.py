@@ -16,14 +16,13 @@ from solver.io.read_orbit import find_catalogue
 from solver.io.scratch import scratch_beside
 from solver.io.survey import (
     EXPOSURES,
-    MANIFEST,
     REFERENCE,
-    listed_files,
     measurement_path,
     read_header,
     read_survey_table,
     write_survey_table,
 )
+from solver.io.survey_manifest import MANIFEST, listed_files
 from solver.io.table_check import conform, refuse
 
 

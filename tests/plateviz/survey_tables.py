@@ -103,7 +103,8 @@ def _truth(
             "is_artificial": artificial,
         }
     )
-    return table.assign(**{f"{name}_error": 0.02 for name in _ASTROMETRY})[schema.TRUTH.names]
+    errors = {f"{name}_error": 0.02 for name in _ASTROMETRY}
+    return table.assign(magnitude=np.nan, **errors)[schema.TRUTH.names]
 
 
 def _catalogue(random: np.random.Generator, truth: pd.DataFrame) -> pd.DataFrame:

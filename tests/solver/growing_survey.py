@@ -8,7 +8,6 @@ from solver.io.manifest import manifest_of
 from solver.io.survey import (
     EXPOSURES,
     HEADER,
-    MANIFEST,
     REFERENCE,
     TRUTH_FILE,
     measurement_path,
@@ -17,6 +16,7 @@ from solver.io.survey import (
     write_survey_table,
 )
 from solver.io.survey_growth import append_orbit
+from solver.io.survey_manifest import MANIFEST
 
 
 class GrowingSurvey:

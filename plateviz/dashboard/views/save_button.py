@@ -38,6 +38,7 @@ class SaveButton(pn.custom.JSComponent):
     """
 
     text = param.String(default="Save", doc="what the button says")
+    done = param.String(default="saved", doc="what the button does, as a participle")
     title = param.String(doc="what is saved, in a few words")
     theme = param.Selector(default="light", objects=["light", "dark"])
     labels = param.List(item_type=str, doc="the choices in order")
@@ -82,7 +83,7 @@ class SaveButton(pn.custom.JSComponent):
       const menu = document.createElement("div")
       const words = document.createElement("p")
       button.type = "button"
-      const { text, title, place, labels } = model
+      const { text, title, place, labels, done } = model
       button.textContent = { line: `\\u2913 ${text}`, corner: "\\u2913", bar: text }[place]
       button.title = text
       button.setAttribute("aria-label", `${text}: ${title}`)
@@ -96,7 +97,11 @@ class SaveButton(pn.custom.JSComponent):
       const say = text => { words.textContent = text; words.hidden = !text }
       show(false)
       say("")
-      const ask = label => { show(false); say("Being made \\u2026"); model.send_msg(label) }
+      const ask = label => {
+        show(false)
+        say(`Being ${done} \\u2026`)
+        model.send_msg(label)
+      }
       for (const label of labels) {
         const entry = document.createElement("button")
         entry.type = "button"
@@ -180,7 +185,7 @@ class SaveButton(pn.custom.JSComponent):
         try:
             made = make()
         except InputError as error:
-            self._send_msg({"words": f"It could not be saved: {error}."})
+            self._send_msg({"words": f"It could not be {self.done}: {error}."})
             return
         if isinstance(made, Later):
             self._begin(made)
@@ -192,7 +197,7 @@ class SaveButton(pn.custom.JSComponent):
     def _begin(self, later: Later) -> None:
         """Make a file on a thread, unless one is being made."""
         if self._is_making:
-            self._send_msg({"words": "The one before is still being made."})
+            self._send_msg({"words": "The one before is not done yet."})
             return
         self._is_making = True
         work = partial(self._make, later, pn.state.curdoc)
@@ -207,14 +212,15 @@ class SaveButton(pn.custom.JSComponent):
                 document.add_next_tick_callback(partial(self._send_msg, message))
 
         def progress(done: int, total: int) -> None:
-            send({"words": f"Being made \u2026 {done} of {total}"})
+            send({"words": f"Being {self.done} \u2026 {done} of {total}"})
 
-        message: dict[str, object] = {"words": "It could not be made; the server's log says why."}
+        could_not = f"It could not be {self.done}"
+        message: dict[str, object] = {"words": f"{could_not}; the server's log says why."}
         try:
             made = later.make(progress)
-            message = {"name": made.name, "content": made.content}
+            message = made._asdict()
         except InputError as error:
-            message = {"words": f"It could not be made: {error}."}
+            message = {"words": f"{could_not}: {error}."}
         finally:
             self._is_making = False
             send(message)

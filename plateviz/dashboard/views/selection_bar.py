@@ -1,26 +1,29 @@
 """SelectionBar: what is selected, and what can be done with it."""
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
-import numpy as np
 import panel as pn
 import panel_material_ui as pmui
-from astropy.table import Table
 
-from plateviz.dashboard.downloads import described, rows_of
-from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.downloads import Done, Later
+from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.same_machine import is_same_machine
 from plateviz.dashboard.selected import KINDS, Selected
+from plateviz.dashboard.selected_tables import (
+    is_of_orbit,
+    selected_places,
+    selected_tables,
+    selection_name,
+)
 from plateviz.dashboard.selection_actions import SelectionActions
+from plateviz.dashboard.table_sender import TableSender
 from plateviz.dashboard.views.kept_selections import KeptSelections
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.dashboard.views.selection_list import SelectionList
-from plateviz.tables.explore import (
-    explorable_exposures,
-    explorable_measurements,
-    explorable_sources,
-)
-from solver.data.survey_schema import MOTIONS
+from solver.errors import InputError
 
 _IN_THE_BAR = {"color": "inherit", "textTransform": "none", "whiteSpace": "nowrap", "minWidth": 0}
 
@@ -42,6 +45,9 @@ class SelectionBar(pn.viewable.Viewer):
         self._row = pmui.Row(margin=0, sx={"alignItems": "center"})
         self.windows = pmui.Column(margin=0)
         self._parts: list[pn.viewable.Viewable] = []
+        self._is_here, self._sender = is_read_here(), TableSender()
+        if pn.state.curdoc is not None:
+            pn.state.on_session_destroyed(lambda _: self._sender.close())
         self._session.selection.param.watch(self._show, [*KINDS, "kept"])
         self._session.choices.param.watch(self._show, "exclusions")
         self._session.param.watch(self._show, ["shown", "theme"])
@@ -59,8 +65,16 @@ class SelectionBar(pn.viewable.Viewer):
         self._open = self._button("Open", self._open_source)
         self._leave_out = self._button("Leave out of the fit", actions.leave_out)
         self._put_back = self._button("Put back into the fit", actions.put_back)
-        self._save = SaveButton(
-            "selection", table_choices(self._subject, self._tables), place="bar"
+        choices = table_choices(
+            partial(selection_name, self._navigation), partial(selected_tables, self._navigation)
+        )
+        self._save = SaveButton("selection", choices, place="bar")
+        self._send_button = SaveButton(
+            "selected sources to TOPCAT or DS9",
+            {"SAMP": self._send},
+            place="bar",
+            text="Send",
+            done="sent",
         )
         self._invert = self._button("Invert", actions.invert)
         self._keep = self._button("Keep", self._kept.open)
@@ -72,6 +86,7 @@ class SelectionBar(pn.viewable.Viewer):
             self._put_back,
             self._invert,
             self._save,
+            self._send_button,
             self._keep,
             self._button("Clear", actions.clear),
         ]
@@ -91,7 +106,7 @@ class SelectionBar(pn.viewable.Viewer):
             return
         if not self._parts:
             self._make()
-        is_orbit, is_left_out = self._is_of_orbit, self._actions.is_left_out
+        is_orbit, is_left_out = is_of_orbit(self._navigation), self._actions.is_left_out
         in_orbit = self._actions.in_orbit if is_orbit else None
         self._words.object = words(selected, in_orbit)
         is_source = selected.kinds == ["sources"] and len(selected.sources) == 1
@@ -99,8 +114,9 @@ class SelectionBar(pn.viewable.Viewer):
         self._leave_out.visible = is_orbit and not is_left_out
         self._put_back.visible = is_orbit and is_left_out
         self._invert.visible = is_orbit
+        self._send_button.visible = bool(selected.sources)
         self._keep.label = "Keep" if selected else "Kept selections"
-        self._save.theme = session.theme
+        self._save.theme = self._send_button.theme = session.theme
         self._list.show()
         shown = self._parts if selected else [self._keep]
         if list(self._row) != shown:
@@ -110,38 +126,15 @@ class SelectionBar(pn.viewable.Viewer):
         (source,) = self._session.selection.sources
         self._navigation.open_source(str(source))
 
-    @property
-    def _is_of_orbit(self) -> bool:
-        return self._navigation.view is View.ORBIT and self._session.shown is not None
-
-    def _subject(self) -> str:
-        of = (
-            self._session.selection.subject()
-            if self._is_of_orbit
-            else f"run-{self._navigation.run_name}"
-        )
-        return f"{of}-selection"
-
-    def _tables(self) -> dict[str, Table]:
-        """Return what is selected and its measurements, or the motions of sources in the run."""
-        shown, run = self._session.shown, self._navigation.run
-        selected = self._session.selection.selected
-        if self._is_of_orbit and shown is not None:
-            result = shown.result
-            sources, exposures = explorable_sources(result), explorable_exposures(result)
-            is_selected = np.isin(sources.read("source_id"), list(selected.sources))
-            tables = {
-                "sources": rows_of(sources, is_selected),
-                "exposures": rows_of(exposures, selected.chosen(result.exposures)),
-                "measurements": rows_of(
-                    explorable_measurements(result), selected.chosen(result.residuals)
-                ),
-            }
-            return {name: table for name, table in tables.items() if len(table)}
-        if run is None:
-            return {}
-        rows = run.motions() if run.is_gathered else run.counts()
-        return {"sources": described(rows[rows["source_id"].isin(selected.sources)], MOTIONS)}
+    def _send(self) -> Later:
+        """Return the sending of the selected sources, as they are now."""
+        if not self._is_here:
+            raise InputError(
+                "programs are reached where plateviz runs only, and this page is read on another "
+                "machine or through a proxy; Save, VOTable is a file for them"
+            )
+        make, name = selected_places(self._navigation), selection_name(self._navigation)
+        return Later(lambda _: Done(self._sender.send(make(), name)))
 
 
 def words(selected: Selected, in_orbit: Selected | None) -> str:
@@ -158,3 +151,12 @@ def words(selected: Selected, in_orbit: Selected | None) -> str:
     return (
         f"{text}, {in_orbit.words()} in this orbit" if in_orbit else f"{text}, none in this orbit"
     )
+
+
+def is_read_here() -> bool:
+    """Return whether the page of this session is read on the machine that serves it."""
+    context: Any = getattr(pn.state.curdoc, "session_context", None)
+    if context is None or context.request is None:
+        return False
+    request = context.request
+    return is_same_machine(request.remote_ip or "", dict(request.headers))

@@ -85,17 +85,17 @@ class CaseSettings(Protocol):
     @property
     def seed(self) -> int:
         """Seed of the survey."""
-        raise NotImplementedError
+        ...
 
     @property
     def target_deg(self) -> tuple[float, float]:
         """Galactic coordinates of the target."""
-        raise NotImplementedError
+        ...
 
     @property
     def pair_spread_deg(self) -> float:
         """Half width of the square around the target that the fields cover."""
-        raise NotImplementedError
+        ...
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from astropy.io import fits
 
 from solver.io.parquet import read_frame, write_parquet
 from solver.io.result import read_result
-from solver.io.survey import MANIFEST, REFERENCE, measurement_path
+from solver.io.survey import REFERENCE, measurement_path
+from solver.io.survey_manifest import MANIFEST
 
 
 @pytest.fixture

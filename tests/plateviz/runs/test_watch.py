@@ -18,12 +18,12 @@ from solver.errors import FitError, InputError
 from solver.io.lock import locked
 from solver.io.survey import (
     EXPOSURES,
-    MANIFEST,
     REFERENCE,
     read_survey_orbit,
     read_survey_table,
     write_survey_table,
 )
+from solver.io.survey_manifest import MANIFEST
 from tests.solver.growing_survey import GrowingSurvey
 
 ONCE = Ends(at_once=True)

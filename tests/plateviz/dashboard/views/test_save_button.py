@@ -75,8 +75,8 @@ def test_file_that_takes_long_is_made_on_a_thread_and_one_at_a_time(sent, monkey
     may_end.set()
     until(lambda: {"name": "a.html", "content": b"x"} in sent)
     assert sent[:2] == [
-        {"words": "Being made … 1 of 2"},
-        {"words": "The one before is still being made."},
+        {"words": "Being saved … 1 of 2"},
+        {"words": "The one before is not done yet."},
     ]
     assert threads[0] is not threading.main_thread()
     until(lambda: not button._is_making)
@@ -90,7 +90,7 @@ def test_file_that_cannot_be_made_is_told(sent, monkeypatch):
 
     monkeypatch.setattr(type(pn.state), "curdoc", Page())
     SaveButton("A report", {"HTML": lambda: Later(fail)})._handle_msg("HTML")
-    until(lambda: sent == [{"words": "It could not be made: orbits are missing."}])
+    until(lambda: sent == [{"words": "It could not be saved: orbits are missing."}])
 
 
 def until(holds):

@@ -1,12 +1,18 @@
 """SelectionBar: the selection in words, what is saved of it, and what it offers."""
 
+from types import SimpleNamespace
+
 import numpy as np
+import panel as pn
 import pytest
 
 from plateviz.dashboard.navigation import View
 from plateviz.dashboard.selected import NOTHING, Selected
+from plateviz.dashboard.selected_tables import selected_tables
+from plateviz.dashboard.table_sender import TableSender
 from plateviz.dashboard.views.calibration import CalibrationView
-from plateviz.dashboard.views.selection_bar import SelectionBar, words
+from plateviz.dashboard.views.selection_bar import SelectionBar, is_read_here, words
+from solver.errors import InputError
 
 SOURCES = Selected(frozenset(range(132)))
 MIXED = Selected(frozenset(range(132)), frozenset({(0, 3)}))
@@ -55,10 +61,9 @@ def test_bar_offers_what_can_be_done(navigation, session):
 
 
 def test_all_measurements_of_what_is_selected_are_saved(navigation, session, fit_result):
-    bar = SelectionBar(navigation)
     source = int(fit_result.sources["source_id"].iloc[3])
     session.selection.select(Selected(frozenset({source}), frozenset({(0, 1)}), frozenset({2})))
-    tables = bar._tables()
+    tables = selected_tables(navigation)
     rows = fit_result.residuals
     expected = (
         (rows["source_id"] == source)
@@ -82,3 +87,34 @@ def test_rows_of_the_calibration_tables_select_and_are_selected(session, fit_res
     label = exposures.value["element"].iloc[2]
     assert label == "field {} plate {}".format(*keys[1])
     assert np.all(detectors.value["element"] == [f"detector {n}" for n in range(4)])
+
+
+@pytest.fixture
+def bar(navigation, session, fit_result):
+    made = SelectionBar(navigation)
+    ids = fit_result.sources["source_id"].iloc[:2].tolist()
+    session.selection.select_sources(frozenset(ids))
+    return made
+
+
+def test_sources_are_sent_from_a_page_on_this_machine(bar, monkeypatch):
+    sent = []
+    monkeypatch.setattr(TableSender, "send", lambda _, *what: sent.append(what) or "2 sent.")
+    bar._is_here = True
+    assert bar._send().make(print).words == "2 sent."
+    ((table, name),) = sent
+    assert (len(table), name) == (2, "orbit-0-selection")
+
+
+def test_page_on_another_machine_says_why_nothing_is_sent(bar):
+    # There is no request, so that nothing says that the page is read here.
+    with pytest.raises(InputError, match="on another machine or through a proxy; Save, VOTable"):
+        bar._send()
+
+
+def test_request_of_a_session_tells_where_its_page_is_read(monkeypatch):
+    for address, is_here in (("127.0.0.1", True), ("192.0.2.7", False)):
+        request = SimpleNamespace(remote_ip=address, headers={"Host": "localhost:5006"})
+        document = SimpleNamespace(session_context=SimpleNamespace(request=request))
+        monkeypatch.setattr(type(pn.state), "curdoc", document)
+        assert is_read_here() is is_here

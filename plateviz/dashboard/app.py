@@ -11,6 +11,8 @@ from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.page_request import WINDOW
+from plateviz.dashboard.rooms import Rooms, Window, window_from
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.figure import Part
 from plateviz.dashboard.views.keyboard import Keyboard
@@ -22,13 +24,21 @@ from plateviz.solving.solution_store import SolutionStore
 _TICK_MILLISECONDS = 30
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
+# Figures that are drawn before the page is shown, if their rooms are known.
+_FIRST_FIGURES = 1
 _SIDEBAR_WIDTH = 300
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
 
-def build_app(store: SolutionStore) -> pmui.Page:
-    """Return the page of one session over `store`."""
-    navigation, ticker, pages = _pages(store)
+def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
+    """Return the page of one session over `store`.
+
+    Parameters
+    ----------
+    rooms : of the cards of earlier pages, with which the first figures are drawn at once
+    """
+    window = _window()
+    navigation, ticker, pages = _pages(store, window, rooms)
     session = navigation.session
     bar, system = SelectionBar(navigation), SystemTheme()
     page = empty_page(
@@ -42,7 +52,11 @@ def build_app(store: SolutionStore) -> pmui.Page:
     with param.edit_constant(page):
         page.busy = False
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
+    if window is not None:
+        page.dark_theme = system.is_dark = window.is_dark
     _set_theme(session, page.dark_theme)
+    for _ in range(_FIRST_FIGURES):
+        pages.draw_due()
     system.param.watch(lambda event: page.param.update(dark_theme=event.new), "is_dark")
     _write_address(navigation)
     if pn.state.curdoc is not None:
@@ -75,11 +89,13 @@ def build_part(store: SolutionStore) -> pn.Row:
     return pn.Row(sidebar, main, sizing_mode="stretch_width")
 
 
-def _pages(store: SolutionStore) -> tuple[Navigation, "_Ticker", Pages]:
+def _pages(
+    store: SolutionStore, window: Window | None = None, rooms: Rooms | None = None
+) -> tuple[Navigation, "_Ticker", Pages]:
     navigation, ticker = Navigation(Session(store)), _Ticker()
     navigation.begin(_arguments())
     pn.state.on_session_destroyed(lambda _: navigation.session.close())
-    return navigation, ticker, Pages(navigation, ticker.wake)
+    return navigation, ticker, Pages(navigation, ticker.wake, window, rooms)
 
 
 def _prepare(document: Document) -> None:
@@ -94,6 +110,12 @@ def _prepare(document: Document) -> None:
 def _arguments() -> dict[str, str]:
     # Invalid UTF-8 is replaced; the result is no valid selection and is ignored.
     return {k: v[0].decode("utf-8", "replace") for k, v in pn.state.session_args.items()}
+
+
+def _window() -> Window | None:
+    """Return the window of the browser, if its page has told of it."""
+    context = pn.state.curdoc.session_context if pn.state.curdoc is not None else None
+    return None if context is None else window_from(context.token_payload.get(WINDOW))
 
 
 def _write_address(navigation: Navigation) -> None:

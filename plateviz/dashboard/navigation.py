@@ -216,7 +216,7 @@ class Navigation(param.Parameterized):
         """Return the solution of an orbit in the run, None if it has none."""
         if self.run is None or orbit is None or not self.run.has_fitted(orbit):
             return None
-        return self.run.result(orbit)
+        return self.session.store.run_result(self.run, orbit)
 
     def _begin_run(self, *_: object) -> None:
         self.written = None

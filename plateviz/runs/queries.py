@@ -204,6 +204,10 @@ class SurveyRun:
         path = kept_table(self._run.orbit_directory(orbit), "residuals", self._unchanged)
         return read_frame(path, rows=rows)
 
+    def orbit_directory(self, orbit: int) -> Path:
+        """Directory of one fitted orbit; it need not exist."""
+        return self._run.orbit_directory(orbit)
+
     def result(self, orbit: int) -> FitResult:
         """Return one fitted orbit; InputError if it does not exist."""
         return read_fitted_orbit(self._run.orbit_directory(orbit))

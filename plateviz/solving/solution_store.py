@@ -39,6 +39,7 @@ class SolutionStore:
             self._folder = ScratchFolder(temporary, "plateviz")
         self._scratch = self._folder.path
         self._read = lru_cache(maxsize=16)(read_fitted_orbit)
+        self._read_of_run = lru_cache(maxsize=8)(lambda directory, *_: read_fitted_orbit(directory))
 
     @property
     def title(self) -> str:
@@ -94,6 +95,16 @@ class SolutionStore:
         """Return a solution that was requested before and is complete, else None."""
         directory = self._directory(orbit, settings, what_if)
         return self._read(directory) if is_complete(directory) else None
+
+    def run_result(self, run: SurveyRun, orbit: int) -> FitResult:
+        """Return a fitted orbit of a run; pages that show the same one share it."""
+        directory = run.orbit_directory(orbit)
+        try:
+            status = directory.stat()
+        except OSError:
+            return run.result(orbit)
+        # An orbit is never changed in place; one that replaces it is another directory.
+        return self._read_of_run(directory, status.st_ino, status.st_mtime_ns)
 
     def close(self) -> None:
         """End the solver process and remove the scratch folder."""

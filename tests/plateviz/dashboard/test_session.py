@@ -48,6 +48,9 @@ class FakeStore:
     def result(self, orbit, settings, what_if=False):
         return self._result
 
+    def run_result(self, run, orbit):
+        return run.result(orbit)
+
 
 @pytest.fixture
 def session(fit_result):

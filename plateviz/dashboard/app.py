@@ -11,6 +11,8 @@ from panel.io.resources import get_dist_path
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation
+from plateviz.dashboard.page_request import WINDOW
+from plateviz.dashboard.rooms import Rooms, Window, window_from
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.address_bar import AddressBar
@@ -27,13 +29,21 @@ from plateviz.solving.solution_store import SolutionStore
 _PROGRESS_MILLISECONDS = 250
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
+# Figures that are drawn before the page is shown, if their rooms are known.
+_FIRST_FIGURES = 1
 _SIDEBAR_WIDTH = 300
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
 
-def build_app(store: SolutionStore) -> pmui.Page:
-    """Return the page of one session over `store`."""
-    navigation, ticker, pages = _pages(store)
+def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
+    """Return the page of one session over `store`.
+
+    Parameters
+    ----------
+    rooms : of the cards of earlier pages, with which the first figures are drawn at once
+    """
+    window = _window()
+    navigation, ticker, pages = _pages(store, window, rooms)
     session = navigation.session
     bar, system = SelectionBar(navigation), SystemTheme()
     header = [
@@ -54,7 +64,11 @@ def build_app(store: SolutionStore) -> pmui.Page:
     with param.edit_constant(page):
         page.busy = False
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
+    if window is not None:
+        page.dark_theme = system.is_dark = window.is_dark
     _set_theme(session, page.dark_theme)
+    for _ in range(_FIRST_FIGURES):
+        pages.draw_due()
     system.param.watch(lambda event: page.param.update(dark_theme=event.new), "is_dark")
     if pn.state.curdoc is not None and pn.state.location is not None:
         # Panel reads the location when it is first asked for, and with it writes a path from the
@@ -88,11 +102,13 @@ def build_part(store: SolutionStore) -> pn.Row:
     return pn.Row(sidebar, main, sizing_mode="stretch_width")
 
 
-def _pages(store: SolutionStore) -> tuple[Navigation, "_Ticker", Pages]:
+def _pages(
+    store: SolutionStore, window: Window | None = None, rooms: Rooms | None = None
+) -> tuple[Navigation, "_Ticker", Pages]:
     navigation, ticker = Navigation(Session(store)), _Ticker()
     navigation.begin(_arguments())
     pn.state.on_session_destroyed(lambda _: navigation.session.close())
-    return navigation, ticker, Pages(navigation, ticker.wake)
+    return navigation, ticker, Pages(navigation, ticker.wake, window, rooms)
 
 
 def _prepare(document: Document) -> None:
@@ -107,6 +123,13 @@ def _prepare(document: Document) -> None:
 def _arguments() -> dict[str, str]:
     # Invalid UTF-8 is replaced; the result is no valid selection and is ignored.
     return {k: v[0].decode("utf-8", "replace") for k, v in pn.state.session_args.items()}
+
+
+def _window() -> Window | None:
+    """Return the window of the browser, if its page has told of it."""
+    context = pn.state.curdoc.session_context if pn.state.curdoc is not None else None
+    # A page that Panel makes elsewhere has no token.
+    return window_from(getattr(context, "token_payload", {}).get(WINDOW))
 
 
 class _Ticker:

@@ -30,6 +30,7 @@ REQUESTS = Rate(at_once=3000, per_second=200)
 MESSAGES = Rate(at_once=6000, per_second=600)
 # A session takes a second of the server's time to make, and ten MB of its memory for a while.
 OPENINGS = Rate(at_once=60, per_second=1)
+TOO_MANY_OPENED = "too many pages opened from this address; try again in a minute"
 
 
 class RateLimit:
@@ -103,7 +104,12 @@ class PageLimit:
 
 
 class Limits:
-    """The limits of one server."""
+    """The limits of one server.
+
+    Attributes
+    ----------
+    latest : when the latest request has come, as from `time.monotonic`
+    """
 
     def __init__(self, pages: PageLimit, is_proxied: bool = False) -> None:
         """Begin without clients.
@@ -115,7 +121,17 @@ class Limits:
         self.pages = pages
         self.requests, self.messages = RateLimit(REQUESTS), RateLimit(MESSAGES)
         self.openings = RateLimit(OPENINGS)
+        self.latest = 0.0
         self._is_proxied = is_proxied
+
+    def may_ask(self, client: str | None) -> bool:
+        """Count a request of a client; return whether it is to be answered."""
+        self.latest = time.monotonic()
+        return client is None or self.requests.allows(client)
+
+    def may_open(self, client: str | None) -> bool:
+        """Count a session that a client asks for; return whether it may have it."""
+        return client is None or self.openings.allows(client)
 
     def client_of(self, request: HTTPServerRequest) -> str | None:
         """Return the address of a client; None if only its proxy knows it."""

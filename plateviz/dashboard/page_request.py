@@ -4,7 +4,11 @@ Bokeh and Panel make a whole session for each request of a page, whoever sends i
 not anything follows. Here the session is made when the page opens its websocket.
 """
 
+import asyncio
+import json
+import re
 import secrets
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -12,14 +16,30 @@ from typing import Any, cast
 import panel_material_ui as pmui
 from bokeh.document import Document
 from bokeh.server.session import ServerSession
-from bokeh.util.token import generate_jwt_token, generate_session_id
+from bokeh.util.token import (
+    generate_jwt_token,
+    generate_session_id,
+    get_session_id,
+    get_token_payload,
+)
 from panel.io.resources import Resources
 from panel.io.server import DocHandler, server_html_page_for_session
 from tornado.web import Application, RequestHandler, authenticated
 
 from plateviz.dashboard.limits import Limits
+from plateviz.dashboard.websocket import is_valid_token
+
+WINDOW = "window"
+"""Name under which a session's token has the window of its browser, see `rooms.window_from`."""
 
 _FULL = Path(__file__).with_name("full.html")
+_BEGIN = Path(__file__).with_name("begin.js")
+# The script that loads components.
+_LOADER = re.compile(r"<script[^>]*/es-module-shims[^>]*></script>")
+_MOST_BYTES = 2**16
+# A page asks for its files within so long of each other, and within so long in all.
+_QUIET_SECONDS = 0.03
+_MOST_SECONDS = 0.3
 
 
 class PageHandler(DocHandler):
@@ -56,9 +76,63 @@ class PageHandler(DocHandler):
         return generate_jwt_token(
             generate_session_id(**key),
             expiration=own.session_token_expiration,
-            extra_payload={"arguments": self.request.arguments, "app_path": "/"},
+            extra_payload={
+                "arguments": self.request.arguments,
+                "query": self.request.query,
+                "app_path": "/",
+            },
             **key,
         )
+
+
+class SessionHandler(DocHandler):
+    """Makes the session of a page that loads its scripts, before it connects."""
+
+    def initialize(self, limits: Limits, **_: object) -> None:
+        """Take the limits of sessions."""
+        self._limits = limits
+
+    @authenticated
+    async def post(self, *_: object, **__: object) -> None:
+        """Make a session for a valid token, with what the page tells of its window."""
+        token, window = self._told()
+        if not is_valid_token(token, self.application):
+            self.set_status(403)
+            return
+        client = self._limits.client_of(self.request)
+        if self._limits.pages.reason(client) or not self._limits.may_open(client):
+            self.set_status(429)
+            return
+        await self._quiet()
+        own = self.application
+        payload = get_token_payload(token)
+        left = payload.pop("session_expiry") - int(time.time())
+        session = get_session_id(token)
+        token = generate_jwt_token(
+            session,
+            secret_key=own.secret_key,
+            signed=own.sign_sessions,
+            expiration=max(left, 1),
+            extra_payload={**payload, WINDOW: window},
+        )
+        self.request.path = f"{own.prefix}/"
+        self.request.uri = f"{own.prefix}/?{payload['query']}"
+        await self.application_context.create_session_if_needed(session, self.request, token)
+        self.set_status(204)
+
+    async def _quiet(self) -> None:
+        """Let the files of the page go first, which the browser runs meanwhile."""
+        end = time.monotonic() + _MOST_SECONDS
+        while time.monotonic() < min(end, self._limits.latest + _QUIET_SECONDS):
+            await asyncio.sleep(_QUIET_SECONDS / 2)
+
+    def _told(self) -> tuple[str, object]:
+        """Return the token and the window of a request; nothing of what is not well-formed."""
+        try:
+            told = json.loads(self.request.body[:_MOST_BYTES])
+            return str(told["token"]), told[WINDOW]
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return "", None
 
 
 class NoScript(RequestHandler):
@@ -76,6 +150,8 @@ class EmptyPage:
         """Write the HTML around the contents of `page`."""
         sample, document = Document(), Document()
         page.server_doc(sample, location=False)
+        # The file of all components, which the page would only find in its session.
+        components = str(page._render_esm(server=True))  # noqa: SLF001 a test notices a change
         document.title, document.template = sample.title, sample.template
         document.template_variables.update(sample.template_variables)
         sample.clear()
@@ -88,11 +164,16 @@ class EmptyPage:
             template=document.template,
             template_variables=document.template_variables,
         )
-        self._before, self._after = html.split(token)
+        begin = _BEGIN.read_text(encoding="utf-8").replace('"TOKEN"', json.dumps(token))
+        link = f'<link rel="preload" as="fetch" crossorigin href="{components}">'
+        html = html.replace("</title>", f"</title>\n{link}\n<script>{begin}</script>", 1)
+        load = f"window.importShim?.({json.dumps(components)}).catch(() => {{}})"
+        html = _LOADER.sub(lambda found: f"{found[0]}\n<script>{load}</script>", html, count=1)
+        self._parts = html.split(token)
 
     def with_token(self, token: str) -> str:
         """Return the HTML for one request."""
-        return f"{self._before}{token}{self._after}"
+        return token.join(self._parts)
 
 
 def send_empty_pages(application: Application, page: pmui.Page, limits: Limits) -> None:
@@ -115,6 +196,7 @@ def send_empty_pages(application: Application, page: pmui.Page, limits: Limits) 
         r".*",
         [
             (rf"{own.prefix}/?", PageHandler, arguments),
+            (rf"{own.prefix}/session", SessionHandler, arguments),
             (rf"{own.prefix}/autoload\.js", NoScript),
         ],
     )

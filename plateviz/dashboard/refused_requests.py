@@ -35,8 +35,7 @@ class _TooMany(Matcher):
         self._limits = limits
 
     def match(self, request: HTTPServerRequest) -> dict[str, Any] | None:
-        client = self._limits.client_of(request)
-        return None if client is None or self._limits.requests.allows(client) else {}
+        return None if self._limits.may_ask(self._limits.client_of(request)) else {}
 
 
 def refuse_floods(application: Application, limits: Limits) -> None:

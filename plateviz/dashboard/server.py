@@ -1,6 +1,7 @@
 """The web server: one process without JAX, safe by default, over one store."""
 
 import contextlib
+import gc
 import re
 import secrets
 import socket
@@ -16,6 +17,7 @@ from plateviz.dashboard.limits import Limits, PageLimit
 from plateviz.dashboard.page_request import send_empty_pages
 from plateviz.dashboard.password import PasswordLogin
 from plateviz.dashboard.refused_requests import refuse_floods, refuse_paths
+from plateviz.dashboard.rooms import Rooms
 from plateviz.dashboard.waiting_messages import send_waiting_messages
 from plateviz.dashboard.websocket import LIMITS, check_websockets
 from plateviz.solving.solution_store import SolutionStore
@@ -68,6 +70,9 @@ def serve(store: SolutionStore, endpoint: Endpoint, ready: Callable[[str], None]
     server = _server(store, endpoint)
     try:
         server.start()
+        # What is there now stays; the collector need not go through it again for each page.
+        gc.collect()
+        gc.freeze()
         path = f"{endpoint.prefix}/" if endpoint.prefix else ""
         ready(f"http://{endpoint.address}:{endpoint.port}/{path}")
         # Ctrl-C is the normal way to end the server.
@@ -90,9 +95,10 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
     send_waiting_messages()
     check_websockets()
     hosts = sorted({endpoint.address, "localhost", "127.0.0.1"})
+    rooms = Rooms()
     # A server, not a thread, because `threaded` is not set.
     server: Any = pn.serve(
-        lambda: build_app(store),
+        lambda: build_app(store, rooms),
         port=endpoint.port,
         address=endpoint.address,
         # Websockets from pages of other hosts are refused.

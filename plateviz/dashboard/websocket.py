@@ -3,12 +3,13 @@
 import time
 from typing import Any
 
+from bokeh.protocol.exceptions import ProtocolError
 from bokeh.protocol.message import Message
 from bokeh.server.urls import per_app_patterns
-from bokeh.util.token import check_token_signature, get_token_payload
+from bokeh.util.token import check_token_signature, get_session_id, get_token_payload
 from panel.io.server import WSHandler
 
-from plateviz.dashboard.limits import Limits
+from plateviz.dashboard.limits import TOO_MANY_OPENED, Limits
 
 LIMITS = "plateviz_limits"
 """Name of the setting of a server's Tornado application that has its `Limits`."""
@@ -47,9 +48,9 @@ class CheckedWebsocket(WSHandler):
         if reason := limits.pages.reason(self._client):
             self.set_status(503)
             self.finish(f"{reason}\n")
-        elif self._client is not None and not limits.openings.allows(self._client):
+        elif not (self._has_session() or limits.may_open(self._client)):
             self.set_status(429)
-            self.finish("too many pages opened from this address; try again in a minute\n")
+            self.finish(f"{TOO_MANY_OPENED}\n")
 
     def open(self, *arguments: str, **named: str) -> None:
         """Count the page."""
@@ -102,18 +103,33 @@ class CheckedWebsocket(WSHandler):
         """The limits of the server; another server of this process has none."""
         return self.application.settings.get(LIMITS)
 
+    @property
+    def _offered_token(self) -> str:
+        return self.request.headers.get("Sec-WebSocket-Protocol", "").split(",")[-1].strip()
+
     def _has_token(self) -> bool:
-        words = self.request.headers.get("Sec-WebSocket-Protocol", "").split(",")
-        token = words[-1].strip()
-        own: Any = self.application
+        return is_valid_token(self._offered_token, self.application)
+
+    def _has_session(self) -> bool:
+        """Whether the page has asked for its session already, or had one."""
         try:
-            # The payload is decompressed, so the signature is checked before it.
-            return bool(
-                check_token_signature(token, secret_key=own.secret_key, signed=own.sign_sessions)
-                and get_token_payload(token)["session_expiry"] > time.time()
-            )
-        except _NO_TOKEN:
+            self.application_context.get_session(get_session_id(self._offered_token))
+        except ProtocolError:
             return False
+        return True
+
+
+def is_valid_token(token: str, application: Any) -> bool:  # noqa: ANN401 of Bokeh
+    """Return whether the server of `application` has signed a token, which is still valid."""
+    key = {"secret_key": application.secret_key, "signed": application.sign_sessions}
+    try:
+        # The payload is decompressed, so the signature is checked before it.
+        return bool(
+            check_token_signature(token, **key)
+            and get_token_payload(token)["session_expiry"] > time.time()
+        )
+    except _NO_TOKEN:
+        return False
 
 
 def check_websockets() -> None:

@@ -4,7 +4,7 @@ Each orbit's directory contains its part of the history. After orbits are added,
 gathered into one file sorted by source, from which one source can be read without the rest.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 
@@ -48,12 +48,16 @@ FROM rows GROUP BY source_class ORDER BY source_class
 """
 
 
+ReadOrbit = Callable[[Path], FitResult]
+"""Reads a fitted orbit from its directory."""
+
+
 class SurveyRun:
     """Queries over the orbits of one run; reads files and keeps nothing large in memory."""
 
-    def __init__(self, run: Run) -> None:
-        """Open a run, complete or not."""
-        self._run = run
+    def __init__(self, run: Run, read: ReadOrbit = read_fitted_orbit) -> None:
+        """Open a run, complete or not; `read` reads a fitted orbit."""
+        self._run, self._read = run, read
         self._unchanged = UnchangedFiles()
 
     @property
@@ -179,7 +183,7 @@ class SurveyRun:
 
     def result(self, orbit: int) -> FitResult:
         """Return one fitted orbit; InputError if it does not exist."""
-        return read_fitted_orbit(self._run.orbit_directory(orbit))
+        return self._read(self._run.orbit_directory(orbit))
 
     @cached_property
     def _has_history(self) -> bool:
@@ -222,9 +226,9 @@ class SurveyRun:
             raise InputError(message) from error
 
 
-def survey_runs(survey: Path) -> list[SurveyRun]:
-    """Return the runs of a survey directory, by name."""
-    return [SurveyRun(run) for run in runs_of(survey)]
+def survey_runs(survey: Path, read: ReadOrbit = read_fitted_orbit) -> list[SurveyRun]:
+    """Return the runs of a survey directory, by name; `read` reads a fitted orbit."""
+    return [SurveyRun(run, read) for run in runs_of(survey)]
 
 
 def open_run(survey: Path, name: str) -> SurveyRun:

@@ -78,7 +78,7 @@ class FigureView(pn.viewable.Viewer):
         """
         super().__init__(**params)
         self.is_wide = figure.is_wide
-        self._name, self._plot_figure = figure.name, plot_figure
+        self.card_name, self._plot_figure = figure.name, plot_figure
         self._actions, self._zoom = actions or PointActions(), zoom
         self._selected = self._shown_selected = NO_IDS
         self._figure: Figure | None = None
@@ -94,7 +94,7 @@ class FigureView(pn.viewable.Viewer):
         self._tools = CardTools(figure.title, figure.caption)
         choices = figure_choices(figure.name, self._on_screen, saved or Saved())
         self._save = SaveButton(figure.title, choices, place="corner")
-        self._card = _card(self.visibility, self._body, self._save, self._tools, name=figure.name)
+        self._card = _card(self.visibility, self._body, name=figure.name)
         self.change(theme)
         self._show_text("Being drawn.")
 
@@ -132,6 +132,9 @@ class FigureView(pn.viewable.Viewer):
 
     def draw(self) -> None:
         """Draw the figure from the current data, with what is selected."""
+        if self._save not in self._card:
+            # A page opens sooner without them.
+            self._card.extend([self._save, self._tools])
         if self._needs_drawing or self._drawn is None:
             self._draw()
         self._shown_selected = self._selected
@@ -158,7 +161,7 @@ class FigureView(pn.viewable.Viewer):
                 self._show(self._figure)
         except (InputError, ValueError, KeyError, TypeError, ArithmeticError) as error:
             # One figure that cannot be drawn must not break the page.
-            _LOG.exception("%s cannot be drawn", self._name)
+            _LOG.exception("%s cannot be drawn", self.card_name)
             self._show_text(f"This figure cannot be drawn: {error}")
 
     def _on_screen(self) -> OnScreen | None:

@@ -1,15 +1,19 @@
 """FigureGrid: the cards of a workspace, in rows of one height."""
 
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 
 import panel as pn
 import panel_material_ui as pmui
 
+from plateviz.dashboard.rooms import Room
 from plateviz.dashboard.selected import SelectedIds
 from plateviz.dashboard.views.figure import FigureView, Part
 
 # Figures that are drawn for the first time at once.
 _BATCH = 1
+# Time in which the browser lays out a page that has been opened.
+_SETTLING_SECONDS = 10.0
 
 
 class FigureGrid(pn.viewable.Viewer):
@@ -70,6 +74,33 @@ class FigureGrid(pn.viewable.Viewer):
     def is_laid_out(self) -> bool:
         """Whether the browser has said how large any card is."""
         return any(min(view.visibility.room) > 0 for view in self._views)
+
+    @property
+    def cards(self) -> list[str]:
+        """Names of the figures in order."""
+        return [view.card_name for view in self._views]
+
+    def begin_with(self, rooms: Mapping[str, Room], note: Callable[[str, Room], object]) -> None:
+        """Begin with the rooms that cards had on an earlier page.
+
+        Parameters
+        ----------
+        rooms : of the cards on the screen, by name
+        note : called with the name and the room of a card when the browser says that it differs
+        """
+        until = time.monotonic() + _SETTLING_SECONDS
+
+        def take(view: FigureView) -> None:
+            # Later it is a person who changes the window, or opens a card large.
+            if view.visibility.is_near and time.monotonic() < until:
+                width, height = view.visibility.room
+                note(view.card_name, (width, height))
+
+        for view in self._views:
+            if view.card_name in rooms:
+                room = list(rooms[view.card_name])
+                view.visibility.param.update(room=room, is_near=True)
+            view.visibility.param.watch(lambda *_, view=view: take(view), ["is_near", "room"])
 
     def change(self, theme: str) -> None:
         """Mark all figures as changed, and set their theme."""

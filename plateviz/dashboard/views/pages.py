@@ -1,11 +1,14 @@
 """Pages: the views of one browser session, with a switch between them and their workspaces."""
 
 from collections.abc import Callable
+from functools import partial
 
 import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.rooms import Rooms, Window
+from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.notice import NoticeView
 from plateviz.dashboard.views.orbit import OrbitPage
 from plateviz.dashboard.views.source import SourcePage
@@ -36,16 +39,25 @@ class Pages(pn.viewable.Viewer):
     """The view that is on the screen, below the switches; each is made when it is first shown."""
 
     def __init__(
-        self, navigation: Navigation, wake: Callable[..., object], **params: object
+        self,
+        navigation: Navigation,
+        wake: Callable[..., object],
+        window: Window | None = None,
+        rooms: Rooms | None = None,
+        **params: object,
     ) -> None:
         """Follow the view of `navigation`.
 
         Parameters
         ----------
         wake : called when a figure may have become due to be drawn
+        window : of the browser, if it has told
+        rooms : of the cards of earlier pages
         """
         super().__init__(**params)
         self._navigation, self._wake = navigation, wake
+        self._window, self._rooms = window, rooms
+        self._furnished: set[FigureGrid] = set()
         self._pages: dict[View, Page] = {}
         self._stack = Stack({view: lambda view=view: self._page(view).__panel__() for view in View})
         self.sidebar = Stack({view: lambda view=view: self._page(view).sidebar for view in View})
@@ -68,11 +80,23 @@ class Pages(pn.viewable.Viewer):
     @property
     def is_due(self) -> bool:
         """Whether any figure on the screen is to be drawn."""
-        return self._page(self._navigation.view).figures.is_due
+        return self._figures.is_due
 
     def draw_due(self) -> None:
         """Draw the first few figures that are due on the screen."""
-        self._page(self._navigation.view).figures.draw_due()
+        self._figures.draw_due()
+
+    @property
+    def _figures(self) -> FigureGrid:
+        """The figures on the screen; at first with the rooms that they had on earlier pages."""
+        grid = self._page(self._navigation.view).figures
+        if grid not in self._furnished:
+            self._furnished.add(grid)
+            if self._window is not None and self._rooms is not None:
+                cards = grid.cards
+                note = partial(self._rooms.note, self._window, cards)
+                grid.begin_with(self._rooms.of(self._window, cards), note)
+        return grid
 
     def complete(self) -> bool:
         """Make a part of the page that can wait for the figures; return whether there was one."""

@@ -26,11 +26,11 @@ def navigation(fit_result, survey, monkeypatch):
 def test_places_of_a_solution_are_those_of_its_sources(navigation, fit_result):
     navigation.turn_to(View.ORBIT)
     some = fit_result.sources["source_id"].iloc[:3].tolist()
-    navigation.session.select_sources(frozenset([*some, 17]))
+    navigation.session.selection.select_sources(frozenset([*some, 17]))
     assert selection_name(navigation) == "orbit-0-selection"
     make = selected_places(navigation)
     # What is selected when it is sent counts, not what follows.
-    navigation.session.select_sources(frozenset())
+    navigation.session.selection.select_sources(frozenset())
     table = make()
     assert sorted(table["source_id"]) == sorted(some)
     assert {"ra", "dec", "ra_sigma_marginal"} & set(table.colnames) >= {"ra", "dec"}
@@ -39,7 +39,7 @@ def test_places_of_a_solution_are_those_of_its_sources(navigation, fit_result):
 
 def test_places_of_a_run_are_those_of_the_catalogue(navigation, survey):
     some = survey.motions["source_id"].iloc[[4, 1]].tolist()
-    navigation.session.select_sources(frozenset(some))
+    navigation.session.selection.select_sources(frozenset(some))
     assert selection_name(navigation) == "run-default-selection"
     table = selected_places(navigation)()
     catalogue = survey.catalogue.set_index("source_id")
@@ -51,7 +51,7 @@ def test_places_of_a_run_are_those_of_the_catalogue(navigation, survey):
 
 def test_selection_without_a_place_is_refused(navigation, fit_result):
     navigation.turn_to(View.ORBIT)
-    navigation.session.select_sources(frozenset([17]))
+    navigation.session.selection.select_sources(frozenset([17]))
     with pytest.raises(InputError, match="none of the selected sources is on the screen"):
         selected_places(navigation)()
     empty = Navigation(Session(SurveyStore(fit_result, [])))

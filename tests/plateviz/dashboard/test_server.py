@@ -1,19 +1,33 @@
 """A served dashboard without a browser: what makes a session, and what one client may ask for."""
 
 import asyncio
+import json
 import re
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 
 import pytest
+from bokeh.models import Plot
 from bokeh.protocol import Protocol
+from bokeh.server.urls import per_app_patterns
+from panel.io import document as panel_document
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
 from plateviz.dashboard import limits
 from plateviz.dashboard.limits import Rate
+from plateviz.dashboard.rooms import Rooms
 from plateviz.dashboard.server import Endpoint, begin, check_address
 from tests.plateviz.dashboard.test_navigation import SurveyStore
+
+
+@pytest.fixture(autouse=True)
+def libraries(monkeypatch):
+    """Leave Bokeh and Panel to other tests as they were."""
+    monkeypatch.setattr(panel_document, "_dispatch_msgs", panel_document._dispatch_msgs)
+    before = list(per_app_patterns)
+    yield
+    per_app_patterns[:] = before
 
 
 @pytest.fixture
@@ -106,6 +120,86 @@ def test_websocket_makes_the_session_that_the_address_requests(store, prefix):
             assert dist == "static/extensions/panel/"
 
     with_server(store, scenario, prefix=prefix)
+
+
+def asked(token, window):
+    return {"method": "POST", "body": json.dumps({"token": token, "window": window})}
+
+
+WINDOW = {"width": 1920, "height": 1080, "is_dark": True}
+
+
+def test_page_that_loads_its_scripts_has_its_session_made(store):
+    async def scenario(address, server):
+        page = (await get(f"{address}?view=orbit&orbit=0"))[1]
+        token = token_of(page)
+        assert (await get(f"{address}session", **asked(token, WINDOW)))[0] == 204
+        (session,) = server.get_sessions()
+        location = next(m for m in session.document.roots if hasattr(m, "pathname"))
+        assert (location.pathname, location.search) == ("/", "?view=orbit&orbit=0")
+        whole = next(m for m in session.document.roots if hasattr(m, "esm"))
+        assert whole.data.dark_theme
+        # The page has begun to load what all its components are in.
+        assert page.count(f'"{whole.esm}"') == 2
+        connection = await websocket_connect(
+            HTTPRequest(f"{address.replace('http', 'ws', 1)}ws"), subprotocols=["bokeh", token]
+        )
+        assert '"ACK"' in await connection.read_message()
+        assert server.get_sessions() == [session]
+        connection.close()
+
+    with_server(store, scenario)
+
+
+def test_session_is_made_for_a_valid_token_only(store):
+    async def scenario(address, server):
+        good = token_of((await get(address))[1])
+        for token in (good[:-1], "", "e30.e30", None):
+            assert (await get(f"{address}session", **asked(token, WINDOW)))[0] == 403
+        for body in ("", "[]", "[" * 2**15, "x" * 2**20):
+            assert (await get(f"{address}session", method="POST", body=body))[0] == 403
+        assert server.get_sessions() == []
+        # A window that is none is as if it had not been told.
+        assert (await get(f"{address}session", **asked(good, {"width": -1})))[0] == 204
+
+    with_server(store, scenario)
+
+
+def test_client_opens_so_many_pages_a_minute(store, monkeypatch):
+    monkeypatch.setattr(limits, "OPENINGS", Rate(at_once=1, per_second=0.01))
+
+    async def scenario(address, server):
+        first, second = [token_of((await get(address))[1]) for _ in range(2)]
+        assert (await get(f"{address}session", **asked(first, WINDOW)))[0] == 204
+        assert (await get(f"{address}session", **asked(second, WINDOW)))[0] == 429
+        request = HTTPRequest(f"{address.replace('http', 'ws', 1)}ws")
+        with pytest.raises(HTTPClientError, match="429"):
+            await websocket_connect(request, subprotocols=["bokeh", second])
+        # The first one has its session already.
+        connection = await websocket_connect(request, subprotocols=["bokeh", first])
+        connection.close()
+
+    with_server(store, scenario)
+
+
+class KnownRooms(Rooms):
+    """Rooms as if another page had told them."""
+
+    def of(self, window, cards):
+        return dict.fromkeys(cards, (500, 300))
+
+
+@pytest.mark.parametrize(("rooms", "n_drawn"), [(Rooms, 0), (KnownRooms, 1)])
+def test_first_figure_is_drawn_before_the_page_is_shown(store, monkeypatch, rooms, n_drawn):
+    monkeypatch.setattr("plateviz.dashboard.server.Rooms", rooms)
+
+    async def scenario(address, server):
+        token = token_of((await get(f"{address}?view=orbit&orbit=0"))[1])
+        assert (await get(f"{address}session", **asked(token, WINDOW)))[0] == 204
+        (session,) = server.get_sessions()
+        assert len(list(session.document.select({"type": Plot}))) == n_drawn
+
+    with_server(store, scenario)
 
 
 def test_page_without_its_last_slash_is_sent_to_its_path(store):

@@ -1,5 +1,7 @@
 """FigureView: drawn once when near the screen, then followed in place; faded while out of date."""
 
+import time
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -60,6 +62,32 @@ def test_figure_is_due_only_near_the_screen(view):
     assert view.is_due
     view.draw()
     assert not view.is_due
+
+
+def test_grid_begins_with_the_rooms_that_an_earlier_page_had(view, monkeypatch):
+    noted = []
+    grid = FigureGrid([view], lambda *_: None)
+    grid.begin_with({grid.cards[0]: (500, 400)}, lambda *told: noted.append(told))
+    assert view.is_due
+    come_near(view)
+    assert noted == []
+    come_near(view, (510, 400))
+    assert noted == [(diagnostics()[0].name, (510, 400))]
+    # Later it is a person who changes the room.
+    now = time.monotonic()
+    monkeypatch.setattr(time, "monotonic", lambda: now + 60.0)
+    come_near(view, (1900, 1000))
+    assert len(noted) == 1
+
+
+def test_grid_without_rooms_notes_those_of_its_cards(view):
+    noted = []
+    grid = FigureGrid([view], lambda *_: None)
+    grid.begin_with({}, lambda *told: noted.append(told))
+    assert not view.is_due
+    view.visibility.room = [500, 400]
+    view.visibility.is_near = True
+    assert noted == [(diagnostics()[0].name, (500, 400))]
 
 
 def test_drawn_figure_follows_its_room_without_being_plotted_again(view, drawn):

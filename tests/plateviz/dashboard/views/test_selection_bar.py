@@ -107,7 +107,7 @@ def test_sources_are_sent_from_a_page_on_this_machine(bar, monkeypatch):
 
 
 def test_page_on_another_machine_says_why_nothing_is_sent(bar):
-    # There is no request, so that nothing says that the page is read here.
+    bar._is_here = False
     with pytest.raises(InputError, match="on another machine or through a proxy; Save, VOTable"):
         bar._send()
 

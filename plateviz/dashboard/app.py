@@ -96,7 +96,8 @@ def _write_address(navigation: Navigation) -> None:
             location.search = f"?{urlencode(navigation.address(), safe=',')}"
 
     navigation.param.watch(write, ["view", *WORKSPACES.values(), "run_name", "found"])
-    navigation.exploration.param.watch(write, list(navigation.exploration.param.values()))
+    for exploration in (navigation.exploration, navigation.survey_exploration):
+        exploration.param.watch(write, list(exploration.param.values()))
     navigation.session.param.watch(write, "shown")
     navigation.session.selection.param.watch(
         write, ["orbit", "field", "plates", "detector", "sources"]

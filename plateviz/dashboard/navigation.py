@@ -13,6 +13,7 @@ from plateviz.dashboard.exploration import Exploration
 from plateviz.dashboard.growth import Growth
 from plateviz.dashboard.session import Session
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
+from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.runs.queries import SurveyRun
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables.explore import EXPLORABLE
@@ -54,8 +55,8 @@ class Navigation(param.Parameterized):
     """What is on the screen of one browser session.
 
     `run_name` is None if the survey has no run. `found` is the result of the last search for a
-    source of the run; if it is None, `message` says why. `exploration` is what the Explore
-    workspace draws.
+    source of the run; if it is None, `message` says why. `exploration` and `survey_exploration` are
+    what the Explore workspaces of the Orbit and the Survey view draw.
     """
 
     view = param.Selector(default=View.ORBIT, objects=list(View), doc="view on the screen")
@@ -73,6 +74,7 @@ class Navigation(param.Parameterized):
         super().__init__()
         self.session = session
         self.exploration = Exploration(list(EXPLORABLE))
+        self.survey_exploration = Exploration(list(COLUMNS_OF_RUN))
         self._source_text = ""
         self._growth: tuple[SurveyRun, Growth] | None = None
         self._runs = {run.name: run for run in session.store.runs()}
@@ -145,7 +147,8 @@ class Navigation(param.Parameterized):
             Orbit view
         """
         self.session.selection.restore(address)
-        self.exploration.restore(address)
+        is_survey = address.get("view") == View.SURVEY.value
+        (self.survey_exploration if is_survey else self.exploration).restore(address)
         views = {view.value: view for view in View}
         if address.get("run") in self._runs:
             self.run_name = address["run"]
@@ -167,6 +170,8 @@ class Navigation(param.Parameterized):
             query["source"] = str(self.found.source_id)
         if self.workspace is OrbitWorkspace.EXPLORE:
             query |= self.exploration.address()
+        if self.workspace is SurveyWorkspace.EXPLORE:
+            query |= self.survey_exploration.address()
         return query
 
     def turn_to(self, view: View) -> None:

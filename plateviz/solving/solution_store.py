@@ -8,9 +8,11 @@ next one.
 import hashlib
 import json
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
 
+from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.fitted_orbit import is_complete, read_fitted_orbit
 from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.solving.job import Job, JobStatus
@@ -22,9 +24,18 @@ from solver.data.settings import ENGINES, FitSettings
 from solver.io.disk import writing
 from solver.io.scratch import ScratchFolder, temporary_folder
 
+# Threads that read and count rows for all sessions, beside the one of the event loop.
+_READERS = 2
+
 
 class SolutionStore:
-    """Fits orbits of one origin on request and keeps the solutions."""
+    """Fits orbits of one origin on request and keeps the solutions.
+
+    Attributes
+    ----------
+    columns : the columns of runs that were read last
+    background : runs what takes a while, for all sessions
+    """
 
     def __init__(self, origin: Origin, solver: SolverQueue) -> None:
         """Solve orbits of `origin` with `solver`, which is closed with the store."""
@@ -39,6 +50,8 @@ class SolutionStore:
             self._folder = ScratchFolder(temporary, "plateviz")
         self._scratch = self._folder.path
         self._read = lru_cache(maxsize=16)(read_fitted_orbit)
+        self.columns = ColumnCache()
+        self.background = ThreadPoolExecutor(_READERS, thread_name_prefix="reader")
 
     @property
     def title(self) -> str:
@@ -87,6 +100,7 @@ class SolutionStore:
 
     def close(self) -> None:
         """End the solver process and remove the scratch folder."""
+        self.background.shutdown(wait=False, cancel_futures=True)
         self._solver.close()
         self._folder.close()
 

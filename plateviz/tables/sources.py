@@ -31,17 +31,17 @@ _DEVIATION_COLUMNS = [
 
 
 def ordered_by_class(sources: pd.DataFrame) -> pd.DataFrame:
-    """Return the sources with a `source_class`, in the order of `CLASSES`, then of id.
-
-    A source flagged both reference and artificial counts as reference.
-    """
-    names = np.select(
-        [sources["is_reference"], sources["is_artificial"]], [REFERENCE, ARTIFICIAL], NON_REFERENCE
-    )
-    table = sources.assign(source_class=names.astype(object))
+    """Return the sources with a `source_class`, in the order of `CLASSES`, then of id."""
+    table = sources.assign(source_class=class_names(sources))
     order = table["source_class"].map(CLASSES.index)
     ranked = table.assign(_rank=order).sort_values(["_rank", "source_id"], kind="stable")
     return ranked.drop(columns="_rank").reset_index(drop=True)
+
+
+def class_names(sources: pd.DataFrame) -> np.ndarray:
+    """Return the class of each source; one flagged both ways counts as reference."""
+    flags = [sources["is_reference"].to_numpy(bool), sources["is_artificial"].to_numpy(bool)]
+    return np.select(flags, [REFERENCE, ARTIFICIAL], NON_REFERENCE).astype(object)
 
 
 def chi2_per_dof(table: pd.DataFrame) -> np.ndarray:

@@ -83,22 +83,24 @@ def file_name(stem: str, suffix: str) -> str:
     return re.sub(r"[^\w.-]+", "-", stem).lstrip(".-") + suffix
 
 
-def rows_of(
-    table: ExplorableTable, is_kept: np.ndarray, names: Iterable[str] | None = None
-) -> Table:
-    """Return the kept rows, with the units and meanings of their columns.
+def rows_of(table: ExplorableTable, rows: np.ndarray, names: Iterable[str] | None = None) -> Table:
+    """Return rows, with the units and meanings of their columns.
 
     Parameters
     ----------
-    is_kept : whether a row is kept
+    rows : their numbers, or whether each row is one of them
     names : columns besides the id and the class of a source; all by default
     """
     found = Table()
-    for name in (*("source_id",) * table.has_sources, *("source_class",) * table.has_classes):
-        found[name] = _plain(table.read(name)[is_kept])
+    if table.has_sources:
+        sources = table.sources()
+        codes = sources.codes[rows]
+        found["source_id"] = sources.ids[codes]
+        if sources.classes is not None:
+            found["source_class"] = _plain(sources.classes[codes])
     for name in table.columns if names is None else names:
         column = table.columns[name]
-        found[name] = _described(table.read(name)[is_kept], column)
+        found[name] = _described(table.read(name)[rows], column)
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import param
 
-from plateviz.plots.explore import Columns
+from plateviz.plots.explored_rows import Columns
 
 # A control shows an empty value as if nothing were chosen.
 NONE = "none"
@@ -19,6 +19,10 @@ _FIRST: Mapping[str, tuple[str, str]] = {
     "measurements": ("focal_x", "residual_x"),
     "sources": ("n_obs", "sigma_ra_marginal"),
     "exposures": ("minutes", "chi2_per_dof"),
+    "residuals": ("focal_x", "residual_x"),
+    "sources per orbit": ("epoch", "offset_ra"),
+    "motions": ("n_orbits", "sigma_parallax"),
+    "orbits": ("epoch", "chi2_per_dof"),
 }
 _NUMBER = r"-?(?:\d+(?:\.\d*)?(?:e[+-]?\d+)?|inf)"
 _NUMBERS = re.compile(rf"{_NUMBER}(?:~{_NUMBER})*")

@@ -15,6 +15,7 @@ from plateviz.dashboard.solution import Request, Solution
 from plateviz.dashboard.solution_address import find_solution, solution_query
 from plateviz.dashboard.units import NAMES, OWN
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
+from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.runs.queries import SurveyRun
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables.explore import EXPLORABLE
@@ -46,8 +47,8 @@ class Navigation(param.Parameterized):
     """What is on the screen of one browser session.
 
     `run_name` is None if the survey has no run. `found` is the result of the last search for a
-    source of the run; if it is None, `message` says why. `exploration` is what the Explore
-    workspace draws.
+    source of the run; if it is None, `message` says why. `exploration` and `survey_exploration` are
+    what the Explore workspaces of the Orbit and the Survey view draw.
     """
 
     view = param.Selector(default=View.ORBIT, objects=list(View), doc="view on the screen")
@@ -65,6 +66,7 @@ class Navigation(param.Parameterized):
         super().__init__()
         self.session = session
         self.exploration = Exploration(list(EXPLORABLE))
+        self.survey_exploration = Exploration(list(COLUMNS_OF_RUN))
         self._source_text = ""
         self._named: dict[str, str] = {}
         self._growth: tuple[SurveyRun, Growth] | None = None
@@ -140,7 +142,8 @@ class Navigation(param.Parameterized):
         """
         session, problems = self.session, []
         session.notice = ""
-        self.exploration.restore(address)
+        is_survey = address.get("view") == View.SURVEY.value
+        (self.survey_exploration if is_survey else self.exploration).restore(address)
         if address.get("unit") in NAMES.values():
             session.units.unit = address["unit"]
         self.run_name = chosen("run", address, self._runs, self.run_name, problems)
@@ -177,6 +180,8 @@ class Navigation(param.Parameterized):
             query["unit"] = self.session.units.unit
         if self.workspace is OrbitWorkspace.EXPLORE:
             query |= self.exploration.address()
+        if self.workspace is SurveyWorkspace.EXPLORE:
+            query |= self.survey_exploration.address()
         return query | self._solution_query()
 
     def _solution_query(self) -> dict[str, str]:

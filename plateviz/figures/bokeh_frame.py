@@ -14,6 +14,8 @@ from plateviz.figures.words import Words
 
 # Least room to the left of a frame, and room for a tick label, screen pixels.
 _LEFT, _TICK = 5, 70
+# Milliseconds without a turn of the wheel after which a person has chosen new limits.
+_SETTLED = 40
 _TITLE_SIZE, _LABEL_SIZE, _TICK_SIZE = "13px", "12px", "11px"
 # Shows an image while the reach of the frame's limits is between those in its tags.
 _SHOW_WITHIN_REACH = """
@@ -128,6 +130,8 @@ class BokehFrame:
     def zoom_by_wheel(self) -> None:
         """Let the wheel zoom at once; elsewhere it scrolls the page until its tool is chosen."""
         self.plot.toolbar.update(active_scroll=self._wheel)
+        # BokehJS tells the server of new limits so long after the last turn of the wheel.
+        self.plot.lod_timeout = _SETTLED
 
     def glyphs(self) -> Iterator[BokehGlyphs]:
         """Iterate over the glyphs, hidden ones among them."""

@@ -24,11 +24,12 @@ class OrbitWorkspace(StrEnum):
 
 
 class SurveyWorkspace(StrEnum):
-    """Workspaces of the Survey page."""
+    """Workspaces of the Survey page; `EXPLORE` as in `OrbitWorkspace`."""
 
     VERDICT = "verdict"
     ACCURACY = "accuracy"
     CATALOGUE = "catalogue"
+    EXPLORE = "explore"
 
 
 class SourceWorkspace(StrEnum):

@@ -140,7 +140,7 @@ class SurveyRun:
         if not self._has_history:
             return pd.DataFrame(columns=HISTORY.names)
         rows = col("source_id") == int(source_id)
-        parts = [read_frame(Path(file), HISTORY.names, rows) for file in self._history_files()]
+        parts = [read_frame(Path(file), HISTORY.names, rows) for file in self.history_files()]
         found = pd.concat(parts, ignore_index=True)
         return found.sort_values("epoch", ignore_index=True, kind="stable")
 
@@ -157,7 +157,7 @@ class SurveyRun:
             "any_value(is_artificial) AS is_artificial, count(*) AS n_orbits, "
             "sum(n_obs)::BIGINT AS n_obs FROM read_parquet(?) "
             "GROUP BY source_id ORDER BY source_id",
-            self._history_files(),
+            self.history_files(),
         )
 
     def classes(self, often: int) -> pd.DataFrame:
@@ -173,7 +173,7 @@ class SurveyRun:
         (rms conditional sigma times sqrt(n_obs)) and `sigma_often` (median marginal sigma in
         RA of sources measured often), mas
         """
-        return self._ask(_CLASSES, self._history_files(), often).set_index("source_class")
+        return self._ask(_CLASSES, self.history_files(), often).set_index("source_class")
 
     def exposure_residuals(self, orbit: int, field: int, plate: int) -> pd.DataFrame:
         """Return `schema.RESIDUALS` of one exposure."""
@@ -189,7 +189,7 @@ class SurveyRun:
     def _has_history(self) -> bool:
         return (self.directory / HISTORY_FILE).is_file() or bool(self._run.complete_orbits())
 
-    def _history_files(self) -> list[str]:
+    def history_files(self) -> list[str]:
         """Return the gathered history, or its parts; InputError if a file is damaged.
 
         Each is read as a whole once: the checksums of its pages do not protect the names of the

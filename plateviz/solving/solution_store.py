@@ -8,10 +8,12 @@ next one.
 import hashlib
 import json
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path
 
+from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.fitted_orbit import read_fitted_orbit
 from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.runs.scratch_result import is_written, read_scratch_result
@@ -25,9 +27,18 @@ from solver.errors import InputError
 from solver.io.disk import writing
 from solver.io.scratch import ScratchFolder, temporary_folder
 
+# Threads that read and count rows for all sessions, beside the one of the event loop.
+_READERS = 2
+
 
 class SolutionStore:
-    """Fits orbits of one origin on request and keeps the solutions."""
+    """Fits orbits of one origin on request and keeps the solutions.
+
+    Attributes
+    ----------
+    columns : the columns of runs that were read last
+    background : runs what takes a while, for all sessions
+    """
 
     def __init__(self, origin: Origin, solver: Solver) -> None:
         """Solve orbits of `origin` with `solver`, which is closed with the store."""
@@ -43,6 +54,8 @@ class SolutionStore:
         self._scratch = self._folder.path
         self._read = lru_cache(maxsize=16)(partial(read_scratch_result, hurry=solver.hurry))
         self._read_of_run = lru_cache(maxsize=8)(lambda directory, *_: read_fitted_orbit(directory))
+        self.columns = ColumnCache()
+        self.background = ThreadPoolExecutor(_READERS, thread_name_prefix="reader")
 
     @property
     def title(self) -> str:
@@ -113,6 +126,7 @@ class SolutionStore:
 
     def close(self) -> None:
         """End the solver process and remove the scratch folder."""
+        self.background.shutdown(wait=False, cancel_futures=True)
         self._solver.close()
         self._folder.close()
 

@@ -31,15 +31,16 @@ _DEVIATION_COLUMNS = [
 
 
 def ordered_by_class(sources: pd.DataFrame) -> pd.DataFrame:
-    """Return the sources with a `source_class`, in the order of `CLASSES`, then of id.
+    """Return the sources with a `source_class`, in the order of `CLASSES`, then of id."""
+    names = class_names(sources)
+    order = np.lexsort((sources["source_id"], pd.Index(CLASSES).get_indexer(names)))
+    return sources.iloc[order].reset_index(drop=True).assign(source_class=names[order])
 
-    A source flagged both reference and artificial counts as reference.
-    """
-    ranks = [CLASSES.index(name) for name in (REFERENCE, ARTIFICIAL, NON_REFERENCE)]
-    rank = np.select([sources["is_reference"], sources["is_artificial"]], ranks[:2], ranks[2])
-    order = np.lexsort((sources["source_id"], rank))
-    names = np.array(CLASSES, dtype=object)[rank[order]]
-    return sources.iloc[order].reset_index(drop=True).assign(source_class=names)
+
+def class_names(sources: pd.DataFrame) -> np.ndarray:
+    """Return the class of each source; one flagged both ways counts as reference."""
+    flags = [sources["is_reference"].to_numpy(bool), sources["is_artificial"].to_numpy(bool)]
+    return np.select(flags, [REFERENCE, ARTIFICIAL], NON_REFERENCE).astype(object)
 
 
 def chi2_per_dof(table: pd.DataFrame) -> np.ndarray:

@@ -65,14 +65,24 @@ def reading(where: str, expected: str) -> Iterator[None]:
     InputError
         With `where`, `expected` and what the library found, in words.
     """
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), refusing(where, expected):
         warnings.simplefilter("ignore")
-        try:
-            yield
-        except InputError:
-            raise
-        except _RAISED_ON_DAMAGE as error:
-            raise InputError(f"{where}: expected {expected}, found {in_words(error)}") from error
+        yield
+
+
+@contextmanager
+def refusing(where: str, expected: str) -> Iterator[None]:
+    """Convert exceptions as `reading` does, with the warnings as they are.
+
+    Warnings are silenced for all threads of a process at once, so that a thread beside others must
+    not silence them.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except _RAISED_ON_DAMAGE as error:
+        raise InputError(f"{where}: expected {expected}, found {in_words(error)}") from error
 
 
 def in_words(error: Exception) -> str:

@@ -8,8 +8,9 @@ from astropy.table import Table
 from pyarrow import parquet
 from pyarrow.compute import Expression
 
+from solver.errors import InputError
 from solver.io.arrow import from_arrow
-from solver.io.failures import reading
+from solver.io.failures import reading, refusing
 from solver.io.limits import check_size
 
 
@@ -33,7 +34,7 @@ def write_parquet(table: pa.Table, path: Path) -> None:
 
 def count_rows(path: str) -> int:
     """Return the number of rows of a table; InputError if it cannot be read."""
-    with reading(path, "a table of plateviz"):
+    with refusing(path, "a table of plateviz"):
         return int(parquet.read_metadata(path).num_rows)
 
 
@@ -71,6 +72,27 @@ def read_frame(
             page_checksum_verification=True,
         )
         return content.to_pandas()
+
+
+def read_columns(path: Path, columns: list[str]) -> pa.Table:
+    """Read some columns of a table as `read_frame` does, for use by several threads at once.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, or lacks a column.
+    """
+    with (
+        refusing(str(path), "a table of plateviz"),
+        parquet.ParquetFile(path, page_checksum_verification=True) as file,
+    ):
+        names = file.schema_arrow.names
+        # The checksums of pages do not protect the names: one bit makes "residual_y" of "_x".
+        if len(set(names)) < len(names) or not set(columns) <= set(names):
+            raise InputError(
+                f"{path}: expected the columns {', '.join(columns)} once each, found other names"
+            )
+        return file.read(columns, use_threads=False)
 
 
 def read_parquet(path: Path) -> dict[str, Table]:

@@ -29,6 +29,23 @@ from tests.benchmarks.machine import cpu_model, usable_cores, write
 _FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"]
 _SIZE = {"width": 1920, "height": 1080}
 _PATIENCE_MS = 120_000
+# More columns of the residuals than the server keeps in memory.
+_PAIRS = (
+    "nx",
+    "residual_y",
+    "ny",
+    "leverage",
+    "focal_x",
+    "residual_x",
+    "ideal_x",
+    "standardised_x",
+    "focal_y",
+    "standardised_y",
+    "ideal_y",
+    "sx",
+    "model_x",
+    "sy",
+)
 # Functions of the page: what is drawn in a card, and whether it is complete.
 _PRELUDE = """
 window.plateviz = (() => {
@@ -112,6 +129,16 @@ def main() -> None:
             # The first answer is not counted: the solver may have to fit the orbit for it.
             times = [act(page, number) for number in range(arguments.repeat + 1)]
             report(start, end, times[1:])
+        page.close()
+        page = open_page()
+        opened(page, f"{address}?view=survey&workspace=explore&rows=residuals")
+        page.wait_for_timeout(3000)
+        for start, act in (
+            ("pan or zoom over all residuals", next_zoom),
+            ("another pair of columns of these", next_pair),
+        ):
+            times = [act(page, number) for number in range(arguments.repeat + 1)]
+            report(start, "new picture", times[1:])
 
 
 def next_exposure(page: Page, number: int) -> float:
@@ -176,6 +203,42 @@ def next_orbit(page: Page, number: int) -> float:
     page.keyboard.press("ArrowDown")
     page.keyboard.press("ArrowDown" if number % 2 == 0 else "ArrowUp")
     return answered(page, lambda: page.keyboard.press("Enter"), None, words=True)
+
+
+def next_zoom(page: Page, number: int) -> float:
+    """Turn the wheel over all residuals; return the milliseconds until the cells are finer."""
+    box = page.locator(".figure-explore:visible canvas").first.bounding_box()
+    if box is None:
+        raise RuntimeError("expected a figure on the screen")
+    # In at different places, so that the frame moves too, and out again.
+    is_in = number % 2 == 0
+    across = 0.3 + 0.1 * (number % 5)
+    page.mouse.move(box["x"] + across * box["width"], box["y"] + 0.5 * box["height"])
+    return answered(page, lambda: page.mouse.wheel(0, -150 if is_in else 150), {"explore"}, False)
+
+
+def next_pair(page: Page, number: int) -> float:
+    """Choose two columns that are not in memory; return the milliseconds until they are drawn.
+
+    Both controls change at once: a hand needs seconds for two lists.
+    """
+    x, y = (_PAIRS[(2 * number + one) % len(_PAIRS)] for one in (0, 1))
+    begin = time.perf_counter()
+    page.evaluate(
+        """([x, y]) => {
+          const { plots, card, until } = window.plateviz;
+          for (const each of Bokeh.documents)
+            for (const { data } of each._all_models.values())
+              if (data?.options && ['x', 'y'].includes(data.label))
+                data.value = data.label === 'x' ? x : y;
+          return until(() => plots().some(
+            view => card(view) === 'explore' && view.model.title.text === `${y} against ${x}`));
+        }""",
+        [x, y],
+    )
+    taken = 1e3 * (time.perf_counter() - begin)
+    page.wait_for_timeout(1500)
+    return taken
 
 
 def answered(page: Page, act: Callable[[], object], cards: set[str] | None, words: bool) -> float:

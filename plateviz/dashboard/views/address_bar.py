@@ -58,7 +58,8 @@ class AddressBar(pn.custom.JSComponent):
         session = navigation.session
         names = ["view", *WORKSPACES.values(), "run_name", "found"]
         navigation.param.watch(self._write, names)
-        navigation.exploration.param.watch(self._write, list(navigation.exploration.param.values()))
+        for exploration in (navigation.exploration, navigation.survey_exploration):
+            exploration.param.watch(self._write, list(exploration.param.values()))
         session.param.watch(self._write, ["shown", "other"])
         session.units.param.watch(self._write, "unit")
         names = ["orbit", "field", "plates", "detector", *KINDS, "kept"]

@@ -1,8 +1,9 @@
-"""ExploreView: any column of a solution's tables against any other."""
+"""ExploreView: any column of the tables of an origin against any other."""
 
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -13,78 +14,113 @@ from astropy.table import Table
 
 from plateviz.dashboard.downloads import rows_of
 from plateviz.dashboard.exploration import NONE, SWITCHES
-from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.latest_answer import PENDING, LatestAnswer, Pending
+from plateviz.dashboard.row_origins import RowsOrigin, TableRequest
+from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
-from plateviz.dashboard.views.point_actions import PointActions
+from plateviz.dashboard.views.markup import markup_pane, paragraph
+from plateviz.dashboard.views.point_actions import NO_LINKS, Links, PointActions
 from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure, Limits
-from plateviz.plots.explore import explored_figure, kept_rows
+from plateviz.plots.explore import explored_figure
+from plateviz.plots.explored_rows import (
+    Columns,
+    Extent,
+    extent_of,
+    kept_rows,
+    rows_in_frame,
+    sources_within,
+)
 from plateviz.plots.style import ROW_LIMIT
-from plateviz.tables.explore import EXPLORABLE, ExplorableTable, sources_within
-from solver.data.result import FitResult
+from plateviz.tables.explore import ExplorableTable
+from solver.errors import InputError
 
 _STEPS = 200
 # Columns that say what a saved row is of, besides the id of its source.
-_KEYS = ("field_id", "plate_id", "detector_id")
+_KEYS = ("orbit_id", "field_id", "plate_id", "detector_id")
 _BETWEEN = "between"
+MOST_SELECTED = 250_000
+"""Sources that an area can select."""
+_MOST_SAVED = 1_000_000
 
 
 class _Text(NamedTuple):
     """What the card says; see `FigureText`."""
 
+    caption: str
     name: str = "explore"
     title: str = "Any column against any other"
-    caption: str = (
-        "The columns that the controls name, one point per row; above 20,000 rows, the number of "
-        "rows in each cell, or the mean of the column that gives the colour. Along both axes their "
-        "histograms. A drag selects the sources in a box, which all other figures show. The wheel "
-        "zooms, and the cells become finer."
-    )
     is_wide: bool = True
+
+
+class _Drawn(NamedTuple):
+    """An answer: the figure, and what it is of."""
+
+    figure: Figure
+    table: ExplorableTable
+    chosen: Columns
+    extent: Extent
 
 
 class ExploreView(pn.viewable.Viewer):
     """Controls for the columns, and the figure."""
 
     def __init__(
-        self, navigation: Navigation, wake: Callable[..., object], **params: object
+        self,
+        origin: RowsOrigin,
+        session: Session,
+        wake: Callable[..., object],
+        links: Links = NO_LINKS,
+        **params: object,
     ) -> None:
-        """Follow the session of `navigation`.
+        """Draw the rows of `origin`.
 
         Parameters
         ----------
+        session : has the selection and the theme
         wake : called when the figure may have become due to be drawn
+        links : what a tap on a row without a source opens, as in `PointActions`
         """
         super().__init__(**params)
-        self._session, self._exploration = navigation.session, navigation.exploration
-        self._wake = wake
-        self._known: tuple[FitResult, str, ExplorableTable] | None = None
+        self._origin, self._session, self._wake = origin, session, wake
+        self._exploration = origin.exploration
+        self._document = pn.state.curdoc
+        self._latest: LatestAnswer[_Drawn] = LatestAnswer(origin.executor, self._draw_soon)
+        self._selecting: LatestAnswer[frozenset[int]] = LatestAnswer(origin.executor)
+        self._drawn: _Drawn | None = None
+        self._table: object = None
+        self._extent: tuple[object, Extent] | None = None
+        self._area: np.ndarray | None = None
         self._is_following = False
+        selection = session.selection
+        actions = PointActions(
+            links,
+            select=selection.select_sources,
+            select_area=self._take_area,
+            select_exposures=selection.select_exposures,
+        )
         self._figure = FigureView(
-            _Text(),
+            _Text(origin.caption),
             self._plot,
-            waiting="The first solution is being computed.",
-            actions=PointActions(
-                select=self._session.selection.select_sources,
-                select_area=self._select_area,
-                select_exposures=self._session.selection.select_exposures,
-            ),
+            waiting=origin.waiting,
+            actions=actions,
             zoom=self._zoom,
-            saved=Saved(self._session.selection.subject, self._rows),
-            theme=self._session.theme,
+            saved=Saved(origin.subject, self._rows),
+            theme=session.theme,
         )
         self.grid = FigureGrid([self._figure], wake, columns=1)
         self._limits = pmui.EditableRangeSlider(
             label=_BETWEEN, start=0.0, end=1.0, size="small", width=260, disabled=True
         )
         self._limits.param.watch(self._take_limits, "value_throttled")
+        self._words = markup_pane()
+        self._words.visible = False
         self._workspace = workspace(self.grid, self._controls())
         names = list(self._exploration.param.values())
-        self._exploration.param.watch(self._show_limits, ["only", "lowest", "highest"])
         self._exploration.param.watch(self._change, names)
-        self._session.selection.param.watch(self._show_selected, "sources")
+        session.selection.param.watch(self._show_selected, "sources")
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the workspace."""
@@ -95,10 +131,10 @@ class ExploreView(pn.viewable.Viewer):
         select = partial(pmui.Select.from_param, size="small", description="", margin=(4, 6))
         return pmui.FlexBox(
             select(parameters.table, label="Rows", width=150),
-            select(parameters.y, label="y", width=210),
-            select(parameters.x, label="x", width=210),
-            select(parameters.colour, label="Colour", width=210),
-            select(parameters.only, label="Limit by", width=210),
+            select(parameters.y, label="y", width=195),
+            select(parameters.x, label="x", width=195),
+            select(parameters.colour, label="Colour", width=195),
+            select(parameters.only, label="Limit by", width=195),
             self._limits,
             *(
                 pmui.Checkbox.from_param(
@@ -106,24 +142,11 @@ class ExploreView(pn.viewable.Viewer):
                 )
                 for name, label in SWITCHES.items()
             ),
+            self._words,
             sx={"alignItems": "center"},
             sizing_mode="stretch_width",
             margin=0,
         )
-
-    @property
-    def _table(self) -> ExplorableTable | None:
-        """The table of the solution on the screen; made once, with the controls for it."""
-        shown, name = self._session.shown, self._exploration.table
-        if shown is None:
-            return None
-        if self._known is None or self._known[0] is not shown.result or self._known[1] != name:
-            table = EXPLORABLE[name](shown.result)
-            self._known = (shown.result, name, table)
-            with self._following():
-                self._exploration.offer(list(table.columns))
-            self._show_limits()
-        return self._known[2]
 
     @contextmanager
     def _following(self) -> Iterator[None]:
@@ -134,63 +157,131 @@ class ExploreView(pn.viewable.Viewer):
         finally:
             self._is_following = False
 
-    def _plot(self) -> Figure | None:
-        table = self._table
-        if table is None:
+    def _plot(self) -> Figure | Pending | None:
+        request = self._origin.request()
+        if request is None:
             return None
-        selected = self._session.selection.sources
-        return explored_figure(table, self._exploration.columns(), selected=selected)
+        if request.key != self._table:
+            self._table = request.key
+            with self._following():
+                self._exploration.offer(request.columns)
+        if not self._select(request):
+            return PENDING
+        chosen, selected = self._exploration.columns(), self._session.selection.sources
+        make = partial(self._make, request, chosen, selected)
+        drawn = self._latest.answer((request.key, chosen, selected), make)
+        if isinstance(drawn, Pending):
+            return drawn
+        self._drawn = drawn
+        self._show_limits(drawn)
+        return drawn.figure
+
+    def _make(self, request: TableRequest, chosen: Columns, selected: frozenset[int]) -> _Drawn:
+        """Make a figure; runs on a thread of its own where that takes a while."""
+        table = request.make()
+        # Neither a zoom nor another colour changes how many rows there are.
+        key = (request.key, replace(chosen, limits=None, colour="", has_median=False))
+        known = self._extent
+        if known is None or known[0] != key:
+            self._extent = known = (key, extent_of(table, chosen))
+        figure = explored_figure(table, chosen, selected=selected, extent=known[1])
+        return _Drawn(figure, table, chosen, known[1])
+
+    def _draw_soon(self) -> None:
+        """Draw an answer as soon as it is made, not at the page's next tick; on any thread."""
+        if self._document is not None:
+            self._document.add_next_tick_callback(self.grid.draw_due)
 
     def _rows(self) -> dict[str, Table]:
         """Return the rows between the limits, with the columns that are drawn and those of keys."""
-        table, chosen = self._table, self._exploration.columns()
-        if table is None:
+        if self._drawn is None:
             return {}
+        table, chosen = self._drawn.table, self._exploration.columns()
+        keys = [name for name in _KEYS if name in table.columns]
+        rows = kept_rows(table, chosen) if table.size <= _MOST_SAVED else None
+        if rows is None:
+            # Each column that nobody has asked for is to be read.
+            keys = keys[:1]
+            rows = rows_in_frame(table, chosen, chosen.limits)
+            if len(rows) > _MOST_SAVED:
+                raise InputError(
+                    f"{len(rows):,} rows are too many to save, at most {_MOST_SAVED:,}: "
+                    "zoom in, limit the rows, or read the Parquet files of the run"
+                )
         drawn = filter(None, (chosen.x, chosen.y, chosen.colour, chosen.only))
-        names = dict.fromkeys((*(name for name in _KEYS if name in table.columns), *drawn))
-        return {table.rows: rows_of(table, kept_rows(table, chosen), names)}
+        return {table.rows: rows_of(table, rows, dict.fromkeys((*keys, *drawn)))}
 
     def _change(self, *_: object) -> None:
         if not self._is_following:
-            self._figure.change(self._session.theme)
-            self._wake()
+            self._say("")
+            self._redraw()
+
+    def _redraw(self) -> None:
+        self._figure.change(self._session.theme)
+        self._wake()
 
     def _show_selected(self, *_: object) -> None:
         """Mark the selected sources among cells; points are marked by themselves."""
-        if self._known is not None and self._known[2].size > ROW_LIMIT:
-            self._change()
+        if self._drawn is not None and self._drawn.table.size > ROW_LIMIT:
+            self._redraw()
 
     def _zoom(self, limits: tuple[Limits, Limits] | None) -> None:
         self._exploration.limits = limits
 
-    def _select_area(self, corners: np.ndarray) -> None:
-        table, chosen = self._table, self._exploration.columns()
-        # An exposure has all sources, so that an area of exposures selects none.
-        if table is not None and table.has_sources:
-            kept = kept_rows(table, chosen)
-            self._session.selection.select_sources(
-                sources_within(table, chosen.x, chosen.y, corners, kept)
-            )
+    def _take_area(self, corners: np.ndarray) -> None:
+        # A row without a source selects none.
+        if self._drawn is not None and self._drawn.table.has_sources:
+            self._area = corners
+            self._redraw()
 
-    def _show_limits(self, *_: object) -> None:
+    def _select(self, request: TableRequest) -> bool:
+        """Select the sources in the area that a person has drawn; return whether that is done."""
+        area, drawn = self._area, self._drawn
+        if area is None or drawn is None:
+            return True
+        make = partial(sources_within, drawn.table, drawn.chosen, area)
+        try:
+            found = self._selecting.answer((request.key, id(area)), make)
+        except InputError as error:
+            self._area = None
+            self._say(f"Nothing was selected: {error}")
+            return True
+        if isinstance(found, Pending):
+            return False
+        self._area = None
+        if not found:
+            self._say("No row is in that area. What was selected stays selected.")
+        elif len(found) > MOST_SELECTED:
+            self._say(
+                f"{len(found):,} sources have rows in that area, and at most {MOST_SELECTED:,} can "
+                "be selected: draw a smaller one, or limit the rows. What was selected stays."
+            )
+        else:
+            self._say("")
+            self._session.selection.select_sources(found)
+        return True
+
+    def _say(self, words: str) -> None:
+        """Show words above the figure; none hides them."""
+        if words or self._words.visible:
+            text = paragraph(words, "caption", self._session.theme) if words else ""
+            self._words.param.update(object=text, visible=bool(words))
+
+    def _show_limits(self, drawn: _Drawn) -> None:
         """Let the slider span the values of the column that limits the rows."""
-        known, exploration = self._known, self._exploration
-        if self._is_following:
-            return
-        if known is None or exploration.only == NONE:
+        name, chosen = self._exploration.only, drawn.chosen
+        if name == NONE:
             self._limits.param.update(label=_BETWEEN, disabled=True)
             return
-        values = known[2].numbers(exploration.only)
-        values = values[np.isfinite(values)]
-        low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+        low, high = drawn.extent.only if not math.isnan(drawn.extent.only[0]) else (0.0, 1.0)
         high = high if high > low else low + 1.0
         with self._following():
             self._limits.param.update(
-                label=f"{exploration.only} between",
+                label=f"{name} between",
                 start=low,
                 end=high,
                 step=(high - low) / _STEPS,
-                value=(max(low, exploration.lowest), min(high, exploration.highest)),
+                value=(max(low, chosen.lowest), min(high, chosen.highest)),
                 disabled=False,
             )
 

@@ -8,6 +8,7 @@ import panel as pn
 import panel_material_ui as pmui
 from bokeh.events import Event, RangesUpdate, Reset
 
+from plateviz.dashboard.latest_answer import Pending
 from plateviz.dashboard.selected import NO_IDS, SelectedIds
 from plateviz.dashboard.views.card_tools import CardTools
 from plateviz.dashboard.views.figure_text import FigureText
@@ -38,12 +39,14 @@ _CENTRED = {
     "align-items": "center",
     "justify-content": "center",
 }
+# A figure that follows soon does not flicker.
+_SLOWLY = {"transition": "opacity 0.2s ease 0.4s"}
 _LOG = logging.getLogger(__name__)
 
 Part = pn.viewable.Viewable | pn.viewable.Viewer
 
-PlotFigure = Callable[[], Figure | None]
-"""Returns a figure, or None while there are no data."""
+PlotFigure = Callable[[], Figure | Pending | None]
+"""Returns a figure, or None while there are no data; `PENDING` while another thread makes it."""
 Zoom = Callable[[tuple[Limits, Limits] | None], object]
 
 
@@ -85,7 +88,7 @@ class FigureView(pn.viewable.Viewer):
         self._drawn: BokehFigure | None = None
         self._pane: pn.pane.Bokeh | None = None
         self._waiting = waiting
-        self._is_changed = self._is_stale = False
+        self._is_changed = self._is_stale = self._is_pending = False
         self._shown_room: list[int] = []
         self.visibility = Visibility()
         # A plain Panel column lays out a new figure at once. Other containers do so a moment later,
@@ -137,6 +140,8 @@ class FigureView(pn.viewable.Viewer):
             self._card.extend([self._save, self._tools])
         if self._needs_drawing or self._drawn is None:
             self._draw()
+        if self._is_pending:
+            return
         self._shown_selected = self._selected
         self._actions.show(self._selected)
 
@@ -152,9 +157,8 @@ class FigureView(pn.viewable.Viewer):
     def _draw(self) -> None:
         self._shown_room = list(self.visibility.room)
         try:
-            if self._is_changed:
-                self._is_changed = False
-                self._figure = self._plot_figure()
+            if self._is_changed and not self._plot():
+                return
             if self._figure is None:
                 self._show_text(self._waiting)
             else:
@@ -163,6 +167,20 @@ class FigureView(pn.viewable.Viewer):
             # One figure that cannot be drawn must not break the page.
             _LOG.exception("%s cannot be drawn", self.card_name)
             self._show_text(f"This figure cannot be drawn: {error}")
+
+    def _plot(self) -> bool:
+        """Take the current figure; return whether there is one, or a reason why there is none.
+
+        Until then the figure stays due, so that it is asked for again.
+        """
+        self._is_pending = self._is_changed = False
+        figure = self._plot_figure()
+        if not isinstance(figure, Pending):
+            self._figure = figure
+            return True
+        self._is_pending = self._is_changed = True
+        self._fade()
+        return False
 
     def _on_screen(self) -> OnScreen | None:
         """Return the figure as it is on the screen, with the limits that a person has chosen."""
@@ -212,7 +230,8 @@ class FigureView(pn.viewable.Viewer):
 
     def _fade(self) -> None:
         is_old = self._is_changed or self._is_stale
-        self._body.styles = {**_BODY, **_CENTRED, "opacity": "0.45" if is_old else "1"}
+        styles = {**_BODY, **_CENTRED, "opacity": "0.45" if is_old else "1"}
+        self._body.styles = {**styles, **_SLOWLY} if self._is_pending else styles
 
 
 def _limits(event: RangesUpdate) -> tuple[Limits, Limits] | None:

@@ -7,6 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.row_origins import OrbitRows
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
@@ -89,7 +90,7 @@ class OrbitPage(pn.viewable.Viewer):
 
     def _workspace(self, one: OrbitWorkspace) -> pn.viewable.Viewable:
         if one is OrbitWorkspace.EXPLORE:
-            explore = ExploreView(self._navigation, self._wake)
+            explore = ExploreView(OrbitRows(self._navigation), self._session, self._wake)
             self._grids[one] = explore.grid
             return explore.__panel__()
         is_first = one is OrbitWorkspace.VERDICT

@@ -10,7 +10,9 @@ from astropy.table import Table
 
 from plateviz.dashboard.downloads import described
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.row_origins import RunRows
 from plateviz.dashboard.selected import KINDS
+from plateviz.dashboard.views.explore import ExploreView
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import (
@@ -95,6 +97,12 @@ class SurveyPage(pn.viewable.Viewer):
         return self._grids[self._navigation.survey_workspace]
 
     def _workspace(self, one: SurveyWorkspace) -> pn.viewable.Viewable:
+        if one is SurveyWorkspace.EXPLORE:
+            links = {"orbit_id": self._open_orbit}
+            explore = ExploreView(RunRows(self._navigation), self._session, self._wake, links)
+            self._grids[one] = explore.grid
+            self._show_selected()
+            return explore.__panel__()
         is_first = one is SurveyWorkspace.VERDICT
         views = [self._figure_view(f) for f in survey_figures() if f.workspace is one]
         grid = FigureGrid(views, self._wake, columns=1 if is_first else 2)

@@ -259,7 +259,7 @@ def test_invalid_address_is_reported_in_one_notice_and_shows_the_rest(navigation
     notice = navigation.session.notice
     assert notice.startswith("Not all that was asked for can be shown: run: expected default,")
     assert "view: expected survey, orbit, source, found 'moon'" in notice
-    assert "workspace: expected verdict, accuracy, catalogue, found 'sky'" in notice
+    assert "workspace: expected verdict, accuracy, catalogue, explore, found 'sky'" in notice
     # Proxies add parts of their own.
     assert "who" not in notice
     assert (navigation.view, navigation.run_name) == (View.SURVEY, "default")

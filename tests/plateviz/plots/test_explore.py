@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from plateviz.figures.figure import Axis
-from plateviz.plots.cells import counts_in_cells, edges_of, means_in_cells
-from plateviz.plots.explore import Columns, explored_figure
+from plateviz.plots.explore import explored_figure
+from plateviz.plots.explored_rows import Columns
 from plateviz.plots.style import ROW_LIMIT
 from plateviz.tables.explore import EXPLORABLE, ExplorableTable
 from solver.data.columns import Column
@@ -54,12 +53,28 @@ def test_many_rows_are_counted_in_cells(many):
 
 
 def test_zoom_counts_what_is_between_the_limits(many):
+    limits = ((1.1, 9.0), (2.0, 8.0))
+    (frame,) = explored_figure(many, Columns("x", "y", limits=limits))
+    x, y = many.numbers("x"), many.numbers("y")
+    expected = np.sum((x >= 1.1) & (x < 9.0) & (y >= 2.0) & (y < 8.0))
+    assert np.nansum(frame["cells by number"].values("image")[0]) == expected
+    assert frame.subtitle == f"{many.size:,} stars; {expected:,} in the frame"
+    assert (frame.x.limits, frame.y.limits) == limits
+
+
+def test_zoom_on_few_rows_shows_these_as_points(many):
     limits = ((2.0, 3.0), (4.0, 6.0))
     (frame,) = explored_figure(many, Columns("x", "y", limits=limits))
     x, y = many.numbers("x"), many.numbers("y")
-    expected = np.sum((x >= 2.0) & (x < 3.0) & (y >= 4.0) & (y < 6.0))
-    assert np.nansum(frame["cells by number"].values("image")[0]) == expected
-    assert (frame.x.limits, frame.y.limits) == limits
+    expected = np.flatnonzero((x >= 2.0) & (x <= 3.0) & (y >= 4.0) & (y <= 6.0))
+    assert frame["rows"].columns["id"].tolist() == list(map(str, expected))
+    assert frame.subtitle == f"{many.size:,} stars; {len(expected):,} in the frame"
+
+
+def test_zoom_beside_all_rows_is_an_empty_frame(many):
+    (frame,) = explored_figure(many, Columns("x", "y", limits=((50.0, 60.0), (4.0, 6.0))))
+    assert len(frame["rows"]) == 0
+    assert frame.subtitle.endswith("; 0 in the frame")
 
 
 @pytest.mark.parametrize("limits", [((1.0, 1.0), (2.0, 3.0)), ((-1.0, 2.0), (2.0, 3.0))])
@@ -87,6 +102,24 @@ def test_selected_sources_are_marked_among_cells(many):
     assert marks.columns["source"].tolist() == ["3", "5"]
     assert "id" not in marks.columns
     assert marks.values("x").tolist() == many.numbers("x")[[3, 5]].tolist()
+
+
+def test_selected_rows_that_are_too_many_are_counted(many):
+    (frame,) = explored_figure(many, Columns("x", "y"), selected=frozenset(range(ROW_LIMIT + 1)))
+    assert "selected sources" not in frame.names
+    assert frame.subtitle.endswith(
+        f"; {ROW_LIMIT + 1:,} of selected sources, too many to be marked"
+    )
+
+
+def test_words_of_rows_are_shown_by_a_hover_and_kept_for_a_tap():
+    table = table_of(x=np.arange(3.0), y=np.ones(3))._replace(
+        has_sources=False, words={"orbit_id": np.array(["4", "5", "6"]).__getitem__}, note="of some"
+    )
+    (frame,) = explored_figure(table, Columns("x", "y"))
+    assert frame["rows"].columns["orbit_id"].tolist() == ["4", "5", "6"]
+    assert ("orbit_id", "@{orbit_id}") in frame["rows"].hover
+    assert frame.subtitle == "3 stars; of some"
 
 
 def test_rows_are_limited_by_a_column():
@@ -142,21 +175,3 @@ def test_median_and_its_range_follow_the_data():
     np.testing.assert_allclose(median.values("y"), 3.0 * median.values("x"), atol=0.6)
     half = 0.5 * (frame["16 to 84 %"].values("y2") - frame["16 to 84 %"].values("y1"))
     assert 0.4 < np.median(half) < 0.75
-
-
-def test_cells_of_a_logarithmic_axis_are_equal_on_it():
-    axis = Axis("x", (1.0, 100.0), is_log=True)
-    np.testing.assert_allclose(edges_of(axis, 2), [1.0, 10.0, 100.0])
-    plain = Axis("y", (0.0, 1.0))
-    counts = counts_in_cells(np.array([5.0, 50.0, 50.0]), np.full(3, 0.5), axis, plain)
-    columns = np.flatnonzero(np.isfinite(counts).any(axis=0))
-    ends = counts.shape[1] * np.log10([5.0, 50.0]) / 2.0
-    assert columns.tolist() == np.floor(ends).astype(int).tolist()
-    assert np.nanmax(counts) == 2.0
-
-
-def test_values_that_are_missing_do_not_count_in_a_mean():
-    axis = Axis("x", (0.0, 1.0))
-    middle = np.full(3, 0.5)
-    means = means_in_cells(middle, middle, np.array([1.0, np.nan, 3.0]), axis, axis)
-    assert means[np.isfinite(means)].tolist() == [2.0]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plateviz.tables.explore import EXPLORABLE, ExplorableTable, sources_within
+from plateviz.tables.explore import EXPLORABLE, ExplorableTable
 from plateviz.tables.sources import deviation
 from solver.data import schema
 from solver.data.columns import Column
@@ -70,20 +70,32 @@ def test_exposures_have_their_fitted_parameters(fit_result):
     assert table.columns["focal_length_offset"].unit
 
 
-def test_area_has_the_sources_with_a_row_inside():
-    """A concave area, and a source with one row inside and another outside."""
-    columns = {
-        "x": np.array([1.0, 3.0, 3.0, 9.0, 1.0]),
-        "y": np.array([1.0, 1.0, 3.0, 9.0, 3.0]),
-        "source_id": np.array([7, 8, 9, 7, 6]),
-    }
-    named = {name: Column(name, "float64", "", "") for name in ("x", "y")}
-    table = ExplorableTable("rows", 5, named, columns.__getitem__, True, False)
-    # An L, which leaves out its upper right quarter.
-    corners = np.array([(0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)], dtype=float)
-    everything = np.ones(5, dtype=bool)
-    assert sources_within(table, "x", "y", corners, everything) == {7, 8, 6}
-    assert sources_within(table, "x", "y", corners[::-1], everything) == {7, 8, 6}
-    assert sources_within(table, "x", "y", corners, columns["source_id"] != 8) == {7, 6}
-    assert sources_within(table, "x", "y", corners[:2], everything) == frozenset()
-    assert sources_within(table, "x", "y", corners + 20.0, everything) == frozenset()
+@pytest.mark.parametrize("name", ["measurements", "sources"])
+def test_rows_have_the_sources_that_their_table_says(name, fit_result):
+    table = EXPLORABLE[name](fit_result)
+    ids, codes, classes = table.sources()
+    assert np.all(np.diff(ids) > 0)
+    np.testing.assert_array_equal(ids[codes], table.read("source_id"))
+    np.testing.assert_array_equal(classes[codes], table.read("source_class"))
+
+
+def test_sources_of_a_table_without_classes_have_none():
+    columns = {"x": np.ones(3), "source_id": np.array([7, 5, 7])}
+    named = {"x": Column("x", "float64", "", "")}
+    table = ExplorableTable("rows", 3, named, columns.__getitem__, True, False)
+    ids, codes, classes = table.sources()
+    assert (ids.tolist(), codes.tolist(), classes) == ([5, 7], [1, 0, 1], None)
+    assert table.sources().among([7, 8]).tolist() == [False, True]
+
+
+def test_numbers_of_four_bytes_are_not_copied_into_eight():
+    values = np.ones(3, dtype=np.float32)
+    table = ExplorableTable(
+        "rows", 3, {"x": Column("x", "float64", "", "")}, {"x": values}.get, False, False
+    )
+    assert table.numbers("x") is values
+
+
+def test_exposures_are_named_for_a_hover(fit_result):
+    words = EXPLORABLE["exposures"](fit_result).words
+    assert words["exposure"](np.array([1])).tolist() == ["field 0, exposure 1"]

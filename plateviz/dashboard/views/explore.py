@@ -43,6 +43,8 @@ class _Text(NamedTuple):
         "zooms, and the cells become finer."
     )
     is_wide: bool = True
+    equation: str = ""
+    document: str = "assets/docs/diagnostics.md, “Reading the page”"
 
 
 class ExploreView(pn.viewable.Viewer):

@@ -19,6 +19,7 @@ from plateviz.dashboard.views.save_choices import OnScreen, Saved, figure_choice
 from plateviz.dashboard.views.visibility import Visibility
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import Figure, Limits
+from plateviz.figures.figure_summary import TextTable, figure_summary, text_tables
 from plateviz.figures.resized import resized
 from solver.errors import InputError
 
@@ -91,7 +92,7 @@ class FigureView(pn.viewable.Viewer):
         # A plain Panel column lays out a new figure at once. Other containers do so a moment later,
         # and the page may measure a figure without a layout.
         self._body = pn.Column(margin=0)
-        self._tools = CardTools(figure.title, figure.caption)
+        self._tools = CardTools(figure, self._text_tables)
         choices = figure_choices(figure.name, self._on_screen, saved or Saved())
         self._save = SaveButton(figure.title, choices, place="corner")
         self._card = _card(self.visibility, self._body, self._save, self._tools, name=figure.name)
@@ -152,6 +153,7 @@ class FigureView(pn.viewable.Viewer):
             if self._is_changed:
                 self._is_changed = False
                 self._figure = self._plot_figure()
+                self._tools.summary = figure_summary(self._figure) if self._figure else ""
             if self._figure is None:
                 self._show_text(self._waiting)
             else:
@@ -160,6 +162,9 @@ class FigureView(pn.viewable.Viewer):
             # One figure that cannot be drawn must not break the page.
             _LOG.exception("%s cannot be drawn", self._name)
             self._show_text(f"This figure cannot be drawn: {error}")
+
+    def _text_tables(self) -> list[TextTable]:
+        return [] if self._figure is None else text_tables(self._figure)
 
     def _on_screen(self) -> OnScreen | None:
         """Return the figure as it is on the screen, with the limits that a person has chosen."""

@@ -13,6 +13,7 @@ from panel.io.resources import get_dist_path
 from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.views.accessible_names import AccessibleNames
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.selection_bar import SelectionBar
@@ -35,7 +36,7 @@ def build_app(store: SolutionStore) -> pmui.Page:
         title=title,
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
-        header=[bar, Keyboard(navigation), system],
+        header=[bar, Keyboard(navigation), system, AccessibleNames()],
         sidebar=[pages.sidebar],
         main=[pages, bar.windows],
         sidebar_width=_SIDEBAR_WIDTH,

@@ -12,6 +12,7 @@ from plateviz.plots.workspace import OrbitWorkspace
 from solver.io.formats import read_tables
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
+from tests.ui.accessibility import require_accessible
 from tests.ui.conftest import (
     BACKGROUNDS,
     VIEWS,
@@ -212,6 +213,16 @@ def test_a_figure_is_explained_and_opens_as_large_as_the_window(walked):
     assert card.bounding_box() == before
 
 
+def require_accessible_workspaces(page):
+    for workspace in OrbitWorkspace:
+        turn_to_workspace(page, workspace)
+        require_accessible(page)
+
+
+def test_every_workspace_is_accessible(walked):
+    require_accessible_workspaces(walked)
+
+
 def test_code_of_the_solution_on_the_screen_is_shown(walked):
     turn_to_workspace(walked, OrbitWorkspace.VERDICT)
     walked.get_by_role("button", name="Reproduce").click()
@@ -254,6 +265,7 @@ def test_a_figure_is_saved_as_pictures_and_data(walked, tmp_path):
 
 def test_figures_have_both_themes(walked):
     turn_dark(walked, diagnostics())
+    require_accessible_workspaces(walked)
 
 
 def selected(page, name, column="id"):

@@ -16,7 +16,7 @@ from plateviz.tables.summary import State
 # The same colours as in `style.css`.
 _COLOURS: Mapping[str, Mapping[State, str]] = MappingProxyType(
     {
-        "light": {"good": "#1a7f5a", "warn": "#b26a00", "bad": "#c0392b"},
+        "light": {"good": "#187a56", "warn": "#995b00", "bad": "#c0392b"},
         "dark": {"good": "#4cc79a", "warn": "#f0b24a", "bad": "#ff8a7a"},
     }
 )

@@ -105,6 +105,12 @@ export function render({ model, el }) {
   const colour = () => { corner.className = `corner ${model.theme}` }
   colour()
   model.on("theme", colour)
-  corner.append(words, explain, enlarge)
+  // Where a figure is drawn anew at once, a word would only flicker.
+  const stale = made("p", "The last solution; another is being computed", "stale")
+  stale.setAttribute("role", "status")
+  const follow = () => { stale.hidden = !model.is_stale }
+  follow()
+  model.on("is_stale", follow)
+  corner.append(words, stale, explain, enlarge)
   el.append(corner)
 }

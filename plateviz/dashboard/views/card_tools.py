@@ -26,6 +26,7 @@ class CardTools(pn.custom.JSComponent):
     equation = param.String(doc="what is drawn, as text")
     # Not "document", which a Bokeh model has already.
     place = param.String(doc="where the documents explain it: file and section")
+    is_stale = param.Boolean(doc="whether what is drawn is of the last solution")
     summary = param.String(doc="what is drawn now, in words and numbers")
 
     _esm = (_HERE / "card_tools.js").read_text(encoding="utf-8")

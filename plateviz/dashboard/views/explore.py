@@ -18,6 +18,7 @@ from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.save_choices import Saved
+from plateviz.dashboard.views.state_text import missing_text
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure, Limits
 from plateviz.plots.explore import explored_figure, kept_rows
@@ -67,7 +68,7 @@ class ExploreView(pn.viewable.Viewer):
         self._figure = FigureView(
             _Text(),
             self._plot,
-            waiting="The first solution is being computed.",
+            waiting=partial(missing_text, self._session),
             actions=PointActions(
                 select=self._session.select_sources,
                 select_area=self._select_area,

@@ -39,6 +39,7 @@ _CENTRED = {
     "align-items": "center",
     "justify-content": "center",
 }
+_WHAT_TO_DO = "The other figures do not depend on it; it is tried again with the next solution."
 _LOG = logging.getLogger(__name__)
 
 Part = pn.viewable.Viewable | pn.viewable.Viewer
@@ -59,7 +60,7 @@ class FigureView(pn.viewable.Viewer):
         figure: FigureText,
         plot_figure: PlotFigure,
         *,
-        waiting: str = "",
+        waiting: str | Callable[[], str] = "",
         actions: PointActions | None = None,
         zoom: Zoom | None = None,
         saved: Saved | None = None,
@@ -70,7 +71,7 @@ class FigureView(pn.viewable.Viewer):
 
         Parameters
         ----------
-        waiting : text while there is nothing to draw
+        waiting : text while there is nothing to draw, or function that returns it
         actions : what its points do
         zoom : called with the limits of the first frame's axes when a person changes them, and
             with None when they are reset
@@ -141,6 +142,7 @@ class FigureView(pn.viewable.Viewer):
     def mark_stale(self, is_stale: bool) -> None:
         """Mark the figure as stale while a new solution is being computed."""
         self._is_stale = is_stale
+        self._tools.is_stale = is_stale and self._figure is not None
         self._fade()
 
     @property
@@ -155,13 +157,16 @@ class FigureView(pn.viewable.Viewer):
                 self._figure = self._plot_figure()
                 self._tools.summary = figure_summary(self._figure) if self._figure else ""
             if self._figure is None:
-                self._show_text(self._waiting)
+                waiting = self._waiting
+                self._show_text(waiting() if callable(waiting) else waiting)
             else:
                 self._show(self._figure)
         except (InputError, ValueError, KeyError, TypeError, ArithmeticError) as error:
             # One figure that cannot be drawn must not break the page.
             _LOG.exception("%s cannot be drawn", self._name)
-            self._show_text(f"This figure cannot be drawn: {error}")
+            self._figure = None
+            self._tools.summary = f"This figure cannot be drawn: {error}"
+            self._show_text(f"{self._tools.summary}. {_WHAT_TO_DO}")
 
     def _text_tables(self) -> list[TextTable]:
         return [] if self._figure is None else text_tables(self._figure)

@@ -22,6 +22,7 @@ _COLOURS: Mapping[str, Mapping[State, str]] = MappingProxyType(
 )
 # Tabulator makes its tables visible even in a hidden view; this prevents it.
 TABLE_STYLE = ":host .tabulator { font-size: 13px; visibility: inherit !important; }"
+_NO_ROWS = "There are no rows to show yet."
 _CLICKABLE = ".tabulator-row { cursor: pointer; }"
 
 
@@ -96,6 +97,7 @@ class DataTable(pn.viewable.Viewer):
             disabled=True,
             show_index=False,
             selectable=False,
+            configuration={"placeholder": _NO_ROWS},
             pagination="remote",
             page_size=self._page_size,
             layout="fit_data_table",

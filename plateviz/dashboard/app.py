@@ -15,6 +15,7 @@ from plateviz.dashboard.page_request import WINDOW
 from plateviz.dashboard.rooms import Rooms, Window, window_from
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.views.accessible_names import AccessibleNames
 from plateviz.dashboard.views.address_bar import AddressBar
 from plateviz.dashboard.views.figure import Part
 from plateviz.dashboard.views.keyboard import Keyboard
@@ -52,6 +53,7 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
         report_button(navigation, "bar"),
         system,
         AddressBar(navigation),
+        AccessibleNames(),
     ]
     page = empty_page(
         store,

@@ -45,13 +45,13 @@ class RowsOrigin(Protocol):
     ----------
     exploration : what is drawn of them
     caption : what the figure says of itself
-    waiting : text while there is no table
+    document : where the documents say more of it
     executor : what makes tables and figures; None if they take no time
     """
 
     exploration: Exploration
     caption: str
-    waiting: str
+    document: str
     executor: Executor | None
 
     def request(self) -> TableRequest | None:
@@ -67,7 +67,7 @@ class OrbitRows:
     """The rows of the solution on the screen."""
 
     caption = _COMMON
-    waiting = "The first solution is being computed."
+    document = "assets/docs/diagnostics.md, “Reading the page”"
     executor: Executor | None = None
 
     def __init__(self, navigation: Navigation) -> None:
@@ -97,7 +97,7 @@ class RunRows:
     """The rows of the run on the screen, which are read by another thread."""
 
     caption = _COMMON + _OF_RUN
-    waiting = "This run has no rows yet."
+    document = "assets/docs/survey-diagnostics.md, “Explore all residuals”"
 
     def __init__(self, navigation: Navigation) -> None:
         """Follow `navigation`."""

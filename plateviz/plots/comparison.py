@@ -154,5 +154,6 @@ DIAGNOSTICS = (
         _plot,
         is_wide=True,
         has_data=lambda chosen: chosen.other is not None,
+        equation="Δ = B − A; Δ / σ, with the marginal σ of A",
     ),
 )

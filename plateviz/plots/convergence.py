@@ -170,5 +170,6 @@ DIAGNOSTICS = (
         90,
         _plot,
         is_wide=True,
+        equation=("max |step| / σ at each iteration; objective = χ²(measurements) + χ²(priors)"),
     ),
 )

@@ -132,5 +132,9 @@ DIAGNOSTICS = (
         75,
         _plot,
         is_wide=True,
+        equation=(
+            "shift = mean residual / share that is left by pointing, roll, focal length "
+            "and source positions"
+        ),
     ),
 )

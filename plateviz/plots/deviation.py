@@ -128,5 +128,6 @@ DIAGNOSTICS = (
         _plot,
         is_wide=True,
         has_data=lambda chosen: chosen.result.true_places is not None,
+        equation="Δ = estimate − truth; rms of Δ / σ, with the marginal σ",
     ),
 )

@@ -54,6 +54,7 @@ class Diagnostic:
     is_wide : whether it takes the whole width of its workspace, or of a report
     has_data : whether there is anything to draw, such as a truth or another solution
     is_key : whether the Verdict workspace shows it, small
+    equation : what is drawn, as text
     """
 
     name: str
@@ -66,3 +67,9 @@ class Diagnostic:
     is_wide: bool = False
     has_data: Callable[[Chosen], bool] = _always
     is_key: bool = False
+    equation: str = ""
+
+    @property
+    def document(self) -> str:
+        """Where the documents explain the figure."""
+        return f"assets/docs/diagnostics.md, “{self.title}”"

@@ -77,5 +77,9 @@ DIAGNOSTICS = (
         80,
         _plot,
         is_key=True,
+        equation=(
+            "δx = Σ A(k,j) P_k(x/s) P_j(y/s), 2 ≤ k + j ≤ order, minus its value at the "
+            "centre; δy with B(k,j); Legendre polynomials P, scale s of the instrument"
+        ),
     ),
 )

@@ -108,5 +108,9 @@ DIAGNOSTICS = (
         _plot,
         is_wide=True,
         has_data=lambda chosen: chosen.other is not None,
+        equation=(
+            "Δ = δ(B) − δ(A), minus its best shift, roll and scale; right: with the "
+            "detectors' places, rotations and pitches"
+        ),
     ),
 )

@@ -123,5 +123,9 @@ DIAGNOSTICS = (
         84,
         _plot_groups,
         is_wide=True,
+        equation=(
+            "move = v with vᵀ S v = 1, one sigma long; share = Σ (v / σ(conditional))² "
+            "of the group over that of all groups"
+        ),
     ),
 )

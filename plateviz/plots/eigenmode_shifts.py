@@ -91,5 +91,6 @@ DIAGNOSTICS = (
         85,
         _plot,
         is_wide=True,
+        equation="shift of a source = J v, with the shift J per parameter, and vᵀ S v = 1",
     ),
 )

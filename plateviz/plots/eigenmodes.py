@@ -205,6 +205,11 @@ DIAGNOSTICS = (
         82,
         _plot_spectrum,
         is_wide=True,
+        equation=(
+            "S(data) v = λ S v, with the information S(data) of the measurements in the "
+            "information S of all, the sources eliminated; left λ, right vᵀ S v / Σ v² "
+            "/ σ²(conditional)"
+        ),
     ),
     Diagnostic(
         "weak-directions",
@@ -217,5 +222,9 @@ DIAGNOSTICS = (
         83,
         _plot_deciders,
         is_wide=True,
+        equation=(
+            "shares of vᵀ S v: of measurements, reference sources, other sources and "
+            "priors of the calibration; they add up to 1"
+        ),
     ),
 )

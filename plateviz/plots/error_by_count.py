@@ -164,5 +164,9 @@ SURVEY_FIGURES = (
         SurveyWorkspace.ACCURACY,
         40,
         _plot,
+        equation=(
+            "error²(N) = noise² / N + floor²; the paper's law: error = σ(one "
+            "measurement) / √(n N), n measurements in an orbit"
+        ),
     ),
 )

@@ -136,5 +136,9 @@ DIAGNOSTICS = (
         75,
         _plot,
         is_wide=True,
+        equation=(
+            "fitted − prior centre; the pointing as Δα cos δ and Δδ in the plane "
+            "tangent to the sky there"
+        ),
     ),
 )

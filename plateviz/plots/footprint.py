@@ -117,5 +117,6 @@ DIAGNOSTICS = (
         10,
         _plot,
         is_key=True,
+        equation="x = Δα cos δ, y = Δδ from the centre of the field of the orbit",
     ),
 )

@@ -151,5 +151,10 @@ DIAGNOSTICS = (
         44,
         _plot,
         is_wide=True,
+        equation=(
+            "χ² = z(x)² + z(y)², with standardised residuals z; expected at rank k of "
+            "n: the median of the k-th largest of n draws of χ² with two degrees of "
+            "freedom"
+        ),
     ),
 )

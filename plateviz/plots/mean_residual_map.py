@@ -118,5 +118,9 @@ DIAGNOSTICS = (
         25,
         _plot,
         is_wide=True,
+        equation=(
+            "mean = Σ w r / Σ w (1 − h), with w = 1/s², the error s of a measurement, "
+            "and the share h that the source positions absorb; σ² = 1 / Σ w (1 − h)"
+        ),
     ),
 )

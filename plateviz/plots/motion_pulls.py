@@ -85,5 +85,6 @@ SURVEY_FIGURES = (
         60,
         _plot,
         is_wide=True,
+        equation="(fitted − true) / σ, for position, parallax and proper motion",
     ),
 )

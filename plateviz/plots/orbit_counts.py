@@ -86,5 +86,6 @@ SURVEY_FIGURES = (
         SurveyWorkspace.CATALOGUE,
         30,
         _plot,
+        equation="N of a source = number of orbits with a measurement of it",
     ),
 )

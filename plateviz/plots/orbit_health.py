@@ -201,5 +201,9 @@ SURVEY_FIGURES = (
         5,
         _plot,
         is_wide=True,
+        equation=(
+            "χ² / dof, band 1 ± √(2 / dof); rms of (estimate − catalogue) / "
+            "σ(catalogue) of the reference sources"
+        ),
     ),
 )

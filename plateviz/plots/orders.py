@@ -213,5 +213,6 @@ DIAGNOSTICS = (
         _plot,
         is_wide=True,
         has_data=lambda chosen: chosen.result.orders is not None,
+        equation="ln evidence (Laplace); odds of two orders = exp(difference of ln evidence)",
     ),
 )

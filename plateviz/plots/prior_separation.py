@@ -89,5 +89,6 @@ SURVEY_FIGURES = (
         20,
         _plot,
         is_wide=True,
+        equation="separation = √((Δα cos δ)² + (Δδ)²), catalogue − truth at the epoch",
     ),
 )

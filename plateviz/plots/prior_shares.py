@@ -89,5 +89,6 @@ DIAGNOSTICS = (
         OrbitWorkspace.CALIBRATION,
         81,
         _plot,
+        equation="share = σ²(marginal) / σ²(prior)",
     ),
 )

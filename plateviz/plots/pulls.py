@@ -126,6 +126,10 @@ DIAGNOSTICS = (
         40,
         _plot_pulls,
         is_key=True,
+        equation=(
+            "z = r / (s √(1 − h/2)), with the residual r, the error s of a measurement "
+            "and its leverage h"
+        ),
     ),
     Diagnostic(
         "exposure-chi2",
@@ -136,5 +140,9 @@ DIAGNOSTICS = (
         70,
         _plot_chi2,
         is_key=True,
+        equation=(
+            "χ² / dof, dof = 2 N − Σ h, with the leverages h of the N measurements; "
+            "band 1 ± 2 √(2 / dof)"
+        ),
     ),
 )

@@ -107,5 +107,10 @@ DIAGNOSTICS = (
         OrbitWorkspace.SKY,
         65,
         _plot,
+        equation=(
+            "catalogue − rest = −P (P − C)⁻¹ o; pull² = oᵀ (P − C)⁻¹ o, with the offset "
+            "o from the catalogue, its covariance P, and the marginal covariance C of "
+            "the estimate"
+        ),
     ),
 )

@@ -162,5 +162,10 @@ SURVEY_FIGURES = (
         50,
         _plot,
         is_wide=True,
+        equation=(
+            "measured: standard deviation of the estimates of all orbits; predicted: "
+            "rms of their σ(noise); deviation: (mean − truth) / its σ from noise and "
+            "catalogue"
+        ),
     ),
 )

@@ -108,5 +108,9 @@ DIAGNOSTICS = (
         OrbitWorkspace.PATTERNS,
         42,
         _plot,
+        equation=(
+            "ξ± from pairs of residuals w = u + iv: ξ₊ = ⟨Re w₁ w₂*⟩, ξ₋ = ⟨Re w₁ w₂ "
+            "exp(−2iφ)⟩; E, B = (ξ₊ ± [ξ₋ − 2 ∫ᵣ^∞ ξ₋ ds/s]) / 2"
+        ),
     ),
 )

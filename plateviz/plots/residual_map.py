@@ -152,5 +152,6 @@ DIAGNOSTICS = (
         _plot,
         follows_shown=True,
         is_key=True,
+        equation="r = n(measured) − n(predicted), for x and y",
     ),
 )

@@ -108,5 +108,9 @@ DIAGNOSTICS = (
         30,
         _plot,
         follows_shown=True,
+        equation=(
+            "r = n(measured) − n(predicted); expected σ² = s² (1 − h/2), with the error "
+            "s of a measurement and its leverage h"
+        ),
     ),
 )

@@ -164,5 +164,6 @@ SURVEY_FIGURES = (
         10,
         _plot,
         is_wide=True,
+        equation="l, b: Galactic longitude and latitude",
     ),
 )

@@ -175,5 +175,6 @@ SOURCE_FIGURES = (
         SourceWorkspace.MOTION,
         10,
         _plot,
+        equation="position = position₀ + μ (t − t₀) + ϖ f(t), with the parallax factors f",
     ),
 )

@@ -11,6 +11,8 @@ from plateviz.figures.figure import Figure
 from plateviz.plots.workspace import SourceWorkspace, SurveyWorkspace
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 
+_DOCUMENT = "assets/docs/survey-diagnostics.md"
+
 
 @dataclass(frozen=True)
 class SurveyFigure:
@@ -25,6 +27,7 @@ class SurveyFigure:
     order : sort key on the page
     plot : function of the tables that returns the figure
     is_wide : whether it takes the whole width of its workspace, or of a report
+    equation : what is drawn, as text
     """
 
     name: str
@@ -34,6 +37,12 @@ class SurveyFigure:
     order: int
     plot: Callable[[SurveyTables], Figure]
     is_wide: bool = False
+    equation: str = ""
+
+    @property
+    def document(self) -> str:
+        """Where the documents explain the figure."""
+        return f"{_DOCUMENT}, “{self.title}”"
 
 
 @dataclass(frozen=True)
@@ -47,3 +56,9 @@ class SourceFigure:
     order: int
     plot: Callable[[SourceTables], Figure]
     is_wide: bool = False
+    equation: str = ""
+
+    @property
+    def document(self) -> str:
+        """Where the documents explain the figure."""
+        return f"{_DOCUMENT}, “{self.title}”"

@@ -181,5 +181,9 @@ SOURCE_FIGURES = (
         20,
         _plot,
         is_wide=True,
+        equation=(
+            "offset = q₀ + μ (t − t₀) + ϖ f(t), with the parallax factors f; residual = "
+            "(estimate − fit) / σ(noise)"
+        ),
     ),
 )

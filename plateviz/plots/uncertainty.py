@@ -160,5 +160,10 @@ DIAGNOSTICS = (
         _plot,
         is_wide=True,
         is_key=True,
+        equation=(
+            "σ²(marginal) = σ²(conditional) + J C Jᵀ, with the covariance C of the "
+            "calibration and the shift J of the source per parameter; σ(conditional) ≈ "
+            "σ(one measurement) / √N"
+        ),
     ),
 )

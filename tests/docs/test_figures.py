@@ -39,6 +39,12 @@ def test_section_says_what_is_good_and_what_is_bad(figure, page):
     assert len(words.split()) > 30
 
 
+@of_every_figure
+def test_figure_names_its_section_and_its_equation(figure, page):
+    assert figure.document == f"assets/docs/{page.name}, “{figure.title}”"
+    assert len(figure.equation) > 10
+
+
 @pytest.mark.parametrize(
     ("page", "figures"),
     [(ORBIT, diagnostics()), (SURVEY, (*survey_figures(), *source_figures()))],

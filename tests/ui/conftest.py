@@ -125,6 +125,29 @@ def until(page, condition):
     pytest.fail("it did not come about in 30 s")
 
 
+def rests(page):
+    """Whether the browser works less than one second in two, at the latest after half a minute."""
+    metric = metrics_of(page)
+
+    def works_little():
+        before = metric("TaskDuration")
+        page.wait_for_timeout(2000)
+        return metric("TaskDuration") - before < 1.0
+
+    return any(works_little() for _ in range(15))
+
+
+def metrics_of(page):
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable")
+
+    def metric(name):
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        return next(m["value"] for m in metrics if m["name"] == name)
+
+    return metric
+
+
 def turn_dark(page, figures):
     """Change the theme from light to dark and go to each figure until it is drawn in it."""
     assert set(page.evaluate(BACKGROUNDS).values()) == {"#ffffff"}

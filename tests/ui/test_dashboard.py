@@ -12,10 +12,13 @@ from plateviz.plots.workspace import OrbitWorkspace
 from solver.io.formats import read_tables
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
+from tests.ui.accessibility import require_accessible
 from tests.ui.conftest import (
     BACKGROUNDS,
     VIEWS,
+    metrics_of,
     opening_pages,
+    rests,
     see,
     serving,
     turn_dark,
@@ -97,29 +100,6 @@ def is_faded(locator):
     )
 
 
-def rests(page):
-    """Whether the browser works less than one second in two, at the latest after half a minute."""
-    metric = metrics_of(page)
-
-    def works_little():
-        before = metric("TaskDuration")
-        page.wait_for_timeout(2000)
-        return metric("TaskDuration") - before < 1.0
-
-    return any(works_little() for _ in range(15))
-
-
-def metrics_of(page):
-    session = page.context.new_cdp_session(page)
-    session.send("Performance.enable")
-
-    def metric(name):
-        metrics = session.send("Performance.getMetrics")["metrics"]
-        return next(m["value"] for m in metrics if m["name"] == name)
-
-    return metric
-
-
 def chi2(page):
     return value(page, "χ² per degree of freedom")
 
@@ -193,6 +173,14 @@ def test_a_figure_is_explained_and_opens_as_large_as_the_window(walked):
     words = walked.get_by_text("Measured minus predicted position on the detector")
     words = words.filter(visible=True)
     expect(words).to_have_count(1)
+    shown = walked.get_by_role("region", name="Explanation: Residual map").filter(visible=True)
+    expect(shown).to_contain_text("r = n(measured) − n(predicted)")
+    expect(shown).to_contain_text("assets/docs/diagnostics.md, “Residual map”")
+    expect(shown).to_contain_text("Now: Residuals on detector 0")
+    shown.get_by_role("button", name="Show the numbers as a table").click()
+    expect(shown.locator("tbody tr").first).to_be_visible()
+    figure = walked.get_by_role("figure", name="Residual map. Residuals on detector 0")
+    expect(figure.filter(visible=True)).to_have_count(1)
     walked.keyboard.press("Escape")
     expect(words).to_have_count(0)
     button(walked, "Open large: Residual map").click()
@@ -202,6 +190,16 @@ def test_a_figure_is_explained_and_opens_as_large_as_the_window(walked):
     walked.keyboard.press("Escape")
     until(walked, lambda: canvas.bounding_box()["height"] < before["height"])
     assert card.bounding_box() == before
+
+
+def require_accessible_workspaces(page):
+    for workspace in OrbitWorkspace:
+        turn_to_workspace(page, workspace)
+        require_accessible(page)
+
+
+def test_every_workspace_is_accessible(walked):
+    require_accessible_workspaces(walked)
 
 
 def test_code_of_the_solution_on_the_screen_is_shown(walked):
@@ -246,6 +244,7 @@ def test_a_figure_is_saved_as_pictures_and_data(walked, tmp_path):
 
 def test_figures_have_both_themes(walked):
     turn_dark(walked, diagnostics())
+    require_accessible_workspaces(walked)
 
 
 def selected(page, name, column="id"):

@@ -10,6 +10,7 @@ from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.workspace import SourceWorkspace
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
+from tests.ui.accessibility import require_accessible
 from tests.ui.conftest import VIEWS, see, serving, turn_dark, turn_to_workspace, until
 
 expect.set_options(timeout=60_000)
@@ -105,9 +106,11 @@ def test_the_run_is_shown_first_in_both_themes_and_leads_to_an_orbit(page):
     expect(heading(page, "Run: default")).to_be_visible()
     expect(page.locator(".tabulator-row:visible")).to_have_count(N_ORBITS)
     expect(row(page, 0)).to_contain_text("complete")
+    require_accessible(page)
     rows = drawn(page, survey_figures())
     assert [name for name, n in rows.items() if n == 0 and name not in EMPTY] == []
     turn_dark(page, survey_figures())
+    require_accessible(page)
     orbit = tap(page, "orbit-health", "orbit_id")
     expect(heading(page, f"Solution of orbit {orbit}")).to_be_visible()
 
@@ -124,7 +127,9 @@ def test_from_the_survey_to_an_orbit_to_a_source_and_back(page):
     expect(heading(page, f"source: {source}")).to_be_visible()
     expect(page.get_by_label("Source id")).to_have_value(source)
     assert 0 not in drawn(page, source_figures()).values()
+    require_accessible(page)
     turn_to_workspace(page, SourceWorkspace.ORBITS)
+    require_accessible(page)
     row(page, 0).click()
     expect(heading(page, "Solution of orbit")).to_be_visible()
     turn_to(page, "Survey")

@@ -10,6 +10,8 @@ import param
 
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.views.markup import markup_pane, paragraph
+from plateviz.dashboard.views.state_text import missing_text, outdated_text
 from plateviz.dashboard.views.table import TABLE_STYLE
 from plateviz.tables import calibration_tables, outlier_list
 
@@ -45,13 +47,25 @@ class CalibrationView(pn.viewable.Viewer):
         # Otherwise a table in an unopened tab would check in the browser without end whether it can
         # be laid out, which uses one core.
         self._tabs = pmui.Tabs(dynamic=True, sizing_mode="stretch_width")
+        self._words = markup_pane()
+        self._column = pmui.Column(self._words, self._tabs, margin=0, sizing_mode="stretch_width")
         session.param.watch(self._fill, "shown")
+        session.param.watch(self._say, ["shown", "stage", "theme"])
         session.selection.param.watch(self._show_selected, [*KINDS])
         self._fill()
+        self._say()
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Return the tabs."""
-        return self._tabs
+        """Return the tabs, below words on their state unless they are of the requested solution."""
+        return self._column
+
+    def _say(self, *_: object) -> None:
+        session = self._session
+        is_missing = session.shown is None
+        text = missing_text(session) if is_missing else outdated_text(session)
+        self._words.object = paragraph(text, "empty" if is_missing else "outdated", session.theme)
+        self._words.visible = bool(text)
+        self._tabs.visible = not is_missing
 
     def _fill(self, *_: object) -> None:
         shown = self._session.shown

@@ -50,9 +50,11 @@ class _Text(NamedTuple):
     """What the card says; see `FigureText`."""
 
     caption: str
+    document: str
     name: str = "explore"
     title: str = "Any column against any other"
     is_wide: bool = True
+    equation: str = ""
 
 
 class _Drawn(NamedTuple):
@@ -72,6 +74,7 @@ class ExploreView(pn.viewable.Viewer):
         origin: RowsOrigin,
         session: Session,
         wake: Callable[..., object],
+        waiting: str | Callable[[], str],
         links: Links = NO_LINKS,
         **params: object,
     ) -> None:
@@ -81,6 +84,7 @@ class ExploreView(pn.viewable.Viewer):
         ----------
         session : has the selection and the theme
         wake : called when the figure may have become due to be drawn
+        waiting : text while there are no rows, or what returns it
         links : what a tap on a row without a source opens, as in `PointActions`
         """
         super().__init__(**params)
@@ -102,9 +106,9 @@ class ExploreView(pn.viewable.Viewer):
             select_exposures=selection.select_exposures,
         )
         self._figure = FigureView(
-            _Text(origin.caption),
+            _Text(origin.caption, origin.document),
             self._plot,
-            waiting=origin.waiting,
+            waiting=waiting,
             actions=actions,
             zoom=self._zoom,
             saved=Saved(origin.subject, self._rows),

@@ -20,6 +20,7 @@ from plateviz.dashboard.views.save_choices import OnScreen, Saved, figure_choice
 from plateviz.dashboard.views.visibility import Visibility
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import Figure, Limits
+from plateviz.figures.figure_summary import TextTable, figure_summary, text_tables
 from plateviz.figures.resized import resized
 from solver.errors import InputError
 
@@ -41,6 +42,7 @@ _CENTRED = {
 }
 # A figure that follows soon does not flicker.
 _SLOWLY = {"transition": "opacity 0.2s ease 0.4s"}
+_WHAT_TO_DO = "The other figures do not depend on it; it is tried again with the next solution."
 _LOG = logging.getLogger(__name__)
 
 Part = pn.viewable.Viewable | pn.viewable.Viewer
@@ -61,7 +63,7 @@ class FigureView(pn.viewable.Viewer):
         figure: FigureText,
         plot_figure: PlotFigure,
         *,
-        waiting: str = "",
+        waiting: str | Callable[[], str] = "",
         actions: PointActions | None = None,
         zoom: Zoom | None = None,
         saved: Saved | None = None,
@@ -72,7 +74,7 @@ class FigureView(pn.viewable.Viewer):
 
         Parameters
         ----------
-        waiting : text while there is nothing to draw
+        waiting : text while there is nothing to draw, or function that returns it
         actions : what its points do
         zoom : called with the limits of the first frame's axes when a person changes them, and
             with None when they are reset
@@ -94,7 +96,7 @@ class FigureView(pn.viewable.Viewer):
         # A plain Panel column lays out a new figure at once. Other containers do so a moment later,
         # and the page may measure a figure without a layout.
         self._body = pn.Column(margin=0)
-        self._tools = CardTools(figure.title, figure.caption)
+        self._tools = CardTools(figure, self._text_tables)
         choices = figure_choices(figure.name, self._on_screen, saved or Saved())
         self._save = SaveButton(figure.title, choices, place="corner")
         self._card = _card(self.visibility, self._body, name=figure.name)
@@ -148,6 +150,7 @@ class FigureView(pn.viewable.Viewer):
     def mark_stale(self, is_stale: bool) -> None:
         """Mark the figure as stale while a new solution is being computed."""
         self._is_stale = is_stale
+        self._tools.is_stale = is_stale and self._figure is not None
         self._fade()
 
     @property
@@ -160,13 +163,19 @@ class FigureView(pn.viewable.Viewer):
             if self._is_changed and not self._plot():
                 return
             if self._figure is None:
-                self._show_text(self._waiting)
+                waiting = self._waiting
+                self._show_text(waiting() if callable(waiting) else waiting)
             else:
                 self._show(self._figure)
         except (InputError, ValueError, KeyError, TypeError, ArithmeticError) as error:
             # One figure that cannot be drawn must not break the page.
             _LOG.exception("%s cannot be drawn", self.card_name)
-            self._show_text(f"This figure cannot be drawn: {error}")
+            self._figure = None
+            self._tools.summary = f"This figure cannot be drawn: {error}"
+            self._show_text(f"{self._tools.summary}. {_WHAT_TO_DO}")
+
+    def _text_tables(self) -> list[TextTable]:
+        return [] if self._figure is None else text_tables(self._figure)
 
     def _plot(self) -> bool:
         """Take the current figure; return whether there is one, or a reason why there is none.
@@ -177,6 +186,7 @@ class FigureView(pn.viewable.Viewer):
         figure = self._plot_figure()
         if not isinstance(figure, Pending):
             self._figure = figure
+            self._tools.summary = figure_summary(figure) if figure else ""
             return True
         self._is_pending = self._is_changed = True
         self._fade()

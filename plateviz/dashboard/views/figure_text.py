@@ -4,7 +4,7 @@ from typing import Protocol
 
 
 class FigureText(Protocol):
-    """Name, title, caption and width of a figure."""
+    """Name, title, words and width of a figure."""
 
     @property
     def name(self) -> str:
@@ -19,6 +19,16 @@ class FigureText(Protocol):
     @property
     def caption(self) -> str:
         """What the figure shows, and how it looks for a good solution."""
+        ...
+
+    @property
+    def equation(self) -> str:
+        """What is drawn as an equation in plain text; empty if there is none to say."""
+        ...
+
+    @property
+    def document(self) -> str:
+        """Where the documents explain the figure: file and section."""
         ...
 
     @property

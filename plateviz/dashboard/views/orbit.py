@@ -20,6 +20,7 @@ from plateviz.dashboard.views.refit import RefitView
 from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.dashboard.views.stack import Stack
+from plateviz.dashboard.views.state_text import missing_text
 from plateviz.dashboard.views.summary import HeadView, StripView
 from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
@@ -90,7 +91,12 @@ class OrbitPage(pn.viewable.Viewer):
 
     def _workspace(self, one: OrbitWorkspace) -> pn.viewable.Viewable:
         if one is OrbitWorkspace.EXPLORE:
-            explore = ExploreView(OrbitRows(self._navigation), self._session, self._wake)
+            explore = ExploreView(
+                OrbitRows(self._navigation),
+                self._session,
+                self._wake,
+                partial(missing_text, self._session),
+            )
             self._grids[one] = explore.grid
             return explore.__panel__()
         is_first = one is OrbitWorkspace.VERDICT
@@ -113,7 +119,7 @@ class OrbitPage(pn.viewable.Viewer):
         return FigureView(
             diagnostic,
             partial(self._plot, diagnostic),
-            waiting="The first solution is being computed.",
+            waiting=partial(missing_text, self._session),
             actions=PointActions(
                 select=self._session.selection.select_sources,
                 select_exposures=self._session.selection.select_exposures,
@@ -154,3 +160,6 @@ class OrbitPage(pn.viewable.Viewer):
     def _mark_stale(self, *_: object) -> None:
         for grid in self._grids.values():
             grid.mark_stale(self._session.stage is Stage.STALE)
+        if self._session.shown is None:
+            # What is said instead of the figures depends on the stage.
+            self._change()

@@ -30,6 +30,13 @@ _SWITCH = {
         "whiteSpace": "nowrap",
     }
 }
+# Its grey on grey would be hard to read; a rule of the theme would take precedence over one "&".
+_SELECTED = {
+    "&& .MuiToggleButton-root.Mui-selected, && .MuiToggleButton-root.Mui-selected:hover": {
+        "color": "text.primary",
+        "backgroundColor": "action.selected",
+    }
+}
 _TYPES = {View.SURVEY: SurveyPage, View.ORBIT: OrbitPage, View.SOURCE: SourcePage}
 
 Page = SurveyPage | OrbitPage | SourcePage
@@ -126,7 +133,7 @@ class Pages(pn.viewable.Viewer):
     def _workspace_switch(self) -> pmui.RadioButtonGroup:
         navigation = self._navigation
         switch = pmui.RadioButtonGroup(
-            options={}, size="small", color="default", margin=(6, 2), sx=_SWITCH
+            options={}, size="small", color="default", margin=(6, 2), sx={**_SWITCH, **_SELECTED}
         )
 
         def follow(*_: object) -> None:

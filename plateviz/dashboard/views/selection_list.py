@@ -17,6 +17,7 @@ from plateviz.tables.headings import (
     SELECTED_SOURCES,
     Heading,
 )
+from solver.errors import InputError
 
 _PAGE_SIZE = 15
 _NOTHING = "Nothing is selected. A tap, box or lasso in a figure selects what its points are of."
@@ -97,7 +98,11 @@ class SelectionList(pn.viewable.Viewer):
             return selected_exposures(session.selection.exposures, result)
         if kind == "detectors":
             return selected_detectors(session.selection.detectors, result)
-        counts = run.counts() if run is not None else None
+        try:
+            counts = run.counts() if run is not None else None
+        except InputError:
+            # The run is gone; the values of the orbit on the screen are not.
+            counts = None
         return selected_sources(session.selection.sources, result, counts)
 
     def _open_source(self, row: pd.Series) -> None:

@@ -46,11 +46,13 @@ from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE, SOURCES_OF_RUN, i
 from plateviz.tables.survey_tables import SourceTables
 from plateviz.tables.verdict import source_verdict
 from solver.data.survey_schema import HISTORY, MOTIONS
+from solver.errors import InputError
 
 _INVITATION = (
     "Write a source's id on the left, choose one below, or tap its point in a figure of the "
     "Survey or the Orbit view and open it."
 )
+_WHAT_TO_DO = "Reload the page once the run is there again."
 _NO_SOURCES = "No orbit of this run is fitted yet. Its sources are listed here once one is."
 
 
@@ -162,7 +164,11 @@ class SourcePage(pn.viewable.Viewer):
     def _list_sources(self, *_: object) -> None:
         run = self._navigation.run
         if run is not None:
-            sources = source_list(run.counts())
+            try:
+                sources = source_list(run.counts())
+            except InputError as error:
+                self._invitation = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
+                return
             self._invitation = _NO_SOURCES if sources.empty else _INVITATION
             self._list.show(sources)
 

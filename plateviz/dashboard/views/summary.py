@@ -7,6 +7,7 @@ from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.markup import judged, markup_pane, paragraph, titled
+from plateviz.dashboard.views.state_text import missing_text, outdated_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.reports.summary_strip import strip
 from plateviz.tables import summary_strip
@@ -39,8 +40,7 @@ class HeadView(pn.viewable.Viewer):
         session = self._session
         shown, other = session.shown, session.other
         if shown is None:
-            text = session.message if session.stage is Stage.FAILED else "No solution yet."
-            self._head.object = paragraph(text, "empty", session.theme)
+            self._head.object = paragraph(missing_text(session), "empty", session.theme)
             return
         is_open = self._navigation.orbit_workspace is OrbitWorkspace.VERDICT
         names = [_name(shown, "(B) Solution" if other else "Solution")]
@@ -48,9 +48,11 @@ class HeadView(pn.viewable.Viewer):
             names.append(_name(other, "(A) Compared with solution"))
         stale = " stale" if session.stage is Stage.STALE else ""
         verdict = session.units.text(judged(self._verdict(shown.result), is_open=is_open))
-        self._head.object = (
-            f"<div class='head {session.theme}{stale}'>{verdict}{''.join(names)}</div>"
-        )
+        head = f"<div class='head {session.theme}{stale}'>{verdict}{''.join(names)}</div>"
+        outdated = outdated_text(session)
+        if outdated:
+            head += paragraph(outdated, "outdated", session.theme)
+        self._head.object = head
 
     def _verdict(self, result: FitResult) -> Verdict:
         if self._judged is None or self._judged[0] is not result:

@@ -43,6 +43,9 @@ from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.tables.survey_tables import SurveyTables
 from plateviz.tables.verdict import run_verdict
 from solver.data.survey_schema import MOTIONS, RUN_ORBITS
+from solver.errors import InputError
+
+_WHAT_TO_DO = "What was read before stays. Reload the page once the run is there again."
 
 
 class SurveyPage(pn.viewable.Viewer):
@@ -63,6 +66,7 @@ class SurveyPage(pn.viewable.Viewer):
         self._grids: dict[SurveyWorkspace, FigureGrid] = {}
         self._tables: SurveyTables | None = None
         self._orbits = self._motions = pd.DataFrame()
+        self._failure = ""
         self._head, self._strip = markup_pane(), markup_pane()
         self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=8)
         self._save = SaveButton(
@@ -99,7 +103,13 @@ class SurveyPage(pn.viewable.Viewer):
     def _workspace(self, one: SurveyWorkspace) -> pn.viewable.Viewable:
         if one is SurveyWorkspace.EXPLORE:
             links = {"orbit_id": self._open_orbit}
-            explore = ExploreView(RunRows(self._navigation), self._session, self._wake, links)
+            explore = ExploreView(
+                RunRows(self._navigation),
+                self._session,
+                self._wake,
+                "This run has no rows yet.",
+                links,
+            )
             self._grids[one] = explore.grid
             self._show_selected()
             return explore.__panel__()
@@ -142,12 +152,19 @@ class SurveyPage(pn.viewable.Viewer):
         # The tables of the figures take longer, and are read when the first figure is drawn.
         self._tables = None
         run = self._navigation.run
+        self._failure = ""
         if run is not None:
-            self._orbits, self._motions = run.orbits(), run.motions()
+            try:
+                self._orbits, self._motions = run.orbits(), run.motions()
+            except InputError as error:
+                self._failure = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
         self._show()
 
     def _show(self, *_: object) -> None:
         theme, words = self._session.theme, self._navigation.why_no_run
+        if self._orbits.empty:
+            # Nothing was read before that could stay.
+            words = words or self._failure
         self._save.theme = theme
         self._below.visible = not words
         if words:
@@ -166,6 +183,8 @@ class SurveyPage(pn.viewable.Viewer):
         title = titled("Run", self._navigation.run_name)
         verdict = self._session.units.text(judged(run_verdict(self._orbits, self._motions)))
         head = f"<div class='head'>{verdict}{title}</div>"
+        if self._failure:
+            head += paragraph(self._failure, "outdated", self._session.theme)
         if self._navigation.growth:
             head += paragraph(self._navigation.growth, "caption", self._session.theme)
         self._head.object = themed(head, self._session.theme)

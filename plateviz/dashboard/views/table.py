@@ -16,12 +16,13 @@ from plateviz.tables.summary import State
 # The same colours as in `style.css`.
 _COLOURS: Mapping[str, Mapping[State, str]] = MappingProxyType(
     {
-        "light": {"good": "#1a7f5a", "warn": "#b26a00", "bad": "#c0392b"},
+        "light": {"good": "#187a56", "warn": "#995b00", "bad": "#c0392b"},
         "dark": {"good": "#4cc79a", "warn": "#f0b24a", "bad": "#ff8a7a"},
     }
 )
 # Tabulator makes its tables visible even in a hidden view; this prevents it.
 TABLE_STYLE = ":host .tabulator { font-size: 13px; visibility: inherit !important; }"
+_NO_ROWS = "There are no rows to show yet."
 _CLICKABLE = ".tabulator-row { cursor: pointer; }"
 
 
@@ -96,6 +97,7 @@ class DataTable(pn.viewable.Viewer):
             disabled=True,
             show_index=False,
             selectable=False,
+            configuration={"placeholder": _NO_ROWS},
             pagination="remote",
             page_size=self._page_size,
             layout="fit_data_table",

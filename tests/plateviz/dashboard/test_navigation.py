@@ -54,6 +54,9 @@ class FakeRun:
         rows = self._survey.history
         return rows[rows["source_id"] == source_id].reset_index(drop=True)
 
+    def orbits(self):
+        return self._survey.orbits
+
     def motions(self):
         return self._survey.motions
 

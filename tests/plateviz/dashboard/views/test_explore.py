@@ -58,7 +58,7 @@ def executor(navigation):
 
 @pytest.fixture
 def view(navigation):
-    made = ExploreView(RunRows(navigation), navigation.session, lambda *_: None)
+    made = ExploreView(RunRows(navigation), navigation.session, lambda *_: None, "No rows.")
     made.grid._views[0].visibility.param.update(is_near=True, room=[900, 500])
     return made
 

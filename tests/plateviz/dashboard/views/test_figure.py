@@ -263,6 +263,25 @@ def test_stale_figure_is_faded(view):
     assert opacity(view) == "1"
 
 
+def test_figure_is_explained_in_words_and_as_tables(view, monkeypatch):
+    tools, sent = view._tools, []
+    monkeypatch.setattr(tools, "_send_msg", sent.append)
+    tools._handle_msg("tables")
+    assert (tools.summary, sent.pop()) == ("", {"tables": []})
+    come_near(view)
+    view.draw()
+    assert tools.summary == "1 sources. y (mm) against x (mm): 1 point (sources)."
+    tools._handle_msg("tables")
+    ((table,),) = (message["tables"] for message in sent)
+    assert table["rows"] == [["0", "1", "7"]]
+    # What a browser of ours never sends.
+    tools._handle_msg({"tables": 1})
+    assert len(sent) == 1
+    model = tools.get_root()
+    assert model.data.equation == diagnostics()[0].equation
+    assert model.data.place == "assets/docs/diagnostics.md, “Footprint”"
+
+
 def test_empty_card_has_the_waiting_text():
     view = FigureView(diagnostics()[0], lambda: None, waiting="Nothing yet.")
     assert "Being drawn." in text(view)

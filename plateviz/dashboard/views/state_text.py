@@ -1,0 +1,24 @@
+"""The state of the solution on the screen in words, the same in every pane."""
+
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.stage import Stage
+
+_WHAT_TO_DO = "Change the settings on the left and press Fit, or choose another orbit."
+
+
+def missing_text(session: Session) -> str:
+    """Return why there is no solution yet, and what to do about it."""
+    if session.stage is Stage.FAILED:
+        return f"There is no solution. {session.message} {_WHAT_TO_DO}"
+    return "The first solution is being computed."
+
+
+def outdated_text(session: Session) -> str:
+    """Return why the solution on the screen is not the requested one; empty if it is."""
+    if session.shown is None:
+        return ""
+    if session.stage is Stage.STALE:
+        return "Another solution is being computed; this is still the last one."
+    if session.stage is Stage.FAILED:
+        return f"This is still the last solution: the request after it failed. {session.message}"
+    return ""

@@ -1,0 +1,151 @@
+"""Every pane says whether it is loading, ready, out of date, failed or empty, and what to do."""
+
+import pytest
+
+from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.stage import Stage
+from plateviz.dashboard.views.calibration import CalibrationView
+from plateviz.dashboard.views.figure import FigureView
+from plateviz.dashboard.views.orbit import OrbitPage
+from plateviz.dashboard.views.source import SourcePage
+from plateviz.dashboard.views.summary import HeadView, StripView
+from plateviz.dashboard.views.survey import SurveyPage
+from plateviz.plots.gallery import diagnostics
+from solver.errors import InputError
+from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.test_session import finish
+
+LOADING = "The first solution is being computed."
+STALE = "Another solution is being computed"
+
+
+def wake(*_):
+    """Nothing is drawn in these tests unless they say so."""
+
+
+@pytest.fixture
+def fresh(fit_result):
+    """A page whose first solution is being computed."""
+    store = SurveyStore(fit_result, [])
+    store.orbits = [*store.orbits]
+    navigation = Navigation(Session(store))
+    navigation.begin({"view": "orbit"})
+    return navigation
+
+
+def tables(view):
+    """Words and tabs of the view of the calibration."""
+    return view.__panel__()[0], view.__panel__()[1]
+
+
+def figure(page, name="residual-map"):
+    (view,) = (one for one in page.figures._views if one.card_name == name)
+    view.visibility.param.update(is_near=True, room=[500, 400])
+    view.draw()
+    return view
+
+
+def test_panes_of_an_orbit_go_through_their_states(fresh):
+    session = fresh.session
+    head, strip = HeadView(fresh).__panel__(), StripView(session).__panel__()
+    calibration, page = CalibrationView(session), OrbitPage(fresh, wake)
+    words, tabs = tables(calibration)
+    view = figure(page)
+    assert session.stage is Stage.LOADING
+    assert LOADING in head.object
+    assert LOADING in words.object
+    assert LOADING in view._body[0].object
+    assert (strip.object, tabs.visible) == ("", False)
+
+    finish(session)
+    view.draw()
+    assert "verdict" in head.object
+    assert "cell" in strip.object
+    assert (words.visible, tabs.visible) == (False, True)
+    assert view._tools.summary.startswith("Residuals on detector")
+
+    session.refit()
+    assert session.stage is Stage.STALE
+    assert STALE in head.object
+    assert STALE in words.object
+    assert "stale" in strip.object
+    assert view._tools.is_stale
+
+    session.job.take({"event": "failed", "message": "orbit <0>: no exposure"})
+    session.poll()
+    for pane in (head, words):
+        assert "This is still the last solution: the request after it failed." in pane.object
+        assert "<0>" not in pane.object
+    assert not view._tools.is_stale
+    assert tabs.visible
+
+
+def test_first_solution_that_failed_says_what_to_do(fresh):
+    session = fresh.session
+    head, page = HeadView(fresh).__panel__(), OrbitPage(fresh, wake)
+    words, tabs = tables(CalibrationView(session))
+    view = figure(page)
+    session.job.take({"event": "failed", "message": "no reference source"})
+    session.poll()
+    assert view.is_due
+    view.draw()
+    for text in (head.object, words.object, view._body[0].object):
+        assert "There is no solution." in text
+        assert "no reference source" in text
+        assert "press Fit, or choose another orbit" in text
+    assert not tabs.visible
+
+
+def test_figure_that_cannot_be_drawn_has_no_words_or_numbers_of_the_one_before():
+    def draw():
+        raise ValueError("no sources")
+
+    view = FigureView(diagnostics()[0], draw)
+    view.visibility.param.update(is_near=True, room=[500, 400])
+    view.draw()
+    assert view._tools.summary == "This figure cannot be drawn: no sources"
+    assert "tried again with the next solution" in view._body[0].object
+    assert view._text_tables() == []
+
+
+class LostRun(FakeRun):
+    """A run that is deleted while it is shown."""
+
+    is_lost = False
+
+    def orbits(self):
+        if self.is_lost:
+            raise InputError("runs/default: expected a run, found nothing")
+        return super().orbits()
+
+    def counts(self):
+        if self.is_lost:
+            raise InputError("runs/default: expected a run, found nothing")
+        return super().counts()
+
+
+def test_run_that_is_gone_is_said_and_what_was_read_stays(fit_result, survey):
+    run = LostRun("default", survey, fit_result)
+    navigation = Navigation(Session(SurveyStore(fit_result, [run])))
+    page = SurveyPage(navigation, wake)
+    rows = page._table._table.value
+    run.is_lost = True
+    page._read()
+    assert "The run cannot be read: runs/default: expected a run" in page._head.object
+    assert "Reload the page once the run is there again." in page._head.object
+    assert page._below.visible
+    assert page._table._table.value.equals(rows)
+    run.is_lost = False
+    page._read()
+    assert "cannot be read" not in page._head.object
+
+
+def test_run_that_was_gone_before_the_page_is_said_instead(fit_result, survey):
+    run = LostRun("default", survey, fit_result)
+    run.is_lost = True
+    navigation = Navigation(Session(SurveyStore(fit_result, [run])))
+    survey_page, source_page = SurveyPage(navigation, wake), SourcePage(navigation, wake)
+    assert "The run cannot be read" in survey_page._head.object
+    assert not survey_page._below.visible
+    assert "The run cannot be read" in source_page._head.object

@@ -12,6 +12,7 @@ from panel.io.resources import get_dist_path
 from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.address_bar import AddressBar
+from plateviz.dashboard.views.browser_session import BrowserSession
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.selection_bar import SelectionBar
@@ -34,7 +35,13 @@ def build_app(store: SolutionStore) -> pmui.Page:
         title=title,
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
-        header=[bar, Keyboard(navigation), system, AddressBar(navigation)],
+        header=[
+            bar,
+            Keyboard(navigation),
+            system,
+            AddressBar(navigation),
+            BrowserSession(session.journal),
+        ],
         sidebar=[pages.sidebar],
         main=[pages, bar.windows],
         sidebar_width=_SIDEBAR_WIDTH,

@@ -93,6 +93,11 @@ class Navigation(param.Parameterized):
         return self._runs.get(self.run_name)
 
     @property
+    def runs(self) -> list[SurveyRun]:
+        """The runs of the survey, by name."""
+        return list(self._runs.values())
+
+    @property
     def why_no_run(self) -> str:
         """Message on how to make a run; empty if there is one."""
         if self.run is not None:
@@ -244,14 +249,17 @@ class Navigation(param.Parameterized):
 
     def _default(self, orbit: int | None) -> Solution | Request:
         """Return the solution of the run; InputError if it cannot be read."""
-        return find_solution(None, orbit, self.run, self._runs)
+        return self._solution(None, orbit)
+
+    def _solution(self, text: str | None, orbit: int | None) -> Solution | Request:
+        return find_solution(text, orbit, self.run, self._runs, self.session.store.kept)
 
     def _find(self, name: str, orbit: int | None) -> Solution | Request | None:
         """Return a solution that the address names; a notice says why there is none."""
         if name not in self._named:
             return None
         try:
-            return find_solution(self._named[name], orbit, self.run, self._runs)
+            return self._solution(self._named[name], orbit)
         except InputError as error:
             self.session.note([f"{name}: {error}"])
             return None

@@ -38,6 +38,10 @@ class SelectedSources(param.Parameterized):
         """Select sources by their ids, in place of those selected before."""
         self.selection.sources = sources
 
+    def subject(self) -> str:
+        """Return the orbit on the screen as it is named in files, such as "orbit-3"."""
+        return f"orbit-{self.selection.orbit}"
+
     @property
     def selected_ids(self) -> frozenset[str]:
         """The selected sources as tables of figures name them."""

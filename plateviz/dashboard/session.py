@@ -7,8 +7,9 @@ from collections.abc import Iterable
 
 import param
 
+from plateviz.dashboard.journal import Journal
 from plateviz.dashboard.selected_sources import SelectedSources
-from plateviz.dashboard.solution import Request, Solution
+from plateviz.dashboard.solution import Request, Solution, what_if_settings
 from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.state import ANSWERED_AT_ONCE
 from plateviz.solving.job import Job, JobStatus
@@ -24,7 +25,8 @@ class Session(SelectedSources):
 
     `shown` is the solution on the screen, `other` the one that it is compared with; either may
     be None. `stage` and `message` are the state of the last request. `notice` says what of the
-    last address, or saved view, cannot be shown.
+    last address, or saved view, cannot be shown. `journal` lists the solutions of the session, of
+    all orbits.
     """
 
     other = param.ClassSelector(class_=Solution, default=None, allow_None=True)
@@ -38,6 +40,8 @@ class Session(SelectedSources):
         self.store = store
         self.selection.param["orbit"].objects = store.orbits
         self.selection.orbit = store.orbits[0]
+        self.journal = Journal(store.made)
+        self._detectors = [detector.detector_id for detector in store.instrument.detectors]
         self._job: Job | None = None
         self._requested = Request(store.orbits[0], FitSettings())
         self._next_what_if: FitSettings | None = None
@@ -139,7 +143,7 @@ class Session(SelectedSources):
         if not self.choices.what_if_at_once or fitted is None:
             return
         try:
-            settings = _what_if_settings(self.choices.settings(), fitted.settings)
+            settings = what_if_settings(self.choices.settings(), fitted.settings)
         except InputError as error:
             self.refuse(str(error))
             return
@@ -148,9 +152,11 @@ class Session(SelectedSources):
         known = next((s for s in self.solutions if s.settings == settings), None)
         if self._job is not None:
             self._next_what_if = settings if self._requested.is_what_if else None
+        elif self.shown is not None and settings == self.shown.settings:
+            return
         elif known is not None:
             self._return_to(known)
-        elif self.shown is None or settings != self.shown.settings:
+        else:
             self._request(Request(self.selection.orbit, settings, is_what_if=True))
 
     @property
@@ -163,10 +169,7 @@ class Session(SelectedSources):
         if self.shown is not None and self.shown.is_what_if:
             kept = self.shown._replace(is_what_if=False)
             self.param.update(solutions=[*self.solutions, kept], shown=kept)
-
-    def subject(self) -> str:
-        """Return the orbit on the screen as it is named in files, such as "orbit-3"."""
-        return f"orbit-{self.selection.orbit}"
+            self.journal.add(kept)
 
     def cancel(self) -> None:
         """Cancel the waiting or running job."""
@@ -198,6 +201,16 @@ class Session(SelectedSources):
         if solution is not self.shown:
             self.param.update(shown=solution, other=self._beside(solution, self.fitted))
             self.choices.load(solution.settings)
+
+    def open_listed(self, solution: Solution | Request) -> None:
+        """Show a solution of the list; that on the screen becomes the other, if of this orbit."""
+        is_here = self.shown is not None and self.shown.orbit == solution.orbit
+        if is_here and isinstance(solution, Solution):
+            self._cancel_job()
+            self._put_on_screen(solution)
+            self.choices.load(solution.settings)
+        else:
+            self.open(solution, self.fitted if is_here else None)
 
     def compare_with(self, solution: Solution | None) -> None:
         """Compare what is on the screen with a solution; None for the one before each.
@@ -258,8 +271,7 @@ class Session(SelectedSources):
         self._put_on_screen(Solution(orbit, settings, result, is_step, is_step))
 
     def _put_on_screen(self, solution: Solution) -> None:
-        numbers = [d.detector_id for d in self.store.instrument.detectors]
-        problems = self.selection.limit_to(solution.result, numbers)
+        problems = self.selection.limit_to(solution.result, self._detectors)
         orbit, settings = solution.orbit, solution.settings
         before = self.fitted if self.fitted and self.fitted.orbit == orbit else None
         self._fitted = before or solution
@@ -271,22 +283,16 @@ class Session(SelectedSources):
             stage=Stage.READY,
             message="",
         )
+        self.journal.add(solution)
         self.note(problems)
 
     def limit_selection(self) -> None:
         """Limit the selection to the solution on the screen, after an address changed it."""
         if self.shown is not None:
-            numbers = [d.detector_id for d in self.store.instrument.detectors]
-            self.note(self.selection.limit_to(self.shown.result, numbers))
+            self.note(self.selection.limit_to(self.shown.result, self._detectors))
 
     def note(self, problems: Iterable[str]) -> None:
         """Add what of an address cannot be shown to the notice."""
         told = self.notice.removeprefix(_NOTICE).rstrip(".")
         told = "; ".join(filter(None, [told, *problems]))
         self.notice = f"{_NOTICE}{told}." if told else ""
-
-
-def _what_if_settings(settings: FitSettings, fitted: FitSettings) -> FitSettings:
-    """Return the settings of a what-if; it keeps a comparison of orders only if still valid."""
-    is_still_valid = settings.with_(order=fitted.order, compare_orders=True) == fitted
-    return settings.with_(compare_orders=is_still_valid)

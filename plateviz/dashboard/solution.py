@@ -33,6 +33,7 @@ class Solution(NamedTuple):
     is_what_if : whether the next what-if replaces it
     is_step : whether it was computed by a step from a fit, kept or not
     run : name of the run that it was read from; empty for none
+    kept : name of the kept solution that it was read from; empty for none
     """
 
     orbit: int | None
@@ -41,13 +42,22 @@ class Solution(NamedTuple):
     is_what_if: bool = False
     is_step: bool = False
     run: str = ""
+    kept: str = ""
 
     @property
     def label(self) -> str:
         """Short description of the solution."""
         text = self.settings.describe()
+        if self.kept:
+            return f"{self.kept}: {text}"
         return _OF_WHAT_IF.format(text) if self.is_what_if else text
 
     def equals(self, other: "Solution") -> bool:
         """Whether both are the same solution of the same orbit."""
         return self[:2] == other[:2] and self[4:] == other[4:]
+
+
+def what_if_settings(settings: FitSettings, fitted: FitSettings) -> FitSettings:
+    """Return the settings of a what-if; it keeps a comparison of orders only if still valid."""
+    is_still_valid = settings.with_(order=fitted.order, compare_orders=True) == fitted
+    return settings.with_(compare_orders=is_still_valid)

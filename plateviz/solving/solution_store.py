@@ -12,25 +12,39 @@ from functools import lru_cache
 from pathlib import Path
 
 from plateviz.runs.fitted_orbit import is_complete, read_fitted_orbit
+from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.solving.job import Job, JobStatus
+from plateviz.solving.made_solutions import MadeSolution, MadeSolutions
 from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
 from plateviz.solving.solver_queue import SolverQueue
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.data.settings import ENGINES, FitSettings
+from solver.errors import InputError
 from solver.io.disk import writing
 from solver.io.scratch import ScratchFolder, temporary_folder
 
 
 class SolutionStore:
-    """Fits orbits of one origin on request and keeps the solutions."""
+    """Fits orbits of one origin on request and keeps the solutions.
+
+    Attributes
+    ----------
+    origin : of the orbits
+    orbits : their ids
+    instrument : that took them
+    kept : solutions that people have kept on disk
+    made : which solutions each browser session has made
+    """
 
     def __init__(self, origin: Origin, solver: SolverQueue) -> None:
         """Solve orbits of `origin` with `solver`, which is closed with the store."""
         self.origin = origin
         self.orbits = origin.orbits()
         self.instrument: Instrument = origin.read_instrument()
+        self.kept = KeptSolutions(origin.solutions)
+        self.made = MadeSolutions()
         self._solver = solver
         self._lock = threading.Lock()
         self._jobs: dict[Path, Job] = {}
@@ -84,6 +98,20 @@ class SolutionStore:
         """Return a solution that was requested before and is complete, else None."""
         directory = self._directory(orbit, settings, what_if)
         return self._read(directory) if is_complete(directory) else None
+
+    def keep(self, made: MadeSolution, name: str) -> KeptSolution:
+        """Keep a solution on disk under a name.
+
+        Raises
+        ------
+        InputError
+            If the solution is no longer there, the name is not valid or not free, or the disk
+            takes no file.
+        """
+        directory = self._directory(*made[:3])
+        if not is_complete(directory):
+            raise InputError("expected a solution of this server, found that it was removed")
+        return self.kept.keep(name, made.orbit, made.is_step, directory)
 
     def close(self) -> None:
         """End the solver process and remove the scratch folder."""

@@ -298,6 +298,29 @@ def test_sources_are_selected_in_one_figure_shown_in_all_saved_and_left_out(page
     until(page, lambda: selected(page, "footprint") == [0, n_sources])
 
 
+def keep_reload_and_show(page):
+    """Keep the what-if of order 4 on disk, load the page again, note upon it and show it."""
+    kept = "orbit 0: lower: order 4 (what-if, kept)"
+    page.get_by_role("button", name="All solutions").click()
+    window = page.get_by_role("dialog", name="Solutions")
+    window.get_by_role("radio", name="orbit 0: order 4 (what-if)").check()
+    window.get_by_role("textbox", name="Name").fill("lower")
+    window.get_by_role("textbox", name="Name").blur()
+    window.get_by_role("button", name="Keep on disk").click()
+    expect(window.get_by_role("radio", name=kept)).to_be_visible()
+    page.reload()
+    page.get_by_role("button", name="All solutions").click()
+    expect(window.get_by_role("radio", name="orbit 0: order 3 (fit)")).to_be_visible()
+    window.get_by_role("radio", name=kept).check()
+    window.get_by_role("textbox", name="Note").fill("<i>as text</i>")
+    window.get_by_role("textbox", name="Note").blur()
+    window.get_by_role("button", name="Save the note").click()
+    expect(window.get_by_text("The note is saved.")).to_be_visible()
+    window.get_by_role("button", name="Show", exact=True).click()
+    page.keyboard.press("Escape")
+    expect(shown(page)).to_contain_text("lower: order 4")
+
+
 def test_a_change_is_tried_at_once_kept_and_fitted(page):
     see(page, "convergence")
     canvas = page.locator(".figure-convergence canvas").first
@@ -325,6 +348,7 @@ def test_a_change_is_tried_at_once_kept_and_fitted(page):
     assert chi2(page) != kept
     until(page, lambda: residual_arrows(page) != arrows)
     see(page, "comparison")
+    keep_reload_and_show(page)
 
 
 def test_what_is_left_out_is_left_out_and_a_wrong_prior_is_refused(page):

@@ -75,7 +75,7 @@ class OrbitPage(pn.viewable.Viewer):
         if self._is_complete or not self.figures.is_laid_out:
             return False
         self._is_complete = True
-        self.sidebar.append(RefitView(self._session))
+        self.sidebar.append(RefitView(self._navigation))
         return True
 
     @property

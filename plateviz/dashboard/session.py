@@ -50,7 +50,7 @@ class Session(SelectedSources):
         self._is_opening = False
         self._fitted: Solution | None = None
         # What all solutions are compared with, in place of the one before each.
-        self._chosen: Solution | None = None
+        self.chosen: Solution | None = None
         self._unprepared: Solution | None = None
         self.choices.param.watch(
             lambda *_: self.ask_what_if(),
@@ -101,7 +101,7 @@ class Session(SelectedSources):
         self.selection.orbit = orbit
         if self.shown is None or self.shown.orbit != orbit:
             self.solutions = []
-        self._chosen = self.other = None
+        self.chosen = self.other = None
         self._later = solutions
         self._show_next()
 
@@ -219,7 +219,7 @@ class Session(SelectedSources):
         ----------
         solution : may be of another run or orbit
         """
-        self._chosen = solution
+        self.chosen = solution
         if self.shown is not None:
             self.other = self._beside(self.shown, self.fitted)
 
@@ -228,8 +228,8 @@ class Session(SelectedSources):
         shown, other = self.shown, self.other
         if shown is None or other is None:
             return
-        if self._chosen is not None:
-            self._chosen = shown
+        if self.chosen is not None:
+            self.chosen = shown
         if shown.orbit != other.orbit:
             self._cancel_job()
             self.param.update(solutions=[] if other.is_what_if else [other])
@@ -239,8 +239,8 @@ class Session(SelectedSources):
 
     def _beside(self, solution: Solution, before: Solution | None) -> Solution | None:
         """Return what a solution is compared with, given the one before it of the same orbit."""
-        if self._chosen is not None:
-            return None if self._chosen.equals(solution) else self._chosen
+        if self.chosen is not None:
+            return None if self.chosen.equals(solution) else self.chosen
         return None if before is None or before.settings == solution.settings else before
 
     def _return_to(self, solution: Solution) -> None:

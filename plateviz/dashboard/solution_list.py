@@ -1,5 +1,6 @@
 """SolutionList: all solutions that a page can show or compare with, without Panel."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -128,6 +129,25 @@ def _described(run: SurveyRun) -> str:
         return run_settings(run).describe()
     except InputError:
         return _DAMAGED
+
+
+def label_of(solution: Solution, entries: Mapping[str, Entry]) -> str | None:
+    """Return the label of a solution in a list; None if it is not there."""
+    for label, entry in entries.items():
+        what = entry.what
+        if isinstance(what, OfRun):
+            is_same = (what.run.name, what.orbit) == (solution.run, solution.orbit)
+        elif isinstance(what, KeptSolution):
+            is_same = what.name == solution.kept
+        else:
+            is_same = not (solution.run or solution.kept) and what[:3] == (
+                solution.orbit,
+                solution.settings,
+                solution.is_step,
+            )
+        if is_same:
+            return label
+    return None
 
 
 def _how(is_step: bool) -> str:

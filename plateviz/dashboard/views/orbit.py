@@ -9,6 +9,7 @@ import panel_material_ui as pmui
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
+from plateviz.dashboard.views.compare import CompareView
 from plateviz.dashboard.views.explore import ExploreView
 from plateviz.dashboard.views.figure import FigureView, card
 from plateviz.dashboard.views.figure_grid import FigureGrid
@@ -21,6 +22,7 @@ from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.summary import HeadView, StripView
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
+from plateviz.plots.both_solutions import BOTH, figure_of_both
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace
@@ -43,6 +45,7 @@ class OrbitPage(pn.viewable.Viewer):
         self._session = session = navigation.session
         self._grids: dict[OrbitWorkspace, FigureGrid] = {}
         self._selected: list[FigureView] = []
+        self._compare: CompareView | None = None
         self._is_complete = False
         self._stack = Stack({one: partial(self._workspace, one) for one in OrbitWorkspace})
         self.sidebar = pmui.Column(
@@ -91,10 +94,14 @@ class OrbitPage(pn.viewable.Viewer):
         is_first = one is OrbitWorkspace.VERDICT
         among = [d for d in diagnostics() if (d.is_key if is_first else d.workspace is one)]
         views = {d: self._figure_view(d) for d in among}
-        self._selected += [view for d, view in views.items() if d.follows_selection]
         others, above = [], []
+        if one is OrbitWorkspace.ORDERS:
+            views = {BOTH: self._figure_view(BOTH), **views}
+            self._compare = CompareView(self._navigation, lambda: self._change_figure(views[BOTH]))
+            others = [card(self._compare, "changes")]
         if one is OrbitWorkspace.CALIBRATION:
             others = [card(CalibrationView(self._session), "tables")]
+        self._selected += [view for d, view in views.items() if d.follows_selection]
         if is_first:
             above = [StripView(self._session)]
         grid = FigureGrid(
@@ -125,6 +132,8 @@ class OrbitPage(pn.viewable.Viewer):
             detector=session.selection.detector_id,
             other=session.other.result if session.other else None,
         )
+        if diagnostic is BOTH and self._compare is not None:
+            return figure_of_both(self._compare.figure, chosen)
         return diagnostic.plot(chosen)
 
     def _show_workspace(self, *_: object) -> None:
@@ -133,6 +142,10 @@ class OrbitPage(pn.viewable.Viewer):
     def _change(self, *_: object) -> None:
         for grid in self._grids.values():
             grid.change(self._session.theme)
+
+    def _change_figure(self, view: FigureView) -> None:
+        view.change(self._session.theme)
+        self._wake()
 
     def _change_selected(self, *_: object) -> None:
         for view in self._selected:

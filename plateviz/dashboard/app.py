@@ -17,6 +17,7 @@ from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.selection_bar import SelectionBar
 from plateviz.dashboard.views.system_theme import SystemTheme
+from plateviz.dashboard.views.view_file import ViewFile
 from plateviz.solving.solution_store import SolutionStore
 
 _TICK_MILLISECONDS = 30
@@ -37,6 +38,7 @@ def build_app(store: SolutionStore) -> pmui.Page:
         meta_title=escape(title, quote=True),
         header=[
             bar,
+            ViewFile(navigation),
             Keyboard(navigation),
             system,
             AddressBar(navigation),

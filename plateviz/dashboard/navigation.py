@@ -158,7 +158,9 @@ class Navigation(param.Parameterized):
         default = View.ORBIT if any(name in selectable for name in address) else self.view
         view = views[chosen("view", address, views, default.value, problems)]
         session.note(problems)
-        self._named = {name: address[name] for name in _NAMED if name in address}
+        # Half a character, which JSON can hold, is no part of an address.
+        named = {name: address[name] for name in _NAMED if name in address}
+        self._named = {k: v.encode("utf-8", "replace").decode() for k, v in named.items()}
         if view is View.ORBIT or session.shown is not None:
             self._open(orbit)
         else:
@@ -166,8 +168,13 @@ class Navigation(param.Parameterized):
         self.view = view
         self._begin_workspace(address)
 
-    def address(self) -> dict[str, str]:
-        """Return what is on the screen as the query of the page's address."""
+    def address(self, is_whole: bool = False) -> dict[str, str]:
+        """Return what is on the screen as the query of the page's address.
+
+        Parameters
+        ----------
+        is_whole : whether settings that are too long for an address are written, too
+        """
         query = {"view": self.view.value, "workspace": self.workspace.value}
         query |= self.session.selection.address()
         if self.run_name is not None:
@@ -176,13 +183,13 @@ class Navigation(param.Parameterized):
             query["source"] = str(self.found.source_id)
         if self.workspace is OrbitWorkspace.EXPLORE:
             query |= self.exploration.address()
-        return query | self._solution_query()
+        return query | self._solution_query(is_whole)
 
-    def _solution_query(self) -> dict[str, str]:
+    def _solution_query(self, is_whole: bool = False) -> dict[str, str]:
         session = self.session
         if session.shown is None or session.is_opening:
             return self._named
-        return solution_query(session.shown, session.other, self.run_name)
+        return solution_query(session.shown, session.other, self.run_name, is_whole)
 
     def turn_to(self, view: View) -> None:
         """Show a view; the Orbit view requests its orbit when it is first shown."""

@@ -415,7 +415,7 @@ def test_any_column_is_drawn_against_any_other_and_selects(page, open_page):
     expect(again.get_by_role("combobox", name="Limit by")).to_have_text("is_reference")
 
 
-def test_the_address_is_what_is_shown_and_the_browser_goes_back(page, open_page):
+def test_the_address_is_what_is_shown_and_the_browser_goes_back(page, open_page, tmp_path):
     choose(page, "Detector", "3")
     choose(page, "Field", "all")
     page.wait_for_url("**field=all**detector=3**")
@@ -439,9 +439,16 @@ def test_the_address_is_what_is_shown_and_the_browser_goes_back(page, open_page)
     )
     assert "solution=order=4+what-if" in page.url
     page.go_forward()
-    expect(page.get_by_role("button", name="Sky", exact=True)).to_have_attribute(
-        "aria-pressed", "true"
-    )
+    sky = page.get_by_role("button", name="Sky", exact=True)
+    expect(sky).to_have_attribute("aria-pressed", "true")
+    with page.expect_download() as started:
+        page.get_by_role("button", name="Save view").click()
+    assert started.value.suggested_filename == "sky-view.json"
+    started.value.save_as(tmp_path / "view.json")
+    turn_to_workspace(page, OrbitWorkspace.VERDICT)
+    page.wait_for_url("**workspace=verdict**")
+    page.get_by_label("File of a saved view").set_input_files(tmp_path / "view.json")
+    expect(sky).to_have_attribute("aria-pressed", "true")
 
 
 def test_keys_do_what_their_list_says(page):

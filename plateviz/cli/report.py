@@ -13,6 +13,7 @@ from solver.errors import InputError
 
 if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
+    from plateviz.runs.kept_solutions import KeptSolution
     from solver.data.result import FitResult
 
 
@@ -31,7 +32,11 @@ class ReportRequest(NamedTuple):
 def report(
     path: Annotated[
         Path,
-        typer.Argument(help="Survey directory, or a result file of `fit`.", metavar="DIR|RESULT"),
+        typer.Argument(
+            help="Survey directory, a result file of `fit`, or a solution kept in the dashboard "
+            "(DIR/solutions/NAME).",
+            metavar="DIR|RESULT",
+        ),
     ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="File to write (HTML).", metavar="REPORT")
@@ -125,6 +130,10 @@ def _write_page(request: ReportRequest, output: Path, pdf: bool, overwrite: bool
 def _compose(request: ReportRequest) -> "Report":
     if not request.path.is_dir():
         return _compose_from_file(request)
+    from plateviz.runs.kept_solutions import kept_solution
+
+    if (kept := kept_solution(request.path)) is not None:
+        return _compose_from_kept(request, kept)
     chosen = [request.orbit is not None, request.source is not None, request.survey]
     if sum(chosen) > 1:
         raise InputError("report: expected one of --orbit, --source and --survey, found several")
@@ -163,6 +172,22 @@ def _compose_from_file(request: ReportRequest) -> "Report":
     other = read_result(Path(request.other)) if request.other else None
     facts = {**_facts(), SOLVED: read_versions(request.path)}
     return orbit_report(result, focal_plane, facts, other)
+
+
+def _compose_from_kept(request: ReportRequest, kept: "KeptSolution") -> "Report":
+    if request.orbit is not None or request.source is not None or request.survey:
+        raise InputError(
+            f"{request.path}: expected a survey directory with --orbit, --source or --survey, "
+            "found a kept solution"
+        )
+    from plateviz.reports.orbit import orbit_report
+    from plateviz.runs.kept_solutions import instrument_of
+    from solver.data.instrument import read_instrument
+    from solver.io.result import read_result
+
+    focal_plane = read_instrument(request.instrument) if request.instrument else instrument_of(kept)
+    other = read_result(Path(request.other)) if request.other else None
+    return orbit_report(kept.read(), focal_plane, _facts(), other)
 
 
 def _other_solution(request: ReportRequest, orbit: int) -> "FitResult | None":

@@ -17,12 +17,14 @@ from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.accessible_names import AccessibleNames
 from plateviz.dashboard.views.address_bar import AddressBar
+from plateviz.dashboard.views.browser_session import BrowserSession
 from plateviz.dashboard.views.figure import Part
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.report_button import report_button
 from plateviz.dashboard.views.selection_bar import SelectionBar
 from plateviz.dashboard.views.system_theme import SystemTheme
+from plateviz.dashboard.views.view_file import ViewFile
 from plateviz.solving.job import Job
 from plateviz.solving.solution_store import SolutionStore
 
@@ -49,10 +51,12 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
     bar, system = SelectionBar(navigation), SystemTheme()
     header = [
         bar,
-        Keyboard(navigation),
+        ViewFile(navigation),
         report_button(navigation, "bar"),
+        Keyboard(navigation),
         system,
         AddressBar(navigation),
+        BrowserSession(session.journal),
         AccessibleNames(),
     ]
     page = empty_page(

@@ -6,6 +6,7 @@ from pathlib import Path
 from shlex import quote
 
 from plateviz.runs.queries import Written
+from plateviz.solving.origin import Origin, SurveyFolder
 
 # After so many seconds without another orbit, nobody seems to fit the rest.
 _PATIENCE = 120.0
@@ -64,3 +65,17 @@ class Growth:
         seconds = (written.n_orbits - done) / per_second
         left = f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
         return f", {60 * per_second:.2g} per minute, about {left} left"
+
+
+def how_to_make_a_run(origin: Origin) -> str:
+    """Return how orbits of an origin become a run."""
+    if isinstance(origin, SurveyFolder):
+        return (
+            "This survey has not been fitted as a whole. "
+            f"`plateviz survey {origin.directory}` fits all its orbits; "
+            "reload this page once it has begun."
+        )
+    return (
+        "These are the files of one orbit. For a survey directory, `plateviz survey DIR` "
+        "fits all orbits, and `plateviz serve DIR` shows them here."
+    )

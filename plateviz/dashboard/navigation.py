@@ -9,7 +9,7 @@ import param
 from plateviz.dashboard.address_parts import chosen
 from plateviz.dashboard.exploration import Exploration
 from plateviz.dashboard.found_source import FoundSource, find_source
-from plateviz.dashboard.growth import Growth
+from plateviz.dashboard.growth import Growth, how_to_make_a_run
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Request, Solution
 from plateviz.dashboard.solution_address import find_solution, solution_query
@@ -17,7 +17,6 @@ from plateviz.dashboard.units import NAMES, OWN
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.runs.queries import SurveyRun
-from plateviz.solving.origin import SurveyFolder
 from plateviz.tables.explore import EXPLORABLE
 from solver.data.settings import FitSettings
 from solver.errors import InputError
@@ -96,21 +95,14 @@ class Navigation(param.Parameterized):
         return self._runs.get(self.run_name)
 
     @property
+    def runs(self) -> list[SurveyRun]:
+        """The runs of the survey, by name."""
+        return list(self._runs.values())
+
+    @property
     def why_no_run(self) -> str:
         """Message on how to make a run; empty if there is one."""
-        if self.run is not None:
-            return ""
-        origin = self.session.store.origin
-        if isinstance(origin, SurveyFolder):
-            return (
-                "This survey has not been fitted as a whole. "
-                f"`plateviz survey {origin.directory}` fits all its orbits; "
-                "reload this page once it has begun."
-            )
-        return (
-            "These are the files of one orbit. For a survey directory, `plateviz survey DIR` "
-            "fits all orbits, and `plateviz serve DIR` shows them here."
-        )
+        return how_to_make_a_run(self.session.store.origin) if self.run is None else ""
 
     def look_again(self) -> bool:
         """Look what the run on the screen has by now; return whether more may be added to it."""
@@ -160,7 +152,9 @@ class Navigation(param.Parameterized):
         default = View.ORBIT if any(name in selectable for name in address) else self.view
         view = views[chosen("view", address, views, default.value, problems)]
         session.note(problems)
-        self._named = {name: address[name] for name in _NAMED if name in address}
+        # Half a character, which JSON can hold, is no part of an address.
+        named = {name: address[name] for name in _NAMED if name in address}
+        self._named = {k: v.encode("utf-8", "replace").decode() for k, v in named.items()}
         if view is View.ORBIT or session.shown is not None:
             self._open(orbit)
         else:
@@ -168,8 +162,13 @@ class Navigation(param.Parameterized):
         self.view = view
         self._begin_workspace(address)
 
-    def address(self) -> dict[str, str]:
-        """Return what is on the screen as the query of the page's address."""
+    def address(self, is_whole: bool = False) -> dict[str, str]:
+        """Return what is on the screen as the query of the page's address.
+
+        Parameters
+        ----------
+        is_whole : whether settings that are too long for an address are written, too
+        """
         query = {"view": self.view.value, "workspace": self.workspace.value}
         query |= self.session.selection.address()
         if self.run_name is not None:
@@ -182,13 +181,13 @@ class Navigation(param.Parameterized):
             query |= self.exploration.address()
         if self.workspace is SurveyWorkspace.EXPLORE:
             query |= self.survey_exploration.address()
-        return query | self._solution_query()
+        return query | self._solution_query(is_whole)
 
-    def _solution_query(self) -> dict[str, str]:
+    def _solution_query(self, is_whole: bool = False) -> dict[str, str]:
         session = self.session
         if session.shown is None or session.is_opening:
             return self._named
-        return solution_query(session.shown, session.other, self.run_name)
+        return solution_query(session.shown, session.other, self.run_name, is_whole)
 
     def turn_to(self, view: View) -> None:
         """Show a view; the Orbit view requests its orbit when it is first shown."""
@@ -255,14 +254,17 @@ class Navigation(param.Parameterized):
 
     def _default(self, orbit: int | None) -> Solution | Request:
         """Return the solution of the run; InputError if it cannot be read."""
-        return find_solution(None, orbit, self.run, self._runs)
+        return self._solution(None, orbit)
+
+    def _solution(self, text: str | None, orbit: int | None) -> Solution | Request:
+        return find_solution(text, orbit, self.run, self._runs, self.session.store.kept)
 
     def _find(self, name: str, orbit: int | None) -> Solution | Request | None:
         """Return a solution that the address names; a notice says why there is none."""
         if name not in self._named:
             return None
         try:
-            return find_solution(self._named[name], orbit, self.run, self._runs)
+            return self._solution(self._named[name], orbit)
         except InputError as error:
             self.session.note([f"{name}: {error}"])
             return None

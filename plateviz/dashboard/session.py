@@ -3,12 +3,11 @@
 The last solution stays on the screen until the next one is complete; then both can be compared.
 """
 
-from collections.abc import Iterable
-
 import param
 
+from plateviz.dashboard.journal import Journal
 from plateviz.dashboard.solution import Request, Solution, what_if_settings
-from plateviz.dashboard.stage import Stage
+from plateviz.dashboard.stage import RequestState, Stage
 from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices, Selection
 from plateviz.dashboard.units import Units
 from plateviz.solving.job import Job, JobStatus
@@ -16,23 +15,17 @@ from plateviz.solving.solution_store import SolutionStore
 from solver.data.settings import ENGINES, FitSettings
 from solver.errors import InputError
 
-_NOTICE = "Not all that was asked for can be shown: "
 
-
-class Session(param.Parameterized):
+class Session(RequestState):
     """State of one browser session.
 
     `shown` is the solution on the screen, `other` the one that it is compared with; either may
-    be None. `stage` and `message` are the state of the last request. `notice` says what of the
-    last address, or saved view, cannot be shown.
+    be None. `journal` lists the solutions of the session, of all orbits.
     """
 
     shown = param.ClassSelector(class_=Solution, default=None, allow_None=True)
     other = param.ClassSelector(class_=Solution, default=None, allow_None=True)
     solutions = param.List(default=[], item_type=Solution)
-    stage = param.ClassSelector(class_=Stage, default=Stage.LOADING)
-    message = param.String(default="")
-    notice = param.String(default="")
     theme = param.Selector(default="light", objects=["light", "dark"])
 
     def __init__(self, store: SolutionStore) -> None:
@@ -42,7 +35,9 @@ class Session(param.Parameterized):
         self.selection = Selection()
         self.choices = FitChoices()
         self.units = Units(store.instrument)
+        self.journal = Journal(store.made)
         self.selection.offer_orbits(store.orbits)
+        self._detectors = store.instrument.detector_ids
         self._job: Job | None = None
         self._requested = Request(store.orbits[0], FitSettings())
         self._next_what_if: FitSettings | None = None
@@ -51,7 +46,7 @@ class Session(param.Parameterized):
         self._is_opening = False
         self._fitted: Solution | None = None
         # What all solutions are compared with, in place of the one before each.
-        self._chosen: Solution | None = None
+        self.chosen: Solution | None = None
         self._unprepared: Solution | None = None
         self.choices.param.watch(
             lambda *_: self.ask_what_if(),
@@ -102,7 +97,7 @@ class Session(param.Parameterized):
         self.selection.orbit = orbit
         if self.shown is None or self.shown.orbit != orbit:
             self.solutions = []
-        self._chosen = self.other = None
+        self.chosen = self.other = None
         self._later = solutions
         self._show_next()
 
@@ -123,10 +118,6 @@ class Session(param.Parameterized):
         solution, self._unprepared = self._unprepared, None
         if solution is not None and self.shown is solution and self.choices.what_if_at_once:
             self.store.prepare(solution.orbit, solution.settings)
-
-    def refuse(self, message: str) -> None:
-        """Show why a request failed; the last solution stays."""
-        self.param.update(stage=Stage.FAILED, message=message)
 
     def refit(self) -> None:
         """Request a fit with the settings of the controls; report an invalid one at once."""
@@ -157,9 +148,11 @@ class Session(param.Parameterized):
         known = next((s for s in self.solutions if s.settings == settings), None)
         if self._job is not None:
             self._next_what_if = settings if self._requested.is_what_if else None
+        elif self.shown is not None and settings == self.shown.settings:
+            return
         elif known is not None:
             self._return_to(known)
-        elif self.shown is None or settings != self.shown.settings:
+        else:
             self._request(Request(self.selection.orbit, settings, is_what_if=True))
 
     @property
@@ -172,6 +165,7 @@ class Session(param.Parameterized):
         if self.shown is not None and self.shown.is_what_if:
             kept = self.shown._replace(is_what_if=False)
             self.param.update(solutions=[*self.solutions, kept], shown=kept)
+            self.journal.add(kept)
 
     def cancel(self) -> None:
         """Cancel the waiting or running job."""
@@ -211,6 +205,16 @@ class Session(param.Parameterized):
             self.param.update(shown=solution, other=self._beside(solution, self.fitted))
             self.choices.load(solution.settings)
 
+    def open_listed(self, solution: Solution | Request) -> None:
+        """Show a solution of the list; that on the screen becomes the other, if of this orbit."""
+        is_here = self.shown is not None and self.shown.orbit == solution.orbit
+        if is_here and isinstance(solution, Solution):
+            self._cancel_job()
+            self._put_on_screen(solution)
+            self.choices.load(solution.settings)
+        else:
+            self.open(solution, self.fitted if is_here else None)
+
     def compare_with(self, solution: Solution | None) -> None:
         """Compare what is on the screen with a solution; None for the one before each.
 
@@ -218,7 +222,7 @@ class Session(param.Parameterized):
         ----------
         solution : may be of another run or orbit
         """
-        self._chosen = solution
+        self.chosen = solution
         if self.shown is not None:
             self.other = self._beside(self.shown, self.fitted)
 
@@ -227,8 +231,8 @@ class Session(param.Parameterized):
         shown, other = self.shown, self.other
         if shown is None or other is None:
             return
-        if self._chosen is not None:
-            self._chosen = shown
+        if self.chosen is not None:
+            self.chosen = shown
         if shown.orbit != other.orbit:
             self._cancel_job()
             self.param.update(solutions=[] if other.is_what_if else [other])
@@ -238,8 +242,8 @@ class Session(param.Parameterized):
 
     def _beside(self, solution: Solution, before: Solution | None) -> Solution | None:
         """Return what a solution is compared with, given the one before it of the same orbit."""
-        if self._chosen is not None:
-            return None if self._chosen.equals(solution) else self._chosen
+        if self.chosen is not None:
+            return None if self.chosen.equals(solution) else self.chosen
         return None if before is None or before.settings == solution.settings else before
 
     def _return_to(self, solution: Solution) -> None:
@@ -270,8 +274,7 @@ class Session(param.Parameterized):
             self._put_on_screen(Solution(orbit, settings, result, is_step, is_step))
 
     def _put_on_screen(self, solution: Solution) -> None:
-        ids = self.store.instrument.detector_ids
-        problems = self.selection.limit_to(solution.result, ids)
+        problems = self.selection.limit_to(solution.result, self._detectors)
         before = self.fitted if self.fitted and self.fitted.orbit == solution.orbit else None
         self._fitted = before or solution
         kept = [s for s in self.solutions if s.settings != solution.settings]
@@ -282,16 +285,10 @@ class Session(param.Parameterized):
             stage=Stage.READY,
             message="",
         )
+        self.journal.add(solution)
         self.note(problems)
 
     def limit_selection(self) -> None:
         """Limit the selection to the solution on the screen, after an address changed it."""
         if self.shown is not None:
-            ids = self.store.instrument.detector_ids
-            self.note(self.selection.limit_to(self.shown.result, ids))
-
-    def note(self, problems: Iterable[str]) -> None:
-        """Add what of an address cannot be shown to the notice."""
-        before = self.notice.removeprefix(_NOTICE).rstrip(".")
-        told = "; ".join(filter(None, [before, *problems]))
-        self.notice = f"{_NOTICE}{told}." if told else ""
+            self.note(self.selection.limit_to(self.shown.result, self._detectors))

@@ -33,6 +33,7 @@ class Solution(NamedTuple):
     is_what_if : whether the next what-if replaces it
     is_step : whether it was computed by a step from a fit, kept or not
     run : name of the run that it was read from; empty for none
+    kept : name of the kept solution that it was read from; empty for none
     """
 
     orbit: int | None
@@ -41,11 +42,14 @@ class Solution(NamedTuple):
     is_what_if: bool = False
     is_step: bool = False
     run: str = ""
+    kept: str = ""
 
     @property
     def label(self) -> str:
         """Short description of the solution."""
         text = self.settings.describe()
+        if self.kept:
+            return f"{self.kept}: {text}"
         return _OF_WHAT_IF.format(text) if self.is_what_if else text
 
     def equals(self, other: "Solution") -> bool:

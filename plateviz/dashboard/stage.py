@@ -1,6 +1,11 @@
-"""Stage: the state of the solution on the screen of a session."""
+"""Stage: the state of the solution on the screen of a session; RequestState: and why, in words."""
 
+from collections.abc import Iterable
 from enum import Enum
+
+import param
+
+_NOTICE = "Not all that was asked for can be shown: "
 
 
 class Stage(Enum):
@@ -10,3 +15,25 @@ class Stage(Enum):
     READY = "the solution is the requested one"
     STALE = "another solution is being computed"
     FAILED = "the last request failed"
+
+
+class RequestState(param.Parameterized):
+    """State of what was asked for last.
+
+    `stage` and `message` are the state of the last request. `notice` says what of the last address,
+    or saved view, cannot be shown.
+    """
+
+    stage = param.ClassSelector(class_=Stage, default=Stage.LOADING)
+    message = param.String(default="")
+    notice = param.String(default="")
+
+    def refuse(self, message: str) -> None:
+        """Show why a request failed; the last solution stays."""
+        self.param.update(stage=Stage.FAILED, message=message)
+
+    def note(self, problems: Iterable[str]) -> None:
+        """Add what of an address cannot be shown to the notice."""
+        before = self.notice.removeprefix(_NOTICE).rstrip(".")
+        told = "; ".join(filter(None, [before, *problems]))
+        self.notice = f"{_NOTICE}{told}." if told else ""

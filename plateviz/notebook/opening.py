@@ -9,6 +9,7 @@ from plateviz.notebook.orbit import OpenOrbit
 from plateviz.notebook.report import path_of
 from plateviz.notebook.solution import OpenSolution
 from plateviz.notebook.survey import OpenSurvey
+from plateviz.runs.kept_solutions import instrument_of, kept_solution
 from plateviz.solving.job import Job
 from plateviz.solving.origin import OrbitFiles
 from solver.data.instrument import MINI_MOCK, read_instrument
@@ -34,8 +35,9 @@ def open(
 
     Parameters
     ----------
-    path : a survey directory, a result file of `plateviz fit`, or, with `reference`, the
-        measurements and exposures of an orbit, as for `plateviz fit`
+    path : a survey directory, a result file of `plateviz fit`, a solution that was kept in the
+        dashboard (`DIR/solutions/NAME`), or, with `reference`, the measurements and exposures of
+        an orbit, as for `plateviz fit`
     reference : the reference catalogue of the measurements
     truth : the true catalogue of a simulation; accepted only with the files of an orbit
     instrument : a TOML file, with measurements or a solution; the mini-mock's by default
@@ -57,6 +59,14 @@ def open(
         _refuse(given_names & {"run"}, "the files of an orbit")
         return _open_orbit(path, reference, truth, instrument, orbit)
     target = _existing_path(path)
+    if (kept := kept_solution(target)) is not None:
+        _refuse(given_names - {"instrument"}, "a kept solution")
+        camera = (
+            instrument_of(kept)
+            if instrument is None
+            else read_instrument(_existing_path(instrument))
+        )
+        return OpenSolution(kept.read(), camera, kept.name, f"plateviz.open({str(target)!r})")
     if target.is_dir():
         _refuse(given_names - {"run"}, "a survey directory")
         return OpenSurvey(target, run)

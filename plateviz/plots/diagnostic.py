@@ -25,6 +25,7 @@ class Chosen:
     exposures : shown exposures as (field_id, plate_id)
     detector : shown detector_id, or None for all
     other : solution to compare with, or None
+    beside : solution whose figure stands beside this one, with arrows to the same scale, or None
     """
 
     result: FitResult
@@ -32,6 +33,7 @@ class Chosen:
     exposures: tuple[tuple[int, int], ...] = ()
     detector: int | None = None
     other: FitResult | None = None
+    beside: FitResult | None = None
 
 
 def _always(_: Chosen) -> bool:

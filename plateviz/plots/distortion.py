@@ -63,8 +63,14 @@ def plot_distortion(
 
 
 def _plot(chosen: Chosen) -> Figure:
-    table = distortion(chosen.result, chosen.instrument)
-    return plot_distortion(table, detectors=chosen.instrument.detectors)
+    table, *others = (
+        distortion(one, chosen.instrument)
+        for one in (chosen.result, chosen.beside)
+        if one is not None
+    )
+    fields = [(one, field_about(one, _MARGIN)) for one in (table, *others) if not one.empty]
+    scale = min((automatic_scale(*one) for one in fields), default=None)
+    return plot_distortion(table, detectors=chosen.instrument.detectors, arrow_scale=scale)
 
 
 DIAGNOSTICS = (

@@ -129,15 +129,25 @@ def _shown_exposures(table: pd.DataFrame) -> str:
 
 
 def _plot(chosen: Chosen) -> Figure:
-    table = residual_map(
-        chosen.result,
-        chosen.instrument,
-        exposures=chosen.exposures,
-        detector_id=chosen.detector,
-    )
     detectors = {d.detector_id: d for d in chosen.instrument.detectors}
     shown = chosen.instrument if chosen.detector is None else detectors[chosen.detector]
-    return plot_residual_map(table, shown)
+    table, *others = (
+        residual_map(
+            one,
+            chosen.instrument,
+            exposures=chosen.exposures,
+            detector_id=chosen.detector,
+        )
+        for one in (chosen.result, chosen.beside)
+        if one is not None
+    )
+    scales = [_scale(one, shown) for one in (table, *others) if not one.empty]
+    return plot_residual_map(table, shown, arrow_scale=min(scales, default=None))
+
+
+def _scale(table: pd.DataFrame, detector: Detector | Instrument) -> float:
+    field = _field(detector)
+    return automatic_scale(_thinned(table, detector, field)[0], field)
 
 
 DIAGNOSTICS = (

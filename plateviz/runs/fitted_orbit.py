@@ -17,6 +17,7 @@ import pyarrow as pa
 
 from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES, TRACE, Table
+from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import flush
 from solver.io.disk import writing
@@ -138,6 +139,15 @@ def read_provenance(directory: Path) -> dict[str, str]:
     head = _read_json(directory / _HEAD)
     with reading(str(directory), "the inputs of a fitted orbit"):
         return {str(name): str(digest) for name, digest in head["provenance"].items()}
+
+
+def read_settings(directory: Path) -> FitSettings:
+    """Return the settings of a complete fitted orbit; InputError if its files are damaged."""
+    wanted = read_manifest(directory / _COMPLETE).get(_HEAD)
+    require_unchanged(directory / _HEAD, wanted, _REMEDY)
+    with reading(str(directory), "the settings of a fitted orbit"):
+        head = _read_json(directory / _HEAD)
+        return parse_settings(head["settings"], str(directory / _HEAD))
 
 
 def kept_table(directory: Path, name: str, unchanged: UnchangedFiles) -> Path:

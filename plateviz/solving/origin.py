@@ -7,6 +7,7 @@ send it to the solver process, which does.
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from plateviz.runs.kept_solutions import FOLDER
 from solver.data.instrument import MINI_MOCK, Instrument, read_instrument
 from solver.data.orbit import OrbitData
 from solver.io.read_orbit import observation_files, read_orbit
@@ -33,6 +34,12 @@ class OrbitFiles:
     def title(self) -> str:
         """Name of the origin."""
         return Path(self.observations).name
+
+    @property
+    def solutions(self) -> Path:
+        """Directory of the kept solutions, which need not exist."""
+        path = Path(self.observations)
+        return path.parent / f"{path.name.partition('.')[0]}-{FOLDER}"
 
     def inputs(self) -> list[Path]:
         """Return the files that are read, whether they exist or not."""
@@ -64,6 +71,11 @@ class SurveyFolder:
     def title(self) -> str:
         """Name of the origin."""
         return Path(self.directory).resolve().name
+
+    @property
+    def solutions(self) -> Path:
+        """Directory of the kept solutions, which need not exist."""
+        return Path(self.directory) / FOLDER
 
     def orbits(self) -> list[int | None]:
         """Return the orbit_id of all orbits."""

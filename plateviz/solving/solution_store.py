@@ -15,9 +15,11 @@ from pathlib import Path
 
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.fitted_orbit import read_fitted_orbit
+from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.runs.scratch_result import is_written, read_scratch_result
 from plateviz.solving.job import Job, JobStatus
+from plateviz.solving.made_solutions import MadeSolution, MadeSolutions
 from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
 from plateviz.solving.solver_pool import Solver
 from solver.data.instrument import Instrument
@@ -36,6 +38,10 @@ class SolutionStore:
 
     Attributes
     ----------
+    origin : of the orbits
+    instrument : that took them
+    kept : solutions that people have kept on disk
+    made : which solutions each browser session has made
     columns : the columns of runs that were read last
     background : runs what takes a while, for all sessions
     """
@@ -45,6 +51,8 @@ class SolutionStore:
         self.origin = origin
         self._orbits = origin.orbits()
         self.instrument: Instrument = origin.read_instrument()
+        self.kept = KeptSolutions(origin.solutions)
+        self.made = MadeSolutions()
         self._solver = solver
         self._lock = threading.Lock()
         self._jobs: dict[Path, Job] = {}
@@ -123,6 +131,20 @@ class SolutionStore:
         """
         directory = self._directory(orbit, settings, what_if)
         return self._read(directory) if is_written(directory) else None
+
+    def keep(self, made: MadeSolution, name: str) -> KeptSolution:
+        """Keep a solution on disk under a name.
+
+        Raises
+        ------
+        InputError
+            If the solution is no longer there, the name is not valid or not free, or the disk
+            takes no file.
+        """
+        result = self.result(*made[:3])
+        if result is None:
+            raise InputError("expected a solution of this server, found that it was removed")
+        return self.kept.keep(name, made.orbit, made.is_step, result)
 
     def close(self) -> None:
         """End the solver process and remove the scratch folder."""

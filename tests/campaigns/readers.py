@@ -12,10 +12,12 @@ from tornado.escape import parse_qs_bytes
 
 from plateviz.dashboard.navigation import Navigation, View
 from plateviz.dashboard.session import Session
+from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.runs.load_tables import survey_tables
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
 from plateviz.runs.run import Run
 from plateviz.solving.job import Job
+from plateviz.solving.made_solutions import MadeSolutions
 from plateviz.solving.origin import SurveyFolder
 from solver.data.columns import Table, numpy_dtype
 from solver.data.instrument import read_instrument
@@ -199,6 +201,7 @@ class _Store:
         self.origin = SurveyFolder(str(folder))
         self.orbits = self.origin.orbits()
         self.instrument = self.origin.read_instrument()
+        self.made, self.kept = MadeSolutions(), KeptSolutions(self.origin.solutions)
 
     def runs(self) -> list[SurveyRun]:
         return survey_runs(Path(self.origin.directory))

@@ -125,6 +125,25 @@ def until(page, condition):
     pytest.fail("it did not come about in 30 s")
 
 
+def residual_arrows(page):
+    return page.evaluate(
+        f"""() => {{ {VIEWS} return figures.filter(view => card(view) === 'residual-map')
+          .flatMap(view => view.model.renderers.filter(r => r.glyph?.type === 'Segment'))
+          .map(r => JSON.stringify(Object.values(r.data_source.data).map(c => Array.from(c))))
+          .join() }}"""
+    )
+
+
+def is_faded(locator):
+    """Whether what is on the screen there is of a solution that is no longer shown."""
+    return locator.evaluate(
+        """element => {
+          for (let e = element; e; e = e.parentElement ?? e.getRootNode().host)
+            if (getComputedStyle(e).opacity !== '1') return true;
+          return false }"""
+    )
+
+
 def rests(page):
     """Whether the browser works less than one second in two, at the latest after half a minute."""
     metric = metrics_of(page)

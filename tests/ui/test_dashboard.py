@@ -16,8 +16,10 @@ from tests.ui.accessibility import require_accessible
 from tests.ui.conftest import (
     BACKGROUNDS,
     VIEWS,
+    is_faded,
     metrics_of,
     opening_pages,
+    residual_arrows,
     rests,
     see,
     serving,
@@ -79,25 +81,6 @@ def set_order(page, order):
     for _ in range(abs(order - current)):
         slider.press("ArrowRight" if order > current else "ArrowLeft")
     expect(slider).to_have_attribute("aria-valuenow", str(order))
-
-
-def residual_arrows(page):
-    return page.evaluate(
-        f"""() => {{ {VIEWS} return figures.filter(view => card(view) === 'residual-map')
-          .flatMap(view => view.model.renderers.filter(r => r.glyph?.type === 'Segment'))
-          .map(r => JSON.stringify(Object.values(r.data_source.data).map(c => Array.from(c))))
-          .join() }}"""
-    )
-
-
-def is_faded(locator):
-    """Whether what is on the screen there is of a solution that is no longer shown."""
-    return locator.evaluate(
-        """element => {
-          for (let e = element; e; e = e.parentElement ?? e.getRootNode().host)
-            if (getComputedStyle(e).opacity !== '1') return true;
-          return false }"""
-    )
 
 
 def chi2(page):
@@ -323,6 +306,29 @@ def select_exposures_too(page):
     turn_to_workspace(page, OrbitWorkspace.VERDICT)
 
 
+def keep_reload_and_show(page):
+    """Keep the what-if of order 4 on disk, load the page again, note upon it and show it."""
+    kept = "orbit 0: lower: order 4 (what-if, kept)"
+    page.get_by_role("button", name="All solutions").click()
+    window = page.get_by_role("dialog", name="Solutions")
+    window.get_by_role("radio", name="orbit 0: order 4 (what-if)").check()
+    window.get_by_role("textbox", name="Name").fill("lower")
+    window.get_by_role("textbox", name="Name").blur()
+    window.get_by_role("button", name="Keep on disk").click()
+    expect(window.get_by_role("radio", name=kept)).to_be_visible()
+    page.reload()
+    page.get_by_role("button", name="All solutions").click()
+    expect(window.get_by_role("radio", name="orbit 0: order 3 (fit)")).to_be_visible()
+    window.get_by_role("radio", name=kept).check()
+    window.get_by_role("textbox", name="Note").fill("<i>as text</i>")
+    window.get_by_role("textbox", name="Note").blur()
+    window.get_by_role("button", name="Save the note").click()
+    expect(window.get_by_text("The note is saved.")).to_be_visible()
+    window.get_by_role("button", name="Show", exact=True).click()
+    page.keyboard.press("Escape")
+    expect(shown(page)).to_contain_text("lower: order 4")
+
+
 def test_a_change_is_tried_at_once_kept_and_fitted(page):
     see(page, "convergence")
     canvas = page.locator(".figure-convergence canvas").first
@@ -350,6 +356,7 @@ def test_a_change_is_tried_at_once_kept_and_fitted(page):
     assert chi2(page) != kept
     until(page, lambda: residual_arrows(page) != arrows)
     see(page, "comparison")
+    keep_reload_and_show(page)
 
 
 def test_what_is_left_out_is_left_out_and_a_wrong_prior_is_refused(page):
@@ -416,7 +423,7 @@ def test_any_column_is_drawn_against_any_other_and_selects(page, open_page):
     expect(again.get_by_role("combobox", name="Limit by")).to_have_text("is_reference")
 
 
-def test_the_address_is_what_is_shown_and_the_browser_goes_back(page, open_page):
+def test_the_address_is_what_is_shown_and_the_browser_goes_back(page, open_page, tmp_path):
     choose(page, "Detector", "3")
     choose(page, "Field", "all")
     page.wait_for_url("**field=all**detector=3**")
@@ -440,9 +447,16 @@ def test_the_address_is_what_is_shown_and_the_browser_goes_back(page, open_page)
     )
     assert "solution=order=4+what-if" in page.url
     page.go_forward()
-    expect(page.get_by_role("button", name="Sky", exact=True)).to_have_attribute(
-        "aria-pressed", "true"
-    )
+    sky = page.get_by_role("button", name="Sky", exact=True)
+    expect(sky).to_have_attribute("aria-pressed", "true")
+    with page.expect_download() as started:
+        page.get_by_role("button", name="Save view").click()
+    assert started.value.suggested_filename == "sky-view.json"
+    started.value.save_as(tmp_path / "view.json")
+    turn_to_workspace(page, OrbitWorkspace.VERDICT)
+    page.wait_for_url("**workspace=verdict**")
+    page.get_by_label("File of a saved view").set_input_files(tmp_path / "view.json")
+    expect(sky).to_have_attribute("aria-pressed", "true")
 
 
 def test_keys_do_what_their_list_says(page):

@@ -62,7 +62,7 @@ class Keyboard(pn.custom.JSComponent):
 
     _stylesheets = [
         """
-        :host { margin-left: auto; align-self: center; }
+        :host { align-self: center; }
         button { padding: 4px 8px; border: 0; border-radius: 4px; cursor: pointer;
                  font: 13px Helvetica, Arial, sans-serif; color: white; background: transparent; }
         button:hover, button:focus-visible { background: rgb(255 255 255 / 20%); }

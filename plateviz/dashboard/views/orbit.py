@@ -11,6 +11,7 @@ from plateviz.dashboard.row_origins import OrbitRows
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
+from plateviz.dashboard.views.compare import CompareView
 from plateviz.dashboard.views.explore import ExploreView
 from plateviz.dashboard.views.figure import FigureView, card
 from plateviz.dashboard.views.figure_grid import FigureGrid
@@ -25,6 +26,7 @@ from plateviz.dashboard.views.summary import HeadView, StripView
 from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
+from plateviz.plots.both_solutions import BOTH, figure_of_both
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace
@@ -47,6 +49,7 @@ class OrbitPage(pn.viewable.Viewer):
         self._session = session = navigation.session
         self._grids: dict[OrbitWorkspace, FigureGrid] = {}
         self._following: list[FigureView] = []
+        self._compare: CompareView | None = None
         self._is_complete = False
         self._stack = Stack({one: partial(self._workspace, one) for one in OrbitWorkspace})
         self.sidebar = pmui.Column(
@@ -81,7 +84,7 @@ class OrbitPage(pn.viewable.Viewer):
         if self._is_complete or not self.figures.is_laid_out:
             return False
         self._is_complete = True
-        self.sidebar.append(RefitView(self._session))
+        self.sidebar.append(RefitView(self._navigation))
         return True
 
     @property
@@ -102,10 +105,14 @@ class OrbitPage(pn.viewable.Viewer):
         is_first = one is OrbitWorkspace.VERDICT
         among = [d for d in diagnostics() if (d.is_key if is_first else d.workspace is one)]
         views = {d: self._figure_view(d) for d in among}
-        self._following += [view for d, view in views.items() if d.follows_shown]
         others, above = [], []
+        if one is OrbitWorkspace.ORDERS:
+            views = {BOTH: self._figure_view(BOTH), **views}
+            self._compare = CompareView(self._navigation, lambda: self._change_figure(views[BOTH]))
+            others = [card(self._compare, "changes")]
         if one is OrbitWorkspace.CALIBRATION:
             others = [card(CalibrationView(self._session), "tables")]
+        self._following += [view for d, view in views.items() if d.follows_shown]
         if is_first:
             above = [StripView(self._session)]
         grid = FigureGrid(
@@ -140,7 +147,10 @@ class OrbitPage(pn.viewable.Viewer):
             detector=session.selection.detector_id,
             other=session.other.result if session.other else None,
         )
-        return session.units.figure(diagnostic.plot(chosen))
+        figure = diagnostic.plot(chosen)
+        if diagnostic is BOTH and self._compare is not None:
+            figure = figure_of_both(self._compare.figure, chosen)
+        return session.units.figure(figure)
 
     def _show_workspace(self, *_: object) -> None:
         self._stack.show(self._navigation.orbit_workspace)
@@ -148,6 +158,10 @@ class OrbitPage(pn.viewable.Viewer):
     def _change(self, *_: object) -> None:
         for grid in self._grids.values():
             grid.change(self._session.theme)
+
+    def _change_figure(self, view: FigureView) -> None:
+        view.change(self._session.theme)
+        self._wake()
 
     def _change_shown(self, *_: object) -> None:
         for view in self._following:

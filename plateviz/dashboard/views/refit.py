@@ -5,11 +5,12 @@ from html import escape
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.state import CONTROLS, FitChoices, default_widths
 from plateviz.dashboard.views.code_window import CodeWindow
+from plateviz.dashboard.views.solution_window import SolutionWindow
 from solver.data.parameters import PARAMETERS, Group
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import SETTINGS
@@ -22,10 +23,10 @@ _TIGHT = (0, 10)
 class RefitView(pn.viewable.Viewer):
     """Controls of a refit, its progress, and the selection of a solution."""
 
-    def __init__(self, session: Session, **params: object) -> None:
-        """Follow `session`."""
+    def __init__(self, navigation: Navigation, **params: object) -> None:
+        """Follow the session of `navigation`."""
         super().__init__(**params)
-        self._session = session
+        self._session = session = navigation.session
         self._widths: dict[str, pmui.TextInput] = {}
         self._reset = pmui.Button(label="The paper's priors", variant="text", size="small")
         self._fit = pmui.Button(label="Fit", color="primary", sizing_mode="stretch_width")
@@ -39,6 +40,8 @@ class RefitView(pn.viewable.Viewer):
         self._message = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
         self._code = CodeWindow(session)
+        self._list = SolutionWindow(navigation)
+        self._open_list = pmui.Button(label="All solutions", variant="text", size="small")
         self._reproduce = pmui.Button(label="Reproduce", variant="text", size="small")
         self._column = pmui.Column(
             pmui.Switch.from_param(
@@ -54,8 +57,9 @@ class RefitView(pn.viewable.Viewer):
             self._message,
             self._keep,
             self._solutions,
-            self._reproduce,
+            pmui.Row(self._open_list, self._reproduce, margin=0),
             self._code,
+            self._list,
             sizing_mode="stretch_width",
             margin=0,
         )
@@ -71,6 +75,7 @@ class RefitView(pn.viewable.Viewer):
         self._stop.on_click(lambda _: session.cancel())
         self._keep.on_click(lambda _: session.keep())
         self._reset.on_click(self._reset_priors)
+        self._open_list.on_click(lambda _: self._list.open())
         self._reproduce.on_click(lambda _: self._code.open())
         self._solutions.param.watch(self._select, "value")
         session.choices.param.watch(self._show_widths, "prior_widths")

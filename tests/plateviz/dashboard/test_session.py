@@ -1,5 +1,7 @@
 """Session: its rules, with a fake store whose jobs are ended by the test."""
 
+from pathlib import Path
+
 import pytest
 
 from plateviz.dashboard.session import Session
@@ -13,7 +15,9 @@ from plateviz.dashboard.state import (
     Selection,
     default_widths,
 )
+from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.solving.job import Job
+from plateviz.solving.made_solutions import MadeSolutions
 from solver.data.instrument import MINI_MOCK
 from solver.data.settings import SETTINGS, FitSettings
 from solver.errors import InputError
@@ -30,6 +34,7 @@ class FakeStore:
         self._result = result
         self.requested, self.prepared, self.cancelled, self.abandoned = [], [], [], []
         self.is_shared = False
+        self.made, self.kept = MadeSolutions(), KeptSolutions(Path("nowhere"))
 
     def request(self, orbit, settings, what_if=False):
         self.requested.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
@@ -383,50 +388,6 @@ def test_description_has_what_differs_from_the_paper():
     changed = FitSettings(order=3, aberration=False, prior_widths={"distortion_x": 0.5})
     assert changed.describe() == "order 3, no aberration, distortion_x 0.5 um"
     assert FitSettings(compare_orders=True).describe() == "order 5, orders compared"
-
-
-def test_address_restores_the_selection(fit_result):
-    numbers = [d.detector_id for d in MINI_MOCK.detectors]
-    first, second = Selection(), Selection()
-    first.limit_to(fit_result, numbers)
-    last = first.param["plates"].bounds[1]
-    first.param.update(field=ALL, detector=str(numbers[-1]), plates=(last, last))
-    second.restore(first.address())
-    second.limit_to(fit_result, numbers)
-    assert second.address() == first.address()
-
-
-@pytest.mark.parametrize(
-    ("address", "told"),
-    [
-        (
-            {"field": "99", "detector": "none", "plates": "many", "unknown": "x"},
-            ["plates: expected FIRST-LAST", "field: expected all, 0, 1, 2, 3, found '99'", "detec"],
-        ),
-        ({"plates": "3", "field": ""}, ["plates: expected FIRST-LAST", "field: expected all"]),
-        ({"plates": "1-900"}, ["plates: expected exposures from 0 to 2"]),
-        ({"plates": "0-1", "field": "2"}, []),
-    ],
-    ids=["nonsense", "half", "beyond", "valid"],
-)
-def test_invalid_address_is_ignored_and_told(fit_result, address, told):
-    selection = Selection()
-    problems = selection.restore(address) + selection.limit_to(fit_result, [1, 2])
-    assert len(problems) == len(told)
-    assert all(text.startswith(words) for text, words in zip(problems, told, strict=True))
-    lowest, highest = selection.param["plates"].bounds
-    assert lowest <= selection.plates[0] <= selection.plates[1] <= highest
-    assert selection.field in selection.param["field"].objects
-    # It is told once.
-    assert selection.limit_to(fit_result, [1, 2]) == []
-
-
-def test_address_names_an_orbit(fit_result):
-    selection = Session(FakeStore(fit_result)).selection
-    assert selection.orbit_of({"orbit": "1"}) == 1
-    assert selection.orbit_of({}) == selection.orbit == 0
-    with pytest.raises(InputError, match="orbit: expected one of this page, found '7'"):
-        selection.orbit_of({"orbit": "7"})
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,102 @@
+"""CompareView: what the solution is compared with, and what differs between the two."""
+
+from collections.abc import Callable
+
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.solution import Request
+from plateviz.dashboard.solution_list import Entry, SolutionList, by_label, label_of
+from plateviz.dashboard.views.markup import markup_pane, numbers, paragraph, themed
+from plateviz.plots.both_solutions import comparable_figures
+from plateviz.plots.diagnostic import Diagnostic
+from plateviz.tables.solution_changes import solution_changes
+from solver.errors import InputError
+
+_BEFORE = "the solution before it"
+_TITLES = {"what": "", "a": "A", "b": "B", "change": "B minus A"}
+
+
+class CompareView(pn.viewable.Viewer):
+    """Two choosers, of the other solution and of the figure that is drawn of both, and a table."""
+
+    def __init__(
+        self, navigation: Navigation, change_figure: Callable[[], object], **params: object
+    ) -> None:
+        """Follow the session of `navigation`.
+
+        Parameters
+        ----------
+        change_figure : called when another figure is to be drawn of both
+        """
+        super().__init__(**params)
+        self._navigation, self._session = navigation, navigation.session
+        self._list = SolutionList(navigation)
+        wide = {"sizing_mode": "stretch_width", "size": "small"}
+        self._other = pmui.Select(
+            label="Compare with (A)", options=[_BEFORE], value=_BEFORE, **wide
+        )
+        figures = {one.title: one for one in comparable_figures()}
+        self._figure = pmui.Select(
+            label="Figure of both", options=figures, value=figures["Residual map"], **wide
+        )
+        self._figure.param.watch(lambda _: change_figure(), "value")
+        self._table = markup_pane()
+        self._message = ""
+        self._column = pn.Column(
+            self._other, self._figure, self._table, sizing_mode="stretch_width"
+        )
+        self._entries: dict[str, Entry] = {}
+        self._is_offering = False
+        self._other.param.watch(self._choose, "value")
+        self._session.param.watch(self._fill, ["shown", "other", "theme"])
+        self._session.param.watch(self._offer, ["shown", "other"])
+        self._session.journal.param.watch(self._offer, "made")
+        navigation.param.watch(self._offer, ["run_name", "orbit_workspace"])
+        self._offer()
+        self._fill()
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the choosers and the table."""
+        return self._column
+
+    @property
+    def figure(self) -> Diagnostic:
+        """The figure that is drawn of both solutions."""
+        return self._figure.value
+
+    def _offer(self, *_: object) -> None:
+        entries = [*self._list.entries(), *self._list.other_orbits()]
+        self._entries = by_label(entries)
+        self._is_offering = True
+        try:
+            chosen = self._session.chosen
+            label = None if chosen is None else label_of(chosen, self._entries)
+            self._other.param.update(options=[_BEFORE, *self._entries], value=label or _BEFORE)
+        finally:
+            self._is_offering = False
+
+    def _choose(self, *_: object) -> None:
+        if self._is_offering:
+            return
+        entry = self._entries.get(str(self._other.value))
+        self._message = ""
+        try:
+            found = None if entry is None else self._list.load(entry)
+            if isinstance(found, Request):
+                raise InputError("this solution has to be fitted again: show it first")
+            self._session.compare_with(found)
+        except InputError as error:
+            self._message = str(error)
+        self._fill()
+
+    def _fill(self, *_: object) -> None:
+        session = self._session
+        shown, other = session.shown, session.other
+        if self._message or shown is None or other is None:
+            text = self._message or "Fit with other settings, or choose what to compare with."
+            self._table.object = paragraph(text, "empty", session.theme)
+            return
+        table = solution_changes(other.result, shown.result).rename(columns=_TITLES)
+        self._table.object = themed(numbers(table), session.theme)

@@ -1,0 +1,49 @@
+"""Any figure of an orbit, of two solutions beside each other."""
+
+from dataclasses import replace
+
+from plateviz.figures.alike import beside
+from plateviz.figures.figure import Figure, message
+from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.gallery import diagnostics
+from plateviz.plots.workspace import OrbitWorkspace
+
+_TITLE = "Both solutions"
+_TITLES = ("(A)", "(B)")
+
+
+BOTH = Diagnostic(
+    "both-solutions",
+    _TITLE,
+    "A figure of the solution that is compared with (A) and of the solution (B), with the same "
+    "limits, colours and lengths of arrows. Frames with the same axes zoom and move together.",
+    OrbitWorkspace.ORDERS,
+    88,
+    lambda chosen: figure_of_both(comparable_figures()[0], chosen),
+    follows_shown=True,
+    is_wide=True,
+)
+"""The card of the Orbit page, which chooses the figure; a report has none."""
+
+
+def comparable_figures() -> tuple[Diagnostic, ...]:
+    """Return the figures of one solution in page order."""
+    return tuple(one for one in diagnostics() if one.workspace is not OrbitWorkspace.ORDERS)
+
+
+def figure_of_both(diagnostic: Diagnostic, chosen: Chosen) -> Figure:
+    """Draw a figure of the solution that is compared with (A), and of the solution (B).
+
+    Limits, colours and lengths of arrows are the same for both.
+    """
+    if chosen.other is None:
+        return message(_TITLE, "Fit with other settings, or choose what to compare with.")
+    b = replace(chosen, other=None, beside=chosen.other)
+    a = replace(chosen, result=chosen.other, other=None, beside=chosen.result)
+    figures = diagnostic.plot(a), diagnostic.plot(b)
+    for figure, title in zip(figures, _TITLES, strict=True):
+        if figure.message is not None:
+            return message(f"{title} {diagnostic.title}", figure.message)
+    if len(figures[0]) != len(figures[1]):
+        return message(diagnostic.title, "The figures of these solutions have different parts.")
+    return beside(*figures, _TITLES)

@@ -36,9 +36,9 @@ Progress = Callable[[int, int], None]
 
 
 class Done(NamedTuple):
-    """What was done instead of making a file, in words."""
+    """What was done instead of making a file, as text."""
 
-    words: str
+    text: str
 
 
 class Later(NamedTuple):

@@ -97,7 +97,9 @@ class SaveButton(pn.custom.JSComponent):
       const say = text => { words.textContent = text; words.hidden = !text }
       show(false)
       say("")
+      let isBusy = false
       const ask = label => {
+        isBusy = true
         show(false)
         say(`Being ${done} \\u2026`)
         model.send_msg(label)
@@ -116,7 +118,9 @@ class SaveButton(pn.custom.JSComponent):
         show(menu.hidden)
       }
       box.addEventListener("focusout", event => {
-        if (!box.contains(event.relatedTarget)) show(false)
+        if (box.contains(event.relatedTarget)) return
+        show(false)
+        if (!isBusy) say("")
       })
       box.addEventListener("keydown", event => {
         if (event.key !== "Escape" || menu.hidden) return
@@ -124,13 +128,18 @@ class SaveButton(pn.custom.JSComponent):
         show(false)
         button.focus()
       })
-      model.on("msg:custom", async ({ name, content, item, words }) => {
+      const tell = text => {
+        say(text)
+        setTimeout(() => { if (words.textContent === text) say("") }, 12_000)
+      }
+      model.on("msg:custom", async ({ name, content, item, text, more }) => {
+        isBusy = Boolean(more)
         try {
-          if (words) return say(words)
+          if (text) return more ? say(text) : tell(text)
           if (item) await draw(name, item)
           else keep(name, new Blob([content]))
           say("")
-        } catch (problem) { say(`It could not be saved: ${problem.message}`) }
+        } catch (problem) { tell(`It could not be saved: ${problem.message}`) }
       })
       const colour = () => {
         box.className = `save ${model.theme} ${model.place}`
@@ -185,7 +194,7 @@ class SaveButton(pn.custom.JSComponent):
         try:
             made = make()
         except InputError as error:
-            self._send_msg({"words": f"It could not be {self.done}: {error}."})
+            self._send_msg({"text": f"It could not be {self.done}: {error}."})
             return
         if isinstance(made, Later):
             self._begin(made)
@@ -197,7 +206,7 @@ class SaveButton(pn.custom.JSComponent):
     def _begin(self, later: Later) -> None:
         """Make a file on a thread, unless one is being made."""
         if self._is_making:
-            self._send_msg({"words": "The one before is not done yet."})
+            self._send_msg({"text": "The one before is not done yet.", "more": True})
             return
         self._is_making = True
         work = partial(self._make, later, pn.state.curdoc)
@@ -212,15 +221,15 @@ class SaveButton(pn.custom.JSComponent):
                 document.add_next_tick_callback(partial(self._send_msg, message))
 
         def progress(done: int, total: int) -> None:
-            send({"words": f"Being {self.done} \u2026 {done} of {total}"})
+            send({"text": f"Being {self.done} \u2026 {done} of {total}", "more": True})
 
         could_not = f"It could not be {self.done}"
-        message: dict[str, object] = {"words": f"{could_not}; the server's log says why."}
+        message: dict[str, object] = {"text": f"{could_not}; the server's log says why."}
         try:
             made = later.make(progress)
             message = made._asdict()
         except InputError as error:
-            message = {"words": f"{could_not}: {error}."}
+            message = {"text": f"{could_not}: {error}."}
         finally:
             self._is_making = False
             send(message)

@@ -4,7 +4,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import pandas as pd
@@ -79,6 +79,7 @@ class Defect:
         return {"%": "", "ppm": "", "mpix": "pix"}.get(self.unit, self.unit)
 
 
+@runtime_checkable
 class CaseSettings(Protocol):
     """What defects use of `SurveySettings`, which itself uses the table of defects."""
 

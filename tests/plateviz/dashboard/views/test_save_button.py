@@ -35,7 +35,7 @@ def sent(monkeypatch):
     [
         ("CSV", {"name": "a.csv", "content": b"x"}),
         ("PNG", {"name": "a.png", "item": json.dumps({"doc": 1})}),
-        ("FITS", {"words": "It could not be saved: there is nothing to save yet."}),
+        ("FITS", {"text": "It could not be saved: there is nothing to save yet."}),
     ],
 )
 def test_choice_is_sent(sent, choice, message):
@@ -75,8 +75,8 @@ def test_file_that_takes_long_is_made_on_a_thread_and_one_at_a_time(sent, monkey
     may_end.set()
     until(lambda: {"name": "a.html", "content": b"x"} in sent)
     assert sent[:2] == [
-        {"words": "Being saved … 1 of 2"},
-        {"words": "The one before is not done yet."},
+        {"text": "Being saved … 1 of 2", "more": True},
+        {"text": "The one before is not done yet.", "more": True},
     ]
     assert threads[0] is not threading.main_thread()
     until(lambda: not button._is_making)
@@ -90,7 +90,7 @@ def test_file_that_cannot_be_made_is_told(sent, monkeypatch):
 
     monkeypatch.setattr(type(pn.state), "curdoc", Page())
     SaveButton("A report", {"HTML": lambda: Later(fail)})._handle_msg("HTML")
-    until(lambda: sent == [{"words": "It could not be saved: orbits are missing."}])
+    until(lambda: sent == [{"text": "It could not be saved: orbits are missing."}])
 
 
 def until(holds):

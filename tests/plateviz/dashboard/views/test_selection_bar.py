@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import panel as pn
 import pytest
+from bokeh.document import Document
+from panel.io.state import set_curdoc
 
 from plateviz.dashboard.navigation import View
 from plateviz.dashboard.selected import NOTHING, Selected
@@ -101,7 +103,7 @@ def test_sources_are_sent_from_a_page_on_this_machine(bar, monkeypatch):
     sent = []
     monkeypatch.setattr(TableSender, "send", lambda _, *what: sent.append(what) or "2 sent.")
     bar._is_here = True
-    assert bar._send().make(print).words == "2 sent."
+    assert bar._send().make(print).text == "2 sent."
     ((table, name),) = sent
     assert (len(table), name) == (2, "orbit-0-selection")
 
@@ -110,6 +112,18 @@ def test_page_on_another_machine_says_why_nothing_is_sent(bar):
     bar._is_here = False
     with pytest.raises(InputError, match="on another machine or through a proxy; Save, VOTable"):
         bar._send()
+
+
+def test_what_was_sent_is_removed_with_the_session(fit_result, monkeypatch):
+    closed = []
+    monkeypatch.setattr(TableSender, "close", lambda _: closed.append(1))
+    document = Document()
+    with set_curdoc(document):
+        SelectionBar(Navigation(Session(SurveyStore(fit_result, []))))
+    assert closed == []
+    for end in document.callbacks.session_destroyed_callbacks:
+        end(None)
+    assert closed == [1]
 
 
 def test_request_of_a_session_tells_where_its_page_is_read(monkeypatch):

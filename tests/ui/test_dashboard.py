@@ -374,7 +374,9 @@ def test_what_is_left_out_is_left_out_and_a_wrong_prior_is_refused(page):
     entry.fill("1 deg")
     entry.press("Enter")
     page.get_by_role("button", name="Fit", exact=True).click()
-    expect(page.get_by_text("prior of distortion_x: expected a unit such as um")).to_be_visible()
+    words = "prior of distortion_x: expected a unit such as um"
+    expect(page.get_by_role("alert").get_by_text(words)).to_be_visible()
+    expect(page.locator(".outdated").get_by_text(words).first).to_be_visible()
 
 
 def test_a_refit_can_be_cancelled_and_the_old_solution_stays(page):
@@ -383,7 +385,8 @@ def test_a_refit_can_be_cancelled_and_the_old_solution_stays(page):
     set_order(page, 8)
     page.get_by_role("button", name="Fit", exact=True).click()
     page.get_by_role("button", name="Cancel").click()
-    expect(page.get_by_text("The fit was cancelled; the last solution stays.")).to_be_visible()
+    words = "The fit was cancelled; the last solution stays."
+    expect(page.get_by_text(words, exact=True)).to_be_visible()
     assert chi2(page) == before
     expect(page.locator(".solution")).to_have_count(1)
 

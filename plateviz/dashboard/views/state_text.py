@@ -20,5 +20,5 @@ def outdated_text(session: Session) -> str:
     if session.stage is Stage.STALE:
         return "Another solution is being computed; this is still the last one."
     if session.stage is Stage.FAILED:
-        return f"This is still the last solution: the request after it failed. {session.message}"
+        return f"The last request has no solution, and this one stays. {session.message}"
     return ""

@@ -35,7 +35,11 @@ class CompareView(pn.viewable.Viewer):
         self._list = SolutionList(navigation)
         wide = {"sizing_mode": "stretch_width", "size": "small"}
         self._other = pmui.Select(
-            label="Compare with (A)", options=[_BEFORE], value=_BEFORE, **wide
+            label="Compare with (A)",
+            options=[_BEFORE],
+            value=_BEFORE,
+            margin=(12, 10, 5, 10),
+            **wide,
         )
         figures = {one.title: one for one in comparable_figures()}
         self._figure = pmui.Select(

@@ -142,6 +142,7 @@ class SolutionWindow(pn.viewable.Viewer):
 
     def _say(self, text: str, severity: str = "error") -> None:
         # It is taken for Markdown, in which HTML would be kept.
+        text = text[:1].upper() + text[1:]
         self._message.param.update(object=escape(text), visible=bool(text), severity=severity)
 
 

@@ -8,6 +8,7 @@ import param
 from bokeh.document import Document
 from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
+from param.parameterized import Watcher
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation
@@ -87,7 +88,8 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
 def empty_page(store: SolutionStore, **contents: list[Part]) -> pmui.Page:
     """Return the page of `store` with its title and style, and with `contents` by their place."""
     title = f"plateviz · {store.title}"
-    return pmui.Page(
+    before = _busy_watchers()
+    page = pmui.Page(
         title=title,
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
@@ -95,6 +97,15 @@ def empty_page(store: SolutionStore, **contents: list[Part]) -> pmui.Page:
         theme_config={"typography": {"fontSize": 13}},
         **contents,
     )
+    # The page would show whether the server is busy, for which the server would keep it for ever.
+    for watcher in _busy_watchers():
+        if watcher not in before:
+            pn.state.param.unwatch(watcher)
+    return page
+
+
+def _busy_watchers() -> list[Watcher]:
+    return list(pn.state.param.watchers.get("busy", {}).get("value", []))
 
 
 def build_part(store: SolutionStore) -> pn.Row:

@@ -1,8 +1,10 @@
 """A served dashboard without a browser: what makes a session, and what one client may ask for."""
 
 import asyncio
+import gc
 import json
 import re
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 
@@ -15,6 +17,7 @@ from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
 from plateviz.dashboard import limits
+from plateviz.dashboard.app import empty_page
 from plateviz.dashboard.limits import Rate
 from plateviz.dashboard.rooms import Rooms
 from plateviz.dashboard.server import Endpoint, begin, check_address
@@ -200,6 +203,12 @@ def test_first_figure_is_drawn_before_the_page_is_shown(store, monkeypatch, room
         assert len(list(session.document.select({"type": Plot}))) == n_drawn
 
     with_server(store, scenario)
+
+
+def test_server_does_not_keep_a_page(store):
+    page = weakref.ref(empty_page(store))
+    gc.collect()
+    assert page() is None
 
 
 def test_page_without_its_last_slash_is_sent_to_its_path(store):

@@ -114,12 +114,12 @@ def test_page_on_another_machine_says_why_nothing_is_sent(bar):
         bar._send()
 
 
-def test_what_was_sent_is_removed_with_the_session(fit_result, monkeypatch):
+def test_what_was_sent_is_removed_with_the_session(navigation, monkeypatch):
     closed = []
     monkeypatch.setattr(TableSender, "close", lambda _: closed.append(1))
     document = Document()
     with set_curdoc(document):
-        SelectionBar(Navigation(Session(SurveyStore(fit_result, []))))
+        SelectionBar(navigation)
     assert closed == []
     for end in document.callbacks.session_destroyed_callbacks:
         end(None)

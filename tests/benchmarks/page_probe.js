@@ -1,0 +1,116 @@
+// Functions of a page of the dashboard: what its figures show, and when that is complete.
+window.plateviz = (() => {
+  // Every message of the server: when it came, how long it is, how many changes it has.
+  const messages = [];
+  const Socket = window.WebSocket;
+  window.WebSocket = class extends Socket {
+    constructor(...given) {
+      super(...given);
+      this.addEventListener("message", ({ data }) => {
+        const events = typeof data === "string" && data.startsWith('{"events"')
+          ? JSON.parse(data).events.length : 0;
+        messages.push({ at: now(), bytes: data.byteLength ?? data.length, events });
+      });
+    }
+  };
+  // Milliseconds since 1970, as the server counts them.
+  const now = () => performance.timeOrigin + performance.now();
+  const views = () => {
+    const found = [];
+    const walk = view => { found.push(view); (view.child_views ?? []).forEach(walk); };
+    for (const view of Bokeh.index) walk(view);
+    return found;
+  };
+  const card = view => {
+    for (let e = view.el; e; e = e.parentElement ?? e.getRootNode().host)
+      for (const name of e.classList ?? []) if (name.startsWith("figure-")) return name.slice(7);
+  };
+  const isOnScreen = view => {
+    const box = view.el.getBoundingClientRect();
+    return box.width > 0 && box.bottom > 0 && box.top < innerHeight
+      && view.el.checkVisibility({ visibilityProperty: true });
+  };
+  // To look for the plots lays the page out, which would delay it in every picture.
+  let known = [], looked = -Infinity;
+  const plots = () => {
+    if (performance.now() - looked > 200) {
+      known = views().filter(view => view.model.type === "Plot" && isOnScreen(view))
+        .map(view => Object.assign(view, { card: card(view) }));
+      looked = performance.now();
+    }
+    return known;
+  };
+  const column = (source, name) => source.data[name] ?? source.data.get?.(name);
+  // Sum of some of the values: to sum all of them in every picture would take its time.
+  const total = values => {
+    let sum = 0;
+    const step = 1 + (values.length >> 6);
+    for (let i = 0; i < values.length; i += step) {
+      const value = values[i];
+      if (typeof value === "number" && isFinite(value)) sum += (1 + i % 7) * value;
+      else if (ArrayBuffer.isView(value) || Array.isArray(value)) sum += total(value);
+    }
+    return sum;
+  };
+  // What the figures on the screen show, as a text that differs for other solutions.
+  const shown = () => plots().map(view => [view.card, ...view.model.renderers.map(renderer => {
+    const data = renderer.data_source?.data ?? {};
+    const columns = data instanceof Map ? [...data.values()] : Object.values(data);
+    return columns.map(values => `${values.length} ${total(values)}`).join();
+  })].join(";"));
+  // The tables of sources on the screen.
+  const ofSources = () => plots().flatMap(view => view.model.renderers
+    .map(renderer => renderer.data_source).filter(source => column(source, "id")));
+  const chosen = source => {
+    const ids = column(source, "id");
+    return new Set(source.selected.indices.map(row => ids[row]));
+  };
+  // Whether every figure on the screen shows as selected what this table has selected.
+  const agree = among => {
+    const wanted = chosen(among);
+    return wanted.size > 0 && ofSources().every(source => {
+      const rows = new Set(source.selected.indices);
+      return Array.from(column(source, "id")).every((id, row) => wanted.has(id) === rows.has(row));
+    });
+  };
+  // Corners, in pixels of the window, of a box with some `count` points of a figure about one.
+  const boxAround = (name, count, row) => {
+    const view = plots().find(one => one.card === name);
+    const { data_source: source, glyph } = view.model.renderers
+      .find(one => one.glyph.type === "Scatter" && column(one.data_source, "id"));
+    const [x, y] = [glyph.x, glyph.y].map(of => Array.from(column(source, of.field)));
+    const at = row % x.length;
+    const far = x.map((_, i) => Math.max(Math.abs(x[i] - x[at]), Math.abs(y[i] - y[at])));
+    const half = [...far].sort((a, b) => a - b)[Math.min(count, far.length) - 1];
+    const frame = view.canvas_view.el.getBoundingClientRect();
+    const corner = sign => ({
+      x: frame.left + view.frame.x_scale.compute(x[at] + sign * half),
+      y: frame.top + view.frame.y_scale.compute(y[at] - sign * half),
+    });
+    window.plateviz.among = source;
+    return [corner(-1), corner(1)];
+  };
+  const texts = () => {
+    const found = [];
+    const walk = root => {
+      for (const e of root.querySelectorAll("*")) {
+        if (e.matches(".solution, .strip")) found.push(e.textContent);
+        if (e.shadowRoot) walk(e.shadowRoot);
+      }
+    };
+    walk(document);
+    return found.join();
+  };
+  // When a person last did something.
+  let acted = 0;
+  for (const kind of ["keydown", "pointerup", "wheel"])
+    addEventListener(kind, event => { acted = performance.timeOrigin + event.timeStamp; }, true);
+  // Resolve with the times of what a person did and of the picture after `isDone`.
+  const until = isDone => new Promise(resolve => {
+    const look = () => isDone()
+      ? requestAnimationFrame(() => setTimeout(() => resolve([acted, now()])))
+      : requestAnimationFrame(look);
+    look();
+  });
+  return { agree, boxAround, messages, plots, shown, texts, until };
+})();

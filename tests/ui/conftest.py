@@ -167,6 +167,27 @@ def metrics_of(page):
     return metric
 
 
+def drag(page, name, start, end):
+    """Drag across a figure, from one place to another in shares of its width and height."""
+    box = page.locator(f".figure-{name}:visible canvas").first.bounding_box()
+    (x, y), last = (
+        (box["x"] + across * box["width"], box["y"] + down * box["height"])
+        for across, down in (start, end)
+    )
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(*last, steps=8)
+    page.mouse.up()
+
+
+def explored(page):
+    """Title of the figure of the Explore workspace."""
+    return page.evaluate(
+        f"""() => {{ {VIEWS}
+          return figures.find(view => card(view) === 'explore')?.model.title.text }}"""
+    )
+
+
 def turn_dark(page, figures):
     """Change the theme from light to dark and go to each figure until it is drawn in it."""
     assert set(page.evaluate(BACKGROUNDS).values()) == {"#ffffff"}

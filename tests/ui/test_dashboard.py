@@ -16,6 +16,8 @@ from tests.ui.accessibility import require_accessible
 from tests.ui.conftest import (
     BACKGROUNDS,
     VIEWS,
+    drag,
+    explored,
     is_faded,
     metrics_of,
     opening_pages,
@@ -235,19 +237,6 @@ def selected(page, name, column="id"):
     return page.evaluate(SELECTED, [name, column])
 
 
-def drag(page, name, start, end):
-    """Drag across a figure, from one place to another in shares of its width and height."""
-    box = page.locator(f".figure-{name}:visible canvas").first.bounding_box()
-    (x, y), last = (
-        (box["x"] + across * box["width"], box["y"] + down * box["height"])
-        for across, down in (start, end)
-    )
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(*last, steps=8)
-    page.mouse.up()
-
-
 def test_sources_are_selected_in_one_figure_shown_in_all_saved_and_left_out(page, tmp_path):
     page.locator(".figure-footprint:visible canvas").first.wait_for(state="attached")
     bar = page.get_by_text(re.compile(r"^[\d,]+ sources? selected$"))
@@ -396,14 +385,6 @@ def choose(page, label, option):
     page.locator(".MuiMenuItem-root").get_by_text(option, exact=True).click()
     # While it closes, it covers the page.
     expect(page.locator(".MuiMenuItem-root")).to_have_count(0)
-
-
-def explored(page):
-    """Title of the figure of the Explore workspace."""
-    return page.evaluate(
-        f"""() => {{ {VIEWS}
-          return figures.find(view => card(view) === 'explore')?.model.title.text }}"""
-    )
 
 
 def test_any_column_is_drawn_against_any_other_and_selects(page, open_page):

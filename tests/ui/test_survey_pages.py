@@ -1,5 +1,6 @@
 """The three views of a fitted survey in a real Chromium: from an orbit to a source and back."""
 
+import re
 import subprocess
 import sys
 
@@ -7,11 +8,20 @@ import pytest
 from playwright.sync_api import expect
 
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
-from plateviz.plots.workspace import SourceWorkspace
+from plateviz.plots.workspace import SourceWorkspace, SurveyWorkspace
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 from tests.ui.accessibility import require_accessible
-from tests.ui.conftest import VIEWS, see, serving, turn_dark, turn_to_workspace, until
+from tests.ui.conftest import (
+    VIEWS,
+    drag,
+    explored,
+    see,
+    serving,
+    turn_dark,
+    turn_to_workspace,
+    until,
+)
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -136,6 +146,21 @@ def test_from_the_survey_to_an_orbit_to_a_source_and_back(page):
     expect(heading(page, "Run: default")).to_be_visible()
     expect(page.get_by_role("combobox", name="Run")).to_be_visible()
     open_the_worst_orbit(page)
+    turn_to(page, "Survey")
+    explore_all_orbits(page)
+
+
+def explore_all_orbits(page):
+    """Draw the residuals of all orbits, choose another column, and select in an area."""
+    turn_to_workspace(page, SurveyWorkspace.EXPLORE)
+    until(page, lambda: explored(page) == "residual_x against focal_x")
+    page.get_by_role("combobox", name="x", exact=True).click()
+    page.locator(".MuiMenuItem-root").get_by_text("orbit_id", exact=True).click()
+    until(page, lambda: explored(page) == "residual_x against orbit_id")
+    expect(page.locator(".MuiMenuItem-root")).to_have_count(0)
+    drag(page, "explore", (0.3, 0.3), (0.6, 0.7))
+    expect(page.get_by_text(re.compile(r"^\d[\d,]+ sources selected$"))).to_be_visible()
+    page.wait_for_url("**x=orbit_id**")
 
 
 def open_the_worst_orbit(page):

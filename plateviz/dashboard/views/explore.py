@@ -245,7 +245,8 @@ class ExploreView(pn.viewable.Viewer):
             return True
         make = partial(sources_within, drawn.table, drawn.chosen, area)
         try:
-            found = self._selecting.answer((request.key, id(area)), make)
+            key = (request.key, drawn.chosen, area.tobytes())
+            found = self._selecting.answer(key, make)
         except InputError as error:
             self._area = None
             self._say(f"Nothing was selected: {error}")

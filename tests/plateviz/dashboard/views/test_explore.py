@@ -143,6 +143,16 @@ def test_area_of_cells_selects_the_sources_inside(view, executor, navigation):
     assert not view._words.visible
 
 
+def test_each_area_selects_anew(view, executor, navigation):
+    draw(view, executor)
+    for low in (-0.5, 0.1, -0.9, 0.6):
+        area(view, low, low + 0.01)
+        draw(view, executor)
+        rows = np.linspace(-1.0, 1.0, SIZE)
+        inside = np.flatnonzero((rows >= low) & (rows < low + 0.01)) % 1000
+        assert navigation.session.selection.sources == frozenset(inside.tolist())
+
+
 def test_area_around_nothing_says_so_and_keeps_the_selection(view, executor, navigation):
     draw(view, executor)
     navigation.session.selection.select_sources(frozenset([3]))

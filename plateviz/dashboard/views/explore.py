@@ -293,8 +293,7 @@ class ExploreView(pn.viewable.Viewer):
     def _take_limits(self, event: Any) -> None:  # noqa: ANN401 as param
         if self._is_following or event.new is None:
             return
-        # The ends of the slider are all values: what it shows of them is rounded.
-        low, high = event.new
+        low, high = event.new  # the ends of the slider are all values: what it shows is rounded
         self._exploration.param.update(
             lowest=low if low > self._limits.start else -math.inf,
             highest=high if high < self._limits.end else math.inf,

@@ -4,7 +4,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -79,26 +79,6 @@ class Defect:
         return {"%": "", "ppm": "", "mpix": "pix"}.get(self.unit, self.unit)
 
 
-@runtime_checkable
-class CaseSettings(Protocol):
-    """What defects use of `SurveySettings`, which itself uses the table of defects."""
-
-    @property
-    def seed(self) -> int:
-        """Seed of the survey."""
-        ...
-
-    @property
-    def target_deg(self) -> tuple[float, float]:
-        """Galactic coordinates of the target."""
-        ...
-
-    @property
-    def pair_spread_deg(self) -> float:
-        """Half width of the square around the target that the fields cover."""
-        ...
-
-
 @dataclass(frozen=True)
 class Case:
     """A defect with its amplitude in one survey, and its random numbers.
@@ -113,7 +93,8 @@ class Case:
 
     name: str
     amplitude: float
-    settings: CaseSettings
+    # `SurveySettings`, which imports the table of defects and so cannot be imported here.
+    settings: Any
     orbit_id: int = 0
 
     def survey_rng(self) -> np.random.Generator:

@@ -212,6 +212,9 @@ class _Ticker:
             self._looks.start()
 
     def _look(self) -> None:
+        if self._pages is not None and self._pages.is_due:
+            # A table that the browser is still making takes no other rows.
+            return
         if self._navigation is None or not self._navigation.look_again():
             self._looks.stop()
 

@@ -10,6 +10,9 @@ from typing import Any, NamedTuple
 
 import panel as pn
 
+# The scripts of tables are sent with the page, before any session has a table.
+import panel.models.tabulator
+
 from plateviz.dashboard.app import build_app, empty_page
 from plateviz.dashboard.closed_pages import silence_closed_pages
 from plateviz.dashboard.headers import NotebookHeaders, SecurityHeaders
@@ -66,7 +69,6 @@ def serve(store: SolutionStore, endpoint: Endpoint, ready: Callable[[str], None]
     ----------
     ready : called with the page's address once the server accepts connections
     """
-    pn.extension("tabulator")
     server = _server(store, endpoint)
     try:
         server.start()
@@ -79,6 +81,8 @@ def serve(store: SolutionStore, endpoint: Endpoint, ready: Callable[[str], None]
         with contextlib.suppress(KeyboardInterrupt):
             server.io_loop.start()
     finally:
+        # DuckDB complains at the end of the process of what is not collected.
+        gc.unfreeze()
         server.stop()
         store.close()
 

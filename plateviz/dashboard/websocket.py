@@ -3,6 +3,7 @@
 import time
 from typing import Any
 
+from bokeh.io import doc as bokeh_io_doc
 from bokeh.protocol.exceptions import ProtocolError
 from bokeh.protocol.message import Message
 from bokeh.server.urls import per_app_patterns
@@ -14,6 +15,8 @@ from plateviz.dashboard.limits import TOO_MANY_OPENED, Limits
 LIMITS = "plateviz_limits"
 """Name of the setting of a server's Tornado application that has its `Limits`."""
 
+# The documents in which the process is at the moment. It has no public name.
+_PATCHED_DOCUMENTS: list[Any] = bokeh_io_doc._PATCHED_CURDOCS  # noqa: SLF001
 # Opening a websocket with something that is no token of this server raises one of these.
 _NO_TOKEN = (ValueError, TypeError, KeyError, AttributeError, AssertionError, RecursionError)
 # Status codes of RFC 6455: what was sent is against the rules of the server.
@@ -85,6 +88,8 @@ class CheckedWebsocket(WSHandler):
 
     async def _schedule(self, work: Any) -> None:  # noqa: ANN401 as Bokeh
         if isinstance(work, Message) and work.msgtype == "ERROR":
+            # Bokeh forgets to leave the document in which an error was raised.
+            _PATCHED_DOCUMENTS.clear()
             self._errors += 1
             if self._errors > _MOST_ERRORS:
                 self.close(_AGAINST_THE_RULES, "too many messages that were wrong")

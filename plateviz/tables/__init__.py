@@ -53,6 +53,7 @@ from plateviz.tables.selected_exposures import selected_detectors, selected_expo
 from plateviz.tables.selected_sources import selected_sources
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
+from plateviz.tables.solution_changes import solution_changes
 from plateviz.tables.source_profile import (
     motion_table,
     source_class,
@@ -140,6 +141,7 @@ __all__ = [
     "sky_density",
     "sky_distribution",
     "sky_track",
+    "solution_changes",
     "source_class",
     "source_curves",
     "source_list",

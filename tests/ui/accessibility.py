@@ -24,4 +24,4 @@ def require_accessible(page):
     if axe:
         page.evaluate(Path(axe).read_text("utf-8"))
         found += page.evaluate(_AXE)
-    assert found == []
+    assert found == [], found

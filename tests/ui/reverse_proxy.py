@@ -18,8 +18,16 @@ class _Pages(RequestHandler):
         self._upstream = upstream
 
     async def get(self):
+        await self._hand_on()
+
+    async def post(self):
+        await self._hand_on(body=self.request.body)
+
+    async def _hand_on(self, **contents):
         request = HTTPRequest(
             f"{self._upstream()}{self.request.uri}",
+            method=self.request.method,
+            **contents,
             headers=self.request.headers,
             follow_redirects=False,
         )

@@ -11,7 +11,7 @@ from plateviz.dashboard.solution_list import Entry, SolutionList, by_label, labe
 from plateviz.dashboard.views.markup import markup_pane, numbers, paragraph, themed
 from plateviz.plots.both_solutions import comparable_figures
 from plateviz.plots.diagnostic import Diagnostic
-from plateviz.tables.solution_changes import solution_changes
+from plateviz.tables import solution_changes
 from solver.errors import InputError
 
 _BEFORE = "the solution before it"

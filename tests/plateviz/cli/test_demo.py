@@ -37,6 +37,9 @@ class NoSolver:
     def submit(self, job):
         pytest.fail(f"expected no request, found {job.request}")
 
+    def hurry(self):
+        pytest.fail("expected no request")
+
 
 class DeadSolver:
     """A solver process that ends at each request."""

@@ -100,6 +100,8 @@ def test_request_of_the_page_makes_no_session(store):
             status, page = await get(address)
             assert status == 200
             assert "<title>plateviz · " in page
+            # No session has a table yet whose scripts a notebook would have to send.
+            assert "tabulator.min.js" in page
         assert (await get(f"{address}autoload.js?bokeh-autoload-element=1"))[0] == 404
         assert server.get_sessions() == []
         tokens = {token_of((await get(address))[1]) for _ in range(3)}

@@ -1,7 +1,6 @@
 """The comparison of the orders: table, sentence, figure, command line and refit panel."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import panel_material_ui as pmui
@@ -9,10 +8,11 @@ import pytest
 
 from plateviz import plots, tables
 from plateviz.cli.output import print_orders
+from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.refit import RefitView
 from plateviz.tables.orders import preferred_order
-from solver.data.instrument import MINI_MOCK
+from tests.plateviz.dashboard.test_navigation import SurveyStore
 
 
 @pytest.fixture(scope="module")
@@ -177,11 +177,11 @@ def test_command_line_prints_a_row_for_every_order_and_the_verdict(compared, cap
 
 
 def test_refit_panel_has_a_switch_for_the_comparison(fit_result):
-    store = SimpleNamespace(orbits=(0,), instrument=MINI_MOCK)
-    session = Session(store)
+    navigation = Navigation(Session(SurveyStore(fit_result, [])))
+    session = navigation.session
     (switch,) = (
         widget
-        for widget in RefitView(session).__panel__().select(pmui.Switch)
+        for widget in RefitView(navigation).__panel__().select(pmui.Switch)
         if widget.label == "Compare all orders"
     )
     assert not session.choices.settings().compare_orders

@@ -36,7 +36,8 @@ class _Pages(RequestHandler):
         for name, value in answer.headers.get_all():
             if name.lower() not in _NOT_HANDED_ON:
                 self.set_header(name, value)
-        self.finish(answer.body)
+        # An answer without contents may have no empty ones either.
+        self.finish(answer.body or None)
 
 
 class _Websockets(WebSocketHandler):

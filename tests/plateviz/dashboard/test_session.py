@@ -412,34 +412,3 @@ def test_every_setting_with_a_control_is_a_parameter():
     controls = {name for name, one in SETTINGS.items() if one.control}
     assert controls == set(CONTROLS) == set(FitChoices.param) - {"name", "what_if_at_once"}
     assert set(ANSWERED_AT_ONCE) == controls - {"engine", "compare_orders"}
-
-
-@pytest.mark.parametrize("count", [1, 20])
-def test_address_has_a_few_selected_sources(count):
-    first, second = Selection(), Selection()
-    first.sources = frozenset(range(2**63 - count, 2**63))
-    second.restore(first.address())
-    assert second.sources == first.sources
-
-
-def test_address_says_that_many_sources_are_selected(fit_result):
-    first, second = Selection(), Selection()
-    first.sources = frozenset(range(21))
-    address = first.address()
-    assert address["sources"] == "many"
-    # Who goes back keeps them; who opens the address is told.
-    assert first.restore(address) == []
-    assert len(first.sources) == 21
-    assert "room for 20" in second.restore(address)[0]
-    assert first.restore({}) == []
-    assert first.sources == frozenset()
-
-
-@pytest.mark.parametrize(
-    "text", ["", "x", "1,", "99999999999999999999", "1;2", "9223372036854775808", "1," * 20 + "1"]
-)
-def test_invalid_selected_sources_of_an_address_are_ignored_and_told(text):
-    selection = Selection()
-    (told,) = selection.restore({"sources": text})
-    assert told.startswith("sources: expected 20 ids or fewer, found ")
-    assert selection.sources == frozenset()

@@ -4,7 +4,9 @@ import math
 from dataclasses import replace
 
 from plateviz.figures.figure import MARGIN, Axis, Figure, Frame, Link, Ramp
-from plateviz.figures.words import PER_CHARACTER, words_of
+from plateviz.figures.text_width import text_width
+from plateviz.figures.theme import LABEL_SIZE, SMALL_SIZE
+from plateviz.figures.words import words_of
 
 # Screen pixels around a frame: label of the left axis, its shortest tick labels, margin on the
 # right, colour bar.
@@ -13,14 +15,12 @@ _LEFT, _TICKS, _RIGHT, _BAR = 32, 34, 18, 72
 _TOOLBAR, _TITLE, _LINE, _BELOW = 18, 19, 15, 54
 # A row of the legend, the mark of one of its labels.
 _ROW, _MARK = 26, 32
-# How far the label of the lower axis may reach beyond its frame.
-_OVERHANG = 40
 _LEAST = 60
 # Words that would leave a frame less than this share of its height are left out.
 _SHARE = 0.55
 
 
-def resized(figure: Figure, width: int, height: int) -> Figure:
+def resized(figure: Figure, width: int, height: int, *, corner: int = 0) -> Figure:
     """Return the figure in a size that fills an area as far as the scales of its axes allow.
 
     Frames with equal scales of both axes keep them. Frames that share no x axis are arranged in
@@ -30,12 +30,20 @@ def resized(figure: Figure, width: int, height: int) -> Figure:
     Parameters
     ----------
     width, height : of the area, with everything around the frames, screen pixels
+    corner : width of what covers the upper right corner of the area, screen pixels
     """
     columns = [figure.columns]
     if figure.linked != "x":
         columns += range(1, len(figure) + 1)
-    candidates = [_arranged(figure, number, width, height) for number in columns]
+    candidates = [_arranged(_free(figure, n, corner), n, width, height) for n in columns]
     return max(candidates, key=_least_side)
+
+
+def _free(figure: Figure, columns: int, corner: int) -> Figure:
+    """Return the figure with the corner left free by the title of the frame below it."""
+    last = min(columns, len(figure)) - 1
+    frames = (replace(f, corner=corner if n == last else 0) for n, f in enumerate(figure))
+    return replace(figure, frames=tuple(frames))
 
 
 def _arranged(figure: Figure, columns: int, width: int, height: int) -> Figure:
@@ -78,17 +86,15 @@ def _of_height(frame: Frame, height: int, room: int) -> Frame:
 
 def _of_width(frame: Frame, width: int, room: int) -> Frame:
     margin = MARGIN + max(0, (room - _beside(frame) - width) // 2)
+    # A label is in the middle below the frame, and is cut off at the edge of the margin.
+    fits = text_width(frame.x.label, LABEL_SIZE) < width + 2 * margin
     return replace(
         frame,
-        x=replace(frame.x, label=frame.x.label if _fits(frame.x.label, width) else ""),
+        x=replace(frame.x, label=frame.x.label if fits else ""),
         width=width,
         margin=margin,
         legend_columns=_legend_columns(frame, width + margin),
     )
-
-
-def _fits(label: str, width: int) -> bool:
-    return PER_CHARACTER * len(label) < width + _OVERHANG
 
 
 def _least_side(figure: Figure) -> float:
@@ -100,8 +106,7 @@ def _least_height(figure: Figure) -> float:
 
 
 def _beside(frame: Frame) -> int:
-    longest = max((len(label) for _, label in frame.y.ticks or ()), default=0)
-    ticks = max(_TICKS, round(longest * PER_CHARACTER) + 10)
+    ticks = max(_TICKS, round(_longest_tick(frame.y)) + 10)
     return _LEFT + ticks + _RIGHT + (_BAR if _has_bar(frame) else 0)
 
 
@@ -112,15 +117,18 @@ def _has_bar(frame: Frame) -> bool:
 
 def _rise(axis: Axis) -> int:
     """Return the height of turned labels, screen pixels."""
-    longest = max((len(label) for _, label in axis.ticks or ()), default=0)
-    return round(longest * PER_CHARACTER * math.sin(math.radians(axis.rotation)))
+    return round(_longest_tick(axis) * math.sin(math.radians(axis.rotation)))
+
+
+def _longest_tick(axis: Axis) -> float:
+    return max((text_width(label, SMALL_SIZE) for _, label in axis.ticks or ()), default=0.0)
 
 
 def _legend_columns(frame: Frame, width: int) -> int:
     labels = _labels(frame)
     if not frame.legend_columns or not labels:
         return frame.legend_columns
-    widest = _MARK + PER_CHARACTER * max(map(len, labels))
+    widest = _MARK + max(text_width(label, SMALL_SIZE) for label in labels)
     return min(len(labels), max(1, int(width / widest)))
 
 

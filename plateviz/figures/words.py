@@ -1,14 +1,11 @@
 """Titles and subtitles of frames, wrapped to their widths."""
 
-import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from plateviz.figures.figure import Frame
-
-# Screen pixels per character of the labels' and of the title's font.
-PER_CHARACTER = 5.3
-_PER_CHARACTER_OF_TITLE = 7.2
+from plateviz.figures.text_width import wrapped
+from plateviz.figures.theme import SMALL_SIZE, TITLE_SIZE
 
 
 class Words(NamedTuple):
@@ -22,8 +19,8 @@ def words_of(frame: Frame) -> Words:
     """Return the words of a frame, wrapped to its width and its margin."""
     width = frame.width + frame.margin
     return Words(
-        _wrapped(frame.title, width / _PER_CHARACTER_OF_TITLE),
-        _wrapped(frame.subtitle, width / PER_CHARACTER),
+        wrapped(frame.title, width - frame.corner, TITLE_SIZE, is_bold=True),
+        wrapped(frame.subtitle, width, SMALL_SIZE),
     )
 
 
@@ -34,12 +31,6 @@ def words_of_row(row: Sequence[Frame]) -> list[Words]:
         _filled([getattr(words, name) for words in found]) for name in Words._fields
     )
     return [Words(*lines) for lines in zip(titles, subtitles, strict=True)]
-
-
-def _wrapped(text: str, characters: float) -> list[str]:
-    at_most = max(1, int(characters))
-    lines = text.split("\n")
-    return [part for line in lines for part in textwrap.wrap(line, at_most, break_long_words=False)]
 
 
 def _filled(texts: list[list[str]]) -> list[list[str]]:

@@ -8,6 +8,8 @@ import pytest
 from plateviz.figures.figure import Axis, Figure, Ramp, framed, side_by_side
 from plateviz.figures.glyphs import line, points
 from plateviz.figures.resized import resized
+from plateviz.figures.text_width import text_width
+from plateviz.figures.words import words_of, words_of_row
 
 X = Axis("x (mm)", (0.0, 10.0))
 TABLE = {"x": [1.0], "y": [1.0], "n": [3.0]}
@@ -107,3 +109,32 @@ def test_frames_above_one_another_with_one_x_axis_stay_so():
 
 def test_smallest_area_has_a_frame():
     assert min(sizes(resized(Figure(frame().frames * 4, 2), 0, 0))[0]) > 0
+
+
+WORDS = "Field 0, exposure 0. 684 measurements, one arrow each. Arrows enlarged 20,000 times"
+
+
+@pytest.mark.parametrize("area", [(300, 300), (440, 280), (700, 300), (1500, 900)])
+@pytest.mark.parametrize("height", [None, 100])
+def test_no_word_is_wider_than_its_room(area, height):
+    ((frame_of_area,), (words,)) = shown(frame(height=height, subtitle=WORDS), area)
+    room = frame_of_area.width + frame_of_area.margin
+    assert all(text_width(line, 13, is_bold=True) <= room for line in words.title)
+    assert all(text_width(line, 11) <= room for line in words.subtitle)
+    assert room <= area[0]
+
+
+def test_title_leaves_the_corner_free():
+    titled = replace(frame()[0], title="A title of a figure that fills a line")
+    row = Figure((titled,) * 4, 2)
+    frames = resized(row, 740, 800, corner=76)
+    assert [one.corner for one in frames] == [0, 76, 0, 0]
+    first, second = (words_of(one) for one in frames.frames[:2])
+    room = frames[1].width + frames[1].margin
+    assert all(text_width(line, 13, is_bold=True) <= room - 76 for line in second.title)
+    assert len(second.title) > len(first.title)
+
+
+def shown(figure, area):
+    frames = resized(figure, *area).frames
+    return frames, words_of_row(frames)

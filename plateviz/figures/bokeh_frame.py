@@ -8,7 +8,7 @@ from bokeh import models
 from bokeh.core.property.vectorization import Field, Value
 
 from plateviz.figures.bokeh_glyphs import BokehGlyphs
-from plateviz.figures.figure import MARGIN, Axis, Frame
+from plateviz.figures.figure import Axis, Frame
 from plateviz.figures.theme import FONT, LABEL_SIZE, SMALL_SIZE, TITLE_SIZE, Theme
 from plateviz.figures.words import Words
 
@@ -104,8 +104,7 @@ class BokehFrame:
             frame_height=frame.frame_height,
             # Without it, the frame is cut off where another in its column has wider labels.
             min_border_right=frame.margin,
-            # A frame with a wide margin stands in the middle.
-            min_border_left=_LEFT + frame.margin - MARGIN,
+            min_border_left=_LEFT + frame.indent,
             background_fill_color=theme.background,
             border_fill_color=theme.background,
             outline_line_color=theme.muted,
@@ -242,7 +241,7 @@ def _follow_axis(
     elif isinstance(drawn.ticker, models.FixedTicker):
         drawn.update(ticker=models.LogTicker() if axis.is_log else models.BasicTicker())
     if isinstance(drawn.ticker, models.BasicTicker):
-        drawn.ticker.desired_num_ticks = min(6, max(2, length // _TICK))
+        drawn.ticker.desired_num_ticks = min(6, max(3, length // _TICK))
     drawn.update(
         axis_label=axis.label,
         major_label_overrides=dict(axis.ticks or ()),

@@ -36,28 +36,30 @@ def wrapped(text: str, width: float, size: int, *, is_bold: bool = False) -> lis
     ----------
     width, size : of a line and of the font, screen pixels
     """
-
-    def fits(line: str) -> bool:
-        return text_width(line, size, is_bold=is_bold) <= width
-
-    def pieces(word: str) -> Iterator[str]:
-        while not fits(word):
-            end = max(1, sum(fits(word[:end]) for end in range(1, len(word))))
-            if end == len(word):
-                break
-            yield word[:end]
-            word = word[end:]
-        yield word
-
+    space = text_width(" ", size, is_bold=is_bold)
     lines = []
     for paragraph in text.split("\n"):
-        line = ""
-        for piece in (piece for word in paragraph.split() for piece in pieces(word)):
-            longer = f"{line} {piece}".lstrip()
-            if line and not fits(longer):
+        line, left = "", width
+        for piece, needs in _pieces(paragraph, width, size, is_bold):
+            if line and space + needs <= left:
+                line, left = f"{line} {piece}", left - space - needs
+                continue
+            if line:
                 lines.append(line)
-                longer = piece
-            line = longer
+            line, left = piece, width - needs
         if line:
             lines.append(line)
     return lines
+
+
+def _pieces(text: str, width: float, size: int, is_bold: bool) -> Iterator[tuple[str, float]]:
+    """Iterate over words, those that are too wide in parts, each with its width."""
+    for word in text.split():
+        rest, needs = word, text_width(word, size, is_bold=is_bold)
+        while needs > width and len(rest) > 1:
+            ends = range(1, len(rest))
+            end = max(1, sum(text_width(rest[:n], size, is_bold=is_bold) <= width for n in ends))
+            yield rest[:end], text_width(rest[:end], size, is_bold=is_bold)
+            rest = rest[end:]
+            needs = text_width(rest, size, is_bold=is_bold)
+        yield rest, needs

@@ -7,6 +7,9 @@ from plateviz.figures.figure import Frame
 from plateviz.figures.text_width import wrapped
 from plateviz.figures.theme import SMALL_SIZE, TITLE_SIZE
 
+# Bokeh drops empty lines, but not one with a space of no width.
+_EMPTY = "\u200b"
+
 
 class Words(NamedTuple):
     """Lines of the title and the subtitle of a frame."""
@@ -18,10 +21,13 @@ class Words(NamedTuple):
 def words_of(frame: Frame) -> Words:
     """Return the words of a frame, wrapped to its width and its margin."""
     width = frame.width + frame.margin
-    return Words(
-        wrapped(frame.title, width - frame.corner, TITLE_SIZE, is_bold=True),
-        wrapped(frame.subtitle, width, SMALL_SIZE),
+    title, beside = (
+        wrapped(frame.title, room, TITLE_SIZE, is_bold=True)
+        for room in (width, width - frame.corner)
     )
+    # Beside what covers the corner, or below it where there is too little room beside it.
+    title = beside if len(beside) <= len(title) + 1 else [_EMPTY, *title]
+    return Words(title, wrapped(frame.subtitle, width, SMALL_SIZE))
 
 
 def words_of_row(row: Sequence[Frame]) -> list[Words]:
@@ -35,5 +41,4 @@ def words_of_row(row: Sequence[Frame]) -> list[Words]:
 
 def _filled(texts: list[list[str]]) -> list[list[str]]:
     most = max(map(len, texts))
-    # Bokeh drops empty lines, but not one with a space of no width.
-    return [[*lines, *["\u200b"] * (most - len(lines))] for lines in texts]
+    return [[*lines, *[_EMPTY] * (most - len(lines))] for lines in texts]

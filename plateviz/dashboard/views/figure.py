@@ -261,7 +261,8 @@ def _card(*contents: Part, name: str) -> pmui.Paper:
         OwnLayout(),
         *contents,
         css_classes=["card", "figure", f"figure-{name}"],
-        styles={"align-self": "stretch", "min-width": "0", "height": "auto"},
+        # A card that begins with its figure would have the width of its contents, which fill it.
+        styles={"align-self": "stretch", "width": "100%", "min-width": "0", "height": "auto"},
         stylesheets=[".paper { height: 100%; }"],
         margin=0,
         sx={"height": "100%", "position": "relative", "zIndex": 0},

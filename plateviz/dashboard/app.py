@@ -47,6 +47,9 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
     rooms : of the cards of earlier pages, with which the first figures are drawn at once
     """
     window = _window()
+    if window is not None and window.is_dark:
+        # The first component that the browser makes decides the theme of all.
+        pn.config.theme = "dark"
     navigation, ticker, pages = _pages(store, window, rooms)
     session = navigation.session
     bar, system = SelectionBar(navigation), SystemTheme()
@@ -71,8 +74,7 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
     with param.edit_constant(page):
         page.busy = False
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
-    if window is not None:
-        page.dark_theme = system.is_dark = window.is_dark
+    system.is_dark = page.dark_theme
     _set_theme(session, page.dark_theme)
     for _ in range(_FIRST_FIGURES):
         pages.draw_due()

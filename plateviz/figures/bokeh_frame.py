@@ -8,15 +8,14 @@ from bokeh import models
 from bokeh.core.property.vectorization import Field, Value
 
 from plateviz.figures.bokeh_glyphs import BokehGlyphs
-from plateviz.figures.figure import MARGIN, Axis, Frame
-from plateviz.figures.theme import FONT, Theme
+from plateviz.figures.figure import Axis, Frame
+from plateviz.figures.theme import FONT, LABEL_SIZE, SMALL_SIZE, TITLE_SIZE, Theme
 from plateviz.figures.words import Words
 
 # Least room to the left of a frame, and room for a tick label, screen pixels.
 _LEFT, _TICK = 5, 70
 # Milliseconds without a turn of the wheel after which a person has chosen new limits.
 _SETTLED = 40
-_TITLE_SIZE, _LABEL_SIZE, _TICK_SIZE = "13px", "12px", "11px"
 # Shows an image while the reach of the frame's limits is between those in its tags.
 _SHOW_WITHIN_REACH = """
     const reach = Math.max(...[x.start, x.end, y.start, y.end].map(Math.abs));
@@ -105,8 +104,7 @@ class BokehFrame:
             frame_height=frame.frame_height,
             # Without it, the frame is cut off where another in its column has wider labels.
             min_border_right=frame.margin,
-            # A frame with a wide margin stands in the middle.
-            min_border_left=_LEFT + frame.margin - MARGIN,
+            min_border_left=_LEFT + frame.indent,
             background_fill_color=theme.background,
             border_fill_color=theme.background,
             outline_line_color=theme.muted,
@@ -140,13 +138,13 @@ class BokehFrame:
     def _write(self, words: Words, theme: Theme) -> None:
         self._title.update(
             text="\n".join(words.title),
-            **_font("text", theme.text, _TITLE_SIZE),
+            **_font("text", theme.text, TITLE_SIZE),
             text_font_style="bold",
         )
         self._subtitle.update(
             text="\n".join(words.subtitle),
             visible=bool(words.subtitle),
-            **_font("text", theme.muted, _TICK_SIZE),
+            **_font("text", theme.muted, SMALL_SIZE),
             text_font_style="normal",
         )
 
@@ -218,7 +216,7 @@ class BokehFrame:
             padding=2,
             spacing=7,
             label_standoff=6,
-            **_font("label_text", theme.text, _TICK_SIZE),
+            **_font("label_text", theme.text, SMALL_SIZE),
         )
 
 
@@ -243,7 +241,7 @@ def _follow_axis(
     elif isinstance(drawn.ticker, models.FixedTicker):
         drawn.update(ticker=models.LogTicker() if axis.is_log else models.BasicTicker())
     if isinstance(drawn.ticker, models.BasicTicker):
-        drawn.ticker.desired_num_ticks = min(6, max(2, length // _TICK))
+        drawn.ticker.desired_num_ticks = min(6, max(3, length // _TICK))
     drawn.update(
         axis_label=axis.label,
         major_label_overrides=dict(axis.ticks or ()),
@@ -252,8 +250,8 @@ def _follow_axis(
         major_tick_line_color=theme.muted,
         minor_tick_line_color=None,
         axis_label_text_font_style="normal",
-        **_font("axis_label_text", theme.text, _LABEL_SIZE),
-        **_font("major_label_text", theme.muted, _TICK_SIZE),
+        **_font("axis_label_text", theme.text, LABEL_SIZE),
+        **_font("major_label_text", theme.muted, SMALL_SIZE),
     )
 
 
@@ -263,10 +261,10 @@ def _style_bar(bar: models.ColorBar, theme: Theme) -> None:
         label_standoff=8,
         major_tick_line_color=theme.muted,
         title_text_font_style="normal",
-        **_font("title_text", theme.text, _TICK_SIZE),
-        **_font("major_label_text", theme.muted, _TICK_SIZE),
+        **_font("title_text", theme.text, SMALL_SIZE),
+        **_font("major_label_text", theme.muted, SMALL_SIZE),
     )
 
 
-def _font(part: str, colour: str, size: str) -> dict[str, str]:
-    return {f"{part}_color": colour, f"{part}_font": FONT, f"{part}_font_size": size}
+def _font(part: str, colour: str, size: int) -> dict[str, str]:
+    return {f"{part}_color": colour, f"{part}_font": FONT, f"{part}_font_size": f"{size}px"}

@@ -1,4 +1,4 @@
-"""Colours of the light and the dark theme, and the font of both."""
+"""Colours of the light and the dark theme, and the fonts of both."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,6 +7,8 @@ from types import MappingProxyType
 from bokeh.palettes import interp_palette
 
 FONT = "Helvetica, Arial, sans-serif"
+TITLE_SIZE, LABEL_SIZE, SMALL_SIZE = 13, 12, 11
+"""Sizes of titles, of labels of axes, and of other words, screen pixels."""
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,14 @@
 """Titles and subtitles of frames, wrapped to their widths."""
 
-import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from plateviz.figures.figure import Frame
+from plateviz.figures.text_width import wrapped
+from plateviz.figures.theme import SMALL_SIZE, TITLE_SIZE
 
-# Screen pixels per character of the labels' and of the title's font.
-PER_CHARACTER = 5.3
-_PER_CHARACTER_OF_TITLE = 7.2
+# Bokeh drops empty lines, but not one with a space of no width.
+_EMPTY = "\u200b"
 
 
 class Words(NamedTuple):
@@ -21,10 +21,13 @@ class Words(NamedTuple):
 def words_of(frame: Frame) -> Words:
     """Return the words of a frame, wrapped to its width and its margin."""
     width = frame.width + frame.margin
-    return Words(
-        _wrapped(frame.title, width / _PER_CHARACTER_OF_TITLE),
-        _wrapped(frame.subtitle, width / PER_CHARACTER),
+    title, beside = (
+        wrapped(frame.title, room, TITLE_SIZE, is_bold=True)
+        for room in (width, width - frame.corner)
     )
+    # Beside what covers the corner, or below it where there is too little room beside it.
+    title = beside if len(beside) <= len(title) + 1 else [_EMPTY, *title]
+    return Words(title, wrapped(frame.subtitle, width, SMALL_SIZE))
 
 
 def words_of_row(row: Sequence[Frame]) -> list[Words]:
@@ -36,13 +39,6 @@ def words_of_row(row: Sequence[Frame]) -> list[Words]:
     return [Words(*lines) for lines in zip(titles, subtitles, strict=True)]
 
 
-def _wrapped(text: str, characters: float) -> list[str]:
-    at_most = max(1, int(characters))
-    lines = text.split("\n")
-    return [part for line in lines for part in textwrap.wrap(line, at_most, break_long_words=False)]
-
-
 def _filled(texts: list[list[str]]) -> list[list[str]]:
     most = max(map(len, texts))
-    # Bokeh drops empty lines, but not one with a space of no width.
-    return [[*lines, *["\u200b"] * (most - len(lines))] for lines in texts]
+    return [[*lines, *[_EMPTY] * (most - len(lines))] for lines in texts]

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from numpy.polynomial import legendre
 
-from plateviz.tables.labels import unit_text
+from plateviz.tables.labels import element_labels, unit_text
 from solver.data.instrument import Instrument
 from solver.data.parameters import Axis, groups_on
 from solver.data.result import FitResult
@@ -105,7 +105,7 @@ def _display_table(result: FitResult, axis: Axis) -> pd.DataFrame:
     rows = result.calibration[result.calibration["group"].isin([g.name for g in groups])]
     labels = rows.groupby("element")["label"].agg(lambda names: " ".join(dict.fromkeys(names)))
     table = pd.DataFrame(columns)
-    table.insert(0, "element", labels.reindex(table.index))
+    table.insert(0, "element", element_labels(labels.reindex(table.index)))
     return table.reset_index(drop=True)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.labels import id_strings, unit_text
+from plateviz.tables.labels import element_labels, id_strings, unit_text
 from plateviz.tables.sky import mean_direction, offsets_arcmin
 from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS
 from solver.data.result import FitResult
@@ -31,7 +31,8 @@ def eigenmode_spectrum(result: FitResult) -> pd.DataFrame:
     """
     if result.modes is None:
         return pd.DataFrame(columns=[*_SPECTRUM, "is_weak"])
-    return result.modes[_SPECTRUM].assign(is_weak=result.modes["name"] != "")
+    modes = result.modes[_SPECTRUM].assign(name=element_labels(result.modes["name"]))
+    return modes.assign(is_weak=modes["name"] != "")
 
 
 def eigenmode_deciders(result: FitResult) -> pd.DataFrame:
@@ -46,7 +47,8 @@ def eigenmode_deciders(result: FitResult) -> pd.DataFrame:
     columns = ["mode", "name", "decider", "what", "share", "left", "right"]
     if result.modes is None or result.mode_parameters is None:
         return pd.DataFrame(columns=columns)
-    weak = result.modes[result.modes["name"] != ""]
+    modes = eigenmode_spectrum(result)
+    weak = modes[modes["is_weak"]]
     parts = [
         weak[["mode", "name"]].assign(decider=decider, what=decider, share=weak[column])
         for decider, column in _COLUMNS.items()
@@ -83,7 +85,7 @@ def eigenmode_groups(result: FitResult) -> pd.DataFrame:
     return table.assign(
         move=np.sqrt(table["move"]),
         unit=table["unit"].map(unit_text),
-        name=table["mode"].map(result.modes.set_index("mode")["name"]),
+        name=table["mode"].map(eigenmode_spectrum(result).set_index("mode")["name"]),
         group=[BY_NAME[name].label for name in table["group"]],
         shift_mas=table["mode"].map(_shift_rms(result)),
     )[columns]
@@ -116,7 +118,7 @@ def eigenmode_shifts(result: FitResult, *, most: int | None = None) -> pd.DataFr
     centre = mean_direction(result.sources["ra"].to_numpy(), result.sources["dec"].to_numpy())
     x, y = offsets_arcmin(rows["ra"], rows["dec"], *centre)
     return rows.assign(
-        name=rows["mode"].map(result.modes.set_index("mode")["name"]),
+        name=rows["mode"].map(eigenmode_spectrum(result).set_index("mode")["name"]),
         id=id_strings(rows["source_id"]),
         x=x,
         y=y,

@@ -5,6 +5,7 @@ import re
 import pandas as pd
 
 _EXPOSURE = re.compile(r"field (-?\d+), exposure (-?\d+)")
+_IN_A_RESULT = re.compile(r"field (-?\d+) plate (-?\d+)")
 _MJD_UNIX_EPOCH = 40587.0
 _MINUTE = "%Y-%m-%d %H:%M"
 
@@ -24,6 +25,16 @@ def labelled_exposure(label: str) -> tuple[int, int] | None:
     """Return `field_id` and `plate_id` of an exposure's label; None if it is none."""
     match = _EXPOSURE.fullmatch(label)
     return (int(match[1]), int(match[2])) if match else None
+
+
+def element_labels(labels: pd.Series) -> pd.Series:
+    """Return names of parameters' elements with the exposures named as everywhere else.
+
+    Parameters
+    ----------
+    labels : of a result, whose files say "field 0 plate 3"
+    """
+    return labels.str.replace(_IN_A_RESULT, r"field \1, exposure \2", regex=True)
 
 
 def id_strings(ids: pd.Series) -> pd.Series:

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.labels import unit_text
+from plateviz.tables.labels import element_labels, unit_text
 from solver.data.parameters import BY_NAME
 from solver.data.result import FitResult
 
@@ -35,7 +35,7 @@ def prior_shares(result: FitResult) -> pd.DataFrame:
         {
             "group": [BY_NAME[name].label for name in rows["group"]],
             "row": row.astype(np.int64),
-            "label": rows["label"],
+            "label": element_labels(rows["label"]),
             "height": row + _HALF_BAND * within,
             "prior_share": rows["prior_share"],
             "value": rows["value"],

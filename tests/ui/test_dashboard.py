@@ -473,6 +473,11 @@ def test_keys_do_what_their_list_says(page):
 def test_an_address_of_nonsense_opens_the_page_in_the_theme_of_the_system(served, open_page):
     page = open_page(f"{served}?field=%FF&plates=1e9-x&detector=none&orbit=%00", colours="dark")
     page.locator(".figure-footprint canvas").first.wait_for(state="attached")
+    # Another page has told its room, so that its card begins with it.
+    again = open_page(f"{served}?orbit=0")
+    card = again.locator(".figure-footprint:visible")
+    until(again, lambda: card.bounding_box()["width"] > 200)
+    again.close()
     expect(page.get_by_role("combobox", name="Field")).to_have_text("all")
     notice = page.get_by_role("alert").filter(has_text="Not all that was asked for can be shown")
     expect(notice).to_contain_text("plates: expected FIRST-LAST, found '1e9-x'")

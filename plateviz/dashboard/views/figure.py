@@ -24,8 +24,8 @@ from plateviz.figures.figure_summary import TextTable, figure_summary, text_tabl
 from plateviz.figures.resized import resized
 from solver.errors import InputError
 
-# Screen pixels between the edge of a card and its figure.
-_INSET = 4
+# Screen pixels between the edge of a card and its figure, and width of its three buttons there.
+_INSET, _CORNER = 4, 76
 # Fills its card, whatever it shows.
 _BODY = {
     "position": "absolute",
@@ -196,17 +196,15 @@ class FigureView(pn.viewable.Viewer):
         """Return the figure as it is on the screen, with the limits that a person has chosen."""
         if self._figure is None or self._drawn is None:
             return None
-        width, height = self._shown_area
-        figure = self._drawn.with_limits(resized(self._figure, width, height))
-        return OnScreen(figure, self._theme)
+        return OnScreen(self._drawn.with_limits(self._resized(self._figure)), self._theme)
 
-    @property
-    def _shown_area(self) -> tuple[int, int]:
+    def _resized(self, figure: Figure) -> Figure:
+        """Return the figure in the size of the card."""
         width, height = (length - 2 * _INSET for length in self._shown_room)
-        return width, height
+        return resized(figure, width, height, corner=_CORNER)
 
     def _show(self, figure: Figure) -> None:
-        figure = resized(figure, *self._shown_area)
+        figure = self._resized(figure)
         if self._drawn is None:
             self._drawn = BokehFigure(figure, self._theme)
         else:
@@ -263,7 +261,8 @@ def _card(*contents: Part, name: str) -> pmui.Paper:
         OwnLayout(),
         *contents,
         css_classes=["card", "figure", f"figure-{name}"],
-        styles={"align-self": "stretch", "min-width": "0", "height": "auto"},
+        # A card that begins with its figure would have the width of its contents, which fill it.
+        styles={"align-self": "stretch", "width": "100%", "min-width": "0", "height": "auto"},
         stylesheets=[".paper { height: 100%; }"],
         margin=0,
         sx={"height": "100%", "position": "relative", "zIndex": 0},

@@ -5,6 +5,7 @@ import param
 
 from plateviz.dashboard.keys import DIGITS, KEYS, press
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.views.bar_style import BAR_STYLE
 
 
 class Keyboard(pn.custom.JSComponent):
@@ -45,6 +46,7 @@ class Keyboard(pn.custom.JSComponent):
       model.on("theme", colour)
       const button = document.createElement("button")
       button.type = "button"
+      button.className = "in-bar"
       button.textContent = "Keys ?"
       button.onclick = () => sheet.showModal()
       el.append(button, sheet)
@@ -61,11 +63,9 @@ class Keyboard(pn.custom.JSComponent):
     """
 
     _stylesheets = [
+        BAR_STYLE,
         """
         :host { align-self: center; }
-        button { padding: 4px 8px; border: 0; border-radius: 4px; cursor: pointer;
-                 font: 13px Helvetica, Arial, sans-serif; color: white; background: transparent; }
-        button:hover, button:focus-visible { background: rgb(255 255 255 / 20%); }
         dialog { --text: #1f2933; --line: #d5dbe1; --tile: #ffffff;
                  padding: 14px 22px 18px; border: 1px solid var(--line); border-radius: 6px;
                  font: 14px/1.5 Helvetica, Arial, sans-serif; color: var(--text);
@@ -76,7 +76,7 @@ class Keyboard(pn.custom.JSComponent):
         td { padding: 3px 14px 3px 0; }
         kbd { display: inline-block; min-width: 14px; padding: 1px 7px; font: inherit;
               text-align: center; border: 1px solid var(--line); border-radius: 4px; }
-        """
+        """,
     ]
 
     def __init__(self, navigation: Navigation, **params: object) -> None:

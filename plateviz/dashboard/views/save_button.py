@@ -11,6 +11,7 @@ import param
 from bokeh.document import Document
 
 from plateviz.dashboard.downloads import Download, Later
+from plateviz.dashboard.views.bar_style import BAR_STYLE
 from solver.errors import InputError
 
 
@@ -86,6 +87,7 @@ class SaveButton(pn.custom.JSComponent):
       const { text, title, place, labels, done } = model
       button.textContent = { line: `\\u2913 ${text}`, corner: "\\u2913", bar: text }[place]
       button.title = text
+      if (place === "bar") button.className = "in-bar"
       button.setAttribute("aria-label", `${text}: ${title}`)
       if (labels.length > 1) button.setAttribute("aria-haspopup", "menu")
       menu.setAttribute("role", "menu")
@@ -161,10 +163,6 @@ class SaveButton(pn.custom.JSComponent):
                  font: 14px Helvetica, Arial, sans-serif; color: var(--muted); cursor: pointer; }
         .save > button { height: 24px; padding: 0 6px; }
         .corner > button { width: 24px; padding: 0; }
-        .bar > button { height: 30px; padding: 0 5px; font-size: 12px; font-weight: 500;
-                        font-family: inherit; }
-        .bar > button, .bar > button:hover, .bar > button:focus-visible { color: #ffffff; }
-        .bar > button:hover, .bar > button:focus-visible { background: rgb(255 255 255 / 15%); }
         button:hover, button:focus-visible { background: var(--line); color: var(--text); }
         div[role=menu], p { position: absolute; right: 0; top: 26px; z-index: 4; margin: 0;
             border: 1px solid var(--line); border-radius: 4px; background: var(--tile);
@@ -177,7 +175,8 @@ class SaveButton(pn.custom.JSComponent):
                                 color: var(--text); }
         p { padding: 8px 12px; width: max-content; max-width: 260px; color: var(--text);
             font: 13px/1.4 Helvetica, Arial, sans-serif; }
-        """
+        """,
+        BAR_STYLE,
     ]
 
     def __init__(self, title: str, choices: Choices, **params: object) -> None:

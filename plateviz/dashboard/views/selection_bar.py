@@ -19,13 +19,12 @@ from plateviz.dashboard.selected_tables import (
 )
 from plateviz.dashboard.selection_actions import SelectionActions
 from plateviz.dashboard.table_sender import TableSender
+from plateviz.dashboard.views.bar_style import IN_BAR
 from plateviz.dashboard.views.kept_selections import KeptSelections
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.dashboard.views.selection_list import SelectionList
 from solver.errors import InputError
-
-_IN_THE_BAR = {"color": "inherit", "textTransform": "none", "whiteSpace": "nowrap", "minWidth": 0}
 
 
 class SelectionBar(pn.viewable.Viewer):
@@ -60,7 +59,7 @@ class SelectionBar(pn.viewable.Viewer):
 
     def _make(self) -> None:
         actions = self._actions
-        self._words = pmui.Typography("", variant="body2", margin=(0, 8), sx=_IN_THE_BAR)
+        self._words = pmui.Typography("", variant="body2", margin=(0, 8), sx=IN_BAR)
         self._list, self._kept = SelectionList(self._navigation), KeptSelections(self._navigation)
         self._open = self._button("Open", self._open_source)
         self._leave_out = self._button("Leave out of the fit", actions.leave_out)
@@ -93,9 +92,7 @@ class SelectionBar(pn.viewable.Viewer):
         self.windows[:] = [self._list, self._kept]
 
     def _button(self, label: str, act: Callable[[], None]) -> pmui.Button:
-        button = pmui.Button(
-            label=label, variant="text", size="small", margin=(0, 2), sx=_IN_THE_BAR
-        )
+        button = pmui.Button(label=label, variant="text", size="small", margin=(0, 2), sx=IN_BAR)
         button.on_click(lambda _: act())
         return button
 

@@ -6,6 +6,7 @@ import param
 from plateviz.dashboard.downloads import file_name
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.saved_view import MOST_BYTES, open_view, view_text
+from plateviz.dashboard.views.bar_style import BAR_STYLE
 from solver.errors import InputError
 
 
@@ -19,6 +20,7 @@ class ViewFile(pn.custom.JSComponent):
       const button = (text, title, act) => {
         const made = document.createElement("button")
         made.type = "button"
+        made.className = "in-bar"
         made.textContent = text
         made.title = title
         made.onclick = act
@@ -52,12 +54,8 @@ class ViewFile(pn.custom.JSComponent):
     }
     """
     _stylesheets = [
-        """
-        :host { margin-left: auto; align-self: center; white-space: nowrap; }
-        button { padding: 4px 8px; border: 0; border-radius: 4px; cursor: pointer;
-                 font: 13px Helvetica, Arial, sans-serif; color: white; background: transparent; }
-        button:hover, button:focus-visible { background: rgb(255 255 255 / 20%); }
-        """
+        BAR_STYLE,
+        ":host { margin-left: auto; align-self: center; white-space: nowrap; }",
     ]
 
     def __init__(self, navigation: Navigation, **params: object) -> None:

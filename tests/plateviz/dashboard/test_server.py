@@ -134,6 +134,10 @@ def asked(token, window):
 WINDOW = {"width": 1920, "height": 1080, "is_dark": True}
 
 
+def esm_models(document):
+    return [one for one in document.models if hasattr(one, "esm")]
+
+
 def test_page_that_loads_its_scripts_has_its_session_made(store):
     async def scenario(address, server):
         page = (await get(f"{address}?view=orbit&orbit=0"))[1]
@@ -144,6 +148,10 @@ def test_page_that_loads_its_scripts_has_its_session_made(store):
         assert (location.pathname, location.search) == ("/", "?view=orbit&orbit=0")
         whole = next(m for m in session.document.roots if hasattr(m, "esm"))
         assert whole.data.dark_theme
+        # One that is light would turn the page light.
+        themes = [getattr(m.data, "dark_theme", True) for m in esm_models(session.document)]
+        assert len(themes) > 10
+        assert all(themes)
         # The page has begun to load what all its components are in.
         assert page.count(f'"{whole.esm}"') == 2
         connection = await websocket_connect(

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plateviz.figures.figure import Axis, Figure, Ramp, framed, side_by_side
+from plateviz.figures.figure import MARGIN, Axis, Figure, Ramp, framed, side_by_side
 from plateviz.figures.glyphs import line, points
 from plateviz.figures.resized import resized
+from plateviz.figures.text_width import text_width
+from plateviz.figures.words import words_of, words_of_row
 
 X = Axis("x (mm)", (0.0, 10.0))
 TABLE = {"x": [1.0], "y": [1.0], "n": [3.0]}
@@ -46,7 +48,7 @@ def test_only_sizes_and_columns_differ():
 @pytest.mark.parametrize(
     "words",
     [
-        {"subtitle": "one line of words"},
+        {"subtitle": "two lines\nof words"},
         {"glyphs": [line([0, 1], [0, 1], name="l", color="mark", label="a line")]},
     ],
 )
@@ -107,3 +109,52 @@ def test_frames_above_one_another_with_one_x_axis_stay_so():
 
 def test_smallest_area_has_a_frame():
     assert min(sizes(resized(Figure(frame().frames * 4, 2), 0, 0))[0]) > 0
+
+
+WORDS = "Field 0, exposure 0. 684 measurements, one arrow each. Arrows enlarged 20,000 times"
+
+
+@pytest.mark.parametrize("area", [(300, 300), (440, 280), (700, 300), (1500, 900)])
+@pytest.mark.parametrize("height", [None, 100])
+def test_no_word_is_wider_than_its_room(area, height):
+    ((frame_of_area,), (words,)) = shown(frame(height=height, subtitle=WORDS), area)
+    room = frame_of_area.width + frame_of_area.margin
+    assert all(text_width(line, 13, is_bold=True) <= room for line in words.title)
+    assert all(text_width(line, 11) <= room for line in words.subtitle)
+    assert room <= area[0]
+
+
+def test_title_leaves_the_corner_free():
+    titled = replace(frame()[0], title="A title of a figure that fills a line")
+    row = Figure((titled,) * 4, 2)
+    frames = resized(row, 740, 800, corner=76)
+    assert [one.corner for one in frames] == [0, 76, 0, 0]
+    first, second = (words_of(one) for one in frames.frames[:2])
+    room = frames[1].width + frames[1].margin
+    assert all(text_width(line, 13, is_bold=True) <= room - 76 for line in second.title)
+    assert len(second.title) > len(first.title)
+
+
+def test_title_is_below_the_corner_where_there_is_no_room_beside_it():
+    titled = replace(frame()[0], title="Non-reference sources", width=110, corner=76)
+    assert words_of(titled).title == ["\u200b", "Non-reference", "sources"]
+    assert words_of(replace(titled, width=260)).title == ["Non-reference sources"]
+
+
+@pytest.mark.parametrize("area", [(380, 350), (570, 235)])
+def test_a_narrow_frame_gives_its_words_the_room_that_they_need(area):
+    square = replace(frame(height=None, y=(0.0, 10.0), subtitle=WORDS)[0], title=WORDS)
+    (one,) = resized(Figure((square,)), *area, corner=76)
+    words = words_of(one)
+    assert one.indent < one.margin
+    widest = max(text_width(line, 13, is_bold=True) + 76 for line in words.title)
+    assert widest <= one.width + one.margin
+    assert one.indent + one.width + one.margin < area[0]
+    assert one.frame_height > 0.35 * area[1]
+    (bare,) = resized(frame(height=None, y=(0.0, 10.0)), *area, corner=76)
+    assert bare.indent == pytest.approx(bare.margin - MARGIN, abs=1)
+
+
+def shown(figure, area):
+    frames = resized(figure, *area).frames
+    return frames, words_of_row(frames)

@@ -9,6 +9,7 @@ from numpy.polynomial import legendre
 
 from plateviz import tables
 from plateviz.tables.calibration import displacement_um
+from plateviz.tables.labels import element_labels
 from plateviz.tables.sky import offsets_mas
 from solver.data import schema
 
@@ -255,6 +256,26 @@ def test_calibration_tables_name_units_and_cover_every_group(fit_result):
     assert "focal length [µm]" in found["Exposures"]
     assert "σ pointing RA, marginal [arcsec]" in found["Exposures"]
     assert found["Distortion"]["element"].iloc[0] == "A(2,0) B(2,0)"
+    # The file of a result says "field 0 plate 0".
+    assert found["Exposures"]["element"].iloc[0] == "field 0, exposure 0"
+    assert fit_result.calibration["label"].str.contains("plate").any()
+
+
+def test_exposures_have_one_name_in_all_tables_of_the_calibration(fit_result):
+    shown = [
+        tables.prior_shares(fit_result)["label"],
+        tables.eigenmode_spectrum(fit_result)["name"],
+        tables.eigenmode_deciders(fit_result)["name"],
+        tables.eigenmode_groups(fit_result)["name"],
+        tables.eigenmode_shifts(fit_result)["name"],
+    ]
+    assert not any(names.str.contains("plate").any() for names in shown)
+    assert shown[0].str.fullmatch(r"field \d+, exposure \d+").any()
+    assert list(element_labels(pd.Series(["pointing RA of field 3 plate 12", "A(2,0)", ""]))) == [
+        "pointing RA of field 3, exposure 12",
+        "A(2,0)",
+        "",
+    ]
 
 
 def test_comparison_of_a_fit_with_itself_is_zero(fit_result):

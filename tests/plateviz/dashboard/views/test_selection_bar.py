@@ -87,7 +87,7 @@ def test_rows_of_the_calibration_tables_select_and_are_selected(session, fit_res
     assert detectors.selection == [3]
     assert exposures.selection == [0, 2]
     label = exposures.value["element"].iloc[2]
-    assert label == "field {} plate {}".format(*keys[1])
+    assert label == "field {}, exposure {}".format(*keys[1])
     assert np.all(detectors.value["element"] == [f"detector {n}" for n in range(4)])
 
 

@@ -1,0 +1,65 @@
+"""Width of text before it is drawn, and text wrapped to a width."""
+
+from collections.abc import Iterator
+
+# Width of characters over the size of the font in DejaVu Sans, the widest of the common fonts that
+# `theme.FONT` stands for: it is shown where there is neither Helvetica nor Arial.
+_CLASSES = {
+    0.32: "'ijlIJ ,.·|",
+    0.41: "/:;\\f-()[]t!²³r",
+    0.53: '"*_`–°sz?',
+    0.60: "cLξFkχvxyλPTY",
+    0.64: "aoδθeESbdghnpquση$0123456789{}µ√",
+    0.70: "KαφAVΔBRXZC",
+    0.79: "UHNDG&OQ",
+}
+_WIDTHS = {character: width for width, all_of in _CLASSES.items() for character in all_of}
+_WIDEST = 1.0
+_BOLD = 1.13
+
+
+def text_width(text: str, size: int, *, is_bold: bool = False) -> float:
+    """Return how wide a line of text is at most, screen pixels.
+
+    Parameters
+    ----------
+    size : of the font, screen pixels
+    """
+    letters = sum(_WIDTHS.get(character, _WIDEST) for character in text)
+    return size * letters * (_BOLD if is_bold else 1.0)
+
+
+def wrapped(text: str, width: float, size: int, *, is_bold: bool = False) -> list[str]:
+    """Return the lines of text that is no wider than `width`; a longer word is broken.
+
+    Parameters
+    ----------
+    width, size : of a line and of the font, screen pixels
+    """
+    space = text_width(" ", size, is_bold=is_bold)
+    lines = []
+    for paragraph in text.split("\n"):
+        line, left = "", width
+        for piece, needs in _pieces(paragraph, width, size, is_bold):
+            if line and space + needs <= left:
+                line, left = f"{line} {piece}", left - space - needs
+                continue
+            if line:
+                lines.append(line)
+            line, left = piece, width - needs
+        if line:
+            lines.append(line)
+    return lines
+
+
+def _pieces(text: str, width: float, size: int, is_bold: bool) -> Iterator[tuple[str, float]]:
+    """Iterate over words, those that are too wide in parts, each with its width."""
+    for word in text.split():
+        rest, needs = word, text_width(word, size, is_bold=is_bold)
+        while needs > width and len(rest) > 1:
+            ends = range(1, len(rest))
+            end = max(1, sum(text_width(rest[:n], size, is_bold=is_bold) <= width for n in ends))
+            yield rest[:end], text_width(rest[:end], size, is_bold=is_bold)
+            rest = rest[end:]
+            needs = text_width(rest, size, is_bold=is_bold)
+        yield rest, needs

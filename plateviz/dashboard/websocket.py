@@ -1,5 +1,6 @@
 """The websocket of a page: opened with a valid token and within the limits, and then limited."""
 
+import contextlib
 import time
 from typing import Any
 
@@ -19,6 +20,8 @@ LIMITS = "plateviz_limits"
 _PATCHED_DOCUMENTS: list[Any] = bokeh_io_doc._PATCHED_CURDOCS  # noqa: SLF001
 # Opening a websocket with something that is no token of this server raises one of these.
 _NO_TOKEN = (ValueError, TypeError, KeyError, AttributeError, AssertionError, RecursionError)
+# A part that is no JSON, or not what it should be, raises one of these, which Bokeh logs.
+_NO_MESSAGE = (ValueError, TypeError, KeyError, AttributeError, RecursionError)
 # Status codes of RFC 6455: what was sent is against the rules of the server.
 _AGAINST_THE_RULES = 1008
 # Messages of a page that the server could not carry out. A page may be changed while it sends one.
@@ -85,6 +88,14 @@ class CheckedWebsocket(WSHandler):
         """Close the connection; what has arrived and was not handled yet is not."""
         self._is_closing = True
         super().close(code, reason)
+
+    async def _receive(self, fragment: str | bytes) -> Message | None:
+        # A page waits until it is told that its session is there.
+        if self.receiver is not None:
+            with contextlib.suppress(*_NO_MESSAGE):
+                return await super()._receive(fragment)
+        self.close(_AGAINST_THE_RULES, "a message that is wrong")
+        return None
 
     async def _schedule(self, work: Any) -> None:  # noqa: ANN401 as Bokeh
         if isinstance(work, Message) and work.msgtype == "ERROR":

@@ -21,6 +21,7 @@ from plateviz.dashboard.app import empty_page
 from plateviz.dashboard.limits import Rate
 from plateviz.dashboard.rooms import Rooms
 from plateviz.dashboard.server import Endpoint, begin, check_address
+from plateviz.dashboard.websocket import CheckedWebsocket
 from tests.plateviz.dashboard.test_navigation import SurveyStore
 
 
@@ -262,7 +263,7 @@ def test_behind_a_proxy_the_clients_are_those_that_it_states(store):
     with_server(store, scenario, pages_per_address=1, origins=("astro.example.org",))
 
 
-def test_flood_of_requests_is_refused_and_then_forgiven(store, monkeypatch):
+def test_flood_of_requests_is_refused_and_then_forgiven(store, monkeypatch, caplog):
     monkeypatch.setattr(limits, "REQUESTS", Rate(at_once=30, per_second=20))
 
     async def scenario(address, server):
@@ -274,20 +275,47 @@ def test_flood_of_requests_is_refused_and_then_forgiven(store, monkeypatch):
         assert (await get(address))[0] == 200
 
     with_server(store, scenario)
+    assert "429 GET" not in caplog.text
 
 
-def test_messages_that_are_wrong_end_their_connection_only(store):
+@pytest.mark.parametrize(
+    "text", ['{"msgtype": "no such message"}', "no message", "[" * 10_000, '{"msgid": 1}']
+)
+def test_messages_that_are_wrong_end_their_connection_only(store, caplog, text):
     async def scenario(address, server):
         async with opened(address) as good, opened(address) as bad:
             with suppress(WebSocketClosedError):
                 for _ in range(1000):
-                    await bad.write_message('{"msgtype": "no such message"}')
+                    await bad.write_message(text)
             await ended(bad)
             await send(good, Protocol().create("SERVER-INFO-REQ"))
             answer = await asyncio.wait_for(good.read_message(), 20)
             assert '"SERVER-INFO-REPLY"' in answer
 
     with_server(store, scenario)
+    assert "failed to parse" not in caplog.text
+
+
+def test_message_before_the_session_ends_its_connection_only(store, monkeypatch, caplog):
+    async def scenario(address, server):
+        async def no_session_yet(*_):
+            pass
+
+        async with opened(address) as good:
+            token = token_of((await get(address))[1])
+            monkeypatch.setattr(CheckedWebsocket, "_async_open", no_session_yet)
+            request = HTTPRequest(f"{address.replace('http', 'ws', 1)}ws")
+            early = await websocket_connect(request, subprotocols=["bokeh", token])
+            with suppress(WebSocketClosedError):
+                await send(early, Protocol().create("SERVER-INFO-REQ"))
+            assert await ended(early) == 1008
+            early.close()
+            await send(good, Protocol().create("SERVER-INFO-REQ"))
+            answer = await asyncio.wait_for(good.read_message(), 20)
+            assert '"SERVER-INFO-REPLY"' in answer
+
+    with_server(store, scenario)
+    assert "failed to parse" not in caplog.text
 
 
 def test_client_that_sends_too_much_is_cut_off(store, monkeypatch):

@@ -36,6 +36,8 @@ _FULL = Path(__file__).with_name("full.html")
 _BEGIN = Path(__file__).with_name("begin.js")
 # The script that loads components.
 _LOADER = re.compile(r"<script[^>]*/es-module-shims[^>]*></script>")
+# Id of the element that the page is put into.
+_PLACE = "page"
 _MOST_BYTES = 2**16
 # A page asks for its files within so long of each other, and within so long in all.
 _QUIET_SECONDS = 0.03
@@ -169,6 +171,10 @@ class EmptyPage:
         html = html.replace("</title>", f"</title>\n{link}\n<script>{begin}</script>", 1)
         load = f"window.importShim?.({json.dumps(components)}).catch(() => {{}})"
         html = _LOADER.sub(lambda found: f"{found[0]}\n<script>{load}</script>", html, count=1)
+        # A page straight in the body would be taken for a part of another page, and leave the
+        # body without the colours of its theme.
+        html = html.replace("<body>", f'<body>\n<div id="{_PLACE}"></div>', 1)
+        html = html.replace('"use_for_title":', f'"elementid":"{_PLACE}","use_for_title":', 1)
         self._parts = html.split(token)
 
     def with_token(self, token: str) -> str:

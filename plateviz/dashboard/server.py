@@ -9,6 +9,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import panel as pn
+import panel_material_ui as pmui
+from tornado.ioloop import IOLoop
 
 # The scripts of tables are sent with the page, before any session has a table.
 import panel.models.tabulator
@@ -20,6 +22,7 @@ from plateviz.dashboard.limits import Limits, PageLimit
 from plateviz.dashboard.page_request import send_empty_pages
 from plateviz.dashboard.password import PasswordLogin
 from plateviz.dashboard.refused_requests import refuse_floods, refuse_paths
+from plateviz.dashboard.returned_memory import ReturnedMemory, keep_no_first_page
 from plateviz.dashboard.rooms import Rooms
 from plateviz.dashboard.waiting_messages import send_waiting_messages
 from plateviz.dashboard.websocket import LIMITS, check_websockets
@@ -100,9 +103,15 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
     check_websockets()
     hosts = sorted({endpoint.address, "localhost", "127.0.0.1"})
     rooms = Rooms()
+    memory = ReturnedMemory(IOLoop.current())
+
+    def make_page() -> pmui.Page:
+        memory.follow()
+        return build_app(store, rooms)
+
     # A server, not a thread, because `threaded` is not set.
     server: Any = pn.serve(
-        lambda: build_app(store, rooms),
+        make_page,
         port=endpoint.port,
         address=endpoint.address,
         # Websockets from pages of other hosts are refused.
@@ -120,6 +129,7 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
         cookie_secret=secrets.token_hex(),
         **_login(endpoint.password),
     )
+    keep_no_first_page(server.io_loop)
     application = server._tornado  # noqa: SLF001 it has no public name
     pages = PageLimit(endpoint.pages, endpoint.pages_per_address)
     limits = application.settings[LIMITS] = Limits(pages, is_proxied=bool(endpoint.origins))

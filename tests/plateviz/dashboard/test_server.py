@@ -3,12 +3,16 @@
 import asyncio
 import gc
 import json
+import logging
 import re
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 
+import panel as pn
 import pytest
+from bokeh.core.serialization import Serializer
+from bokeh.events import DocumentReady
 from bokeh.models import Plot
 from bokeh.protocol import Protocol
 from bokeh.server.urls import per_app_patterns
@@ -223,6 +227,46 @@ def test_server_does_not_keep_a_page(store):
     page = weakref.ref(empty_page(store))
     gc.collect()
     assert page() is None
+
+
+def test_pages_that_are_closed_leave_nothing(store, monkeypatch):
+    monkeypatch.setattr("plateviz.dashboard.server._LOST_MILLISECONDS", 1)
+    monkeypatch.setattr("plateviz.dashboard.server.Rooms", KnownRooms)
+    # Pytest keeps what is logged, with the pages that it is about.
+    monkeypatch.setattr(logging.root.manager, "disable", logging.CRITICAL)
+    # As in a new process, where Panel begins its task within the first page.
+    monkeypatch.setattr(type(pn.state), "_busy_cleanup_scheduled", None)
+    documents = []
+
+    async def see(address, server):
+        token = token_of((await get(f"{address}?view=orbit&orbit=0"))[1])
+        assert (await get(f"{address}session", **asked(token, WINDOW)))[0] == 204
+        request = HTTPRequest(f"{address.replace('http', 'ws', 1)}ws")
+        connection = await websocket_connect(request, subprotocols=["bokeh", token])
+        for _ in range(3):
+            await connection.read_message()
+        (session,) = server.get_sessions()
+        documents.append(weakref.ref(session.document))
+        ready = {"kind": "MessageSent", "msg_type": "bokeh_event"}
+        ready["msg_data"] = Serializer().encode(DocumentReady())
+        message = Protocol().create("SERVER-INFO-REQ")
+        message.header["msgtype"], message.content = "PATCH-DOC", {"events": [ready]}
+        await send(connection, message)
+        # What the page does in its first moments; its answers come in between.
+        await asyncio.sleep(0.3)
+        connection.close()
+        await ended(connection)
+
+    async def scenario(address, server):
+        for _ in range(3):
+            await see(address, server)
+            await asyncio.sleep(0.05)
+            await server._tornado._cleanup_sessions()
+            assert server.get_sessions() == []
+        gc.collect()
+        assert [document() for document in documents] == [None] * 3
+
+    with_server(store, scenario)
 
 
 def test_page_without_its_last_slash_is_sent_to_its_path(store):

@@ -44,6 +44,12 @@ def peak_memory_mib() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / per_mib
 
 
+def memory_mb(process: int) -> float:
+    """Return the memory, MB, that a process of Linux has at the moment."""
+    lines = Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) * 1024 / 1e6
+
+
 def time_of(work: Callable[[], object], repeat: int) -> float:
     """Return the median time, s."""
     seconds = []

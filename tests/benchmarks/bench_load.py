@@ -50,7 +50,13 @@ from tests.benchmarks.load_report import (
     report_memory,
     report_seconds,
 )
-from tests.benchmarks.machine import cpu_model, memory_mb, usable_cores, write
+from tests.benchmarks.machine import (
+    cpu_model,
+    memory_mb,
+    processor_seconds,
+    usable_cores,
+    write,
+)
 from tests.benchmarks.page_client import PageClient, PageError
 
 _ORBIT = "?view=orbit&orbit=0"
@@ -108,9 +114,12 @@ def opening(scene: Scene) -> None:
         first = await _opened(scene, _ORBIT)
         n_figures = first.count("Plot")
         await first.close()
+        used = processor_seconds(scene.process)
         pages = await asyncio.gather(
             *(open_one(n_figures) for _ in range(scene.asked.opening)), return_exceptions=True
         )
+        used = processor_seconds(scene.process) - used
+        write(f"    the server's process took {used:.1f} s of a core for that")
         for page in pages:
             if isinstance(page, PageClient):
                 await page.close()
@@ -125,6 +134,8 @@ def opening(scene: Scene) -> None:
         whole.append(page.last_drawing - begin)
         return page
 
+    # A browser has six connections of its own.
+    AsyncHTTPClient.configure(None, max_clients=6 * scene.asked.opening)
     asyncio.run(open_all())
     report_seconds(f"opening: {scene.asked.opening} at once, whole", whole, f"{_WHOLE:g} s")
 

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import NamedTuple, TextIO
 
 from playwright.sync_api import Locator, Page, sync_playwright
 
@@ -293,6 +293,13 @@ def additions() -> float:
     return time.perf_counter() - begin
 
 
+class Server(NamedTuple):
+    """The address of a server, and the id of its process."""
+
+    address: str
+    process: int
+
+
 @contextmanager
 def served(survey: Path, stages: Path | None = None) -> Iterator[str]:
     """Serve a survey; yield its address.
@@ -301,14 +308,29 @@ def served(survey: Path, stages: Path | None = None) -> Iterator[str]:
     ----------
     stages : file to which the server writes when stages of its work begin and end
     """
+    with server(survey, stages) as one:
+        yield one.address
+
+
+@contextmanager
+def server(
+    survey: Path, stages: Path | None = None, errors: TextIO | None = None
+) -> Iterator[Server]:
+    """Serve a survey.
+
+    Parameters
+    ----------
+    stages : as for `served`
+    errors : file to which the server's standard error goes
+    """
     program = ["-m", "plateviz.cli.main"]
     if stages is not None:
         program = [str(Path(__file__).with_name("timed_server.py")), str(stages)]
     command = [sys.executable, *program, "serve", str(survey), "--port", "0", "--no-open"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True)
     try:
         line = next(line for line in process.stdout or () if "http" in line)
-        yield next(word for word in line.split() if word.startswith("http"))
+        yield Server(next(word for word in line.split() if word.startswith("http")), process.pid)
     finally:
         process.terminate()
         process.wait()

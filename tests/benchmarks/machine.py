@@ -44,6 +44,19 @@ def peak_memory_mib() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / per_mib
 
 
+def memory_mb(process: int) -> float:
+    """Return the memory, MB, that a process of Linux has at the moment."""
+    lines = Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) * 1024 / 1e6
+
+
+def processor_seconds(process: int) -> float:
+    """Return the time, s, for which a process of Linux has used processors."""
+    # The name, in parentheses, may have spaces.
+    fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def time_of(work: Callable[[], object], repeat: int) -> float:
     """Return the median time, s."""
     seconds = []

@@ -9,11 +9,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import panel as pn
-import panel_material_ui as pmui
-from tornado.ioloop import IOLoop
 
 # The scripts of tables are sent with the page, before any session has a table.
 import panel.models.tabulator
+import panel_material_ui as pmui
+from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.app import build_app, empty_page
 from plateviz.dashboard.closed_pages import silence_closed_pages

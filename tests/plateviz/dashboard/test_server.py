@@ -229,12 +229,19 @@ def test_server_does_not_keep_a_page(store):
     assert page() is None
 
 
+@pytest.fixture
+def without_logs():
+    """Nothing is logged: pytest keeps what is, with the pages that it is about."""
+    logging.disable(logging.CRITICAL)
+    yield
+    logging.disable(logging.NOTSET)
+
+
 @pytest.mark.newest
+@pytest.mark.usefixtures("without_logs")
 def test_pages_that_are_closed_leave_nothing(store, monkeypatch):
     monkeypatch.setattr("plateviz.dashboard.server._LOST_MILLISECONDS", 1)
     monkeypatch.setattr("plateviz.dashboard.server.Rooms", KnownRooms)
-    # Pytest keeps what is logged, with the pages that it is about.
-    monkeypatch.setattr(logging.root.manager, "disable", logging.CRITICAL)
     # As in a new process, where Panel begins its task within the first page.
     monkeypatch.setattr(type(pn.state), "_busy_cleanup_scheduled", None)
     documents = []

@@ -17,7 +17,7 @@ LIMITS = "plateviz_limits"
 """Name of the setting of a server's Tornado application that has its `Limits`."""
 
 # The documents in which the process is at the moment. It has no public name.
-_PATCHED_DOCUMENTS: list[Any] = bokeh_io_doc._PATCHED_CURDOCS  # noqa: SLF001
+_PATCHED_DOCUMENTS: Any = bokeh_io_doc._PATCHED_CURDOCS  # noqa: SLF001
 # Opening a websocket with something that is no token of this server raises one of these.
 _NO_TOKEN = (ValueError, TypeError, KeyError, AttributeError, AssertionError, RecursionError)
 # A part that is no JSON, or not what it should be, raises one of these, which Bokeh logs.
@@ -99,8 +99,9 @@ class CheckedWebsocket(WSHandler):
 
     async def _schedule(self, work: Any) -> None:  # noqa: ANN401 as Bokeh
         if isinstance(work, Message) and work.msgtype == "ERROR":
-            # Bokeh forgets to leave the document in which an error was raised.
-            _PATCHED_DOCUMENTS.clear()
+            # Bokeh 3.9 forgets to leave the document in which an error was raised.
+            if isinstance(_PATCHED_DOCUMENTS, list):
+                _PATCHED_DOCUMENTS.clear()
             self._errors += 1
             if self._errors > _MOST_ERRORS:
                 self.close(_AGAINST_THE_RULES, "too many messages that were wrong")

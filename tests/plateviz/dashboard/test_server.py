@@ -268,8 +268,11 @@ def test_pages_that_are_closed_leave_nothing(store, monkeypatch):
     async def scenario(address, server):
         for _ in range(3):
             await see(address, server)
-            await asyncio.sleep(0.05)
-            await server._tornado._cleanup_sessions()
+            for _ in range(100):
+                await server._tornado._cleanup_sessions()
+                if not server.get_sessions():
+                    break
+                await asyncio.sleep(0.05)
             assert server.get_sessions() == []
         gc.collect()
         assert [document() for document in documents] == [None] * 3

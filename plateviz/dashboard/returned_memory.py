@@ -22,7 +22,7 @@ def keep_no_first_page(loop: IOLoop) -> None:
     The task forgets callbacks that have not ended. It goes on for as long as the process, with the
     context variables of where it was begun, of which one is the page.
     """
-    # It has no public name. A test, run with the newest Panel too, notices a change.
+    # It has no public name in Panel 1.9; Panel 1.10 still keeps its first page.
     state: Any = pn.state
     loop.add_callback(state._schedule_busy_cleanup)  # noqa: SLF001
 

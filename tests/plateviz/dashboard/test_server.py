@@ -237,7 +237,7 @@ def without_logs():
     logging.disable(logging.NOTSET)
 
 
-@pytest.mark.newest
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_logs")
 def test_pages_that_are_closed_leave_nothing(store, monkeypatch):
     monkeypatch.setattr("plateviz.dashboard.server._LOST_MILLISECONDS", 1)

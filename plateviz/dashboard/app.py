@@ -31,6 +31,8 @@ from plateviz.solving.solution_store import SolutionStore
 
 # Milliseconds between two looks at what a running job says.
 _PROGRESS_MILLISECONDS = 250
+# Milliseconds between two questions for a figure that another thread makes.
+_PENDING_MILLISECONDS = 50
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
 # Figures that are drawn before the page is shown, if their rooms are known.
@@ -234,7 +236,11 @@ class _Ticker:
             self._watched = job
             job.watch(self._call)
             self._start_looking()
-        if self._pages.is_due or (job is None and self._pages.complete()):
+        if self._pages.is_pending and self._document is not None:
+            # Another thread makes a figure, and would wait for a page that asks without a pause.
+            self._is_to_tick = True
+            self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
+        elif self._pages.is_due or (job is None and self._pages.complete()):
             self.wake()
         elif job is None:
             if self._progress.running:

@@ -90,7 +90,7 @@ class FigureView(pn.viewable.Viewer):
         self._drawn: BokehFigure | None = None
         self._pane: pn.pane.Bokeh | None = None
         self._waiting = waiting
-        self._is_changed = self._is_stale = self._is_pending = False
+        self._is_changed = self._is_stale = self.is_pending = False
         self._shown_room: list[int] = []
         self.visibility = Visibility()
         # A plain Panel column lays out a new figure at once. Other containers do so a moment later,
@@ -142,7 +142,7 @@ class FigureView(pn.viewable.Viewer):
             self._card.extend([self._save, self._tools])
         if self._needs_drawing or self._drawn is None:
             self._draw()
-        if self._is_pending:
+        if self.is_pending:
             return
         self._shown_selected = self._selected
         self._actions.show(self._selected)
@@ -182,13 +182,13 @@ class FigureView(pn.viewable.Viewer):
 
         Until then the figure stays due, so that it is asked for again.
         """
-        self._is_pending = self._is_changed = False
+        self.is_pending = self._is_changed = False
         figure = self._plot_figure()
         if not isinstance(figure, Pending):
             self._figure = figure
             self._tools.summary = figure_summary(figure) if figure else ""
             return True
-        self._is_pending = self._is_changed = True
+        self.is_pending = self._is_changed = True
         self._fade()
         return False
 
@@ -239,7 +239,7 @@ class FigureView(pn.viewable.Viewer):
     def _fade(self) -> None:
         is_old = self._is_changed or self._is_stale
         styles = {**_BODY, **_CENTRED, "opacity": "0.45" if is_old else "1"}
-        self._body.styles = {**styles, **_SLOWLY} if self._is_pending else styles
+        self._body.styles = {**styles, **_SLOWLY} if self.is_pending else styles
 
 
 def _limits(event: RangesUpdate) -> tuple[Limits, Limits] | None:

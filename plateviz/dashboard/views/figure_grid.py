@@ -71,6 +71,11 @@ class FigureGrid(pn.viewable.Viewer):
         return any(view.is_due for view in self._views)
 
     @property
+    def is_pending(self) -> bool:
+        """Whether another thread makes a figure."""
+        return any(view.is_due and view.is_pending for view in self._views)
+
+    @property
     def is_laid_out(self) -> bool:
         """Whether the browser has said how large any card is."""
         return any(min(view.visibility.room) > 0 for view in self._views)

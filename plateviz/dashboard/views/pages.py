@@ -89,6 +89,11 @@ class Pages(pn.viewable.Viewer):
         """Whether any figure on the screen is to be drawn."""
         return self._figures.is_due
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether another thread makes a figure on the screen."""
+        return self._page(self._navigation.view).figures.is_pending
+
     def draw_due(self) -> None:
         """Draw the first few figures that are due on the screen."""
         self._figures.draw_due()

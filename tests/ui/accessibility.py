@@ -19,7 +19,12 @@ def require_accessible(page):
     """Fail if a control has no name, a text no contrast, or a part no place in the page."""
     page.mouse.move(0, 0)
     page.wait_for_timeout(_COMPLETED_MS)
-    found = page.evaluate(_CHECK.partition("\n")[2])
+    # What widgets leave out is added a moment after they are made.
+    for _ in range(20):
+        found = page.evaluate(_CHECK.partition("\n")[2])
+        if found == []:
+            break
+        page.wait_for_timeout(500)
     axe = os.environ.get("PLATEVIZ_AXE")
     if axe:
         page.evaluate(Path(axe).read_text("utf-8"))

@@ -5,6 +5,7 @@ import gc
 import json
 import logging
 import re
+import warnings
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
@@ -58,8 +59,12 @@ def with_server(store, scenario, **options):
             server.stop()
 
     # Playwright, in the process of other tests, has an event loop in this thread.
-    with ThreadPoolExecutor(1) as thread:
+    with ThreadPoolExecutor(1) as thread, warnings.catch_warnings():
+        # Panel makes the coroutine of a change before it may enter the document, so that a server
+        # that ends meanwhile leaves one behind that nothing has awaited.
+        warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
         thread.submit(asyncio.run, scene()).result()
+        gc.collect()
 
 
 async def get(address, **options):

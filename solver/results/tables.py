@@ -20,7 +20,8 @@ from solver.data.schema import (
 )
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Mode
-from solver.linear.leverage import Covariances, Residuals, covariances, residuals
+from solver.linear.covariances import Covariances, covariances
+from solver.linear.leverage import Residuals, residuals
 from solver.linear.source_elimination import ReducedSystem
 from solver.model.astrometry import frames_at, sky_position
 from solver.model.distortion import terms

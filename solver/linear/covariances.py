@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from solver.linear.normal_equations import one_blas_thread
 from solver.linear.source_elimination import ReducedSystem
 from solver.linear.triangular import rows_solved, upper_solve
 from solver.problem.source_blocks import SourceBlock, SourceBlocks
+from solver.runtime.threads import one_blas_thread
 
 _WORKERS = 2
 

@@ -15,10 +15,11 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Bool, Float
 
-from solver.linear.normal_equations import NormalEquations, one_blas_thread
+from solver.linear.normal_equations import NormalEquations
 from solver.linear.triangular import lower_solve, rows_solved, upper_solve
 from solver.problem.priors import Priors
 from solver.problem.source_blocks import SourceBlock, SourceBlocks
+from solver.runtime.threads import one_blas_thread
 
 # Limits on the information along a direction, relative to that of its parameters taken alone:
 # of weak directions, which only the priors constrain, and of poorly constrained ones.

@@ -7,6 +7,7 @@ a reference source scatters less than its prior.
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg as sl
 from jaxtyping import Bool, Float
 
 from solver.engines.gauss_newton import Mode
@@ -122,7 +123,8 @@ def mean_covariance(
     # Mean shift of the members, along each axis.
     mean_shift = np.eye(2)[:, :, None] * (members / count)
     shared = reduced.onto_calibration(lower_solve(reduced.source_factor, mean_shift))
-    return conditional + shared @ reduced.theta_covariance() @ shared.T
+    half = sl.solve_triangular(reduced.factor, shared.T, trans="T")
+    return conditional + half.T @ half
 
 
 def induced_shift(

@@ -189,10 +189,11 @@ def true_places(solution: SolvedProblem, truth: pd.DataFrame | None) -> pd.DataF
     if truth is None:
         return None
     problem = solution.problem
-    known = problem.sources["source_id"].isin(truth["source_id"]).to_numpy()
-    ids = problem.sources["source_id"].to_numpy()[known]
+    # The truth has all stars of the sky, far more than there are sources.
+    rows = truth[truth["source_id"].isin(problem.sources["source_id"])].sort_values("source_id")
+    ids = rows["source_id"].to_numpy()
+    known = np.isin(problem.sources["source_id"].to_numpy(), ids)
     observer = observer_at(np.array([problem.epoch])).position[0]
-    rows = truth.set_index("source_id").loc[ids].reset_index()
     direction = frames_at(rows, problem.epoch, observer)[:, 0]
     ra, dec = sky_position(direction)
     error = np.zeros((problem.n_src, 2))

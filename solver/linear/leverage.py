@@ -133,9 +133,10 @@ def _shared_covariances(problem: Problem, covariance: Covariances) -> SharedCova
     )
     source = covariance.source[:, [0, 0, 1], [0, 1, 1]]
     # From block order to that of the sources.
-    with_source = covariance.own_cross[shared].reshape(2 * n_coef * 2, -1)
+    n_sources = covariance.own_cross.shape[-1]
+    with_source = covariance.own_cross[shared].reshape(2 * n_coef * 2, n_sources)
     with_source = np.take(with_source, covariance.source_blocks.position, axis=1)
-    with_source = with_source.reshape(2, n_coef, 2, -1).swapaxes(1, 2)
+    with_source = with_source.reshape(2, n_coef, 2, n_sources).swapaxes(1, 2)
     terms = covariance.theta[shared, shared].reshape(2, n_coef, 2, n_coef)
     return SharedCovariances(
         pad(source, "src", sizes).T,

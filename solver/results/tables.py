@@ -99,6 +99,7 @@ def source_table(solution: SolvedProblem) -> pd.DataFrame:
         "offset_dec": solution.mode.sources[:, 1],
         "chi2": np.bincount(index, chi2, n_src),
         "dof": np.bincount(index, 2.0 - solution.residuals.trace, n_src),
+        "magnitude": sources.get("magnitude", pd.Series(np.nan, sources.index)).to_numpy(float),
     }
     return _frame(columns, SOURCES)
 

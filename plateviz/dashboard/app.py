@@ -23,6 +23,7 @@ from plateviz.dashboard.views.accessible_names import AccessibleNames
 from plateviz.dashboard.views.address_bar import AddressBar
 from plateviz.dashboard.views.browser_session import BrowserSession
 from plateviz.dashboard.views.figure import Part
+from plateviz.dashboard.views.figure_painting import FigurePainting
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.report_button import report_button
@@ -70,6 +71,7 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
         AddressBar(navigation),
         BrowserSession(session.journal),
         AccessibleNames(),
+        FigurePainting(),
     ]
     page = empty_page(
         store,

@@ -57,6 +57,8 @@ class SolutionStore:
         self.made = MadeSolutions()
         self._solver = solver
         self._lock = threading.Lock()
+        # The orbit for which preparations were asked for last, unless they were given up.
+        self._prepared: int | None = None
         self._jobs: dict[Path, Job] = {}
         temporary = temporary_folder()
         with writing(temporary, "to make a folder for the solutions"):
@@ -111,7 +113,17 @@ class SolutionStore:
         answers what-ifs.
         """
         if settings.engine == ENGINES[0]:
+            self._prepared = orbit
             self._solver.prepare(self._fit_of(orbit, settings))
+
+    def leave(self, orbit: int | None) -> None:
+        """Give up what is prepared for an orbit that a page leaves: the page needs the cores.
+
+        What was asked for later, of another orbit, is not given up.
+        """
+        if self._prepared == orbit:
+            self._prepared = None
+            self._solver.rest()
 
     def cancel(self, job: Job) -> bool:
         """Give up a job that was requested; stop it, and return True, if nobody else holds it."""

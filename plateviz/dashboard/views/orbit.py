@@ -170,8 +170,9 @@ class OrbitPage(pn.viewable.Viewer):
             grid.show_selected(self._session.selection.ids)
 
     def _mark_stale(self, *_: object) -> None:
-        for grid in self._grids.values():
-            grid.mark_stale(self._session.stage is Stage.STALE)
+        with pn.io.hold():
+            for grid in self._grids.values():
+                grid.mark_stale(self._session.stage is Stage.STALE)
         if self._session.shown is None:
             # What is said instead of the figures depends on the stage.
             self._change()

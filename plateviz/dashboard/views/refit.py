@@ -18,6 +18,11 @@ from solver.data.text_setting import LeftOut, PriorShifts, Texts
 
 # Margin of a control close to the next one.
 _TIGHT = (0, 10)
+# Each picture of the moving bar takes time from a solver on the same machine; a what-if is over
+# before the bar moves.
+_UNHURRIED = {
+    "& .MuiLinearProgress-bar": {"animationDelay": "1s", "animationFillMode": "backwards"}
+}
 
 
 class RefitView(pn.viewable.Viewer):
@@ -36,7 +41,9 @@ class RefitView(pn.viewable.Viewer):
         self._stop = pmui.Button(
             label="Cancel", color="warning", variant="outlined", sizing_mode="stretch_width"
         )
-        self._bar = pmui.LinearProgress(variant="indeterminate", sizing_mode="stretch_width")
+        self._bar = pmui.LinearProgress(
+            variant="indeterminate", sizing_mode="stretch_width", sx=_UNHURRIED
+        )
         self._message = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
         self._list = SolutionWindow(navigation)

@@ -29,6 +29,7 @@ from tests.ui.conftest import (
     turn_to_workspace,
     until,
 )
+from tests.ui.painted import require_marks_where_they_are
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -136,6 +137,7 @@ def test_every_figure_is_drawn_when_near_and_within_the_screen(walked):
     assert not is_faded(walked.locator(".figure-convergence canvas").first)
     # A part that asks without end whether it can be laid out would take a core.
     assert rests(walked)
+    require_marks_where_they_are(walked)
 
 
 def test_what_is_drawn_keeps_its_layout(walked):

@@ -46,8 +46,8 @@ def plot(view):
     return view._body[0].object.children[0][0]
 
 
-def opacity(view):
-    return view._body.styles["opacity"]
+def is_faded(view):
+    return view.visibility.is_faded
 
 
 def text(view):
@@ -105,14 +105,14 @@ def test_drawn_figure_follows_its_room_without_being_plotted_again(view, drawn):
 def test_change_away_from_the_screen_waits_and_fades_the_figure(view, drawn):
     come_near(view)
     view.draw()
-    assert opacity(view) == "1"
+    assert not is_faded(view)
     view.visibility.is_near = False
     view.change("dark")
     assert not view.is_due
-    assert opacity(view) != "1"
+    assert is_faded(view)
     view.visibility.is_near = True
     view.draw()
-    assert opacity(view) == "1"
+    assert not is_faded(view)
     assert len(drawn) == 2
 
 
@@ -258,9 +258,9 @@ def test_other_rows_of_what_is_selected_again_stay_marked():
 def test_stale_figure_is_faded(view):
     view.draw()
     view.mark_stale(True)
-    assert opacity(view) != "1"
+    assert is_faded(view)
     view.mark_stale(False)
-    assert opacity(view) == "1"
+    assert not is_faded(view)
 
 
 def test_figure_is_explained_in_words_and_as_tables(view, monkeypatch):

@@ -84,8 +84,8 @@ def residuals(
         if i < n_chunks:
             pending.append(launch(i))
         if i >= _MAX_PENDING and pending:
-            for column, of_chunk_i in zip(values, pending.popleft(), strict=True):
-                column[i - _MAX_PENDING] = of_chunk_i
+            for number, column in enumerate(pending.popleft()):
+                values[number, i - _MAX_PENDING] = column
     columns = np.take(values.reshape(_N_COLUMNS, -1), tiles.place, axis=1)
     whitened, standardised, pixel, ideal, focal = columns[:-1].reshape(5, 2, -1).swapaxes(1, 2)
     return Residuals(whitened, standardised, columns[-1], pixel, ideal, focal)

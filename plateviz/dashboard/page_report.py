@@ -1,6 +1,5 @@
 """The report of what is on the screen: a solution, a source or a run, as one HTML file."""
 
-import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -15,8 +14,8 @@ from plateviz.reports.page import page_of
 from plateviz.reports.report import Facts, Report
 from plateviz.reports.survey import source_report, survey_report
 from plateviz.runs.queries import SurveyRun
-from plateviz.solving.as_code import as_command
-from solver.data.instrument import Instrument
+from plateviz.solving.as_code import as_command, report_of_run
+from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 
 
@@ -49,7 +48,7 @@ def _of_solution(session: Session) -> Later:
     facts["Report"]["Solution"] = shown.label
     if other is not None:
         facts["Report"]["Compared with solution"] = other.label
-    make = partial(_solution, shown, other, session.store.instrument, facts)
+    make = partial(_solution, shown, other, session.store, facts)
     return _later(session.selection.subject() + ("-what-if" if shown.is_what_if else ""), make)
 
 
@@ -62,23 +61,25 @@ def _later(stem: str, compose: Callable[[], Report]) -> Later:
 
 
 def _solution(
-    shown: Solution, other: Solution | None, instrument: Instrument, facts: Facts
+    shown: Solution, other: Solution | None, store: SolutionStore, facts: Facts
 ) -> Report:
-    report = orbit_report(shown.result, instrument, facts, other.result if other else None)
+    report = orbit_report(
+        shown.result,
+        store.instrument,
+        facts,
+        other.result if other else None,
+        simulation=store.simulation,
+    )
     words = [report.subtitle, shown.label]
     words += [f"compared with {other.label}"] if other is not None else []
     return replace(report, subtitle="; ".join(words))
 
 
 def _survey(run: SurveyRun) -> Report:
-    return survey_report(run, facts_of(_command(run, "--survey"), run.name))
+    command = report_of_run(str(run.survey), run.name, "--survey")
+    return survey_report(run, facts_of(command, run.name))
 
 
 def _source(run: SurveyRun, found: FoundSource) -> Report:
-    command = _command(run, "--source", str(found.source_id))
+    command = report_of_run(str(run.survey), run.name, "--source", str(found.source_id))
     return source_report(run, found.source_id, facts_of(command, run.name))
-
-
-def _command(run: SurveyRun, *options: str) -> str:
-    words = ["plateviz", "report", str(run.survey), "--run", run.name, *options]
-    return shlex.join([*words, "-o", "REPORT.html"])

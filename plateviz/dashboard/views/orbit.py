@@ -7,6 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.orbit_figures import chosen_of, figures_of
 from plateviz.dashboard.row_origins import OrbitRows
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.stage import Stage
@@ -27,8 +28,7 @@ from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
 from plateviz.plots.both_solutions import BOTH, figure_of_both
-from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.gallery import diagnostics
+from plateviz.plots.diagnostic import Diagnostic
 from plateviz.plots.workspace import OrbitWorkspace
 
 
@@ -103,8 +103,7 @@ class OrbitPage(pn.viewable.Viewer):
             self._grids[one] = explore.grid
             return explore.__panel__()
         is_first = one is OrbitWorkspace.VERDICT
-        among = [d for d in diagnostics() if (d.is_key if is_first else d.workspace is one)]
-        views = {d: self._figure_view(d) for d in among}
+        views = {d: self._figure_view(d) for d in figures_of(self._session, one)}
         others, above = [], []
         if one is OrbitWorkspace.ORDERS:
             views = {BOTH: self._figure_view(BOTH), **views}
@@ -115,8 +114,14 @@ class OrbitPage(pn.viewable.Viewer):
         self._following += [view for d, view in views.items() if d.follows_shown]
         if is_first:
             above = [StripView(self._session)]
+        # Six square cards fill a large screen in two rows.
+        are_six = one is OrbitWorkspace.CALIBRATION and len(views) + len(others) == 6
         grid = FigureGrid(
-            list(views.values()), self._wake, columns=3 if is_first else 2, others=others
+            list(views.values()),
+            self._wake,
+            columns=3 if is_first else 2,
+            columns_if_wide=3 if are_six else None,
+            others=others,
         )
         self._grids[one] = grid
         self._show_selected()
@@ -137,20 +142,13 @@ class OrbitPage(pn.viewable.Viewer):
         )
 
     def _plot(self, diagnostic: Diagnostic) -> Figure | None:
-        session, shown = self._session, self._session.shown
-        if shown is None:
+        chosen = chosen_of(self._session)
+        if chosen is None:
             return None
-        chosen = Chosen(
-            result=shown.result,
-            instrument=session.store.instrument,
-            exposures=tuple(session.selection.exposures_of(shown.result)),
-            detector=session.selection.detector_id,
-            other=session.other.result if session.other else None,
-        )
         figure = diagnostic.plot(chosen)
         if diagnostic is BOTH and self._compare is not None:
             figure = figure_of_both(self._compare.figure, chosen)
-        return session.units.figure(figure)
+        return self._session.units.figure(figure)
 
     def _show_workspace(self, *_: object) -> None:
         self._stack.show(self._navigation.orbit_workspace)

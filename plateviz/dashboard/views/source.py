@@ -10,6 +10,7 @@ from astropy.table import Table
 
 from plateviz.dashboard.downloads import described
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import (
@@ -104,6 +105,7 @@ class SourcePage(pn.viewable.Viewer):
             *run_selector(navigation),
             self._entry,
             unit_selector(self._session),
+            *code_button(navigation),
             sizing_mode="stretch_width",
             margin=0,
         )

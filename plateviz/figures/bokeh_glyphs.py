@@ -45,13 +45,19 @@ _SELECTABLE = ("points", "segments")
 
 
 class BokehGlyphs:
-    """A renderer that follows glyph tables of one kind."""
+    """A renderer that follows glyph tables of one kind.
+
+    Attributes
+    ----------
+    keys : columns by which rows are selected -> their values in the rows on the screen
+    """
 
     def __init__(self, glyphs: Glyphs) -> None:
         """Make the models; `follow` gives them their values."""
         self.kind = glyphs.kind
         self._models = _models_for(glyphs)
         self.source = models.ColumnDataSource()
+        self.keys: Mapping[str, np.ndarray] = {}
         self._glyph = _GLYPHS[glyphs.kind](**glyphs.at)
         if glyphs.kind == "texts":
             self._glyph.update(text_font=Value(FONT))
@@ -83,6 +89,10 @@ class BokehGlyphs:
     def follow(self, glyphs: Glyphs, theme: Theme) -> None:
         """Show other values of the same kind."""
         columns = dict(glyphs.columns)
+        self.keys = {name: columns[name] for name in SELECTED_BY if name in columns}
+        if self.kind == "segments":
+            # They say nothing to a person, and are most of what would be sent.
+            columns = {name: one for name, one in columns.items() if name not in self.keys}
         if "line_dash" in glyphs.at:
             dashes = [_DASHES[name] for name in glyphs.values("line_dash")]
             columns[glyphs.at["line_dash"]] = np.array(dashes, dtype=object)

@@ -14,7 +14,7 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
-from plateviz.plots.workspace import title_of
+from plateviz.plots.workspace import OrbitWorkspace, title_of
 
 _WORKSPACES = {
     figure.name: figure.workspace
@@ -106,6 +106,18 @@ def turn_to_workspace(page, workspace):
     switch = page.get_by_role("button", name=title_of(workspace), exact=True)
     if switch.get_attribute("aria-pressed") != "true":
         switch.click()
+
+
+def require_room(page, workspace):
+    """Fail if a card of a workspace is beside the screen, or by more than the strip below it."""
+    cards = page.locator(".card:visible")
+    cards.locator("canvas").first.wait_for(state="attached")
+    boxes = cards.evaluate_all("cards => cards.map(card => card.getBoundingClientRect())")
+    assert len(boxes) > (workspace is not OrbitWorkspace.EXPLORE)
+    assert all(box["x"] + box["width"] <= 1500 for box in boxes), workspace
+    # The strip of the Verdict workspace takes more of this window than of a large screen.
+    room = 1100 if workspace is OrbitWorkspace.VERDICT else 1000
+    assert all(box["y"] + box["height"] <= room for box in boxes), workspace
 
 
 def see(page, name):

@@ -11,13 +11,16 @@ _BOTH = """() => {
   for (const view of Bokeh.index) walk(view);
   const [glyph] = glyphs.filter(one => one.data_size > 20 && one.sx[0] !== undefined);
   const indices = Array.from({ length: 600 }, (_, k) => k % glyph.data_size);
+  // A mark without a size is not drawn; the browser has the sizes as they were sent.
+  const { size } = glyph, sizes = Object.create(size);
+  Object.assign(sizes, { is_Scalar: () => false, get: k => k % 7 ? size.get(k) : NaN });
   const opacities = count => {
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = [900, 900];
     const context = canvas.getContext("2d");
     context.scale(1.5, 1.5);
     for (let k = 0; k < indices.length; k += count)
-      glyph._paint(context, indices.slice(k, k + count));
+      glyph._paint(context, indices.slice(k, k + count), { size: sizes });
     return context.getImageData(0, 0, 900, 900).data.filter((_, at) => at % 4 === 3);
   };
   const [together, alone] = [opacities(600), opacities(100)];

@@ -21,6 +21,7 @@ from tests.ui.conftest import (
     is_faded,
     metrics_of,
     opening_pages,
+    require_room,
     residual_arrows,
     rests,
     see,
@@ -105,18 +106,6 @@ LAYOUTS_OF_TEN = """async () => {
   delete page.compute_layout_now
   return [atOnce, times]
 }"""
-
-
-def require_room(page, workspace):
-    """Fail if a card of a workspace is beside the screen, or by more than the strip below it."""
-    cards = page.locator(".card:visible")
-    cards.locator("canvas").first.wait_for(state="attached")
-    boxes = cards.evaluate_all("cards => cards.map(card => card.getBoundingClientRect())")
-    assert len(boxes) > (workspace is not OrbitWorkspace.EXPLORE)
-    assert all(box["x"] + box["width"] <= 1500 for box in boxes), workspace
-    # The strip of the Verdict workspace takes more of this window than of a large screen.
-    room = 1100 if workspace is OrbitWorkspace.VERDICT else 1000
-    assert all(box["y"] + box["height"] <= room for box in boxes), workspace
 
 
 @pytest.fixture(scope="module")

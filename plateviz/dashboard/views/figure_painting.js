@@ -1,5 +1,5 @@
-// Fewer marks are drawn one by one, and so are those of more looks.
-const LEAST = 500, MOST_LOOKS = 32
+// Fewer marks are drawn one by one, and so are those of more looks, or of larger ones.
+const LEAST = 500, MOST_LOOKS = 32, LARGEST = 100
 // Places within a pixel of the screen, along each axis, at which a mark has a stamp.
 const PLACES = 4
 // What the look of a mark depends on.
@@ -15,7 +15,7 @@ const looksOf = (all, indices) => {
   const looks = [], rows = [], numbers = new Uint8Array(indices.length)
   const is = (look, row) => {
     for (let at = 0; at < varied.length; at++)
-      if (look[at] !== varied[at].get(row)) return false
+      if (!Object.is(look[at], varied[at].get(row))) return false
     return true
   }
   for (let k = 0, number = 0; k < indices.length; k++) {
@@ -33,8 +33,9 @@ const looksOf = (all, indices) => {
 }
 
 // Pixels of the screen from the middle of a mark of a row to its farthest corner along an axis.
+// A mark without a size is not drawn.
 const reachOf = (all, row, scale) =>
-  Math.ceil(scale * (0.6 * all.size.get(row) + 1.1 * all.line_width.get(row))) + 1
+  Math.ceil(scale * (0.6 * (all.size.get(row) || 0) + 1.1 * all.line_width.get(row))) + 1
 
 // The pixels that a mark covers, at each place: where, and premultiplied red, green, blue, opacity.
 const stampsOf = (view, paintEach, data, row, scale, reach) => {
@@ -91,7 +92,8 @@ const paintStamped = (view, paintEach, context, indices, data) => {
   if (b !== 0 || c !== 0 || scale !== d || view.visuals.hatch.doit || view.model.defs.size)
     return false
   const looks = looksOf(all, indices)
-  if (looks === null) return false
+  if (looks === null || looks.rows.some(row => !(reachOf(all, row, scale) <= LARGEST)))
+    return false
   const stamps = looks.rows.map(row =>
     keptStampsOf(view, paintEach, data, all, row, scale))
   const { width, height } = context.canvas, { sx, sy } = all
@@ -118,6 +120,20 @@ const paintStamped = (view, paintEach, context, indices, data) => {
   return true
 }
 
+// Lay out the plots of a figure once for all changes that arrive together.
+const layOutOnce = plot => {
+  const layOut = plot.invalidate_layout, waiting = new Set()
+  plot.invalidate_layout = function () {
+    const figure = this.parent ?? this
+    if (waiting.has(figure)) return
+    waiting.add(figure)
+    queueMicrotask(() => {
+      waiting.delete(figure)
+      if (this.el.isConnected) layOut.call(this)
+    })
+  }
+}
+
 export function render() {
   const view = Bokeh.Models.get("Scatter").prototype.default_view.prototype
   // The page has one BokehJS, also where several dashboards are parts of it.
@@ -133,4 +149,5 @@ export function render() {
   Bokeh.require("core/visuals/visual").VisualProperties.prototype._get_css_value = () => ""
   const plot = Bokeh.Models.get("Plot").prototype.default_view.prototype
   Object.defineProperty(plot, "base_font_size", { get: () => 13 })
+  layOutOnce(plot)
 }

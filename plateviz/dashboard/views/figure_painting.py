@@ -12,6 +12,7 @@ class FigurePainting(pn.custom.JSComponent):
     Verdict. Here each look of a figure's many marks is drawn once, at 16 places within a pixel, and
     copied to where the marks are. BokehJS also asks the style sheets for colours and sizes of words
     and lines, for which the browser computes the styles of the page anew; figures have their own.
+    And it lays out a plot again for each property that changes; here, once for those of a message.
     """
 
     _esm = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")

@@ -126,7 +126,7 @@ class PointActions:
         if not is_chosen_among or not glyphs.renderer.visible:
             return ()
         column = selected_column(glyphs) or ""
-        ids, rows = glyphs.source.data[column], set(glyphs.source.selected.indices)
+        ids, rows = glyphs.keys[column], set(glyphs.source.selected.indices)
         before = _rows(glyphs, self._selected)
         if before <= rows:
             # Rows are added to those that stand out, some of which may do so for another reason:
@@ -201,17 +201,16 @@ class _FrameTools:
 
 def selected_column(glyphs: BokehGlyphs) -> str | None:
     """Return the column by which rows are selected; None if they are not."""
-    return next((column for column in SELECTED_BY if column in glyphs.source.data), None)
+    return next(iter(glyphs.keys), None)
 
 
 def _rows(glyphs: BokehGlyphs, selected: SelectedIds) -> set[int]:
     """Return the rows of any selected source, exposure or detector."""
-    data = glyphs.source.data
     return {
         row
         for column, ids in selected.items()
-        if column in data and ids
-        for row, one in enumerate(data[column])
+        if column in glyphs.keys and ids
+        for row, one in enumerate(glyphs.keys[column])
         if str(one) in ids
     }
 

@@ -208,7 +208,8 @@ def test_next_selection_in_a_map_of_arrows_replaces_the_first():
     tails.selected.indices = [0]
     view.show_selected({"id": frozenset({"7"})})
     view.draw()
-    # The shaft and both strokes of the head.
+    # The shaft and both strokes of the head, whose ids are not sent to the browser.
+    assert "id" not in shafts.data
     assert shafts.selected.indices == [0, 2, 3]
     tails.selected.indices = [1]
     assert chosen == [frozenset({7}), frozenset({8})]

@@ -29,6 +29,19 @@ _BOTH = """() => {
   return [sum(together), sum(alone), sum(differences), differences.some(one => one > 0)];
 }"""
 
+# How often the page is laid out at once, and within a picture, when it is asked for ten times.
+LAYOUTS_OF_TEN = """async () => {
+  const [page] = Bokeh.index
+  const now = page.compute_layout_now
+  let times = 0
+  page.compute_layout_now = () => { times++; now.call(page) }
+  for (let i = 0; i < 10; i++) page.invalidate_layout()
+  const atOnce = times
+  await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))
+  delete page.compute_layout_now
+  return [atOnce, times]
+}"""
+
 
 def require_marks_where_they_are(page):
     """Fail if marks that are painted together cover other pixels than each of them alone."""

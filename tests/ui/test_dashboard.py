@@ -30,7 +30,7 @@ from tests.ui.conftest import (
     turn_to_workspace,
     until,
 )
-from tests.ui.painted import require_marks_where_they_are
+from tests.ui.painted import LAYOUTS_OF_TEN, require_marks_where_they_are
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -93,19 +93,6 @@ def chi2(page):
 
 def shown(page):
     return page.locator(".solution").first
-
-
-LAYOUTS_OF_TEN = """async () => {
-  const [page] = Bokeh.index
-  const now = page.compute_layout_now
-  let times = 0
-  page.compute_layout_now = () => { times++; now.call(page) }
-  for (let i = 0; i < 10; i++) page.invalidate_layout()
-  const atOnce = times
-  await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))
-  delete page.compute_layout_now
-  return [atOnce, times]
-}"""
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 from plateviz.runs.column_cache import ColumnCache
+from plateviz.runs.kept_selections import KeptSelections
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.queries import SurveyRun, survey_runs
@@ -42,6 +43,7 @@ class SolutionStore:
     instrument : that took them
     simulation : settings with which they were simulated; None for others
     kept : solutions that people have kept on disk
+    selections : selections that people have kept on disk
     made : which solutions each browser session has made
     columns : the columns of runs that were read last
     background : runs what takes a while, for all sessions
@@ -54,6 +56,7 @@ class SolutionStore:
         self.instrument: Instrument = origin.read_instrument()
         self.simulation = origin.read_simulation()
         self.kept = KeptSolutions(origin.solutions)
+        self.selections = KeptSelections(origin.solutions)
         self.made = MadeSolutions()
         self._solver = solver
         self._lock = threading.Lock()

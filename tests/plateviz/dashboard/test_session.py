@@ -1,6 +1,7 @@
 """Session: its rules, with a fake store whose jobs are ended by the test."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -37,6 +38,7 @@ class FakeStore:
         self.left = []
         self.is_shared = False
         self.made, self.kept = MadeSolutions(), KeptSolutions(Path("nowhere"))
+        self.selections = SimpleNamespace(all=dict, keep=lambda *_: None, forget=lambda *_: None)
 
     def request(self, orbit, settings, what_if=False):
         self.requested.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))

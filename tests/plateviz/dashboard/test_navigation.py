@@ -33,7 +33,7 @@ class FakeRun:
         self._result = replace(result, settings=self._settings)
         self.survey = Path("sky")
         self.n_fitted = 2 if is_complete else 1
-        self.read = []
+        self.read, self.expected = [], []
         self.also_written = {}
 
     def header(self):
@@ -49,6 +49,9 @@ class FakeRun:
     def result(self, orbit):
         self.read.append(orbit)
         return self._result
+
+    def expect(self, orbit):
+        self.expected.append(orbit)
 
     def history(self, source_id):
         rows = self._survey.history
@@ -276,6 +279,15 @@ def test_files_and_a_survey_that_was_not_fitted_have_no_runs(tmp_path, made_surv
         for origin in (OrbitFiles("o.fits", "r.fits"), SurveyFolder(str(Path(made_survey))))
     }
     assert list(runs.values()) == [[], []]
+
+
+def test_next_orbit_of_the_run_is_expected_once(navigation, run):
+    navigation.expect_orbit()
+    assert run.expected == []
+    navigation.begin({"view": "orbit", "orbit": "0"})
+    navigation.expect_orbit()
+    navigation.expect_orbit()
+    assert run.expected == [1]
 
 
 def test_run_that_is_still_being_fitted_begins_with_the_orbit(survey, fit_result):

@@ -26,12 +26,13 @@ class SharedCovariances(NamedTuple):
     Attributes
     ----------
     source : elements of each source's covariance
-    terms : of the distortion coefficients
+    terms : of the displacement's elements, coefficients of the products of two distortion terms,
+        each product once: zero below the diagonal
     source_terms : between the coefficients of x and y and the two offsets of each source
     """
 
     source: Float[AnyArray, "3 src"]
-    terms: Float[AnyArray, "2 coef 2 coef"]
+    terms: Float[AnyArray, "3 coef coef"]
     source_terms: Float[AnyArray, "2 2 coef src"]
 
 
@@ -80,8 +81,8 @@ def _of_displacement(
 ) -> _OfDisplacement:
     count = range(len(basis))
     own = [
-        sum(basis[k] * sum(shared.terms[i, k, j, m] * basis[m] for m in count) for k in count)
-        for i, j in _ELEMENTS
+        sum(basis[k] * sum(of[k, m] * basis[m] for m in count[k:]) for k in count)
+        for of in shared.terms
     ]
     with_source = [
         [sum(shared.source_terms[i, a, k][source] * basis[k] for k in count) for a in range(2)]
@@ -92,10 +93,10 @@ def _of_displacement(
 
 @jax.jit
 def _half(chunk: Linearised, tiles: TileCovariances) -> list[Pair]:
-    """Return, for each local parameter, its covariance with half the prediction.
+    """Return, for each local parameter, its covariance with a part of the prediction.
 
-    Half, because its products with the derivatives by the local parameters are added to their
-    transposes, and those of the local parameters among themselves would count twice.
+    Products with the derivatives by the local parameters are added to their transposes. So of the
+    local parameters each pair is counted once, and each alone by half.
     """
     terms = jnp.stack(chunk.prediction.basis, axis=1)
     n_tiles, n_local, _, n_coef = tiles.terms.shape
@@ -103,13 +104,14 @@ def _half(chunk: Linearised, tiles: TileCovariances) -> list[Pair]:
     by_displacement = by_displacement.reshape(n_tiles, n_local, 2, -1)
 
     def half(i: int, axis: int) -> _Slots:
-        of_local = (tiles.local[:, i, j, None] * by[axis] for j, by in enumerate(chunk.local))
+        later = range(i + 1, n_local)
+        of_local = sum(tiles.local[:, i, j, None] * chunk.local[j][axis] for j in later)
         others = sum(
             by_displacement[:, i, k] * chunk.displacement[k][axis]
             + tiles.source[:, i, k] * chunk.source[k][axis]
             for k in range(2)
         )
-        return 0.5 * sum(of_local) + others
+        return 0.5 * tiles.local[:, i, i, None] * chunk.local[i][axis] + of_local + others
 
     return [(half(i, 0), half(i, 1)) for i in range(n_local)]
 

@@ -140,9 +140,15 @@ def _shared_covariances(problem: Problem, covariance: Covariances) -> SharedCova
     terms = covariance.theta[shared, shared].reshape(2, n_coef, 2, n_coef)
     return SharedCovariances(
         pad(source, "src", sizes).T,
-        _with_zeros(terms, (2, sizes["coef"], 2, sizes["coef"])),
+        _with_zeros(_of_products(terms), (3, sizes["coef"], sizes["coef"])),
         _with_zeros(with_source, (2, 2, sizes["coef"], sizes["src"])),
     )
+
+
+def _of_products(terms: Float[np.ndarray, "2 coef 2 coef"]) -> Float[np.ndarray, "3 coef coef"]:
+    """Return the coefficients of the products of two terms, each once, in xx, xy and yy."""
+    blocks = np.stack([terms[0, :, 0], terms[0, :, 1], terms[1, :, 1]])
+    return np.triu(blocks) + np.triu(blocks.swapaxes(1, 2), 1)
 
 
 def _tile_covariances(

@@ -154,7 +154,7 @@ def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.Dat
         "prior_share": priors.hessian_diagonal(theta) * marginal,
     }
     pointing = _pointing(problem, theta)
-    frames = []
+    of_groups = []
     for group in CALIBRATION_GROUPS:
         columns = problem.layout.columns(group)
         centre = priors.centre[columns] / group.per_value_unit
@@ -169,8 +169,11 @@ def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.Dat
             "unit": np.full(len(columns), group.unit),
             **{name: values[columns] for name, values in by_column.items()},
         }
-        frames.append(_frame(values_by_name, CALIBRATION))
-    return pd.concat(frames, ignore_index=True)
+        of_groups.append(values_by_name)
+    columns = {
+        name: np.concatenate([values[name] for values in of_groups]) for name in CALIBRATION.names
+    }
+    return _frame(columns, CALIBRATION)
 
 
 def trace_table(mode: Mode) -> pd.DataFrame:
@@ -190,10 +193,11 @@ def true_places(solution: SolvedProblem, truth: pd.DataFrame | None) -> pd.DataF
     if truth is None:
         return None
     problem = solution.problem
-    known = problem.sources["source_id"].isin(truth["source_id"]).to_numpy()
-    ids = problem.sources["source_id"].to_numpy()[known]
+    # The truth has all stars of the sky, far more than there are sources.
+    rows = truth[truth["source_id"].isin(problem.sources["source_id"])].sort_values("source_id")
+    ids = rows["source_id"].to_numpy()
+    known = np.isin(problem.sources["source_id"].to_numpy(), ids)
     observer = observer_at(np.array([problem.epoch])).position[0]
-    rows = truth.set_index("source_id").loc[ids].reset_index()
     direction = frames_at(rows, problem.epoch, observer)[:, 0]
     ra, dec = sky_position(direction)
     error = np.zeros((problem.n_src, 2))

@@ -94,6 +94,19 @@ def shown(page):
     return page.locator(".solution").first
 
 
+LAYOUTS_OF_TEN = """async () => {
+  const [page] = Bokeh.index
+  const now = page.compute_layout_now
+  let times = 0
+  page.compute_layout_now = () => { times++; now.call(page) }
+  for (let i = 0; i < 10; i++) page.invalidate_layout()
+  const atOnce = times
+  await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))
+  delete page.compute_layout_now
+  return [atOnce, times]
+}"""
+
+
 def require_room(page, workspace):
     """Fail if a card of a workspace is beside the screen, or by more than the strip below it."""
     cards = page.locator(".card:visible")
@@ -149,6 +162,8 @@ def test_what_is_drawn_keeps_its_layout(walked):
         see(walked, name)
     assert rests(walked)
     assert metric("LayoutCount") - before < 200
+    # What asks for a layout meanwhile is laid out with the page, once for a picture.
+    assert walked.evaluate(LAYOUTS_OF_TEN) == [0, 1]
 
 
 def test_a_figure_is_explained_and_opens_as_large_as_the_window(walked):

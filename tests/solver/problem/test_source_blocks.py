@@ -80,19 +80,6 @@ def test_rare_sets_of_fields_share_a_block(index, monkeypatch):
     assert len(blocks.blocks) == 3 < MAX_BLOCKS
 
 
-def test_columns_of_the_blocks_of_a_chain_come_last(index):
-    blocks = source_blocks_of(index)
-    chains = blocks.chains()
-    assert sorted(number for chain in chains for number in chain) == [*range(len(blocks.blocks))]
-    assert len(chains) < len(blocks.blocks)
-    for chain in chains:
-        order = blocks.last(chain, LAYOUT.size)
-        np.testing.assert_array_equal(np.sort(order), np.arange(LAYOUT.size))
-        for number in chain:
-            columns = blocks.blocks[number].columns
-            assert {*order[-len(columns) :].tolist()} == {*columns.tolist()}
-
-
 def test_problem_without_measurements_has_one_block():
     nothing = np.zeros(0, dtype=np.int64)
     (block,) = source_blocks_of(Index(*3 * [nothing])).blocks

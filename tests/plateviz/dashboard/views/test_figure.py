@@ -4,16 +4,19 @@ import time
 
 import numpy as np
 import pandas as pd
+import panel as pn
 import pytest
 from bokeh.events import RangesUpdate, Reset, SelectionGeometry
 
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.point_actions import PointActions
+from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures import glyphs
 from plateviz.figures.figure import Axis, Ramp, framed
 from plateviz.figures.glyphs import points
 from plateviz.plots.arrows import Field, arrows
+from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.gallery import diagnostics
 
 
@@ -62,6 +65,22 @@ def test_figure_is_due_only_near_the_screen(view):
     assert view.is_due
     view.draw()
     assert not view.is_due
+
+
+def test_card_is_as_high_as_its_figure_needs(view):
+    assert view.__panel__().styles["min-height"] == "290px"
+    (high,) = [one for one in diagnostics() if one.name == "eigenmode-groups"]
+    card = FigureView(high, lambda: None).__panel__()
+    assert card.styles["min-height"] == f"{high.least_height}px"
+    assert high.least_height > 290
+
+
+def test_parts_of_a_workspace_stand_above_and_below_its_cards(view):
+    grid, first, last = FigureGrid([view], lambda *_: None), pn.Spacer(), pn.Spacer()
+    box = workspace(grid, first, below=[last])
+    assert [part for part in box if part in (first, last)] == [first, last]
+    assert box[1] is grid.__panel__() or grid.__panel__() in list(box[1])
+    assert box.sx["gridTemplateRows"] == "auto minmax(0, 1fr) auto"
 
 
 def test_grid_begins_with_the_rooms_that_an_earlier_page_had(view, monkeypatch):
@@ -225,10 +244,54 @@ def test_points_without_sources_select_exposures_or_detectors():
     _, source, chosen = selecting(measurements(), [("exposure", "@{exposure}")])
     source.selected.indices = [0, 1]
     assert chosen == [("exposures", frozenset({(0, 3), (0, 4)}))]
+    # A point of an exposure on a detector is one of the exposure.
     hover = [("exposure", "@{exposure}"), ("detector", "@{detector_id}")]
+    _, source, chosen = selecting(measurements(detector_id=[2, 2, 1]), hover)
+    source.selected.indices = [0]
+    assert chosen == [("exposures", frozenset({(0, 3)}))]
+    hover = [("detector", "@{detector_id}")]
     _, source, chosen = selecting(measurements(detector_id=[2, 2, 1]), hover)
     source.selected.indices = [0, 1]
     assert chosen == [("detectors", frozenset({2}))]
+
+
+def test_tap_on_an_outline_of_the_footprint_selects_the_detector(fit_result, instrument):
+    footprint = diagnostics()[0]
+    chosen = []
+    actions = PointActions(
+        select=lambda items: chosen.append(("sources", items)),
+        select_detectors=lambda items: chosen.append(("detectors", items)),
+    )
+    figure = footprint.plot(Chosen(fit_result, instrument))
+    view = FigureView(footprint, lambda: figure, actions=actions)
+    come_near(view)
+    view.draw()
+    named = {one.name: one for one in plot(view).renderers}
+    handles, outlines, sources = (named[name] for name in ("handles", "outlines", "sources"))
+    by_type = {type(tool).__name__: tool for tool in plot(view).tools}
+    assert by_type["TapTool"].renderers == [handles, sources]
+    # A box among the sources leaves the detectors.
+    assert by_type["BoxSelectTool"].renderers == [sources]
+    ids = outlines.data_source.data["detector_id"]
+    (second,) = {d.detector_id for d in instrument.detectors[1:2]}
+    handles.data_source.selected.indices = [list(ids).index(second)]
+    # The same tap has hit a star below the line, which it was not meant for.
+    sources.data_source.selected.indices = [3]
+    assert chosen == [("detectors", frozenset({second}))]
+    assert sources.data_source.selected.indices == []
+    view.show_selected({"detector_id": frozenset({str(second)})})
+    view.draw()
+    # It stands out in every field; what is tapped is never seen.
+    assert outlines.data_source.selected.indices == np.flatnonzero(ids == second).tolist()
+    assert len(outlines.data_source.selected.indices) == 4
+    assert outlines.nonselection_glyph is not None
+    assert handles.nonselection_glyph is None
+    assert sources.data_source.selected.indices == []
+    handles.data_source.selected.indices = []
+    assert chosen[1:] == [("detectors", frozenset())]
+    actions._outline_until = 0.0
+    sources.data_source.selected.indices = [3]
+    assert [kind for kind, _ in chosen] == ["detectors", "detectors", "sources"]
 
 
 def test_measurement_stands_out_for_its_source_exposure_or_detector():

@@ -222,6 +222,7 @@ ORBITS: Mapping[str, Pair] = {
         lambda: _chosen(_fitted(order=2), plates=_FIELDS),
     ),
     "mean-residual-map": (_good_chosen, lambda: _chosen(_fitted(_measured(_displaced_columns)))),
+    "solution-tests": (_good_chosen, lambda: _chosen(_fitted(_measured(_drifting_detector)))),
     "residual-scatter": (
         lambda: _chosen(_good(), detector=1),
         lambda: _chosen(_fitted(_measured(_moved_detector)), detector=1),

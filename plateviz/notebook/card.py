@@ -36,6 +36,7 @@ def summary_line(title: str, subtitle: str, verdict: Verdict | None) -> str:
 def _verdict(verdict: Verdict | None) -> str:
     if verdict is None:
         return ""
-    notable = "".join(f"<li>{escape(text)}</li>" for text in verdict.notable)
+    sentences = [*(cause.sentence() for cause in verdict.causes), *verdict.notable]
+    notable = "".join(f"<li>{escape(text)}</li>" for text in sentences)
     notable = f"<ul>{notable}</ul>" if notable else ""
     return f"<p class='verdict {verdict.state}'>{escape(verdict.headline)}</p>{notable}"

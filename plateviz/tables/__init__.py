@@ -54,6 +54,7 @@ from plateviz.tables.selected_sources import selected_sources
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
 from plateviz.tables.solution_changes import solution_changes
+from plateviz.tables.solution_tests import solution_tests
 from plateviz.tables.source_profile import (
     motion_table,
     source_class,
@@ -143,6 +144,7 @@ __all__ = [
     "sky_distribution",
     "sky_track",
     "solution_changes",
+    "solution_tests",
     "source_class",
     "source_curves",
     "source_list",

@@ -8,18 +8,28 @@ import numpy as np
 import pandas as pd
 from scipy.special import chdtrc
 
+from plateviz.tables.causes import Cause, causes_in_words
 from plateviz.tables.labels import id_strings
+from plateviz.tables.outliers import outlier_sentences
 from plateviz.tables.pulls import exposure_chi2
 from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
+from plateviz.tables.tests_in_words import TestInWords, tests_in_words
 from solver.data.result import FitResult
+from solver.results.diagnosis.causes import find_causes
+from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Diagnosis, Test, diagnose
 
 # Probability that a good orbit has any exposure, or any source, reported as far off.
 _BY_CHANCE = 0.01
 # Tail probabilities of a single chi2: three and four sigmas of a normal, one-sided.
 _UNLIKELY, _FAR_OFF = 1.35e-3, 3.2e-5
 _MOST_NAMED, _MOST_ORBITS = 3, 20
+_UNSEEN = (
+    "No test of one orbit shows smooth errors of the reference catalogue: those that shift, turn "
+    "or stretch the field, or are quadratic in it, are taken for pointing and distortion and move "
+    "the positions by as much as they are large. Only orbits at other position angles show them."
+)
 _HEADLINES: dict[State, str] = {
     "good": "This solution can be trusted.",
     "warn": "This solution can be used with care.",
@@ -37,6 +47,8 @@ class Verdict(NamedTuple):
     reasons : sentences that give the reasons
     notable : sentences on what stands out; may be empty
     faults : what speaks against the solution of an orbit, in short sentences
+    causes : the likely causes of what is wrong with it, the most likely first
+    tests : all tests of it
     """
 
     state: State
@@ -44,22 +56,72 @@ class Verdict(NamedTuple):
     reasons: list[str]
     notable: list[str]
     faults: Sequence[str] = ()
+    causes: Sequence[Cause] = ()
+    tests: Sequence[TestInWords] = ()
 
 
 def with_verdict(result: FitResult) -> FitResult:
     """Return a result whose summary has the verdict on it, for the files and the command line."""
-    verdict = orbit_verdict(result)
-    return replace(result, summary={**result.summary, "verdict": verdict._asdict()})
+    verdict = _judge(result)
+    plain = {
+        **verdict._asdict(),
+        "causes": [one._asdict() for one in verdict.causes],
+        "tests": [one._asdict() for one in verdict.tests],
+    }
+    return replace(result, summary={**result.summary, "verdict": plain})
 
 
 def orbit_verdict(result: FitResult) -> Verdict:
-    """Return the verdict on one fitted orbit, by the same rules as `summary_strip`."""
+    """Return the verdict on one fitted orbit; that of the result itself, if it has one."""
+    stored = result.summary.get("verdict")
+    # Those of older versions lack the tests.
+    if stored is None or set(stored) != set(Verdict._fields):
+        return _judge(result)
+    causes = [Cause(**{**one, "options": tuple(one["options"])}) for one in stored["causes"]]
+    tests = [TestInWords(**one) for one in stored["tests"]]
+    return Verdict(**{**stored, "causes": causes, "tests": tests})
+
+
+def _judge(result: FitResult) -> Verdict:
+    """Return the verdict on one fitted orbit, by its tests.
+
+    All tests together alarm in `CARE_RATE` of good solutions. The solution should not be trusted
+    if the alarm is also one of `BAD_RATE`, and a cause spoils much.
+    """
+    diagnosis = diagnose(result)
+    found, certain = diagnosis.found(CARE_RATE), diagnosis.found(BAD_RATE)
+    converged = bool(result.summary["converged"])
+    has_causes = found or not converged
+    causes = causes_in_words(result, diagnosis, find_causes(diagnosis)) if has_causes else []
+    state: State = "warn" if found else "good"
+    is_large = any(cause.is_large for cause in causes)
+    if not converged or (certain and is_large):
+        state = "bad"
+    headline = _HEADLINES[state]
+    if causes:
+        headline = f"{headline[:-1]}: {causes[0].title}."
     items = summary_strip(result)
-    state = worst(item.state for item in items)
-    reasons = [_converged(result), *map(_sentence, _judged(items)), _common_error(result)]
-    faults = [] if items[0].state == "good" else [_converged(result)]
-    faults += [_judgement(item) for item in _judged(items) if item.state != "good"]
-    return Verdict(state, _HEADLINES[state], reasons, _notable(result), faults)
+    reasons = [_converged(result), *(cause.sentence() for cause in causes)]
+    reasons += [_tested(diagnosis, found), *map(_sentence, _judged(items))]
+    reasons += [_common_error(result), _UNSEEN]
+    faults = [] if converged else [_converged(result)]
+    faults += [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
+    if found and not causes:
+        faults.append(_tested(diagnosis, found))
+    tests = tests_in_words(diagnosis)
+    return Verdict(state, headline, reasons, _notable(result), faults, causes, tests)
+
+
+def _tested(diagnosis: Diagnosis, found: Sequence[Test]) -> str:
+    total = len(diagnosis.tests)
+    chance = f"in {100 * CARE_RATE:.0f} % of good solutions any of them would"
+    if not found:
+        return f"None of {total} tests finds anything that chance does not explain; {chance}."
+    named = ", ".join(dict.fromkeys(one.name for one in found[:_MOST_NAMED]))
+    return (
+        f"{len(found)} of {total} tests find what chance does not explain, among them: {named}; "
+        f"{chance}."
+    )
 
 
 def _judged(items: list[SummaryItem]) -> list[SummaryItem]:
@@ -193,7 +255,7 @@ def _notable(result: FitResult) -> list[str]:
     return [
         *_far_exposures(result),
         *_far_sources(result),
-        *_outliers(result),
+        *outlier_sentences(result),
         *_unknown_truth(result),
     ]
 
@@ -226,12 +288,6 @@ def _far_sources(result: FitResult) -> list[str]:
         for name, row in zip(worst_ids, far.head(_MOST_NAMED).itertuples(), strict=True)
     )
     return [f"Sources that scatter by more than their errors: {len(far):,}. {named}."]
-
-
-def _outliers(result: FitResult) -> list[str]:
-    if result.outliers is None or result.outliers.empty:
-        return []
-    return [f"Measurements removed as outliers: {len(result.outliers):,}."]
 
 
 def _unknown_truth(result: FitResult) -> list[str]:

@@ -41,8 +41,8 @@ _MAKES_PATTERNS = ("swing", "outliers", "stretch", "shear", "quadratic", "refere
 # A cause of another kind is named beside the first one from this share of its sigmas.
 _OF_ITS_OWN = 0.5
 _REFERENCE_LIMIT = 0.01
-# Median of a chi2 with two degrees of freedom.
-_MEDIAN_CHI2 = 1.3863
+# Median of a chi2 with two degrees of freedom, and how much larger it is if all stars are wrong.
+_MEDIAN_CHI2, _ALL_WRONG = 1.3863, 3.0
 
 
 class Found(NamedTuple):
@@ -202,7 +202,7 @@ def _of_references(diagnosis: Diagnosis) -> list[Found]:
     # Wrong stars pull the frame, and so all others; only those that are far beyond are wrong.
     typical = max(float(np.median(chi2)) / _MEDIAN_CHI2, 1.0)
     far = chi2 / typical > chdtri(2.0, -np.expm1(np.log1p(-_REFERENCE_LIMIT) / len(chi2)))
-    if not far.any():
+    if not far.any() or typical > _ALL_WRONG:
         return [Found(worst._replace(subject="references"), size=float(np.sqrt(typical)))]
     order = np.argsort(-chi2[far])
     named = tuple(int(one) for one in ids[far][order])

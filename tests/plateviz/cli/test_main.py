@@ -32,7 +32,7 @@ def test_fit_prints_a_summary_as_text(run, sample, tmp_path):
     code, out, err = run("fit", *sample[:2], "-o", tmp_path / "r.fits", "--order", "3")
     assert code == 3
     assert "should not be trusted as it is; it is written, and --accept" in err
-    assert "This solution should not be trusted as it is." in out
+    assert "This solution should not be trusted as it is: " in out
     assert "- χ² per degree of freedom: " in out
     assert "converged: every step" in out
     assert "gauss-newton, " in out

@@ -1,5 +1,6 @@
 """Verdicts on solutions with a known flaw."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,16 @@ import pandas as pd
 import pytest
 from scipy.special import chdtri
 
-from plateviz.tables.verdict import orbit_verdict, run_verdict, source_verdict, worst
+from plateviz.tables import verdict
+from plateviz.tables.outliers import swapped
+from plateviz.tables.verdict import (
+    orbit_verdict,
+    run_verdict,
+    source_verdict,
+    with_verdict,
+    worst,
+)
+from solver.results.diagnosis.table import diagnose
 
 
 def with_summary(result, **values):
@@ -27,11 +37,75 @@ def test_worst_state_decides(states, expected):
     assert worst(states) == expected
 
 
-def test_good_solution_can_be_trusted(fit_result):
-    sound = with_summary(fit_result, chi2_per_dof=1.0)
-    verdict = orbit_verdict(sound)
-    assert verdict.state in ("good", "warn")
-    assert verdict.reasons[0].startswith("The fit converged after")
+def with_chances(monkeypatch, fit_result, **chances):
+    """Let the tests of a result have these logarithms of their chance by subject, else one half."""
+    found = diagnose(fit_result)
+    tests = [
+        one._replace(
+            log_chance=chances.get(one.subject, -0.7), sigma=8.0 * (one.subject in chances)
+        )
+        for one in found.tests
+    ]
+    monkeypatch.setattr(verdict, "diagnose", lambda _: found._replace(tests=tuple(tests)))
+
+
+def test_good_solution_can_be_trusted(monkeypatch, fit_result):
+    with_chances(monkeypatch, fit_result)
+    judged = orbit_verdict(fit_result)
+    assert judged.state == "good"
+    assert judged.headline == "This solution can be trusted."
+    assert judged.reasons[0].startswith("The fit converged after")
+    assert judged.reasons[1].startswith(f"None of {len(judged.tests)} tests finds anything")
+    assert not judged.causes
+    assert not judged.faults
+
+
+def test_solution_with_a_flaw_names_its_cause_first(monkeypatch, fit_result):
+    with_chances(monkeypatch, fit_result, stretch=-40.0)
+    judged = orbit_verdict(fit_result)
+    assert judged.state in ("warn", "bad")
+    assert judged.causes
+    assert judged.headline.endswith(f": {judged.causes[0].title}.")
+    assert "What to do: " in judged.reasons[1]
+    assert judged.faults[0].startswith(judged.causes[0].title)
+
+
+def test_fit_that_does_not_converge_says_what_helps(fit_result):
+    residuals = fit_result.residuals.copy()
+    residuals[["residual_x", "residual_y"]] *= 100.0
+    stuck = replace(with_summary(fit_result, converged=False, reason="stuck"), residuals=residuals)
+    judged = orbit_verdict(stuck)
+    assert judged.state == "bad"
+    assert [cause.name for cause in judged.causes] == ["wild-measurements"]
+    assert judged.causes[0].options == ("--robust",)
+    robust = replace(stuck, settings=stuck.settings.with_(robust=True))
+    assert [cause.name for cause in orbit_verdict(robust).causes] == ["not-converged"]
+
+
+def test_outliers_with_each_others_identification_are_counted(fit_result):
+    rows = fit_result.residuals.head(4).assign(field_id=0, plate_id=0, detector_id=0)
+    at, places = rows[["model_x", "model_y"]].to_numpy(), [1, 0, 2, 3]
+    measured = at[places] + [[0.0, 0.0], [0.0, 0.0], [0.3, 0.0], [0.0, -0.4]]
+    residual = measured - at
+    outliers = rows.assign(
+        nx=measured[:, 0],
+        ny=measured[:, 1],
+        residual_x=residual[:, 0],
+        residual_y=residual[:, 1],
+        distance=np.hypot(*residual.T) / 0.01,
+    )
+    assert swapped(outliers).tolist() == [True, True, False, False]
+    notable = orbit_verdict(replace(fit_result, outliers=outliers)).notable
+    assert any("outliers: 4. 2 of them have each other's" in sentence for sentence in notable)
+
+
+def test_verdict_of_a_result_is_read_again(fit_result):
+    judged = with_verdict(fit_result)
+    stored = json.loads(json.dumps(judged.summary))
+    read = orbit_verdict(replace(judged, summary=stored))
+    assert read == orbit_verdict(fit_result)
+    assert read.causes
+    assert isinstance(read.causes[0].sentence(), str)
 
 
 def test_solution_that_has_not_converged_is_not_trusted(fit_result):

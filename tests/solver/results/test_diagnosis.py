@@ -74,7 +74,7 @@ def test_covariance_of_patterns_is_that_of_the_whole_problem(small_orbit, proble
     found, expected = (one / np.outer(scale, scale) for one in (left, exact))
     # Cells at the edge hold a few measurements, whose uncertainties along x and y differ.
     np.testing.assert_allclose(found, expected, atol=0.1)
-    assert np.diag(found).mean() == pytest.approx(np.diag(expected).mean(), rel=0.02)
+    assert np.diag(found).mean() == pytest.approx(np.diag(expected).mean(), rel=0.05)
 
 
 def test_good_solution_has_no_cause(clean):

@@ -1,0 +1,84 @@
+"""Figure of the tests of a solution, with what chance makes of as many."""
+
+import pandas as pd
+
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message
+from plateviz.figures.glyphs import points, rectangles, vertical
+from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.workspace import OrbitWorkspace
+from plateviz.tables.chance import largest_by_chance
+from plateviz.tables.solution_tests import solution_tests
+
+_TITLE = "Tests of the solution"
+_XLABEL, _YLABEL = "significance (σ)", "test (the most significant)"
+_HOVER = [
+    ("test", "@{name}"),
+    ("significance", "@{sigma}{0.0} σ"),
+    ("statistic", "@{statistic}{0.000} (expected @{expected}{0.000} ± @{scatter}{0.000})"),
+    ("rms of the pattern", "@{size_nm}{0.0} nm"),
+]
+_ROW_HEIGHT = 22
+_LEAST_RANGE = 6.0
+
+
+def plot_solution_tests(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
+    """Draw the significance of each test, and the largest that chance makes in 99 of 100 orbits.
+
+    Parameters
+    ----------
+    table : `tables.solution_tests`
+    width : of the frame, screen pixels
+    """
+    if table.empty:
+        return message(_TITLE, "No tests", width=width, xlabel=_XLABEL, ylabel=_YLABEL)
+    total = int(table["total"].iloc[0])
+    limit, count = largest_by_chance(total), int(table["is_found"].sum())
+    most = max(1.08 * float(table["sigma"].max()), _LEAST_RANGE)
+    low, high = len(table) - 0.4, -0.6
+    band = {"left": [0.0], "right": [limit], "bottom": [high], "top": [low]}
+    shown = {
+        name: points(
+            table[table["is_found"] == is_found],
+            "sigma",
+            "row",
+            name=name,
+            color=colour,
+            size=9,
+            hover=_HOVER,
+        )
+        for name, is_found, colour in (("by chance", False, "muted"), ("found", True, "mark"))
+    }
+    ticks = [(float(row), name) for row, name in zip(table["row"], table["name"], strict=True)]
+    return framed(
+        [
+            rectangles(band, name="chance", color="band"),
+            vertical(limit, name="limit"),
+            *shown.values(),
+        ],
+        title=_TITLE,
+        subtitle=f"{count} of {total} find more than chance; band: the largest of all by chance, "
+        f"{limit:.1f} σ",
+        x=Axis(_XLABEL, (0.0, most)),
+        y=Axis(_YLABEL, (low, high), ticks=ticks),
+        width=width,
+        height=_ROW_HEIGHT * len(table) + 8,
+    )
+
+
+def _plot(chosen: Chosen) -> Figure:
+    return plot_solution_tests(solution_tests(chosen.result))
+
+
+DIAGNOSTICS = (
+    Diagnostic(
+        "solution-tests",
+        _TITLE,
+        "The tests that the verdict rests on: patterns of the residuals on the focal plane and in "
+        "time, their size, and the reference stars. Good: all within the band. A pattern overlaps "
+        "with others; the one furthest off is the likely cause, and the verdict names it.",
+        OrbitWorkspace.PATTERNS,
+        27,
+        _plot,
+        equation="σ of a normal value with the same probability by chance",
+    ),
+)

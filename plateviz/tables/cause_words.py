@@ -1,0 +1,290 @@
+"""What is said of each kind of cause: its name, the evidence, and what to do."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.labels import id_strings
+from solver.data.result import FitResult
+from solver.results.diagnosis.causes import Causes, Found
+from solver.results.diagnosis.table import Diagnosis
+
+_NM_PER_UM = 1000.0
+_MOST_NAMED = 8
+_ORDINALS = {2: "second", 3: "third"}
+_HIGHEST_ORDER = 9
+
+
+class Case(NamedTuple):
+    """A cause that was found, and the solution that it was found in."""
+
+    found: Found
+    causes: Causes
+    diagnosis: Diagnosis
+    result: FitResult
+
+
+class Said(NamedTuple):
+    """What is said of a cause; see `Cause`."""
+
+    name: str
+    title: str
+    words: str
+    action: str
+    options: tuple[str, ...] = ()
+
+
+def said_of(case: Case) -> Said:
+    """Return what is said of a cause."""
+    return _WORDS[case.found.test.subject](case)
+
+
+def _size(case: Case) -> str:
+    return f"{_NM_PER_UM * case.found.test.size_um:.3g} nm rms on the focal plane"
+
+
+def _fall(case: Case) -> str:
+    test = case.found.test
+    return f"χ² would fall by {test.statistic:,.0f} with {test.expected:.0f} parameters more"
+
+
+def _degree(case: Case) -> str:
+    return f"terms of the {_ORDINALS[case.found.test.what[0]]} degree"
+
+
+def _drift(case: Case) -> Said:
+    return Said(
+        "distortion-drifts",
+        "the distortion drifts",
+        f"The {_degree(case)} change steadily from the first exposure to the last: "
+        f"{_size(case)}; {_fall(case)}.",
+        "solve the beginning and the end of the orbit apart, by leaving out the other exposures",
+    )
+
+
+def _bend(case: Case) -> Said:
+    return Said(
+        "distortion-oscillates",
+        "the distortion changes to and fro, as with the phase of the orbit about the Earth",
+        f"The {_degree(case)} follow a curve in time: {_size(case)}; {_fall(case)}.",
+        "solve parts of the orbit apart, by leaving out the other exposures",
+    )
+
+
+def _step(case: Case) -> Said:
+    step = case.diagnosis.patterns.times[-case.diagnosis.patterns.n_steps :][
+        case.found.test.what[1]
+    ]
+    first = int(case.result.exposures["field_id"].iloc[int(np.flatnonzero(step > 0.0)[0])])
+    return Said(
+        "distortion-steps",
+        f"the distortion changes at field {first}",
+        f"The {_degree(case)} are not the same before and after: {_size(case)}; {_fall(case)}.",
+        f"solve the fields before field {first} and the others apart",
+    )
+
+
+def _velocity(case: Case) -> Said:
+    return Said(
+        "velocity",
+        "the satellite's velocity is left out",
+        "The residuals have the pattern of an aberration that changes with time: "
+        f"{_size(case)}; {_fall(case)}.",
+        "give the satellite's velocity in the columns satellite_vx, satellite_vy and satellite_vz",
+    )
+
+
+def _order(case: Case) -> Said:
+    order = int(case.result.summary["order"])
+    return Said(
+        "order",
+        "the order of the distortion is too low",
+        f"Terms above degree {order} remain in the residuals, the same in all exposures: "
+        f"{_size(case)}; {_fall(case)}.",
+        "raise the order",
+        (f"--order {min(order + 2, _HIGHEST_ORDER)}",),
+    )
+
+
+def _detector(case: Case) -> str:
+    rows = case.result.calibration
+    labels = rows.loc[rows["group"] == "detector_x", "label"]
+    return str(labels.iloc[case.found.test.what[0]])
+
+
+def _moves(name: str, verb: str) -> Callable[[Case], Said]:
+    def said(case: Case) -> Said:
+        detector = _detector(case)
+        return Said(
+            name,
+            f"{detector} {verb} during the orbit",
+            f"Its residuals change with time, against those of the others: {_size(case)}; "
+            f"{_fall(case)}.",
+            "leave the detector out, or solve the exposures before and after apart",
+            (f"--exclude {detector.replace(' ', '=')}",),
+        )
+
+    return said
+
+
+def _cells(case: Case) -> Said:
+    return Said(
+        "map",
+        "the mean residuals over the detectors have a pattern",
+        f"No other cause explains it: {_size(case)}; {_fall(case)}.",
+        "look at the map of the mean residuals",
+    )
+
+
+def _axis(case: Case) -> str:
+    return "xy"[case.found.test.what[0]]
+
+
+def _phase(case: Case) -> Said:
+    axis = _axis(case)
+    return Said(
+        f"pixel-phase-{axis}",
+        f"measured positions depend on the place within the pixel, along {axis}",
+        f"The residuals follow a wave with the period of a pixel: {_size(case)}; {_fall(case)}.",
+        "correct the centring of the images (its model of the point spread) and measure again",
+    )
+
+
+def _magnitude(case: Case) -> Said:
+    axis = _axis(case)
+    return Said(
+        f"charge-transfer-{axis}",
+        f"faint stars are shifted along {axis} of the detectors, as charge transfer does",
+        f"The shift grows along the axis: {_size(case)}; {_fall(case)}.",
+        "correct the measured positions for charge transfer",
+    )
+
+
+def _noise(case: Case) -> Said:
+    factor = float(np.sqrt(case.found.test.statistic))
+    is_larger = factor > 1.0
+    return Said(
+        "noise",
+        f"the noise is {'larger' if is_larger else 'smaller'} than stated",
+        f"It is {factor:.3f} times the stated uncertainties, in all exposures and sources alike.",
+        f"multiply the uncertainties sx and sy by {factor:.3f}",
+    )
+
+
+def _noise_of(name: str, words: str, action: str) -> Callable[[Case], Said]:
+    def said(case: Case) -> Said:
+        test = case.found.test
+        return Said(
+            name,
+            words,
+            f"χ² scatters by more than chance: {test.statistic:.3g}, expected "
+            f"{test.expected:.3g} ± {test.scatter:.2g}.",
+            action,
+        )
+
+    return said
+
+
+def _outliers(case: Case) -> Said:
+    return Said(
+        "outliers",
+        "some measurements are outliers",
+        f"{int(case.found.size):,} residuals are beyond six sigma; chance makes "
+        f"{case.found.test.expected:.1g}.",
+        "let the fit find and leave them out",
+        ("--robust",),
+    )
+
+
+def _of_each(name: str, words: str) -> Callable[[Case], Said]:
+    def said(case: Case) -> Said:
+        return Said(
+            name,
+            words,
+            f"Each exposure has its own amount; {_fall(case)}.",
+            "the model has no term for it; take its size as an error of the positions",
+        )
+
+    return said
+
+
+def _swing(case: Case) -> Said:
+    rows = case.result.exposures.iloc[list(case.found.items)]
+    pairs = [f"{int(f)}/{int(p)}" for f, p in zip(rows["field_id"], rows["plate_id"], strict=True)]
+    named = ", ".join(pairs[:_MOST_NAMED])
+    return Said(
+        "jitter",
+        f"the pointing jittered in {len(pairs)} exposure{'s' if len(pairs) > 1 else ''}",
+        f"Residuals change along the rows, as the detectors are read (field/exposure {named}).",
+        "leave these exposures out",
+        tuple(f"--exclude exposure={pair}" for pair in pairs),
+    )
+
+
+def _references(case: Case) -> Said:
+    return Said(
+        "reference-errors",
+        "the reference stars are further from the catalogue than it states",
+        f"Typical deviations are {case.found.size:.2f} times what its uncertainties allow.",
+        "widen the prior of the reference stars",
+        (f"--prior sources={max(case.found.size, 1.1):.2f}",),
+    )
+
+
+def _reference(case: Case) -> Said:
+    ids = id_strings(pd.Series(case.found.items, dtype=np.int64))
+    some = len(ids) > 1
+    named = ", ".join(ids[:_MOST_NAMED])
+    return Said(
+        "wrong-references",
+        f"{len(ids)} reference star{'s are' if some else ' is'} not where the catalogue has "
+        f"{'them' if some else 'it'}",
+        f"Without its own catalogue position each is far from it, as binaries are: {named}.",
+        f"leave {'these stars' if some else 'this star'} out",
+        tuple(f"--exclude source={one}" for one in ids),
+    )
+
+
+_WORDS: dict[str, Callable[[Case], Said]] = {
+    "drift": _drift,
+    "bend": _bend,
+    "step": _step,
+    "velocity": _velocity,
+    "order": _order,
+    "shift": _moves("detector-shifts", "shifts"),
+    "turn": _moves("detector-turns", "turns"),
+    "cells": _cells,
+    "map": _cells,
+    "phase": _phase,
+    "magnitude": _magnitude,
+    "noise": _noise,
+    "exposures": _noise_of(
+        "noise-of-exposures",
+        "the noise differs between exposures",
+        "look at χ² of each exposure and leave out the worst, or state their noise",
+    ),
+    "magnitudes": _noise_of(
+        "noise-of-magnitudes",
+        "the noise depends on magnitude otherwise than stated",
+        "state the uncertainties sx and sy as a function of magnitude",
+    ),
+    "detectors": _noise_of(
+        "noise-of-detectors",
+        "the noise differs between detectors",
+        "state the uncertainties sx and sy of each detector",
+    ),
+    "sources": _noise_of(
+        "sources",
+        "some sources scatter by more than their noise",
+        "look at the sources that scatter most; they may be double or wrongly identified",
+    ),
+    "outliers": _outliers,
+    "stretch": _of_each("anisotropy", "focal lengths along x and y differ"),
+    "shear": _of_each("shear", "the axes of the focal plane are not at right angles"),
+    "quadratic": _of_each("distortion-of-exposures", "the distortion changes between exposures"),
+    "swing": _swing,
+    "references": _references,
+    "reference": _reference,
+}

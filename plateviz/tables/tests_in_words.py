@@ -1,0 +1,68 @@
+"""The tests of a solution as a table in words."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.results.diagnosis.rate import discoveries
+from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test
+
+_NM_PER_UM = 1000.0
+_DEGREES = ("drift", "bend", "step")
+_DETECTORS = ("shift", "turn", "cells")
+_AXES = ("phase", "magnitude")
+
+
+class TestInWords(NamedTuple):
+    """One test of a solution.
+
+    Attributes
+    ----------
+    name : what is tested
+    statistic, expected, scatter : its value, and mean and scatter of good solutions
+    sigma : its chance as the distance of a normal value
+    size_nm : rms displacement of its pattern on the focal plane, nm; None if it has none
+    is_found : whether it is a discovery, at the rate of false alarms of the verdict
+    """
+
+    # pytest collects classes with this name otherwise.
+    __test__ = False
+
+    name: str
+    statistic: float
+    expected: float
+    scatter: float
+    sigma: float
+    size_nm: float | None
+    is_found: bool
+
+
+def tests_in_words(diagnosis: Diagnosis) -> list[TestInWords]:
+    """Return the tests of a solution, in the order in which they were made."""
+    chances = np.array([test.log_chance for test in diagnosis.tests])
+    return [
+        TestInWords(
+            f"{test.name}{_about(test)}",
+            float(test.statistic),
+            float(test.expected),
+            float(test.scatter),
+            float(test.sigma),
+            _NM_PER_UM * float(test.size_um) if np.isfinite(test.size_um) else None,
+            bool(is_found),
+        )
+        for test, is_found in zip(diagnosis.tests, discoveries(chances, CARE_RATE), strict=True)
+    ]
+
+
+def _about(test: Test) -> str:
+    """Return the degree, the step, the detector or the axis of a test."""
+    if test.subject in _DEGREES:
+        degree, *steps = test.what
+        return f", degree {degree}" + "".join(f", change {one + 1}" for one in steps)
+    if test.subject in _DETECTORS:
+        return f", detector {test.what[0] + 1} of the instrument"
+    if test.subject in _AXES:
+        return f", {'xy'[test.what[0]]}"
+    if test.subject == "references":
+        return f", {'αδ'[test.what[0]]}"
+    return ""

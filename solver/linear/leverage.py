@@ -6,7 +6,7 @@ parameters, H_k = J_k C J_k' (2 x 2). The expected chi2 of the measurement is
 
 A measurement depends on few parameters, and on the distortion's many coefficients only
 through the displacement that they add at its position; so C is first projected onto the
-source, the parameters of `LOCAL_GROUPS` and that displacement.
+source, the parameters of the local groups and that displacement.
 """
 
 from collections import deque
@@ -159,7 +159,7 @@ def _calibration_covariance(
     Float[np.ndarray, "tile local 2 slot"],
     Float[np.ndarray, "tile 2 2 slot"],
 ]:
-    """Return the covariances of the parameters of `LOCAL_GROUPS` and of the displacement.
+    """Return the covariances of the parameters of the local groups and of the displacement.
 
     In this order: of the parameters, between parameters and displacement, of the displacement.
     """
@@ -167,9 +167,9 @@ def _calibration_covariance(
     n_tiles, n_slots = index.source.shape
     terms = _terms(basis, index.source.shape)
     n_rows = 2 * own.shape[-1]
-    between = theta[own][:, :, shared].reshape(n_tiles, n_rows, layout.n_coef)
+    between = theta[own][:, :, shared].reshape(n_tiles, n_rows, layout.n_terms)
     mixed = (between @ terms).reshape(n_tiles, own.shape[-1], 2, n_slots)
-    blocks = theta[shared, shared].reshape(2, layout.n_coef, 2, layout.n_coef)
+    blocks = theta[shared, shared].reshape(2, layout.n_terms, 2, layout.n_terms)
     of_displacement = np.empty((n_tiles, 2, 2, n_slots))
     for i in range(2):
         for j in range(2):
@@ -189,7 +189,7 @@ def _source_covariance(
     source = index.source[:, None, :]
     of_local = np.stack([cross[own[:, :, None], a, source] for a in range(2)], axis=2)
     terms = _terms(basis, index.source.shape)
-    of_terms = cross[layout.coefficients()].reshape(2, layout.n_coef, *cross.shape[1:])
+    of_terms = cross[layout.coefficients()].reshape(2, layout.n_terms, *cross.shape[1:])
     of_displacement = np.empty((len(own), 2, 2, terms.shape[-1]))
     for i in range(2):
         for a in range(2):

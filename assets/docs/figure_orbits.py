@@ -236,6 +236,10 @@ ORBITS: Mapping[str, Pair] = {
     "detector-shifts": (_good_chosen, lambda: _chosen(_fitted(_measured(_drifting_detector)))),
     "exposure-tracks": (_good_chosen, lambda: _chosen(_stale_attitude())),
     "distortion": (_good_chosen, lambda: _chosen(_sparse_distortion())),
+    "distortion-truth": (
+        lambda: replace(_good_chosen(), simulation=_SKY),
+        lambda: replace(_chosen(_low_order()), simulation=_SKY),
+    ),
     "prior-shares": (_good_chosen, lambda: _chosen(_assumed())),
     "eigenmode-spectrum": (_good_chosen, lambda: _chosen(_one_field())),
     "orders": (_good_chosen, lambda: _chosen(_low_order())),

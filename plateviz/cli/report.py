@@ -181,13 +181,15 @@ def _compose_from_kept(request: ReportRequest, kept: "KeptSolution") -> "Report"
             "found a kept solution"
         )
     from plateviz.reports.orbit import orbit_report
-    from plateviz.runs.kept_solutions import instrument_of
+    from plateviz.runs.kept_solutions import instrument_of, simulation_of_kept
     from solver.data.instrument import read_instrument
     from solver.io.result import read_result
 
     focal_plane = read_instrument(request.instrument) if request.instrument else instrument_of(kept)
     other = read_result(Path(request.other)) if request.other else None
-    return orbit_report(kept.read(), focal_plane, _facts(), other)
+    return orbit_report(
+        kept.read(), focal_plane, _facts(), other, simulation=simulation_of_kept(kept)
+    )
 
 
 def _other_solution(request: ReportRequest, orbit: int) -> "FitResult | None":

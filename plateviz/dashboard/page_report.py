@@ -16,7 +16,7 @@ from plateviz.reports.report import Facts, Report
 from plateviz.reports.survey import source_report, survey_report
 from plateviz.runs.queries import SurveyRun
 from plateviz.solving.as_code import as_command
-from solver.data.instrument import Instrument
+from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 
 
@@ -49,7 +49,7 @@ def _of_solution(session: Session) -> Later:
     facts["Report"]["Solution"] = shown.label
     if other is not None:
         facts["Report"]["Compared with solution"] = other.label
-    make = partial(_solution, shown, other, session.store.instrument, facts)
+    make = partial(_solution, shown, other, session.store, facts)
     return _later(session.selection.subject() + ("-what-if" if shown.is_what_if else ""), make)
 
 
@@ -62,9 +62,15 @@ def _later(stem: str, compose: Callable[[], Report]) -> Later:
 
 
 def _solution(
-    shown: Solution, other: Solution | None, instrument: Instrument, facts: Facts
+    shown: Solution, other: Solution | None, store: SolutionStore, facts: Facts
 ) -> Report:
-    report = orbit_report(shown.result, instrument, facts, other.result if other else None)
+    report = orbit_report(
+        shown.result,
+        store.instrument,
+        facts,
+        other.result if other else None,
+        simulation=store.simulation,
+    )
     words = [report.subtitle, shown.label]
     words += [f"compared with {other.label}"] if other is not None else []
     return replace(report, subtitle="; ".join(words))

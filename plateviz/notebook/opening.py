@@ -9,7 +9,7 @@ from plateviz.notebook.orbit import OpenOrbit
 from plateviz.notebook.report import path_of
 from plateviz.notebook.solution import OpenSolution
 from plateviz.notebook.survey import OpenSurvey
-from plateviz.runs.kept_solutions import instrument_of, kept_solution
+from plateviz.runs.kept_solutions import instrument_of, kept_solution, simulation_of_kept
 from plateviz.solving.job import Job
 from plateviz.solving.origin import OrbitFiles
 from solver.data.instrument import MINI_MOCK, read_instrument
@@ -66,7 +66,13 @@ def open(
             if instrument is None
             else read_instrument(_existing_path(instrument))
         )
-        return OpenSolution(kept.read(), camera, kept.name, f"plateviz.open({str(target)!r})")
+        return OpenSolution(
+            kept.read(),
+            camera,
+            kept.name,
+            f"plateviz.open({str(target)!r})",
+            simulation=simulation_of_kept(kept),
+        )
     if target.is_dir():
         _refuse(given_names - {"run"}, "a survey directory")
         return OpenSurvey(target, run)

@@ -58,6 +58,7 @@ class OpenOrbit(HasSolver):
         self._orbit, self._call = orbit, call
         self._data: OrbitData = solver.origin.read(orbit)
         self._instrument = solver.origin.read_instrument()
+        self._simulation = solver.origin.read_simulation()
         self._solution = None if run is None else self._of_run(run)
         self.number = self._data.orbit_id
         self.origin = solver.origin.title
@@ -156,7 +157,12 @@ class OpenOrbit(HasSolver):
         result = run.result(self._data.orbit_id)
         origin = f"{self._solver.origin.title}, run {run.name}"
         return OpenSolution(
-            result, self._instrument, origin, f"{self._call}.solution", what_ifs=_WhatIfs(self)
+            result,
+            self._instrument,
+            origin,
+            f"{self._call}.solution",
+            what_ifs=_WhatIfs(self),
+            simulation=self._simulation,
         )
 
     def _solve(self, settings: FitSettings, base: OpenSolution | None) -> OpenSolution:
@@ -167,7 +173,13 @@ class OpenOrbit(HasSolver):
         )
         call = f"{self._call}.{'what_if' if base else 'fit'}(...)"
         return OpenSolution(
-            result, self._instrument, self.origin, call, other=base, what_ifs=_WhatIfs(self)
+            result,
+            self._instrument,
+            self.origin,
+            call,
+            other=base,
+            what_ifs=_WhatIfs(self),
+            simulation=self._simulation,
         )
 
     def _tables(self) -> dict[str, OpenTable]:

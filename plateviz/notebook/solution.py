@@ -26,6 +26,7 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.result import write_result
+from solver.simulate.settings import SurveySettings
 
 if TYPE_CHECKING:
     from plateviz.plots.diagnostic import Chosen, Diagnostic
@@ -52,6 +53,7 @@ class OpenSolution(HasFigures):
     call : Python code that returns this object, for reports
     other : solution to compare with, or None
     what_ifs : computes what-ifs of the orbit; None for a solution without measurements
+    simulation : settings with which the orbit was simulated; None where they are not known
     """
 
     result: FitResult
@@ -60,6 +62,7 @@ class OpenSolution(HasFigures):
     call: str
     other: "OpenSolution | None" = None
     what_ifs: WhatIfs | None = None
+    simulation: SurveySettings | None = None
 
     @property
     def settings(self) -> FitSettings:
@@ -248,13 +251,20 @@ class OpenSolution(HasFigures):
                 f"{available[0]}, found {absent[0] if absent else 'none'}"
             )
         other = None if self.other is None else self.other.result
-        return Chosen(self.result, self.instrument, tuple(selected), detector, other)
+        return Chosen(
+            self.result,
+            self.instrument,
+            tuple(selected),
+            detector,
+            other,
+            simulation=self.simulation,
+        )
 
     def _report(self, facts: "Facts") -> "Report":
         from plateviz.reports.orbit import orbit_report
 
         other = None if self.other is None else self.other.result
-        return orbit_report(self.result, self.instrument, facts, other)
+        return orbit_report(self.result, self.instrument, facts, other, simulation=self.simulation)
 
 
 def _frame(table: OpenTable) -> pd.DataFrame:

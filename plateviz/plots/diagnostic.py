@@ -12,6 +12,7 @@ from plateviz.figures.figure import Figure
 from plateviz.plots.workspace import OrbitWorkspace
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
+from solver.simulate.settings import SurveySettings
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Chosen:
     detector : shown detector_id, or None for all
     other : solution to compare with, or None
     beside : solution whose figure stands beside this one, with arrows to the same scale, or None
+    simulation : settings with which the orbit was simulated; None where they are not known
     """
 
     result: FitResult
@@ -34,6 +36,7 @@ class Chosen:
     detector: int | None = None
     other: FitResult | None = None
     beside: FitResult | None = None
+    simulation: SurveySettings | None = None
 
 
 def _always(_: Chosen) -> bool:
@@ -55,6 +58,7 @@ class Diagnostic:
     follows_shown : whether the figure depends on the shown exposures and detector
     is_wide : whether it takes the whole width of its workspace, or of a report
     has_data : whether there is anything to draw, such as a truth or another solution
+    is_of_simulation : whether the Orbit page shows it for a simulated survey only
     is_key : whether the Verdict workspace shows it, small
     equation : what is drawn, as text
     """
@@ -68,6 +72,7 @@ class Diagnostic:
     follows_shown: bool = False
     is_wide: bool = False
     has_data: Callable[[Chosen], bool] = _always
+    is_of_simulation: bool = False
     is_key: bool = False
     equation: str = ""
 

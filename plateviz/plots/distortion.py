@@ -80,7 +80,7 @@ DIAGNOSTICS = (
         "Displacement on the focal plane by the fitted Legendre terms, zero at the optical centre. "
         "Good: a smooth pattern without strong growth towards the edges.",
         OrbitWorkspace.CALIBRATION,
-        80,
+        79,
         _plot,
         is_key=True,
         equation=(

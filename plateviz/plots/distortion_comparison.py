@@ -1,6 +1,7 @@
 """Difference between the distortions of two solutions as vectors on the focal plane."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -32,7 +33,11 @@ _MARGIN = 1.2
 
 
 def plot_distortion_comparison(
-    table: pd.DataFrame, *, detectors: Sequence[Detector] = (), width: int = FRAME_WIDTH
+    table: pd.DataFrame,
+    *,
+    detectors: Sequence[Detector] = (),
+    titles: Mapping[str, str] = MappingProxyType(_TITLES),
+    width: int = FRAME_WIDTH,
 ) -> Figure:
     """Draw the difference of the distortion alone, and of distortion and detectors, to scale.
 
@@ -40,6 +45,7 @@ def plot_distortion_comparison(
     ----------
     table : `tables.distortion_comparison`
     detectors : detectors to outline
+    titles : part of the table -> title of its panel
     width : of each panel's frame, screen pixels
     """
     if table.empty:
@@ -47,7 +53,7 @@ def plot_distortion_comparison(
         return message(_TITLE, text, width=width, xlabel=XLABEL, ylabel=YLABEL)
     field = field_about(table, _MARGIN)
     panels = [
-        _panel(rows, _TITLES[str(part)], detectors, field, width)
+        _panel(rows, titles[str(part)], detectors, field, width)
         for part, rows in table.groupby("part", sort=False)
     ]
     return side_by_side(panels, columns=2)
@@ -79,7 +85,7 @@ def _removed(rows: pd.DataFrame) -> str:
     shift, roll, scale = (
         float(np.abs(rows[name].iloc[0])) for name in ("shift_um", "roll_arcsec", "scale_ppm")
     )
-    return f"removed: {_length(shift)}, {angle_text(1000.0 * roll)}, {scale:.2f} ppm"
+    return f"removed: shift {_length(shift)}, roll {roll:.2g} arcsec, scale {scale:,.2f} ppm"
 
 
 def _length(um: float) -> str:

@@ -15,6 +15,7 @@ from plateviz.tables.verdict import Verdict, orbit_verdict
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.result import FitResult
+from solver.simulate.settings import SurveySettings
 
 # Number of exposures that a reader can select: those with the chi2 farthest from its expectation.
 _FARTHEST = 3
@@ -26,6 +27,7 @@ def orbit_report(
     facts: Facts,
     other: FitResult | None = None,
     has_choices: bool = True,
+    simulation: SurveySettings | None = None,
 ) -> Report:
     """Return the report of one orbit.
 
@@ -37,9 +39,11 @@ def orbit_report(
     other : solution to compare with
     has_choices : whether figures that depend on a selection are also drawn for each detector and
         for single exposures
+    simulation : settings with which the orbit was simulated; None where they are not known
     """
     date = dates(pd.Series([result.summary["epoch_mjd"]])).iloc[0]
-    whole = Chosen(result, instrument, _exposures(result.exposures), other=other)
+    exposures = _exposures(result.exposures)
+    whole = Chosen(result, instrument, exposures, other=other, simulation=simulation)
     tables = calibration_tables(result)
     outliers = outlier_list(result)
     if outliers is not None:

@@ -83,7 +83,10 @@ def survey_orbit_report(
     message = run.failures().get(orbit)
     if message is not None:
         return failed_orbit_report(folder.read(orbit), message, facts)
-    return orbit_report(run.result(orbit), folder.read_instrument(), facts, other, has_choices)
+    result, instrument = run.result(orbit), folder.read_instrument()
+    return orbit_report(
+        result, instrument, facts, other, has_choices, simulation=folder.read_simulation()
+    )
 
 
 def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:

@@ -27,6 +27,8 @@ from solver.io.atomic import flush
 from solver.io.disk import writing
 from solver.io.scratch import scratch_beside
 from solver.io.survey import HEADER, read_survey_instrument
+from solver.simulate.settings import SurveySettings
+from solver.simulate.simulated import simulation_of
 
 FOLDER = "solutions"
 # Whoever can open a dashboard can keep solutions; each takes some 30 MB.
@@ -131,6 +133,12 @@ def instrument_of(kept: KeptSolution) -> Instrument:
     """Return the instrument of the survey that a solution is kept in; the mini-mock's of files."""
     survey = kept.directory.parent.parent.parent
     return read_survey_instrument(survey) if (survey / HEADER).is_file() else MINI_MOCK
+
+
+def simulation_of_kept(kept: KeptSolution) -> SurveySettings | None:
+    """Return the settings with which the survey that a solution is kept in was simulated."""
+    survey = kept.directory.parent.parent.parent
+    return simulation_of(survey) if (survey / HEADER).is_file() else None
 
 
 def kept_solution(path: Path) -> KeptSolution | None:

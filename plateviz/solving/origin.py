@@ -12,6 +12,8 @@ from solver.data.instrument import MINI_MOCK, Instrument, read_instrument
 from solver.data.orbit import OrbitData
 from solver.io.read_orbit import observation_files, read_orbit
 from solver.io.survey import read_survey_instrument, read_survey_orbit, survey_orbits
+from solver.simulate.settings import SurveySettings
+from solver.simulate.simulated import simulation_of
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,10 @@ class OrbitFiles:
         """Return the instrument that took the orbit."""
         return read_instrument(Path(self.instrument)) if self.instrument else MINI_MOCK
 
+    def read_simulation(self) -> SurveySettings | None:
+        """Return None: files do not say how they were simulated."""
+        return None
+
 
 @dataclass(frozen=True)
 class SurveyFolder:
@@ -90,6 +96,10 @@ class SurveyFolder:
     def read_instrument(self) -> Instrument:
         """Return the instrument that took the orbits."""
         return read_survey_instrument(Path(self.directory))
+
+    def read_simulation(self) -> SurveySettings | None:
+        """Return the settings with which the orbits were simulated; None for others."""
+        return simulation_of(Path(self.directory))
 
 
 Origin = OrbitFiles | SurveyFolder

@@ -40,6 +40,7 @@ class SolutionStore:
     ----------
     origin : of the orbits
     instrument : that took them
+    simulation : settings with which they were simulated; None for others
     kept : solutions that people have kept on disk
     made : which solutions each browser session has made
     columns : the columns of runs that were read last
@@ -51,6 +52,7 @@ class SolutionStore:
         self.origin = origin
         self._orbits = origin.orbits()
         self.instrument: Instrument = origin.read_instrument()
+        self.simulation = origin.read_simulation()
         self.kept = KeptSolutions(origin.solutions)
         self.made = MadeSolutions()
         self._solver = solver

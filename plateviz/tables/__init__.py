@@ -13,7 +13,7 @@ from plateviz.tables.detector_shifts import (
     detector_shifts,
     shift_statistics,
 )
-from plateviz.tables.distortion_comparison import distortion_comparison
+from plateviz.tables.distortion_comparison import distortion_comparison, distortion_truth
 from plateviz.tables.eigenmodes import (
     eigenmode_deciders,
     eigenmode_groups,
@@ -98,6 +98,7 @@ __all__ = [
     "difference_histogram",
     "distortion",
     "distortion_comparison",
+    "distortion_truth",
     "exposure_chi2",
     "exposure_tracks",
     "footprint_fields",

@@ -1,6 +1,7 @@
 """Table of the difference between two calibrations of the focal plane, as a vector field."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,7 @@ import pandas as pd
 from plateviz.tables.calibration import displacement_um
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
+from solver.simulate.true_calibration import TrueCalibration
 from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
 
 ALONE, TOGETHER = "distortion alone", "distortion and detectors"
@@ -47,12 +49,77 @@ def distortion_comparison(
     `mas_per_unit` (mas per mm), the difference as `dx_um`, `dy_um`, `dx_mas`, `dy_mas`, and
     what was removed: `shift_um`, `roll_arcsec`, `scale_ppm`
     """
+    return _difference(_fitted(result_a), _fitted(result_b), instrument)
+
+
+def distortion_truth(
+    result: FitResult, truth: TrueCalibration, instrument: Instrument
+) -> pd.DataFrame:
+    """Return a fitted calibration minus the true one.
+
+    The true focal length is not used: what a wrong one would change is removed as a scale.
+
+    Parameters
+    ----------
+    result : the fit
+    truth : of its orbit
+    instrument : the nominal one; gives the pixels and the scale s of the polynomials
+
+    Returns
+    -------
+    As from `distortion_comparison`, and `source_mas`: the median marginal sigma of a coordinate of
+    a source, of which the calibration is a part
+    """
+    table = _difference(_true(truth), _fitted(result), instrument)
+    sigma = result.sources[["sigma_ra_marginal", "sigma_dec_marginal"]].to_numpy()
+    return table.assign(source_mas=np.median(sigma))
+
+
+class _Calibration(NamedTuple):
+    """Calibration of the focal plane.
+
+    Attributes
+    ----------
+    coefficients : of the distortion along x and y, um, shape (n, 2)
+    centre, rotation, pitch : of each detector, um, rad and um
+    focal_length : um, mean of the exposures
+    """
+
+    coefficients: np.ndarray
+    centre: np.ndarray
+    rotation: np.ndarray
+    pitch: np.ndarray
+    focal_length: float
+
+
+def _fitted(result: FitResult) -> _Calibration:
+    detectors = result.values_on("det")
+    return _Calibration(
+        result.values_on("coef")[["distortion_x", "distortion_y"]].to_numpy(),
+        detectors[["detector_x", "detector_y"]].to_numpy(),
+        np.radians(detectors["detector_rotation"].to_numpy()),
+        detectors[["pitch_x", "pitch_y"]].to_numpy(),
+        float(result.values_on("exp")["focal_length"].mean()),
+    )
+
+
+def _true(truth: TrueCalibration) -> _Calibration:
+    detectors = truth.instrument.detectors
+    return _Calibration(
+        truth.coefficients,
+        np.array([(d.x_um, d.y_um) for d in detectors]),
+        np.radians([d.rotation_deg for d in detectors]),
+        np.array([(d.pitch_x_um, d.pitch_y_um) for d in detectors]),
+        truth.instrument.focal_length_um,
+    )
+
+
+def _difference(a: _Calibration, b: _Calibration, instrument: Instrument) -> pd.DataFrame:
     numbers, pixels = _grid(instrument)
-    focal = _focal_length(result_a)
-    places_a, places_b = (_ideal(one, instrument, numbers, pixels) for one in (result_a, result_b))
-    moved = focal * (places_a / focal - places_b / _focal_length(result_b))
-    scale = instrument.distortion_scale_um
-    by_optics = _displaced(result_b, places_a, scale) - _displaced(result_a, places_a, scale)
+    focal, scale = a.focal_length, instrument.distortion_scale_um
+    places_a, places_b = (_ideal(one, scale, numbers, pixels) for one in (a, b))
+    moved = focal * (places_a / focal - places_b / b.focal_length)
+    by_optics = _displaced(b, places_a, scale) - _displaced(a, places_a, scale)
     ids = np.array(instrument.detector_ids)[numbers]
     parts = [
         _part(name, ids, places_a, difference, focal)
@@ -118,26 +185,19 @@ def _grid(instrument: Instrument) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _ideal(
-    result: FitResult, instrument: Instrument, numbers: np.ndarray, pixels: np.ndarray
+    calibration: _Calibration, scale_um: float, numbers: np.ndarray, pixels: np.ndarray
 ) -> np.ndarray:
     """Return the undistorted positions of pixels in um: the inverse of Eq. (exp:model:nxny)."""
-    fitted = result.values_on("det").iloc[numbers]
-    x, y = (pixels * fitted[["pitch_x", "pitch_y"]].to_numpy()).T
-    angle = np.radians(fitted["detector_rotation"].to_numpy())
+    x, y = (pixels * calibration.pitch[numbers]).T
+    angle = calibration.rotation[numbers]
     turned = [np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x]
-    focal_plane = fitted[["detector_x", "detector_y"]].to_numpy() + np.stack(turned, axis=-1)
+    focal_plane = calibration.centre[numbers] + np.stack(turned, axis=-1)
     ideal = focal_plane
     for _ in range(_INVERSION_STEPS):
-        ideal = focal_plane - _displaced(result, ideal, instrument.distortion_scale_um)
+        ideal = focal_plane - _displaced(calibration, ideal, scale_um)
     return ideal
 
 
-def _displaced(result: FitResult, places: np.ndarray, scale_um: float) -> np.ndarray:
-    fitted = result.values_on("coef")
+def _displaced(calibration: _Calibration, places: np.ndarray, scale_um: float) -> np.ndarray:
     x, y = (places / scale_um).T
-    groups = ("distortion_x", "distortion_y")
-    return np.stack([displacement_um(fitted[g].to_numpy(), x, y) for g in groups], axis=-1)
-
-
-def _focal_length(result: FitResult) -> float:
-    return float(result.values_on("exp")["focal_length"].mean())
+    return np.stack([displacement_um(one, x, y) for one in calibration.coefficients.T], axis=-1)

@@ -25,6 +25,7 @@ class FigureGrid(pn.viewable.Viewer):
         wake: Callable[..., object],
         *,
         columns: int = 2,
+        columns_if_wide: int | None = None,
         others: Sequence[Part] = (),
         **params: object,
     ) -> None:
@@ -34,6 +35,7 @@ class FigureGrid(pn.viewable.Viewer):
         ----------
         wake : called when a figure comes near the screen, leaves it, or gets another size
         columns : at most, where there is room
+        columns_if_wide : on a large screen; None for `columns`
         others : cards after those of the figures
         """
         super().__init__(**params)
@@ -51,6 +53,7 @@ class FigureGrid(pn.viewable.Viewer):
                 "gridTemplateColumns": {
                     "xs": "minmax(0, 1fr)",
                     "lg": f"repeat({columns}, minmax(0, 1fr))",
+                    "xl": f"repeat({columns_if_wide or columns}, minmax(0, 1fr))",
                 },
                 "gridAutoFlow": "dense",
                 "gridAutoRows": "minmax(250px, 1fr)",

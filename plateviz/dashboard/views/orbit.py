@@ -104,6 +104,8 @@ class OrbitPage(pn.viewable.Viewer):
             return explore.__panel__()
         is_first = one is OrbitWorkspace.VERDICT
         among = [d for d in diagnostics() if (d.is_key if is_first else d.workspace is one)]
+        if self._session.store.simulation is None:
+            among = [d for d in among if not d.is_of_simulation]
         views = {d: self._figure_view(d) for d in among}
         others, above = [], []
         if one is OrbitWorkspace.ORDERS:
@@ -115,8 +117,14 @@ class OrbitPage(pn.viewable.Viewer):
         self._following += [view for d, view in views.items() if d.follows_shown]
         if is_first:
             above = [StripView(self._session)]
+        # Six square cards fill a large screen in two rows.
+        are_six = one is OrbitWorkspace.CALIBRATION and len(views) + len(others) == 6
         grid = FigureGrid(
-            list(views.values()), self._wake, columns=3 if is_first else 2, others=others
+            list(views.values()),
+            self._wake,
+            columns=3 if is_first else 2,
+            columns_if_wide=3 if are_six else None,
+            others=others,
         )
         self._grids[one] = grid
         self._show_selected()
@@ -146,6 +154,7 @@ class OrbitPage(pn.viewable.Viewer):
             exposures=tuple(session.selection.exposures_of(shown.result)),
             detector=session.selection.detector_id,
             other=session.other.result if session.other else None,
+            simulation=session.store.simulation,
         )
         figure = diagnostic.plot(chosen)
         if diagnostic is BOTH and self._compare is not None:

@@ -21,17 +21,17 @@ class Motion(NamedTuple):
     angle: float
 
 
-def motion(case: Case, rows: Rows) -> Motion:
+def motion(case: Case, n_detectors: int, n_exposures: int) -> Motion:
     """Return which detector of the orbit moves, and when."""
     rng = case.orbit_rng()
-    detector = int(rng.integers(len(rows.instrument.detectors)))
-    exposure = int(np.ceil(rng.uniform(*_MOTION) * len(rows.attitude)))
+    detector = int(rng.integers(n_detectors))
+    exposure = int(np.ceil(rng.uniform(*_MOTION) * n_exposures))
     return Motion(detector, exposure, float(rng.uniform(0.0, 2.0 * np.pi)))
 
 
 def detector_shift(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     """Shift one detector on the focal plane, at a random time in mid-orbit."""
-    moves = motion(case, rows)
+    moves = _motion(case, rows)
     # The star stays where it is on the focal plane, and so moves back on the detector.
     shift = -case.amplitude * np.array([np.cos(moves.angle), np.sin(moves.angle)])
     detector = rows.instrument.detectors[moves.detector]
@@ -45,7 +45,7 @@ def detector_shift(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
 
 def detector_turn(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     """Turn one detector about its centre, at a random time in mid-orbit."""
-    moves = motion(case, rows)
+    moves = _motion(case, rows)
     pitch = rows.of_detector("pitch_x_um", "pitch_y_um")
     turned = (pitch * rows.pixel) @ _rotation(RAD_PER_ARCSEC * case.amplitude).T / pitch
     return _after(moves, rows)[:, None] * (turned - rows.pixel)
@@ -61,6 +61,10 @@ def charge_transfer(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
 def pixel_phase(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     """Shift stars by a sine of their position within the pixel, along both axes."""
     return case.amplitude * np.sin(2.0 * np.pi * rows.pixel)
+
+
+def _motion(case: Case, rows: Rows) -> Motion:
+    return motion(case, len(rows.instrument.detectors), len(rows.attitude))
 
 
 def _after(moves: Motion, rows: Rows) -> Bool[np.ndarray, " obs"]:

@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 
 from solver.simulate.defects.defect import Case
-from solver.simulate.defects.optics import ORBITAL_PERIOD_S
+from solver.simulate.defects.distortion_terms import ORBITAL_PERIOD_S
 
 _SECONDS_PER_DAY = 86_400.0
 _MJD_ZERO = 2400000.5

@@ -4,14 +4,16 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import legendre
 
-from solver.simulate.defects.defect import Case, Rows, elapsed
+from solver.simulate.defects.defect import Case, Rows
+from solver.simulate.defects.distortion_terms import (
+    AddedTerms,
+    drifting,
+    of_higher_order,
+    oscillating,
+    stepping,
+)
 from solver.units import RAD_PER_MAS
 
-# Period of a circular orbit 600 km above the Earth, the paper's section "Discussion".
-ORBITAL_PERIOD_S = 5_801.0
-_SECONDS_PER_DAY = 86_400.0
-
-_QUADRATIC, _CUBIC, _ABOVE_FIFTH = (2,), (3,), (6, 7)
 # One exposure of so many jitters, three of the mini-mock's 96.
 EXPOSURES_PER_JITTER = 32
 # The telescope swings once to so many times while the detectors are read.
@@ -20,27 +22,22 @@ _JITTER_HARMONICS = 4
 
 def distortion_drift(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     """Change the quadratic terms linearly with time; zero in the middle of the orbit."""
-    return _distorted(case, rows, _QUADRATIC, elapsed(rows.attitude) - 0.5)
+    return _distorted(rows, drifting(case, rows.attitude))
 
 
 def distortion_orbital(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     """Change the quadratic terms with the phase of the satellite's orbit."""
-    seconds = _SECONDS_PER_DAY * (rows.attitude["obstime"] - rows.attitude["obstime"].min())
-    phase = case.orbit_rng().uniform(0.0, 2.0 * np.pi)
-    angle = 2.0 * np.pi * seconds.to_numpy() / ORBITAL_PERIOD_S + phase
-    return _distorted(case, rows, _QUADRATIC, np.cos(angle))
+    return _distorted(rows, oscillating(case, rows.attitude))
 
 
 def distortion_step(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     """Change the cubic terms between the two halves of the fields."""
-    fields = rows.attitude["field_id"].to_numpy()
-    later = fields >= np.unique(fields)[len(np.unique(fields)) // 2]
-    return _distorted(case, rows, _CUBIC, later.astype(float))
+    return _distorted(rows, stepping(case, rows.attitude))
 
 
 def distortion_order(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     """Add terms of degree 6 and 7, above the fit's default order."""
-    return _distorted(case, rows, _ABOVE_FIFTH, np.ones(len(rows.attitude)))
+    return _distorted(rows, of_higher_order(case, rows.attitude))
 
 
 def focal_anisotropy(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
@@ -82,22 +79,14 @@ def jitter(
     return exposures, swings / np.sqrt(0.5 * np.sum(swings**2, axis=(2, 3), keepdims=True))
 
 
-def _distorted(
-    case: Case, rows: Rows, degrees: tuple[int, ...], change: Float[np.ndarray, " exp"]
-) -> Float[np.ndarray, "obs 2"]:
-    """Return the displacement by terms of some degrees, times a factor of each exposure.
-
-    The coefficients, those of x and y together, are a random direction of the survey with the
-    amplitude as length (root of the sum of squares, um).
-    """
-    terms = [(degree - j, j) for degree in degrees for j in range(degree + 1)]
-    coefficients = case.survey_rng().standard_normal((len(terms), 2))
-    coefficients *= case.amplitude / np.linalg.norm(coefficients)
+def _distorted(rows: Rows, added: AddedTerms) -> Float[np.ndarray, "obs 2"]:
+    """Return the displacement by terms that are added to those of the distortion."""
     at = rows.ideal / rows.instrument.distortion_scale_um
-    in_x, in_y = (legendre.legvander(at[:, axis], max(degrees)) for axis in (0, 1))
-    at_zero = legendre.legvander(np.zeros(1), max(degrees))[0]
+    highest = max(map(max, added.degrees))
+    in_x, in_y = (legendre.legvander(at[:, axis], highest) for axis in (0, 1))
+    at_zero = legendre.legvander(np.zeros(1), highest)[0]
     displacement = np.zeros_like(rows.ideal)
-    for (k, j), pair in zip(terms, coefficients, strict=True):
+    for (k, j), pair in zip(added.degrees, added.coefficients, strict=True):
         # As in the model, the optical centre is not displaced.
         displacement += (in_x[:, k] * in_y[:, j] - at_zero[k] * at_zero[j])[:, None] * pair
-    return change[rows.exposure, None] * displacement
+    return added.change[rows.exposure, None] * displacement

@@ -27,6 +27,17 @@ def has_stage(settings: SurveySettings, *stages: Stage) -> bool:
     return any(BY_NAME[name].stage in stages for name in settings.amplitudes)
 
 
+def cases(
+    settings: SurveySettings, stage: Stage, orbit_id: int = 0
+) -> Iterator[tuple[Defect, Case]]:
+    """Yield the defects of a stage in the order of the table."""
+    for name, amplitude in settings.amplitudes.items():
+        defect = BY_NAME[name]
+        if defect.stage is stage:
+            factor = factor_between(defect.unit, defect.computed_in)
+            yield defect, Case(name, amplitude * factor, settings, orbit_id)
+
+
 def defective_catalogue(
     catalogue: pd.DataFrame, truth: pd.DataFrame, settings: SurveySettings
 ) -> Altered:
@@ -37,7 +48,7 @@ def defective_catalogue(
     catalogue, truth : with the same sources in the same order
     """
     parts = [none_affected()]
-    for defect, case in _cases(settings, Stage.CATALOGUE):
+    for defect, case in cases(settings, Stage.CATALOGUE):
         catalogue, affected = defect.apply(case, catalogue, truth)
         parts.append(_named(affected, defect))
     return Altered(catalogue, pd.concat(parts, ignore_index=True))
@@ -45,7 +56,7 @@ def defective_catalogue(
 
 def true_observer(attitude: pd.DataFrame, settings: SurveySettings, orbit_id: int) -> pd.DataFrame:
     """Return the attitude as it is, where the one without defects is what is recorded."""
-    for defect, case in _cases(settings, Stage.OBSERVER, orbit_id):
+    for defect, case in cases(settings, Stage.OBSERVER, orbit_id):
         attitude = defect.apply(case, attitude)
     return attitude
 
@@ -55,7 +66,7 @@ def focal_displacement(
 ) -> Float[np.ndarray, "obs 2"]:
     """Return the displacement on the focal plane, um."""
     total = np.zeros_like(rows.ideal)
-    for defect, case in _cases(settings, Stage.FOCAL_PLANE, orbit_id):
+    for defect, case in cases(settings, Stage.FOCAL_PLANE, orbit_id):
         total += defect.apply(case, rows)
     return total
 
@@ -64,7 +75,7 @@ def displaced_pixels(
     rows: Rows, settings: SurveySettings, orbit_id: int
 ) -> Float[np.ndarray, "obs 2"]:
     """Return the positions on the detectors, each defect after those before it in the table."""
-    for defect, case in _cases(settings, Stage.DETECTOR, orbit_id):
+    for defect, case in cases(settings, Stage.DETECTOR, orbit_id):
         rows = replace(rows, pixel=rows.pixel + defect.apply(case, rows))
     return rows.pixel
 
@@ -72,7 +83,7 @@ def displaced_pixels(
 def noise_ratio(rows: Rows, settings: SurveySettings, orbit_id: int) -> Float[np.ndarray, " obs"]:
     """Return the noise over the stated uncertainty."""
     ratio = np.ones(len(rows.exposure))
-    for defect, case in _cases(settings, Stage.NOISE, orbit_id):
+    for defect, case in cases(settings, Stage.NOISE, orbit_id):
         ratio = ratio * defect.apply(case, rows)
     return ratio
 
@@ -80,7 +91,7 @@ def noise_ratio(rows: Rows, settings: SurveySettings, orbit_id: int) -> Float[np
 def defective_table(table: pd.DataFrame, settings: SurveySettings, orbit_id: int) -> Altered:
     """Return the table of measurements with its defects, and the measurements affected."""
     parts = [none_affected()]
-    for defect, case in _cases(settings, Stage.MEASUREMENTS, orbit_id):
+    for defect, case in cases(settings, Stage.MEASUREMENTS, orbit_id):
         table, affected = defect.apply(case, table)
         parts.append(_named(affected, defect))
     return Altered(table, pd.concat(parts, ignore_index=True))
@@ -90,20 +101,9 @@ def recorded_exposures(
     exposures: pd.DataFrame, settings: SurveySettings, orbit_id: int
 ) -> pd.DataFrame:
     """Return the table of exposures of an orbit as it is recorded."""
-    for defect, case in _cases(settings, Stage.EXPOSURES, orbit_id):
+    for defect, case in cases(settings, Stage.EXPOSURES, orbit_id):
         exposures = defect.apply(case, exposures)
     return exposures
-
-
-def _cases(
-    settings: SurveySettings, stage: Stage, orbit_id: int = 0
-) -> Iterator[tuple[Defect, Case]]:
-    """Yield the defects of a stage in the order of the table."""
-    for name, amplitude in settings.amplitudes.items():
-        defect = BY_NAME[name]
-        if defect.stage is stage:
-            factor = factor_between(defect.unit, defect.computed_in)
-            yield defect, Case(name, amplitude * factor, settings, orbit_id)
 
 
 def _named(affected: pd.DataFrame, defect: Defect) -> pd.DataFrame:

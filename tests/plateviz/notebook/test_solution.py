@@ -15,7 +15,7 @@ from solver.data.schema import RESULT_TABLES
 from solver.errors import InputError
 from solver.io.result import read_result
 
-OF_COMPARISON = {"comparison", "distortion-comparison", "orders"}
+OF_COMPARISON = {"comparison", "distortion-comparison", "distortion-truth", "orders"}
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,8 @@ import pytest
 
 from plateviz import plots, tables
 from plateviz.figures.bokeh_figure import BokehFigure
+from solver.simulate.settings import SurveySettings
+from solver.simulate.true_calibration import true_calibration
 from tests.plateviz.linear_stars import N_STARS, LinearStars
 
 
@@ -70,6 +72,14 @@ def orbit_drawings(fit_result, linear_fit, compared, make_fit_result, truth, ins
         "distortion_comparison": (
             plots.plot_distortion_comparison,
             tables.distortion_comparison(fit_result, make_fit_result(2)[0], instrument),
+        ),
+        "distortion_truth": (
+            plots.plot_distortion_truth,
+            tables.distortion_truth(
+                fit_result,
+                true_calibration(SurveySettings(), instrument, fit_result.exposures),
+                instrument,
+            ),
         ),
         "reference_influence": (
             plots.plot_reference_influence,

@@ -10,6 +10,7 @@ from plateviz.plots import plot_distortion_comparison, plot_exposure_tracks
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.gallery import diagnostics
 from solver.data.parameters import groups_on
+from solver.simulate.settings import SurveySettings
 from tests.plateviz.plots.drawn import shafts_of, subtitle_of, texts_of
 
 
@@ -128,3 +129,22 @@ def test_difference_is_the_current_solution_minus_the_other(
     table = tables.distortion_comparison(fit_result, other, instrument)
     drawn = figure[0]["tails"].columns["dx_um"]
     assert np.array_equal(drawn, table["dx_um"][: len(drawn)])
+
+
+def test_distortion_minus_truth_says_which_truth_it_means(fit_result, instrument):
+    (truth,) = [one for one in diagnostics() if one.name == "distortion-truth"]
+    alone = Chosen(fit_result, instrument)
+    assert not truth.has_data(alone)
+    assert truth.plot(alone).message.startswith("No truth")
+    settings = SurveySettings(defects=("distortion-drift=0.1um", "pixel-phase=3mpix"))
+    chosen = Chosen(fit_result, instrument, simulation=settings)
+    assert truth.has_data(chosen)
+    figure = truth.plot(chosen)
+    assert len(figure) == 2
+    for frame in figure:
+        said = subtitle_of(frame)
+        assert "σ of a source: " in said
+        assert "mean over the exposures of: distortion that drifts" in said
+        assert "Not in the truth: shift that depends on the position within the pixel" in said
+    plain = truth.plot(Chosen(fit_result, instrument, simulation=SurveySettings()))
+    assert "ruth" not in subtitle_of(plain[0])

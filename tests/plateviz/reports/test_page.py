@@ -14,7 +14,7 @@ from plateviz.reports.report import Report
 from plateviz.tables.verdict import Verdict
 from solver.data.orbit import OrbitData
 
-OF_COMPARISON = {"comparison", "distortion-comparison", "orders"}
+OF_COMPARISON = {"comparison", "distortion-comparison", "distortion-truth", "orders"}
 FACTS = {"Report": {"Command": "plateviz report <b>here</b>"}}
 MADE = datetime(2030, 1, 2, 3, 4, 5, tzinfo=UTC)
 _ADDRESS = re.compile(r"""(?:src|href)=["']?(?!data:)[^"'\s>]+|@import|url\(""")

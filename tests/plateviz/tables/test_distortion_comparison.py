@@ -11,6 +11,7 @@ from plateviz.tables.distortion_comparison import ALONE, TOGETHER
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
 from solver.fit import OrbitFitter
+from solver.simulate.true_calibration import TrueCalibration
 from tests.solver.small_orbit import make_orbit
 
 SCALE = 21_000.0
@@ -159,3 +160,28 @@ def test_left_out_sources_change_the_calibration_within_its_uncertainty():
     # The calibration of some 80 parameters from 2 n measured coordinates, each of them noise.
     noise = single * np.sqrt(80.0 / (2.0 * len(fitted.residuals)))
     assert 0.1 * noise < rms_mas < 10.0 * noise
+
+
+def test_truth_is_compared_as_another_solution(fit_result, make_fit_result, instrument):
+    """With the calibration of a fit as the truth, the table is that of two solutions."""
+    places = fit_result.values_on("det")
+    detectors = tuple(
+        replace(one, x_um=x, y_um=y, rotation_deg=turn, pitch_x_um=px, pitch_y_um=py)
+        for one, (x, y, turn, px, py) in zip(
+            instrument.detectors,
+            places[
+                ["detector_x", "detector_y", "detector_rotation", "pitch_x", "pitch_y"]
+            ].to_numpy(),
+            strict=True,
+        )
+    )
+    coefficients = fit_result.values_on("coef")[["distortion_x", "distortion_y"]].to_numpy()
+    truth = TrueCalibration(replace(instrument, detectors=detectors), coefficients)
+    other = make_fit_result(2)[0]
+    found = tables.distortion_truth(other, truth, instrument)
+    expected = tables.distortion_comparison(fit_result, other, instrument)
+    assert np.abs(vectors(expected)).max() > 0.01
+    # The fit's focal length is not the nominal one of the truth: the difference is removed.
+    assert np.allclose(vectors(found), vectors(expected), atol=1e-4)
+    sigma = other.sources[["sigma_ra_marginal", "sigma_dec_marginal"]].to_numpy()
+    assert found["source_mas"].iloc[0] == np.median(sigma)

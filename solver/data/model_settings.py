@@ -176,3 +176,31 @@ class ModelSettings:
         "PIXPHASE",
         "pixel phase",
     )
+    noise_scale: bool = _switch(
+        "Scale of the noise",
+        "Estimate one factor on the uncertainties of all measurements.",
+        "noise-scale",
+        "NOISE",
+        "noise scaled",
+    )
+    noise_by_exposure: bool = _switch(
+        "Noise of each exposure",
+        "Estimate a factor on the uncertainties of the measurements of each exposure.",
+        "noise-by-exposure",
+        "NOISEEXP",
+        "noise by exposure",
+    )
+    noise_by_magnitude: bool = _switch(
+        "Noise by magnitude",
+        "Estimate a factor on the uncertainties whose logarithm is linear in the magnitude.",
+        "noise-by-magnitude",
+        "NOISEMAG",
+        "noise by magnitude",
+    )
+    reference_scale: bool = _switch(
+        "Scale of the reference errors",
+        "Estimate one factor on the catalogue's uncertainties of all reference stars.",
+        "reference-scale",
+        "REFSCALE",
+        "reference errors scaled",
+    )

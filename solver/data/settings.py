@@ -175,6 +175,12 @@ class FitSettings(ModelSettings):
         return tuple(group for group in OPTIONAL_GROUPS if getattr(self, group.setting))
 
     @property
+    def has_noise_model(self) -> bool:
+        """Whether uncertainties are estimated with the parameters."""
+        by_row = self.noise_scale or self.noise_by_exposure or self.noise_by_magnitude
+        return by_row or self.reference_scale
+
+    @property
     def step_tolerance(self) -> float:
         """Largest distance from the mode at which the engine stops, sigma."""
         return self.svi.tolerance if self.engine == "svi" else self.tolerance

@@ -19,7 +19,7 @@ from solver.engines.run_engine import Resumption, run_engine
 from solver.engines.warm_starts import WarmStart, likely, nearest
 from solver.engines.what_if import linearised, solve_what_if
 from solver.errors import FitError, InputError
-from solver.linear.leverage import Covariances
+from solver.linear.covariances import Covariances
 from solver.problem.noise import Noise
 from solver.problem.problem import Problem, orders_held, rebuilt
 from solver.problem.problem_cache import ProblemCache

@@ -11,6 +11,7 @@ from panel.io.resources import get_dist_path
 from param.parameterized import Watcher
 from tornado.ioloop import IOLoop
 
+from plateviz.dashboard.at_rest import AtRest
 from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.page_request import WINDOW
 from plateviz.dashboard.rooms import Rooms, Window, window_from
@@ -20,6 +21,7 @@ from plateviz.dashboard.views.accessible_names import AccessibleNames
 from plateviz.dashboard.views.address_bar import AddressBar
 from plateviz.dashboard.views.browser_session import BrowserSession
 from plateviz.dashboard.views.figure import Part
+from plateviz.dashboard.views.figure_painting import FigurePainting
 from plateviz.dashboard.views.keyboard import Keyboard
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.report_button import report_button
@@ -35,6 +37,9 @@ _PROGRESS_MILLISECONDS = 250
 _PENDING_MILLISECONDS = 50
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
+# The solver prepares what-ifs once a page has been at rest for so long. Before, the browser draws
+# and a person may step on to the next orbit, for which a fit would take the cores.
+_REST_SECONDS = 3.0
 # Figures that are drawn before the page is shown, if their rooms are known.
 _FIRST_FIGURES = 1
 _SIDEBAR_WIDTH = 300
@@ -64,6 +69,7 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
         AddressBar(navigation),
         BrowserSession(session.journal),
         AccessibleNames(),
+        FigurePainting(),
     ]
     page = empty_page(
         store,
@@ -171,6 +177,7 @@ class _Ticker:
         self._document: Document | None = None
         self._loop: IOLoop | None = None
         self._is_to_tick = False
+        self._rest: AtRest | None = None
 
     def follow(self, navigation: Navigation, pages: Pages) -> None:
         """Begin once the page has loaded; drawing before would delay it."""
@@ -185,6 +192,8 @@ class _Ticker:
         def begin() -> None:
             self._navigation, self._pages = navigation, pages
             self._document, self._loop = pn.state.curdoc, IOLoop.current()
+            later = None if self._document is None else self._document.add_timeout_callback
+            self._rest = AtRest(session.prepare_what_ifs, _REST_SECONDS, later)
             self.wake()
             self._follow_run()
 
@@ -245,7 +254,9 @@ class _Ticker:
         elif job is None:
             if self._progress.running:
                 self._progress.stop()
-            session.prepare_what_ifs()
+            self._navigation.expect_orbit()
+            if self._rest is not None:
+                self._rest.begin()
 
 
 def _set_theme(session: Session, is_dark: bool) -> None:

@@ -10,6 +10,7 @@ from plateviz.dashboard.address_parts import chosen
 from plateviz.dashboard.exploration import Exploration
 from plateviz.dashboard.found_source import FoundSource, find_source
 from plateviz.dashboard.growth import Growth, how_to_make_a_run
+from plateviz.dashboard.next_orbit import NextOrbit
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Request, Solution
 from plateviz.dashboard.solution_address import find_solution, solution_query
@@ -67,6 +68,7 @@ class Navigation(param.Parameterized):
         self.exploration = Exploration(list(EXPLORABLE))
         self.survey_exploration = Exploration(list(COLUMNS_OF_RUN))
         self._source_text = ""
+        self._next_orbit = NextOrbit()
         self._named: dict[str, str] = {}
         self._growth: tuple[SurveyRun, Growth] | None = None
         self._runs = {run.name: run for run in session.store.runs()}
@@ -209,6 +211,14 @@ class Navigation(param.Parameterized):
         """Open the solution of an orbit in the run; fit the orbit if the run has none."""
         self._show_orbit(orbit, None)
         self.view = View.ORBIT
+
+    def expect_orbit(self) -> None:
+        """Let the orbit of the run be read ahead that is likely to be asked for next."""
+        selection, shown = self.session.selection, self.session.shown
+        run = self._runs.get(shown.run) if shown is not None else None
+        orbit = self._next_orbit.after(selection.orbit, selection.param["orbit"].objects)
+        if run is not None and orbit is not None:
+            run.expect(orbit)
 
     def find_source(self, text: str) -> None:
         """Search the run for a source by its id as text."""

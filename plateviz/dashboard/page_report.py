@@ -1,6 +1,5 @@
 """The report of what is on the screen: a solution, a source or a run, as one HTML file."""
 
-import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -15,7 +14,7 @@ from plateviz.reports.page import page_of
 from plateviz.reports.report import Facts, Report
 from plateviz.reports.survey import source_report, survey_report
 from plateviz.runs.queries import SurveyRun
-from plateviz.solving.as_code import as_command
+from plateviz.solving.as_code import as_command, report_of_run
 from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 
@@ -77,14 +76,10 @@ def _solution(
 
 
 def _survey(run: SurveyRun) -> Report:
-    return survey_report(run, facts_of(_command(run, "--survey"), run.name))
+    command = report_of_run(str(run.survey), run.name, "--survey")
+    return survey_report(run, facts_of(command, run.name))
 
 
 def _source(run: SurveyRun, found: FoundSource) -> Report:
-    command = _command(run, "--source", str(found.source_id))
+    command = report_of_run(str(run.survey), run.name, "--source", str(found.source_id))
     return source_report(run, found.source_id, facts_of(command, run.name))
-
-
-def _command(run: SurveyRun, *options: str) -> str:
-    words = ["plateviz", "report", str(run.survey), "--run", run.name, *options]
-    return shlex.join([*words, "-o", "REPORT.html"])

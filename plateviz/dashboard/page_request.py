@@ -34,6 +34,7 @@ WINDOW = "window"
 
 _FULL = Path(__file__).with_name("full.html")
 _BEGIN = Path(__file__).with_name("begin.js")
+_COMPONENTS = Path(__file__).with_name("components.js")
 # The script that loads components.
 _LOADER = re.compile(r"<script[^>]*/es-module-shims[^>]*></script>")
 # Id of the element that the page is put into.
@@ -167,8 +168,10 @@ class EmptyPage:
             template_variables=document.template_variables,
         )
         begin = _BEGIN.read_text(encoding="utf-8").replace('"TOKEN"', json.dumps(token))
+        of_components = _COMPONENTS.read_text(encoding="utf-8")
+        scripts = f"<script>{begin}</script>\n<script>{of_components}</script>"
         link = f'<link rel="preload" as="fetch" crossorigin href="{components}">'
-        html = html.replace("</title>", f"</title>\n{link}\n<script>{begin}</script>", 1)
+        html = html.replace("</title>", f"</title>\n{link}\n{scripts}", 1)
         load = f"window.importShim?.({json.dumps(components)}).catch(() => {{}})"
         html = _LOADER.sub(lambda found: f"{found[0]}\n<script>{load}</script>", html, count=1)
         # A page straight in the body would be taken for a part of another page, and leave the

@@ -9,7 +9,7 @@ from bokeh import models
 from bokeh.core.property.vectorization import Field, Value
 from bokeh.models.glyph import Glyph
 
-from plateviz.figures.figure import By, Glyphs, Look, Ramp
+from plateviz.figures.figure import HANDLES, By, Glyphs, Look, Ramp
 from plateviz.figures.theme import FONT, Theme
 
 _GLYPHS: Mapping[str, Callable[..., Glyph]] = MappingProxyType(
@@ -38,8 +38,9 @@ _TRANSPARENT = "rgba(0, 0, 0, 0)"
 # Maximum number of glyphs that one hover describes.
 _HOVER_LIMIT = 3
 # Columns by which rows are selected: the first one that they have.
-SELECTED_BY = ("id", "detector_id", "exposure")
-# Rows of these kinds are selected; the others are faded while some are.
+SELECTED_BY = ("id", "exposure", "detector_id")
+# Rows of these kinds are selected; the others are faded while some are. Outlines are, if they are
+# those of detectors.
 _SELECTABLE = ("points", "segments")
 
 
@@ -55,7 +56,7 @@ class BokehGlyphs:
         if glyphs.kind == "texts":
             self._glyph.update(text_font=Value(FONT))
         self._faded: Glyph | None = None
-        if glyphs.kind in _SELECTABLE:
+        if _is_faded(glyphs):
             self._faded = _GLYPHS[glyphs.kind](**glyphs.at)
         self.renderer = models.GlyphRenderer(
             data_source=self.source,
@@ -154,6 +155,13 @@ class BokehGlyphs:
         return Field(f"{name}_by")
 
 
+def _is_faded(glyphs: Glyphs) -> bool:
+    """Return whether rows that are not selected are faded while others are."""
+    is_outline = glyphs.kind == "paths" and glyphs.name != HANDLES
+    is_selected_by = any(column in glyphs.columns for column in SELECTED_BY)
+    return glyphs.kind in _SELECTABLE or (is_outline and is_selected_by)
+
+
 def _faded_looks(names: Iterable[str], theme: Theme) -> dict[str, Value]:
     """Return the looks of rows that are not selected, those among them that differ."""
     # Pale and not transparent: where many lie on one another, they must not become dark.
@@ -168,7 +176,7 @@ def _ramps(glyphs: Glyphs) -> list[Ramp]:
 def _models_for(glyphs: Glyphs) -> tuple[object, ...]:
     """Return what decides which models are needed."""
     ramps = [(ramp.is_log, ramp.label is None) for ramp in _ramps(glyphs)]
-    return glyphs.kind, bool(glyphs.hover), glyphs.reach is None, ramps
+    return glyphs.kind, bool(glyphs.hover), glyphs.reach is None, _is_faded(glyphs), ramps
 
 
 def _length(columns: Mapping[str, Any]) -> int:

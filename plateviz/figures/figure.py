@@ -32,6 +32,8 @@ Link = Literal["", "x", "xy"]
 FRAME_WIDTH, MARGIN = 460, 14
 MESSAGE = "message"
 """Name of the text of a figure that has nothing to show."""
+HANDLES = "handles"
+"""Name of wide paths that are not seen, by which the paths below them are tapped."""
 
 
 @dataclass(frozen=True)

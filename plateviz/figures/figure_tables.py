@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 from astropy.table import Column, Table
 
-from plateviz.figures.figure import Figure, Frame, Glyphs
+from plateviz.figures.figure import HANDLES, Figure, Frame, Glyphs
 
 _ALONG_X = ("x", "x0", "x1", "xs", "left", "right")
 _ALONG_Y = ("y", "y0", "y1", "y2", "ys", "bottom", "top")
@@ -27,7 +27,8 @@ def figure_tables(figure: Figure) -> dict[str, Table]:
     for number, frame in enumerate(figure, 1):
         prefix = f"frame{number}_" if len(figure) > 1 else ""
         for glyphs in frame.glyphs:
-            if len(glyphs) and glyphs.kind not in _WITHOUT_NUMBERS:
+            is_seen = glyphs.kind not in _WITHOUT_NUMBERS and glyphs.name != HANDLES
+            if len(glyphs) and is_seen:
                 name = prefix + re.sub(r"\W+", "_", glyphs.name)
                 found[name] = _table(frame, glyphs)
     return found

@@ -3,9 +3,19 @@
 import numpy as np
 import pandas as pd
 
-from plateviz.figures.figure import FRAME_WIDTH, Axis, By, Figure, Glyphs, framed, message
+from plateviz.figures.figure import (
+    FRAME_WIDTH,
+    HANDLES,
+    Axis,
+    By,
+    Figure,
+    Glyphs,
+    framed,
+    message,
+)
 from plateviz.figures.glyphs import paths, texts
 from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.focal_plane import of_detectors
 from plateviz.plots.points import class_points
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.footprint import footprint_fields, footprint_sources
@@ -20,6 +30,8 @@ _HOVER = [
     ("δ", "@{dec}{0.000000}°"),
 ]
 _DASHES = ("solid", "dashed", "dotdash", "dotted")
+# Colour and width, in screen pixels, of what is tapped.
+_UNSEEN, _FINGER = "#00000000", 9.0
 # Room for the fields' numbers beside the outermost corners.
 _MARGIN_X, _MARGIN_Y = 1.25, 1.2
 
@@ -41,7 +53,7 @@ def plot_footprint(
     half_y = _MARGIN_Y * _largest(sources["y_arcmin"], fields["y_arcmin"])
     points = class_points(sources, "x_arcmin", "y_arcmin", hover=_HOVER)
     return framed(
-        [_outlines(fields), points, _field_numbers(fields)],
+        [*_outlines(fields), points, _field_numbers(fields)],
         title=_TITLE,
         subtitle=_subtitle(sources, fields),
         x=Axis(_XLABEL, (half_x, -half_x)),
@@ -66,14 +78,20 @@ def _listed(fields: pd.DataFrame) -> str:
     return ", ".join(f"{field:.0f}" for field in sorted(fields["field_id"].unique()))
 
 
-def _outlines(fields: pd.DataFrame) -> Glyphs:
-    """Return the detector outlines of each field, with dashes that differ between fields."""
-    outlines, dashes = [], []
+def _outlines(fields: pd.DataFrame) -> list[Glyphs]:
+    """Return the detector outlines of each field, with dashes that differ between fields.
+
+    A line is too thin for a finger: what is tapped is a wide one, which is not seen.
+    """
+    outlines, dashes, ids = [], [], []
     for number, (_, field) in enumerate(fields.groupby("field_id")):
-        for _, detector in field.groupby("detector_id"):
+        for detector_id, detector in field.groupby("detector_id"):
+            ids.append(detector_id)
             outlines.append(detector[["x_arcmin", "y_arcmin"]].to_numpy(dtype=float))
             dashes.append(_DASHES[number % len(_DASHES)])
-    return paths(outlines, name="outlines", color="line", width=1.2, dashes=dashes)
+    lines = paths(outlines, name="outlines", color="line", width=1.2, dashes=dashes)
+    handles = paths(outlines, name=HANDLES, color=_UNSEEN, width=_FINGER)
+    return [of_detectors(one, ids) for one in (lines, handles)]
 
 
 def _field_numbers(fields: pd.DataFrame) -> Glyphs:
@@ -112,7 +130,7 @@ DIAGNOSTICS = (
         "Footprint",
         "The sources on the sky, and the fields of this orbit. Good: reference sources in every "
         "field. They tie the solution to the sky; a field with few of them depends on the other "
-        "fields.",
+        "fields. A tap on an outline selects its detector.",
         OrbitWorkspace.SKY,
         10,
         _plot,

@@ -10,7 +10,7 @@ from plateviz.plots.style import SERIES_COLOURS
 from plateviz.plots.survey_figure import SourceFigure
 from plateviz.plots.units import angle_text, orbits_text
 from plateviz.plots.workspace import SourceWorkspace
-from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
+from plateviz.tables.sky_track import TrackStatistics, sky_track_of, track_statistics
 from plateviz.tables.survey_tables import SourceTables
 
 _TITLE = "Motion on the sky"
@@ -162,7 +162,7 @@ def _subtitle(first: pd.Series, statistics: TrackStatistics) -> str:
 
 
 def _plot(tables: SourceTables) -> Figure:
-    return plot_sky_track(sky_track(tables.history, tables.motion))
+    return plot_sky_track(sky_track_of(tables.track, tables.curves))
 
 
 SOURCE_FIGURES = (

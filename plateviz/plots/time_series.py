@@ -11,7 +11,7 @@ from plateviz.plots.survey_figure import SourceFigure
 from plateviz.plots.units import orbits_text
 from plateviz.plots.workspace import SourceWorkspace
 from plateviz.tables.survey_tables import SourceTables
-from plateviz.tables.time_series import time_series
+from plateviz.tables.time_series import series_of
 
 _TITLE = "Time series"
 _XLABEL = "epoch (Julian year, TCB)"
@@ -166,7 +166,7 @@ def _spread(values: pd.Series, *, least: float) -> Limits:
 
 
 def _plot(tables: SourceTables) -> Figure:
-    return plot_time_series(time_series(tables.history, tables.motion))
+    return plot_time_series(series_of(tables.track, tables.curves))
 
 
 SOURCE_FIGURES = (

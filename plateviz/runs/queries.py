@@ -4,7 +4,7 @@ Each orbit's directory contains its part of the history. After orbits are added,
 gathered into one file sorted by source, from which one source can be read without the rest.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 
@@ -14,7 +14,8 @@ import pandas as pd
 from pyarrow.compute import Expression
 from pyarrow.compute import field as col
 
-from plateviz.runs.fitted_orbit import kept_table, read_fitted_orbit, read_summary
+from plateviz.runs.fitted_orbit import is_complete, kept_table, read_fitted_orbit, read_summary
+from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.run import ERRORS_FILE, HISTORY_FILE, MOTIONS_FILE, Run, Written, runs_of
 from solver.data.result import FitResult
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
@@ -48,16 +49,12 @@ FROM rows GROUP BY source_class ORDER BY source_class
 """
 
 
-ReadOrbit = Callable[[Path], FitResult]
-"""Reads a fitted orbit from its directory."""
-
-
 class SurveyRun:
     """Queries over the orbits of one run; reads files and keeps nothing large in memory."""
 
-    def __init__(self, run: Run, read: ReadOrbit = read_fitted_orbit) -> None:
-        """Open a run, complete or not; `read` reads a fitted orbit."""
-        self._run, self._read = run, read
+    def __init__(self, run: Run, cache: OrbitCache | None = None) -> None:
+        """Open a run, complete or not; `cache` is of its fitted orbits."""
+        self._run, self._cache = run, cache
         self._unchanged = UnchangedFiles()
 
     @property
@@ -99,7 +96,7 @@ class SurveyRun:
 
     def has_fitted(self, orbit: int) -> bool:
         """Return whether the run has a solution of an orbit."""
-        return orbit in self._run.complete_orbits()
+        return is_complete(self._run.orbit_directory(orbit))
 
     def orbits(self) -> pd.DataFrame:
         """Return `survey_schema.RUN_ORBITS`, a row per orbit of the survey."""
@@ -183,7 +180,13 @@ class SurveyRun:
 
     def result(self, orbit: int) -> FitResult:
         """Return one fitted orbit; InputError if it does not exist."""
-        return self._read(self._run.orbit_directory(orbit))
+        read = read_fitted_orbit if self._cache is None else self._cache.read
+        return read(self._run.orbit_directory(orbit))
+
+    def expect(self, orbit: int) -> None:
+        """Read a fitted orbit ahead, which is likely to be asked for next, if it exists."""
+        if self._cache is not None and self.has_fitted(orbit):
+            self._cache.expect(self._run.orbit_directory(orbit))
 
     @cached_property
     def _has_history(self) -> bool:
@@ -226,9 +229,9 @@ class SurveyRun:
             raise InputError(message) from error
 
 
-def survey_runs(survey: Path, read: ReadOrbit = read_fitted_orbit) -> list[SurveyRun]:
-    """Return the runs of a survey directory, by name; `read` reads a fitted orbit."""
-    return [SurveyRun(run, read) for run in runs_of(survey)]
+def survey_runs(survey: Path, cache: OrbitCache | None = None) -> list[SurveyRun]:
+    """Return the runs of a survey directory, by name; `cache` is of their fitted orbits."""
+    return [SurveyRun(run, cache) for run in runs_of(survey)]
 
 
 def open_run(survey: Path, name: str) -> SurveyRun:

@@ -159,9 +159,14 @@ class ScratchResult(FitResult):
 
 
 def _write_table(path: Path, frame: pd.DataFrame) -> None:
-    content = pa.Table.from_pandas(frame, preserve_index=False)
+    content = pa.table({name: _arrow(frame[name]) for name in frame})
     with pa.OSFile(str(path), "wb") as sink, pa.ipc.new_file(sink, content.schema) as writer:
         writer.write_table(content)
+
+
+def _arrow(column: pd.Series) -> pa.Array:
+    """Return a column; numbers are neither copied nor searched for NaN, which stays NaN."""
+    return pa.array(column.to_numpy() if column.dtype.kind in "biuf" else column)
 
 
 def _read_table(path: Path) -> pd.DataFrame | None:

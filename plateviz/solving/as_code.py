@@ -1,7 +1,7 @@
-"""A solution as code: the command line and the Python that make it again."""
+"""A solution and its figures as code: the command line and the Python that make them again."""
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 from plateviz.solving.origin import OrbitFiles, Origin, SurveyFolder
 from solver.data.engine_settings import ENGINE_OPTIONS, engine_options
@@ -10,16 +10,20 @@ from solver.data.setting_words import options_of
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import LeftOut, Texts
 
-# Name of the run, or of the result file, that the command writes.
-_NAME = "reproduced"
+NAME = "reproduced"
+"""Name of the run, or of the result file, that the command writes."""
+PREAMBLE = "import plateviz\n\n"
+FigureCall = tuple[str, Mapping[str, object]]
+"""Name of a figure, and the keywords with which it is drawn."""
 
 
-def as_command(origin: Origin, orbit: int | None, settings: FitSettings) -> str:
+def as_command(origin: Origin, orbit: int | None, settings: FitSettings, name: str = NAME) -> str:
     """Return the command line that makes a solution.
 
     Parameters
     ----------
     orbit : orbit_id; None if the origin is files with one orbit only
+    name : of the run, or of the result file without its suffix
 
     Raises
     ------
@@ -29,16 +33,47 @@ def as_command(origin: Origin, orbit: int | None, settings: FitSettings) -> str:
     if isinstance(origin, SurveyFolder):
         if orbit is None:
             raise ValueError("orbit: expected an orbit_id of the survey, found None")
-        words = ["plateviz", "survey", origin.directory, "--run", _NAME, "--orbits", str(orbit)]
+        words = ["plateviz", "survey", origin.directory, "--run", name, "--orbits", str(orbit)]
         return _in_lines(words, _options(settings, "survey"))
-    words = ["plateviz", "fit", origin.observations, origin.reference, "-o", f"{_NAME}.fits"]
+    words = ["plateviz", "fit", origin.observations, origin.reference, "-o", f"{name}.fits"]
     for name, value in _files(origin):
         words += [f"--{name}", str(value)]
     return _in_lines(words, _options(settings, "fit"))
 
 
-def as_python(origin: Origin, orbit: int | None, settings: FitSettings) -> str:
-    """Return Python that makes a solution; parameters as for `as_command`."""
+def report_command(origin: Origin, orbit: int | None, other: str | None = None) -> str:
+    """Return the command line that draws the figures of what `as_command` has made.
+
+    Parameters
+    ----------
+    orbit : as of `as_command`
+    other : name of a second solution that it has made, to compare with; None for none
+    """
+    if isinstance(origin, SurveyFolder):
+        made = [origin.directory, "--run", NAME, "--orbit", str(orbit)]
+        compared = [] if other is None else ["--other", other]
+    else:
+        camera = [] if origin.instrument is None else ["--instrument", origin.instrument]
+        made = [f"{NAME}.fits", *camera]
+        compared = [] if other is None else ["--other", f"{other}.fits"]
+    return shlex.join(["plateviz", "report", *made, *compared, "-o", f"{NAME}.html"])
+
+
+def report_of_run(survey: str, run: str, *options: str) -> str:
+    """Return the command line that reports a run, or what of it the options name."""
+    words = ["plateviz", "report", survey, "--run", run, *options, "-o", "REPORT.html"]
+    return shlex.join(words)
+
+
+def as_python(
+    origin: Origin, orbit: int | None, settings: FitSettings, name: str = "solution"
+) -> str:
+    """Return Python that makes a solution; parameters as for `as_command`.
+
+    Parameters
+    ----------
+    name : of the variable
+    """
     if isinstance(origin, SurveyFolder):
         opened = f"plateviz.open({origin.directory!r}).orbit({orbit})"
     else:
@@ -50,7 +85,16 @@ def as_python(origin: Origin, orbit: int | None, settings: FitSettings) -> str:
         if one.keyword
     } | engine_options(settings.svi, settings.nuts)
     arguments = ", ".join(f"{keyword}={value!r}" for keyword, value in changes.items())
-    return f"import plateviz\n\nsolution = {opened}.fit({arguments})"
+    return f"{PREAMBLE}{name} = {opened}.fit({arguments})"
+
+
+def figures_as_python(variable: str, figures: Sequence[FigureCall]) -> str:
+    """Return Python that draws figures of a solution, a run or a source; none of no figures."""
+    calls = []
+    for name, keywords in figures:
+        arguments = [repr(name), *(f"{one}={value!r}" for one, value in keywords.items())]
+        calls.append(f"    {variable}.figure({', '.join(arguments)}),\n")
+    return f"figures = [\n{''.join(calls)}]" if calls else ""
 
 
 def _files(origin: OrbitFiles) -> Iterator[tuple[str, object]]:

@@ -14,8 +14,8 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 from plateviz.runs.column_cache import ColumnCache
-from plateviz.runs.fitted_orbit import read_fitted_orbit
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
+from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.runs.scratch_result import is_written, read_scratch_result
 from plateviz.solving.job import Job, JobStatus
@@ -63,7 +63,7 @@ class SolutionStore:
             self._folder = ScratchFolder(temporary, "plateviz")
         self._scratch = self._folder.path
         self._read = lru_cache(maxsize=16)(partial(read_scratch_result, hurry=solver.hurry))
-        self._read_of_run = lru_cache(maxsize=8)(lambda directory, *_: read_fitted_orbit(directory))
+        self._of_runs = OrbitCache()
         self.columns = ColumnCache()
         self.background = ThreadPoolExecutor(_READERS, thread_name_prefix="reader")
 
@@ -84,7 +84,7 @@ class SolutionStore:
         origin = self.origin
         if not isinstance(origin, SurveyFolder):
             return []
-        return survey_runs(Path(origin.directory), self._read_shared)
+        return survey_runs(Path(origin.directory), self._of_runs)
 
     def request(self, orbit: int | None, settings: FitSettings, what_if: bool = False) -> Job:
         """Request an orbit fitted with `settings`; the same request returns the same job.
@@ -150,18 +150,10 @@ class SolutionStore:
 
     def close(self) -> None:
         """End the solver process and remove the scratch folder."""
+        self._of_runs.close()
         self.background.shutdown(wait=False, cancel_futures=True)
         self._solver.close()
         self._folder.close()
-
-    def _read_shared(self, directory: Path) -> FitResult:
-        """Return a fitted orbit of a run; pages that show the same one share it."""
-        try:
-            status = directory.stat()
-        except OSError:
-            return read_fitted_orbit(directory)
-        # An orbit is never changed in place; one that replaces it is another directory.
-        return self._read_of_run(directory, status.st_ino, status.st_mtime_ns)
 
     def _request(
         self, orbit: int | None, settings: FitSettings, what_if: bool, directory: Path

@@ -45,10 +45,13 @@ def sky_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
     "catalogue", "true", "fit" or "mean"), `mean_year` and `rms_catalogue_mas`, the rms
     separation from the catalogue (2-D). No rows without an orbit
     """
-    track = source_track(history, motion)
+    return sky_track_of(source_track(history, motion), source_curves(history, motion))
+
+
+def sky_track_of(track: pd.DataFrame, curves: pd.DataFrame) -> pd.DataFrame:
+    """Return `sky_track` from `source_track` and `source_curves`."""
     if track.empty:
         return track.assign(kind="", zero="", rms_catalogue_mas=np.nan)
-    curves = source_curves(history, motion)
     distance = [track[f"{axis}_mas"] - track[f"catalogue_{axis}_mas"] for axis in _AXES]
     zero = "catalogue" if _is_near(track, distance) else _zero(track)
     summary = {

@@ -1,8 +1,11 @@
 """SurveyTables and SourceTables: input tables of the figures of a run."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import pandas as pd
+
+from plateviz.tables.source_track import source_curves, source_track
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class SurveyTables:
 
 @dataclass(frozen=True)
 class SourceTables:
-    """Input tables of the figures of one source.
+    """Input tables of the figures of one source, which share what is computed from them.
 
     Attributes
     ----------
@@ -41,3 +44,13 @@ class SourceTables:
 
     history: pd.DataFrame
     motion: pd.Series | None = None
+
+    @cached_property
+    def track(self) -> pd.DataFrame:
+        """`tables.source_track`."""
+        return source_track(self.history, self.motion)
+
+    @cached_property
+    def curves(self) -> pd.DataFrame:
+        """`tables.source_curves`."""
+        return source_curves(self.history, self.motion)

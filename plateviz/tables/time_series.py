@@ -40,10 +40,14 @@ def time_series(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame
     `noise_mas` (sigma of the part that scatters between orbits) and `pull` (residual_mas over
     noise_mas); rows of the curve have `fit_sigma_mas`. No rows without an orbit
     """
-    track = source_track(history, motion)
+    return series_of(source_track(history, motion), source_curves(history, motion))
+
+
+def series_of(track: pd.DataFrame, curves: pd.DataFrame) -> pd.DataFrame:
+    """Return `time_series` from `source_track` and `source_curves`."""
     if track.empty:
         return pd.DataFrame(columns=_COLUMNS)
-    parts = [("orbit", track), ("curve", source_curves(history, motion))]
+    parts = [("orbit", track), ("curve", curves)]
     zero = _zero(track)
     shift = {axis: _mean_offset(track, axis) if zero == "mean" else 0.0 for axis in _AXES}
     table = pd.concat(

@@ -13,6 +13,8 @@ from solver.errors import InputError
 _LARGEST_ID = 2**63 - 1
 _ID = r"(-?[0-9]{1,19})"
 _EXCLUSION = re.compile(rf"(source|detector)={_ID}|(exposure)={_ID}/{_ID}")
+# Columns that identify an exposure.
+_EXPOSURE = ["field_id", "plate_id"]
 # Number of excluded items of a kind that a short description names one by one.
 _FEW = 4
 
@@ -47,15 +49,15 @@ class Exclusions:
         if not self:
             return data
         rows = data.measurements
-        exposure = pd.MultiIndex.from_frame(rows[["field_id", "plate_id"]])
         is_excluded = np.zeros(len(rows), dtype=bool)
-        for kind, excluded, measured in (
-            ("source", self.sources, pd.Index(rows["source_id"])),
-            ("exposure", self.exposures, exposure),
-            ("detector", self.detectors, pd.Index(rows["detector_id"])),
+        for kind, excluded, index in (
+            ("source", self.sources, lambda: pd.Index(rows["source_id"])),
+            ("exposure", self.exposures, lambda: pd.MultiIndex.from_frame(rows[_EXPOSURE])),
+            ("detector", self.detectors, lambda: pd.Index(rows["detector_id"])),
         ):
             if not excluded:
                 continue
+            measured = index()
             removed = measured.isin(list(excluded))
             missing = excluded.difference(measured[removed].tolist())
             if missing:
@@ -133,9 +135,8 @@ def of_rows(data: OrbitData, chosen: np.ndarray) -> OrbitData:
     chosen : boolean, one per measurement
     """
     rows = data.measurements[chosen]
-    measured = set(zip(rows["field_id"], rows["plate_id"], strict=True))
-    plates = zip(data.exposures["field_id"], data.exposures["plate_id"], strict=True)
-    used = np.fromiter((plate in measured for plate in plates), bool, len(data.exposures))
+    measured = pd.MultiIndex.from_frame(rows[_EXPOSURE].drop_duplicates())
+    used = pd.MultiIndex.from_frame(data.exposures[_EXPOSURE]).isin(measured)
     exposures = data.exposures[used].reset_index(drop=True)
     return replace(data, measurements=rows, exposures=exposures)
 

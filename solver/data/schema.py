@@ -3,6 +3,8 @@
 The result tables use names of this project. `solver.io` maps them to and from files.
 """
 
+import math
+
 from solver.data.columns import Column, Table
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
 from solver.data.input_schema import CATALOGUE as CATALOGUE
@@ -44,6 +46,15 @@ SOURCES = Table(
         Column("offset_dec", "float64", "mas", "estimate minus prior, dec"),
         Column("chi2", "float64", "", "sum of squared whitened residuals"),
         Column("dof", "float64", "", "expected chi2: 2 n_obs less the leverage"),
+        Column(
+            "magnitude",
+            "float64",
+            "mag",
+            "magnitude in the catalogue; NaN where it has none",
+            required=False,
+            default=math.nan,
+            may_be_nan=True,
+        ),
     ),
     key=("source_id",),
 )

@@ -21,6 +21,7 @@ from solver.linear.chi2 import Gradient, gradient
 from solver.linear.normal_equations import NormalEquations, accumulate
 from solver.linear.source_elimination import ReducedSystem, eliminate_sources
 from solver.problem.problem import Problem, thinned
+from solver.runtime.threads import one_blas_thread
 
 _MIN_STEP_FRACTION = 1e-6
 # The Jacobians are reused while steps are at most this many sigmas long, and at most this
@@ -75,6 +76,7 @@ class _Point(NamedTuple):
     objective: float
 
 
+@one_blas_thread()
 def find_mode(
     problem: Problem,
     settings: FitSettings,

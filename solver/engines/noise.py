@@ -17,7 +17,8 @@ from jaxtyping import Float
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, find_mode
 from solver.errors import InputError
-from solver.linear.leverage import Covariances, covariances, residuals
+from solver.linear.covariances import Covariances, covariances
+from solver.linear.leverage import residuals
 from solver.problem.noise import Noise
 from solver.problem.problem import Problem
 
@@ -87,7 +88,8 @@ def _predictors(
 ) -> tuple[list[str], Float[np.ndarray, "obs predictor"]]:
     """Return the names of the predictors, and their values at each measurement."""
     index, n_obs = problem.measurements.index, problem.n_obs
-    names, columns = [], [np.empty((n_obs, 0))]
+    names: list[str] = []
+    columns: list[np.ndarray] = [np.empty((n_obs, 0))]
     if settings.noise_by_exposure:
         names += [f"exposure {one.name}" for one in problem.elements["exp"]]
         columns.append(np.eye(problem.layout.n_exp)[index.exposure])

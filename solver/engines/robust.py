@@ -18,6 +18,7 @@ from solver.data.orbit import OrbitData
 from solver.data.schema import OUTLIERS
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, find_mode
+from solver.linear.covariances import marginal_covariance
 from solver.linear.leverage import of_slots
 from solver.linear.normal_equations import chunks
 from solver.problem.problem import Problem, of_rows
@@ -118,7 +119,7 @@ def _outliers(problem: Problem, mode: Mode, found: Bool[np.ndarray, " obs"]) -> 
         whitened.append(of_slots(chunk.residual))
         jacobian.append(np.stack([of_slots(pair) for pair in chunk.source], axis=-1))
     residual, by_source = np.concatenate(whitened)[place], np.concatenate(jacobian)[place]
-    covariance = mode.reduced.marginal_covariance()[outlier_problem.measurements.index.source]
+    covariance = marginal_covariance(mode.reduced)[outlier_problem.measurements.index.source]
     # One more measurement of a source moves it by gain times residual.
     spread = by_source @ covariance @ by_source.swapaxes(1, 2) + np.eye(2)
     gain = covariance @ by_source.swapaxes(1, 2) @ np.linalg.inv(spread)

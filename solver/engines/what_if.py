@@ -19,6 +19,7 @@ from solver.linear.normal_equations import accumulate
 from solver.linear.source_elimination import POORLY_CONSTRAINED, eliminate_sources
 from solver.linear.update import update_equations
 from solver.problem.problem import Problem
+from solver.runtime.threads import one_blas_thread
 
 # Maximum number of steps; a nearly linear model needs fewer.
 _MAX_STEPS = 5
@@ -50,6 +51,7 @@ def _updated(mode: Mode, solved: Problem, changed: Problem) -> Mode | None:
     return Mode(*equations.at, reduced, FitStatus.WHAT_IF, [], equations)
 
 
+@one_blas_thread()
 def solve_what_if(
     mode: Mode, solved: Problem, changed: Problem, settings: FitSettings
 ) -> Mode | None:

@@ -9,15 +9,12 @@ stay valid when the priors change.
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import cache
 
 import jax
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
-from threadpoolctl import ThreadpoolController
 
 from solver.linear.chi2 import Gradient
 from solver.linear.derivative_products import Rows, one_by_one, rows_of
@@ -28,6 +25,7 @@ from solver.problem.parameter_vector import VectorLayout
 from solver.problem.problem import Problem
 from solver.problem.source_blocks import SourceBlocks
 from solver.problem.tiles import Gathering
+from solver.runtime.threads import one_blas_thread
 
 
 @dataclass(frozen=True)
@@ -92,20 +90,6 @@ def chunks(
         if i + 1 < n_chunks:
             ahead = launch(i + 1)
         yield jax.tree.map(np.asarray, current)
-
-
-def one_blas_thread() -> AbstractContextManager[object]:
-    """Limit BLAS to one thread while many small products are computed.
-
-    BLAS threads wait in a busy loop between products; next to JAX or a browser, on few
-    cores, that was measured to make a pass up to twenty times slower.
-    """
-    return _thread_pools().limit(limits=1, user_api="blas")
-
-
-@cache
-def _thread_pools() -> ThreadpoolController:
-    return ThreadpoolController()
 
 
 def accumulate(

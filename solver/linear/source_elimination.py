@@ -13,12 +13,13 @@ from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sl
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float
 
 from solver.linear.normal_equations import NormalEquations
 from solver.linear.triangular import lower_solve, rows_solved, upper_solve
 from solver.problem.priors import Priors
 from solver.problem.source_blocks import SourceBlock, SourceBlocks
+from solver.runtime.threads import one_blas_thread
 
 # Limits on the information along a direction, relative to that of its parameters taken alone:
 # of weak directions, which only the priors constrain, and of poorly constrained ones.
@@ -41,8 +42,7 @@ class ReducedSystem:
     source_blocks : blocks of the sources
     whitened : Z, one matrix per source block
     of_data : S without the calibration's priors
-    matrix : S
-    factor : upper Cholesky factor R of S = R'R
+    factor : upper Cholesky factor R of S = R'R, with the priors
     """
 
     at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]
@@ -51,7 +51,6 @@ class ReducedSystem:
     source_blocks: SourceBlocks
     whitened: tuple[Float[np.ndarray, "_ 2 _"], ...]
     of_data: Float[np.ndarray, "calib calib"]
-    matrix: Float[np.ndarray, "calib calib"]
     factor: Float[np.ndarray, "calib calib"]
 
     def solve(
@@ -128,62 +127,28 @@ class ReducedSystem:
         """Return -V_i^-1 W_i' v: shift (alpha*, delta) of each source for each vector, mas."""
         return -self.of_whitened(self.onto_sources(vectors.T))
 
-    def spread(self) -> Float[np.ndarray, "calib 2 src"]:
-        """Return T = R'^-1 Z, its sources in block order.
+    def spread(
+        self, members: Bool[np.ndarray, " src"] | None = None
+    ) -> Float[np.ndarray, "calib 2 _"]:
+        """Return T = R'^-1 Z of all sources, or of some, in block order.
 
         I + T_i' T_i is the whitened marginal covariance of source i.
         """
-        return rows_solved(self.factor, self._dense(), trans=True)
+        return rows_solved(self.factor, self._dense(members), trans=True)
 
-    def _dense(self) -> Float[np.ndarray, "calib 2 src"]:
-        """Return Z, its sources in block order."""
-        dense = np.zeros((len(self.factor), 2, len(self.source_factor)))
+    def _dense(
+        self, members: Bool[np.ndarray, " src"] | None = None
+    ) -> Float[np.ndarray, "calib 2 _"]:
+        """Return Z of all sources, or of some, in block order."""
+        order, first = self.source_blocks.order, 0
+        chosen = np.ones(len(order), dtype=bool) if members is None else members[order]
+        dense = np.zeros((len(self.factor), 2, chosen.sum()))
         for block, matrix in self._block_matrices():
-            dense[block.columns, :, block.places] = matrix
+            inside = chosen[block.places]
+            part = matrix if inside.all() else matrix[:, :, inside]
+            dense[block.columns, :, first : first + part.shape[-1]] = part
+            first += part.shape[-1]
         return dense
-
-    def marginal_covariance(
-        self, spread: Float[np.ndarray, "calib 2 src"] | None = None
-    ) -> Float[np.ndarray, "src 2 2"]:
-        """Return the covariance of each source with the calibration integrated out, mas^2.
-
-        Parameters
-        ----------
-        spread : T, if already computed; otherwise only its nonzero blocks are computed
-        """
-        inner = np.empty((2, 2, len(self.source_factor)))
-        for places, rows in self._spreads() if spread is None else [(slice(None), spread)]:
-            for a, b in ((0, 0), (0, 1), (1, 1)):
-                inner[a, b, places] = np.einsum("ks,ks->s", rows[:, a], rows[:, b]) + (a == b)
-        inner[1, 0] = inner[0, 1]
-        half = upper_solve(self.source_factor, inner[:, :, self.source_blocks.position])
-        return upper_solve(self.source_factor, half.swapaxes(0, 1)).transpose(2, 1, 0).copy()
-
-    def _spreads(self) -> Iterator[tuple[slice, Float[np.ndarray, "_ 2 _"]]]:
-        """Yield places and T of each source block, with the block's columns ordered last.
-
-        The other rows of T are then zero, and only the last rows and columns of R are needed.
-        """
-        for chain in self.source_blocks.chains():
-            order = self.source_blocks.last(chain, len(self.factor))
-            factor = self._reordered_factor(order)
-            for number in chain:
-                block, matrix = self.source_blocks.blocks[number], self.whitened[number]
-                own = slice(len(order) - len(matrix), None)
-                rows = np.searchsorted(block.columns, order[own])
-                yield block.places, rows_solved(factor[own, own], matrix[rows], trans=True)
-
-    def _reordered_factor(
-        self, order: Int[np.ndarray, " calib"]
-    ) -> Float[np.ndarray, "calib calib"]:
-        """Return the factor R of S with its rows and columns in another order."""
-        if (order[:-1] < order[1:]).all():
-            return self.factor
-        try:
-            return np.linalg.cholesky(self.matrix[np.ix_(order, order)]).T
-        except np.linalg.LinAlgError:
-            # Slower, but works where S is nearly singular.
-            return np.asarray(np.linalg.qr(self.factor[:, order], mode="r"))
 
     def weak_directions(self, below: float = _WEAK) -> Float[np.ndarray, "calib weak"]:
         """Return the directions of the calibration that only the priors constrain.
@@ -209,16 +174,6 @@ class ReducedSystem:
     def theta_covariance(self) -> Float[np.ndarray, "calib calib"]:
         """Return the marginal covariance of the calibration."""
         return sl.cho_solve((self.factor, False), np.eye(len(self.factor)))
-
-    def cross_covariance(
-        self, spread: Float[np.ndarray, "calib 2 src"]
-    ) -> Float[np.ndarray, "calib 2 src"]:
-        """Return the covariance of the calibration with each source, -S^-1 W V^-1.
-
-        The sources are in block order, as those of `spread` are.
-        """
-        solved = rows_solved(self.factor, spread.copy(), trans=False, scale=-1.0)
-        return upper_solve(self.source_factor[self.source_blocks.order], solved)
 
     def log_determinant(self) -> float:
         """Return the logarithm of the determinant of the full Hessian."""
@@ -247,16 +202,9 @@ def eliminate_sources(
         if before is not None and np.array_equal(before.source_factor, source_factor):
             whitened, of_data = before.whitened, before.of_data
         else:
-            whitened = _whitened(equations, source_factor)
-            of_data = equations.theta.copy()
-            for block, z_matrix in zip(equations.source_blocks.blocks, whitened, strict=True):
-                rows = z_matrix.reshape(len(z_matrix), -1)
-                touched = of_data[block.columns]
-                touched[:, block.columns] -= rows @ rows.T
-                of_data[block.columns] = touched
-        # NumPy's BLAS, as for the product above, because SciPy's threads would wait for it.
-        matrix = _with_diagonal(of_data, prior_hessian)
-        factor = np.linalg.cholesky(matrix).T
+            whitened, of_data = _without_sources(equations, source_factor)
+        # NumPy's BLAS, as for the products above, because SciPy's threads would wait for it.
+        factor = np.linalg.cholesky(_with_diagonal(of_data, prior_hessian)).T
     except np.linalg.LinAlgError:
         return None
     hessian = _with_diagonal(equations.theta, prior_hessian)
@@ -271,23 +219,31 @@ def eliminate_sources(
         equations.source_blocks,
         whitened,
         of_data,
-        matrix,
         factor,
     )
 
 
-def _whitened(
+def _without_sources(
     equations: NormalEquations, source_factor: Float[np.ndarray, "src 2 2"]
-) -> tuple[Float[np.ndarray, "_ 2 _"], ...]:
-    """Return the matrix of Z of each source block."""
+) -> tuple[tuple[Float[np.ndarray, "_ 2 _"], ...], Float[np.ndarray, "calib calib"]]:
+    """Return the matrix of Z of each source block, and U - Z Z' without priors."""
+    blocks, remaining = equations.source_blocks.blocks, equations.theta.copy()
     ordered = source_factor[equations.source_blocks.order]
 
-    def of_block(block: SourceBlock) -> Float[np.ndarray, "_ 2 _"]:
+    def of_block(
+        block: SourceBlock,
+    ) -> tuple[Float[np.ndarray, "_ 2 _"], Float[np.ndarray, "_ _"]]:
         cross = equations.cross[block.columns, :, block.places]
-        return lower_solve(ordered[block.places], cross)
+        matrix = lower_solve(ordered[block.places], cross)
+        rows = matrix.reshape(len(matrix), -1)
+        return matrix, rows @ rows.T
 
-    with ThreadPoolExecutor(max_workers=_WORKERS) as helpers:
-        return tuple(helpers.map(of_block, equations.source_blocks.blocks))
+    # Blocks side by side: BLAS threads would wait for one another in a busy loop.
+    with one_blas_thread(), ThreadPoolExecutor(max_workers=_WORKERS) as helpers:
+        parts = list(helpers.map(of_block, blocks))
+    for block, (_, product) in zip(blocks, parts, strict=True):
+        remaining[np.ix_(block.columns, block.columns)] -= product
+    return tuple(matrix for matrix, _ in parts), remaining
 
 
 def _with_diagonal(

@@ -1,8 +1,14 @@
 """Triangular systems: 2 x 2 ones of each source, and those of the whole calibration."""
 
+from collections.abc import Iterator
+from itertools import pairwise
+
 import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Float
+
+# Parts of a triangular product: more skip more zeros, but make smaller products.
+_PARTS = 4
 
 
 def lower_solve(
@@ -45,3 +51,30 @@ def rows_solved(
     # Solved from the right for the transpose, which has the memory order of BLAS.
     solved = sl.blas.dtrsm(scale, factor, rows.T, trans_a=not trans, side=1, overwrite_b=True)
     return solved.T.reshape(right.shape)
+
+
+def upper_times(
+    upper: Float[np.ndarray, "k k"], right: Float[np.ndarray, "k n"]
+) -> Float[np.ndarray, "k n"]:
+    """Return the product with an upper triangle, without most of its zeros.
+
+    Unlike SciPy's, it lets other threads work.
+    """
+    product = np.empty_like(right)
+    for first, end in _parts(len(upper)):
+        np.matmul(upper[first:end, first:], right[first:], out=product[first:end])
+    return product
+
+
+def upper_transposed_times(
+    upper: Float[np.ndarray, "k k"], right: Float[np.ndarray, "k n"]
+) -> Float[np.ndarray, "k n"]:
+    """Return the product with the transpose of an upper triangle, as `upper_times`."""
+    product = np.empty_like(right)
+    for first, end in _parts(len(upper)):
+        np.matmul(upper[:end, first:end].T, right[:end], out=product[first:end])
+    return product
+
+
+def _parts(size: int) -> Iterator[tuple[int, int]]:
+    return pairwise(np.linspace(0, size, _PARTS + 1).astype(int).tolist())

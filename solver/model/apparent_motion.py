@@ -1,5 +1,6 @@
 """Apparent motion of a source: proper motion and parallax, as offsets on the sky."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ from solver.model.ephemeris import observer_at
 from solver.units import DAYS_PER_JULIAN_YEAR, MJD_J2000
 
 N_PARAMETERS = 5
+# Sets of times whose ephemeris is kept, and most times of one of them.
+_KEPT, _MOST_KEPT = 32, 1000
 
 # An array for array input, a scalar for scalar input.
 AnyFloat = Any
@@ -62,10 +65,24 @@ def motion_design(
     """
     # The ephemeris is computed once per distinct time: many sources share those of an orbit.
     times, inverse = np.unique(mjd, return_inverse=True)
-    observer = observer_at(times).position[inverse]
+    observer = _positions_at(times)[inverse]
     years = julian_year(mjd) - epoch
     design = np.zeros((len(years), 2, N_PARAMETERS))
     design[:, 0, 0] = design[:, 1, 1] = 1.0
     design[:, :, 2] = np.stack(parallax_factors(ra, dec, observer), axis=-1)
     design[:, 0, 3] = design[:, 1, 4] = years
     return design
+
+
+def _positions_at(mjd: np.ndarray) -> np.ndarray:
+    """Return the Earth's position, au, shape (n, 3); that at few times is computed once."""
+    if len(mjd) > _MOST_KEPT:
+        return observer_at(mjd).position
+    return _kept_positions(np.asarray(mjd, dtype=float).tobytes())
+
+
+@lru_cache(maxsize=_KEPT)
+def _kept_positions(mjd: bytes) -> np.ndarray:
+    positions = observer_at(np.frombuffer(mjd)).position
+    positions.flags.writeable = False
+    return positions

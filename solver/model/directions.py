@@ -26,6 +26,22 @@ def tangent_frame(
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def displaced(
+    frame: Float[np.ndarray, "n 3 3"], east: Float[np.ndarray, " n"], north: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 3"]:
+    """Return unit vectors displaced in the tangent plane; as `projection.displace`, in NumPy.
+
+    Outside of a compiled program JAX would compile each operation for each number of vectors.
+
+    Parameters
+    ----------
+    frame : as from `tangent_frame`
+    east, north : rad
+    """
+    moved = frame[:, 0] + east[:, None] * frame[:, 1] + north[:, None] * frame[:, 2]
+    return moved / np.linalg.norm(moved, axis=-1, keepdims=True)
+
+
 def unproject(
     ideal_um: Float[np.ndarray, "n 2"],
     frame: Float[np.ndarray, "3 3"],

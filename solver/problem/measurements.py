@@ -7,6 +7,7 @@ measurements share the arrays derived from them.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -65,11 +66,45 @@ class Measurements:
             label=self.label[chosen],
         )
 
+    def remaining(self, kept: Bool[np.ndarray, " row"], exposures: pd.DataFrame) -> "Remaining":
+        """Return what is left when rows of the input table are removed.
+
+        Parameters
+        ----------
+        kept : whether each row of the table is kept
+        exposures : all exposures, in ascending order of `KEY`
+        """
+        subset = self.of_rows(kept[self.row])
+        with_source = np.bincount(subset.index.source, minlength=len(self.sets.order)) > 0
+        with_exposure = np.bincount(subset.index.exposure, minlength=len(exposures)) > 0
+        exposures = exposures[with_exposure].reset_index(drop=True)
+        index = Index(
+            _renumbered(with_source)[subset.index.source],
+            _renumbered(with_exposure)[subset.index.exposure],
+            subset.index.detector,
+        )
+        sets = field_sets(index, exposures, int(with_source.sum()))
+        row = _renumbered(kept)[subset.row]
+        return Remaining(replace(subset, index=index, row=row, sets=sets), with_source, exposures)
+
     def of_sources(self, keep: Bool[np.ndarray, " src"], exposures: pd.DataFrame) -> "Measurements":
         """Return the measurements of a subset of the sources, with these sources only."""
         subset = self.of_rows(keep[self.index.source])
-        index = subset.index._replace(source=(np.cumsum(keep) - 1)[subset.index.source])
+        index = subset.index._replace(source=_renumbered(keep)[subset.index.source])
         return replace(subset, index=index, sets=field_sets(index, exposures, int(keep.sum())))
+
+
+class Remaining(NamedTuple):
+    """Some measurements of an orbit; which sources they are of, and their exposures."""
+
+    measurements: Measurements
+    with_source: Bool[np.ndarray, " src"]
+    exposures: pd.DataFrame
+
+
+def _renumbered(kept: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+    """Return the number of each kept element among those that are kept."""
+    return np.cumsum(kept) - 1
 
 
 def sort_measurements(

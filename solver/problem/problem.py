@@ -18,11 +18,10 @@ from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import InputError
 from solver.model.astrometry import propagate, sky_position
 from solver.model.causes import Causes
-from solver.model.directions import tangent_frame
+from solver.model.directions import displaced, tangent_frame
 from solver.model.distortion import terms
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry
-from solver.model.projection import displace
 from solver.problem.causes import causes_of, padded
 from solver.problem.elements import Elements, elements, field_numbers
 from solver.problem.measurements import KEY, Measurements, sort_measurements
@@ -147,6 +146,27 @@ def rebuilt(problem: Problem, instrument: Instrument, settings: FitSettings) -> 
     return _build(problem.measurements, problem.sources, problem.exposures, instrument, settings)
 
 
+def remaining(
+    problem: Problem, kept: Bool[np.ndarray, " row"], instrument: Instrument, settings: FitSettings
+) -> Problem:
+    """Return the problem of some rows of the measurements' table, under other settings.
+
+    It equals the one that `build_problem` makes of these rows, without sorting them again.
+
+    Parameters
+    ----------
+    kept : whether each row of the table is kept
+
+    Raises
+    ------
+    InputError
+        If the measurements are too few for the distortion order of the settings.
+    """
+    measurements, with_source, exposures = problem.measurements.remaining(kept, problem.exposures)
+    sources = problem.sources[with_source].reset_index(drop=True)
+    return _build(measurements, sources, exposures, instrument, settings)
+
+
 def _build(
     measurements: Measurements,
     sources: pd.DataFrame,
@@ -206,7 +226,7 @@ def _shifted(
     if not shift.any():
         return frame
     east, north = np.broadcast_to(RAD_PER_MAS * shift, (len(frame), 2)).T
-    return tangent_frame(*sky_position(np.asarray(displace(frame, east, north))))
+    return tangent_frame(*sky_position(displaced(frame, east, north)))
 
 
 def orders_held(n_obs: int, n_src: int, layout: VectorLayout) -> list[int]:

@@ -1,11 +1,12 @@
 """ProblemCache: the problems of one orbit under the latest settings.
 
 Sorting the measurements takes longer than the rest of building a problem. The latest problems
-are therefore kept and rebuilt for settings that select the same measurements.
+are therefore kept and rebuilt for settings that select the same measurements, or fewer.
 """
 
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from solver.data.exclusions import of_rows, thinned_orbit
@@ -13,7 +14,7 @@ from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
 from solver.problem.noise import Noise
-from solver.problem.problem import Problem, build_problem, rebuilt
+from solver.problem.problem import Problem, build_problem, rebuilt, remaining
 
 # One problem for the fit and one for the what-ifs that follow it.
 _CAPACITY = 2
@@ -66,6 +67,7 @@ class ProblemCache:
         """
         for entry in self._entries:
             if entry.matches(settings, outliers, noise):
+                self._keep(entry)
                 return entry.data, rebuilt(entry.problem, self._instrument, settings)
         data = settings.exclusions.without(self._data)
         data = thinned_orbit(data, self._data, settings.thin)
@@ -73,7 +75,32 @@ class ProblemCache:
             data = of_rows(data, ~data.measurements.index.isin(outliers.index))
         if noise is not None:
             data = noise.applied(data)
-        problem = build_problem(data, self._instrument, settings)
-        entry = _Entry(settings.selection(), outliers, noise, data, problem)
-        self._entries = [entry, *self._entries][:_CAPACITY]
+        problem = self._of_fewer_rows(data, settings, noise)
+        if problem is None:
+            problem = build_problem(data, self._instrument, settings)
+        self._keep(_Entry(settings.selection(), outliers, noise, data, problem))
         return data, problem
+
+    def _of_fewer_rows(
+        self, data: OrbitData, settings: FitSettings, noise: Noise | None
+    ) -> Problem | None:
+        """Return the problem of some tables, made from that of a table with more rows."""
+        for entry in self._entries:
+            if entry.noise is not noise:
+                continue
+            rows = entry.data.measurements.index
+            if not 0 < len(data.measurements) < len(rows) or not rows.is_unique:
+                continue
+            places = rows.get_indexer(data.measurements.index)
+            if places[0] >= 0 and (places[:-1] < places[1:]).all():
+                # The larger one serves the next selection, too, so it stays the longest.
+                self._keep(entry)
+                kept = np.zeros(len(rows), dtype=bool)
+                kept[places] = True
+                return remaining(entry.problem, kept, self._instrument, settings)
+        return None
+
+    def _keep(self, entry: _Entry) -> None:
+        """Move an entry to the front, and forget those that were used last."""
+        others = (other for other in self._entries if other is not entry)
+        self._entries = [entry, *others][:_CAPACITY]

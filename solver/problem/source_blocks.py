@@ -46,29 +46,6 @@ class SourceBlocks:
     position: Int[np.ndarray, " src"]
     blocks: tuple[SourceBlock, ...]
 
-    def chains(self) -> list[list[int]]:
-        """Return the numbers of the blocks in chains of nested columns.
-
-        Within a chain, the columns of each block are a subset of those of the block before it.
-        """
-        chains: list[list[int]] = []
-        for number in sorted(range(len(self.blocks)), key=lambda n: -len(self.blocks[n].columns)):
-            columns = self.blocks[number].columns
-            for chain in chains:
-                if np.isin(columns, self.blocks[chain[-1]].columns).all():
-                    chain.append(number)
-                    break
-            else:
-                chains.append([number])
-        return chains
-
-    def last(self, chain: list[int], size: int) -> Int[np.ndarray, " calib"]:
-        """Return all columns, ordered such that those of every block of a chain come last."""
-        rank = np.zeros(size, dtype=np.int64)
-        for number in chain:
-            rank[self.blocks[number].columns] += 1
-        return np.argsort(rank, kind="stable")
-
 
 @dataclass(frozen=True)
 class FieldSets:

@@ -7,12 +7,13 @@ a reference source scatters less than its prior.
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg as sl
 from jaxtyping import Bool, Float
 
 from solver.engines.gauss_newton import Mode
-from solver.linear.leverage import Covariances
+from solver.linear.covariances import Covariances, cross_covariance
 from solver.linear.source_elimination import ReducedSystem
-from solver.linear.triangular import lower_solve
+from solver.linear.triangular import lower_solve, upper_solve
 from solver.problem.priors import Priors
 
 # Number of sources whose covariances with the calibration fit into the caches.
@@ -65,21 +66,20 @@ def deviation_freedom(
     ----------
     prior_variance : mas^2
     """
-    order = covariance.source_blocks.order
-    # T'T is the part of the covariance that two sources share through the calibration.
-    shared = reduced.factor @ covariance.cross[:, :, is_reference[order]].reshape(
-        len(reduced.factor), -1
-    )
-    shared = shared.reshape(len(reduced.factor), 2, -1)
-    variances = prior_variance[order][is_reference[order]]
-    marginal = np.diagonal(covariance.source, axis1=1, axis2=2)[order][is_reference[order]]
+    order = reduced.source_blocks.order
+    order = order[is_reference[order]]
+    # L'^-1 T'T L^-1 is the part of the covariance that sources share through the calibration.
+    shared = upper_solve(reduced.source_factor[order], reduced.spread(is_reference))
+    marginal = np.diagonal(covariance.source, axis1=1, axis2=2)[order]
     freedom = np.zeros(2)
     for axis in range(2):
-        scaled = shared[:, axis] / np.sqrt(variances[:, axis])
-        together = -(scaled.T @ scaled)
-        np.fill_diagonal(together, 1.0 - marginal[:, axis] / variances[:, axis])
-        squares = float((together**2).sum())
-        freedom[axis] = np.trace(together) ** 2 / squares if squares > 0.0 else 0.0
+        scaled = shared[:, axis] / np.sqrt(prior_variance[order, axis])
+        together = scaled @ scaled.T if len(scaled) < scaled.shape[1] else scaled.T @ scaled
+        own = 1.0 - marginal[:, axis] / prior_variance[order, axis]
+        # M is minus the shared part, but for its diagonal; both products have the same norm.
+        diagonal = np.einsum("ks,ks->s", scaled, scaled)
+        squares = float(np.vdot(together, together) - diagonal @ diagonal + own @ own)
+        freedom[axis] = own.sum() ** 2 / squares if squares > 0.0 else 0.0
     return freedom
 
 
@@ -123,7 +123,8 @@ def mean_covariance(
     # Mean shift of the members, along each axis.
     mean_shift = np.eye(2)[:, :, None] * (members / count)
     shared = reduced.onto_calibration(lower_solve(reduced.source_factor, mean_shift))
-    return conditional + shared @ reduced.theta_covariance() @ shared.T
+    half = sl.solve_triangular(reduced.factor, shared.T, trans="T")
+    return conditional + half.T @ half
 
 
 def induced_shift(
@@ -165,6 +166,7 @@ def error_budget(reduced: ReducedSystem, priors: Priors, covariance: Covariances
     is H^-1 H_data H^-1 plus H^-1 P H^-1, whose source blocks these are.
     """
     precision, response = priors.precision, reduced.response()
+    cross = cross_covariance(reduced)
     conditional, n_calib = reduced.conditional_covariance(), len(reduced.theta)
     pulled = np.empty(response.shape)
     for a in range(2):
@@ -175,7 +177,7 @@ def error_budget(reduced: ReducedSystem, priors: Priors, covariance: Covariances
     cross_terms, calibration = (
         contribution[covariance.source_blocks.position]
         for contribution in _quadratic_forms(
-            covariance.cross, shared, priors.hessian_diagonal(covariance.at[0])[:, None]
+            cross, shared, priors.hessian_diagonal(covariance.at[0])[:, None]
         )
     )
     catalogue = half + half.swapaxes(1, 2) + cross_terms

@@ -27,6 +27,7 @@ from solver.results.tables import (
     trace_table,
     true_places,
 )
+from solver.runtime.threads import one_blas_thread
 
 
 class PartialResult(NamedTuple):
@@ -51,6 +52,7 @@ class PartialResult(NamedTuple):
         return replace(self.result, **tables, summary={**self.result.summary, "seconds": seconds})
 
 
+@one_blas_thread()
 def partial_result(
     data: OrbitData,
     instrument: Instrument,

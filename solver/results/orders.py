@@ -39,7 +39,7 @@ from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, find_mode, objective
 from solver.engines.what_if import solve_what_if
 from solver.linear.chi2 import gradient
-from solver.linear.leverage import covariances
+from solver.linear.covariances import covariances
 from solver.model.distortion import terms
 from solver.problem.parameter_vector import PER_COEFFICIENT
 from solver.problem.problem import Problem, thinned

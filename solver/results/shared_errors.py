@@ -14,7 +14,7 @@ from jaxtyping import Float
 from solver.data.parameters import SOURCES
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERROR_BUDGET, N_DRAWS, SHARED_ERRORS
-from solver.linear.leverage import Covariances
+from solver.linear.covariances import Covariances
 from solver.linear.source_elimination import ReducedSystem
 from solver.model.astrometry import catalogue_covariance, jacobian_at, years_since_epoch
 from solver.model.correlation import square_roots

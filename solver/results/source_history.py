@@ -5,7 +5,7 @@ import pandas as pd
 
 from solver.data.result import FitResult
 from solver.data.survey_schema import HISTORY
-from solver.linear.leverage import Covariances
+from solver.linear.covariances import Covariances
 from solver.linear.source_elimination import ReducedSystem
 from solver.model.directions import tangent_frame
 from solver.problem.problem import Problem

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from solver.data.instrument import Instrument
 from solver.data.parameter_group import Group
@@ -20,11 +20,12 @@ from solver.data.schema import (
 )
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Mode
-from solver.linear.leverage import Covariances, Residuals, covariances, residuals
+from solver.linear.covariances import Covariances, covariances
+from solver.linear.leverage import Residuals, residuals
 from solver.linear.source_elimination import ReducedSystem
 from solver.model.astrometry import frames_at, sky_position
+from solver.model.directions import displaced
 from solver.model.ephemeris import observer_at
-from solver.model.projection import displace
 from solver.problem.problem import Problem
 from solver.results.diagnostics import induced_shift
 from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
@@ -97,6 +98,7 @@ def source_table(solution: SolvedProblem) -> pd.DataFrame:
         "offset_dec": solution.mode.sources[:, 1],
         "chi2": np.bincount(index, chi2, n_src),
         "dof": np.bincount(index, 2.0 - solution.residuals.trace, n_src),
+        "magnitude": sources.get("magnitude", pd.Series(np.nan, sources.index)).to_numpy(float),
     }
     return _frame(columns, SOURCES)
 
@@ -104,8 +106,7 @@ def source_table(solution: SolvedProblem) -> pd.DataFrame:
 def residual_table(solution: SolvedProblem, measurements: pd.DataFrame) -> pd.DataFrame:
     """Return `schema.RESIDUALS`, in the row order of `measurements`."""
     problem, residuals = solution.problem, solution.residuals
-    input_order = np.empty_like(problem.measurements.row)
-    input_order[problem.measurements.row] = np.arange(problem.n_obs)
+    row = problem.measurements.row
     pairs = {
         "model_": residuals.pixel,
         "residual_": residuals.whitened * problem.measurements.sigma,
@@ -114,11 +115,18 @@ def residual_table(solution: SolvedProblem, measurements: pd.DataFrame) -> pd.Da
         "focal_": residuals.focal,
     }
     columns = {c: measurements[c].to_numpy() for c in RESIDUALS.names if c in measurements}
-    columns["leverage"] = residuals.trace[input_order]
+    columns["leverage"] = _at(row, residuals.trace)
     for name, values in pairs.items():
         for axis, letter in enumerate("xy"):
-            columns[name + letter] = values[input_order, axis]
+            columns[name + letter] = _at(row, values[:, axis])
     return _frame(columns, RESIDUALS)
+
+
+def _at(row: Int[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return values at their rows."""
+    placed = np.empty(len(values))
+    placed[row] = values
+    return placed
 
 
 def exposure_table(solution: SolvedProblem) -> pd.DataFrame:
@@ -181,10 +189,11 @@ def true_places(solution: SolvedProblem, truth: pd.DataFrame | None) -> pd.DataF
     if truth is None:
         return None
     problem = solution.problem
-    known = problem.sources["source_id"].isin(truth["source_id"]).to_numpy()
-    ids = problem.sources["source_id"].to_numpy()[known]
+    # The truth has all stars of the sky, far more than there are sources.
+    rows = truth[truth["source_id"].isin(problem.sources["source_id"])].sort_values("source_id")
+    ids = rows["source_id"].to_numpy()
+    known = np.isin(problem.sources["source_id"].to_numpy(), ids)
     observer = observer_at(np.array([problem.epoch])).position[0]
-    rows = truth.set_index("source_id").loc[ids].reset_index()
     direction = frames_at(rows, problem.epoch, observer)[:, 0]
     ra, dec = sky_position(direction)
     error = np.zeros((problem.n_src, 2))
@@ -222,7 +231,7 @@ def separation(
 def _displaced(
     frame: Float[np.ndarray, "n 3 3"], offset: Float[np.ndarray, "n 2"], unit: float
 ) -> Float[np.ndarray, "n 3"]:
-    return np.asarray(displace(frame, unit * offset[:, 0], unit * offset[:, 1]))
+    return displaced(frame, unit * offset[:, 0], unit * offset[:, 1])
 
 
 def _pointing(
@@ -264,4 +273,5 @@ def uncertainties(
 
 
 def _frame(columns: dict[str, np.ndarray], table: Table) -> pd.DataFrame:
-    return pd.DataFrame({name: columns[name] for name in table.names})
+    # Not copied into common blocks: a column is what is written, read and drawn.
+    return pd.DataFrame({name: columns[name] for name in table.names}, copy=False)

@@ -7,6 +7,11 @@ all cores efficiently.
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+
+from threadpoolctl import ThreadpoolController
 
 _POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
@@ -31,9 +36,24 @@ def use_one_thread() -> None:
     finally:
         if cores:
             _free_threads(cores)
-    from threadpoolctl import threadpool_limits
+    ThreadpoolController().limit(limits=1)
 
-    threadpool_limits(limits=1)
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Limit BLAS to one thread, in a block or in a decorated function.
+
+    BLAS threads wait for one another in a busy loop. Where another process uses a core, such as a
+    browser that draws, and where products are small, that was measured to make work up to a
+    hundred times slower. Large work is divided among threads of Python instead.
+    """
+    with _thread_pools().limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache
+def _thread_pools() -> ThreadpoolController:
+    return ThreadpoolController()
 
 
 def count_cores() -> int:

@@ -23,7 +23,8 @@ from solver.data.exclusions import Exclusions
 from solver.fit import fit_orbit
 from solver.engines.gauss_newton import Mode, find_mode
 from solver.data.instrument import MINI_MOCK
-from solver.linear.leverage import covariances, residuals
+from solver.linear.covariances import covariances, marginal_covariance
+from solver.linear.leverage import residuals
 from solver.runtime.memory import keep_memory
 from solver.linear.normal_equations import accumulate
 from solver.linear.chi2 import gradient
@@ -37,7 +38,6 @@ from tests.benchmarks.orbits import simulated_orbit, survey_of
 from tests.benchmarks.stages import (
     UNIT_REPEATS,
     fit_with_sigmas,
-    marginal_sigmas,
     unit_product,
     what_if,
 )
@@ -102,7 +102,7 @@ def stages(
         "accumulate, one linearisation pass": lambda: accumulate(problem, theta, sources),
         "gradient, one pass": lambda: gradient(problem, theta, sources),
         "reduce": lambda: eliminate_sources(equations, problem.priors),
-        "marginal covariances of the sources": lambda: marginal_sigmas(reduced),
+        "marginal covariances of the sources": lambda: marginal_covariance(reduced),
         "all covariances": lambda: covariances(reduced),
         "residuals with leverage": lambda: residuals(problem, theta, sources, covariance),
         "from the catalogue to marginal sigmas": lambda: fit_with_sigmas(problem, settings),

@@ -22,7 +22,7 @@ import numpy as np
 
 from solver.engines.gauss_newton import find_mode
 from solver.data.instrument import MINI_MOCK
-from solver.linear.leverage import covariances
+from solver.linear.covariances import covariances
 from solver.runtime.memory import keep_memory
 from solver.problem.problem import Problem, build_problem
 from solver.data.settings import FitSettings

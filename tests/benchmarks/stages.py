@@ -11,7 +11,7 @@ from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Mode, find_mode
 from solver.engines.what_if import linearised, solve_what_if
-from solver.linear.source_elimination import ReducedSystem
+from solver.linear.covariances import marginal_covariance
 from solver.problem.problem import Problem
 from solver.problem.problem_cache import ProblemCache
 
@@ -27,7 +27,7 @@ def unit_product(problem: Problem) -> Callable[[], object]:
 
 def fit_with_sigmas(problem: Problem, settings: FitSettings) -> object:
     reduced = find_mode(_as_new(problem), settings).reduced
-    return None if reduced is None else marginal_sigmas(reduced)
+    return None if reduced is None else marginal_covariance(reduced)
 
 
 def what_if(
@@ -53,7 +53,7 @@ def what_if(
         # Tiles exist for the same measurements and have to be arranged for others.
         target = changed if is_same else _as_new(changed)
         reduced = _what_if(mode, solved, target, after).reduced
-        return None if reduced is None else marginal_sigmas(reduced)
+        return None if reduced is None else marginal_covariance(reduced)
 
     return work
 
@@ -68,7 +68,3 @@ def _what_if(mode: Mode, solved: Problem, changed: Problem, settings: FitSetting
     if found is None:
         sys.exit(f"no what-if for {settings}")
     return found
-
-
-def marginal_sigmas(reduced: ReducedSystem) -> object:
-    return reduced.marginal_covariance()

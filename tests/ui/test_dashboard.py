@@ -29,6 +29,7 @@ from tests.ui.conftest import (
     turn_to_workspace,
     until,
 )
+from tests.ui.painted import require_marks_where_they_are
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -93,6 +94,19 @@ def shown(page):
     return page.locator(".solution").first
 
 
+LAYOUTS_OF_TEN = """async () => {
+  const [page] = Bokeh.index
+  const now = page.compute_layout_now
+  let times = 0
+  page.compute_layout_now = () => { times++; now.call(page) }
+  for (let i = 0; i < 10; i++) page.invalidate_layout()
+  const atOnce = times
+  await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))
+  delete page.compute_layout_now
+  return [atOnce, times]
+}"""
+
+
 def require_room(page, workspace):
     """Fail if a card of a workspace is beside the screen, or by more than the strip below it."""
     cards = page.locator(".card:visible")
@@ -136,6 +150,7 @@ def test_every_figure_is_drawn_when_near_and_within_the_screen(walked):
     assert not is_faded(walked.locator(".figure-convergence canvas").first)
     # A part that asks without end whether it can be laid out would take a core.
     assert rests(walked)
+    require_marks_where_they_are(walked)
 
 
 def test_what_is_drawn_keeps_its_layout(walked):
@@ -147,6 +162,8 @@ def test_what_is_drawn_keeps_its_layout(walked):
         see(walked, name)
     assert rests(walked)
     assert metric("LayoutCount") - before < 200
+    # What asks for a layout meanwhile is laid out with the page, once for a picture.
+    assert walked.evaluate(LAYOUTS_OF_TEN) == [0, 1]
 
 
 def test_a_figure_is_explained_and_opens_as_large_as_the_window(walked):

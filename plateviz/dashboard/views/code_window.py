@@ -1,27 +1,30 @@
-"""CodeWindow: a window with the code that makes the solution on the screen."""
+"""CodeWindow: a window with the code that makes what is on the screen."""
 
 from html import escape
 
 import panel as pn
+import panel_material_ui as pmui
 
-from plateviz.dashboard.session import Session
-from plateviz.dashboard.views.markup import markup_pane, themed
+from plateviz.dashboard.navigation import WORKSPACES, Navigation
+from plateviz.dashboard.page_code import page_code
+from plateviz.dashboard.views.markup import markup_pane, paragraph, themed
 from plateviz.dashboard.views.window import window
-from plateviz.solving.as_code import as_command, as_python
+from solver.errors import InputError
 
-_ABOUT = "These make the solution on the screen again: {}. A click selects the whole text."
-_OF_WHAT_IF = " It is a what-if; a fit agrees with it to a thousandth of each uncertainty."
+_TO_COPY = "A click selects the whole text."
 
 
 class CodeWindow(pn.viewable.Viewer):
-    """The command line and the Python that make the solution on the screen."""
+    """The command line and the Python that make the solution and the figures on the screen."""
 
-    def __init__(self, session: Session, **params: object) -> None:
+    def __init__(self, navigation: Navigation, **params: object) -> None:
         """Begin closed."""
         super().__init__(**params)
-        self._session, self._text = session, markup_pane()
+        self._navigation, self._session = navigation, navigation.session
+        self._text = markup_pane()
         self._window = window("Reproduce", self._text, width="md")
-        session.param.watch(self._follow, ["shown", "theme"])
+        self._session.param.watch(self._follow, ["shown", "other", "theme"])
+        navigation.param.watch(self._follow, ["view", "run_name", "found", *WORKSPACES.values()])
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the window."""
@@ -33,17 +36,34 @@ class CodeWindow(pn.viewable.Viewer):
         self._follow()
 
     def _follow(self, *_: object) -> None:
-        shown, origin = self._session.shown, self._session.store.origin
-        if shown is None or not self._window.open:
+        if not self._window.open:
             return
-        parts = {
-            "Command line": as_command(origin, shown.orbit, shown.settings),
-            "Python": as_python(origin, shown.orbit, shown.settings),
-        }
+        try:
+            code = page_code(self._navigation)
+        except InputError as error:
+            text = f"There is nothing to reproduce: {error}."
+            self._text.object = paragraph(text, "empty", self._session.theme)
+            return
+        parts = {"Command line": code.command, "Python": code.python}
         blocks = "".join(
-            f"<h3>{title}</h3><pre>{escape(code)}</pre>" for title, code in parts.items()
+            f"<h3>{title}</h3><pre>{escape(one)}</pre>" for title, one in parts.items()
         )
-        about = _ABOUT.format(shown.settings.describe())
-        text = escape(about + (_OF_WHAT_IF if shown.is_what_if else ""))
-        markup = f"<div class='code'><p>{text}</p>{blocks}</div>"
+        markup = f"<div class='code'><p>{escape(code.about)} {_TO_COPY}</p>{blocks}</div>"
         self._text.object = themed(markup, self._session.theme)
+
+
+def code_button(navigation: Navigation) -> list[pn.viewable.Viewable]:
+    """Return the button that opens the window, and the place of the window, empty until then."""
+    place = pmui.Column(margin=0)
+    made: list[CodeWindow] = []
+
+    def open_window(_: object) -> None:
+        if not made:
+            # A page opens sooner without it.
+            made.append(CodeWindow(navigation))
+            place.append(made[0])
+        made[0].open()
+
+    button = pmui.Button(label="Reproduce", variant="text", size="small")
+    button.on_click(open_window)
+    return [button, place]

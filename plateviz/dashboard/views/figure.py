@@ -17,7 +17,7 @@ from plateviz.dashboard.views.own_layout import OwnLayout
 from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import OnScreen, Saved, figure_choices
-from plateviz.dashboard.views.visibility import Visibility
+from plateviz.dashboard.views.visibility import FADING, Visibility
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import Figure, Limits
 from plateviz.figures.figure_summary import TextTable, figure_summary, text_tables
@@ -40,8 +40,6 @@ _CENTRED = {
     "align-items": "center",
     "justify-content": "center",
 }
-# A figure that follows soon does not flicker.
-_SLOWLY = {"transition": "opacity 0.2s ease 0.4s"}
 _WHAT_TO_DO = "The other figures do not depend on it; it is tried again with the next solution."
 _LOG = logging.getLogger(__name__)
 
@@ -95,7 +93,7 @@ class FigureView(pn.viewable.Viewer):
         self.visibility = Visibility()
         # A plain Panel column lays out a new figure at once. Other containers do so a moment later,
         # and the page may measure a figure without a layout.
-        self._body = pn.Column(margin=0)
+        self._body = pn.Column(margin=0, styles=_BODY | _CENTRED, css_classes=[FADING])
         self._tools = CardTools(figure, self._text_tables)
         choices = figure_choices(figure.name, self._on_screen, saved or Saved())
         self._save = SaveButton(figure.title, choices, place="corner")
@@ -237,9 +235,7 @@ class FigureView(pn.viewable.Viewer):
         self._fade()
 
     def _fade(self) -> None:
-        is_old = self._is_changed or self._is_stale
-        styles = {**_BODY, **_CENTRED, "opacity": "0.45" if is_old else "1"}
-        self._body.styles = {**styles, **_SLOWLY} if self.is_pending else styles
+        self.visibility.is_faded = self._is_changed or self._is_stale
 
 
 def _limits(event: RangesUpdate) -> tuple[Limits, Limits] | None:

@@ -96,7 +96,9 @@ class Keyboard(pn.custom.JSComponent):
         navigation.session.param.watch(self._follow_theme, "theme")
 
     def _handle_msg(self, data: object) -> None:
-        press(self._navigation, str(data))
+        # What follows from it is sent as one message.
+        with pn.io.hold():
+            press(self._navigation, str(data))
 
     def _follow_theme(self, *_: object) -> None:
         self.theme = self._navigation.session.theme

@@ -7,6 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.orbit_figures import chosen_of, figures_of
 from plateviz.dashboard.row_origins import OrbitRows
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.stage import Stage
@@ -27,8 +28,7 @@ from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
 from plateviz.plots.both_solutions import BOTH, figure_of_both
-from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.gallery import diagnostics
+from plateviz.plots.diagnostic import Diagnostic
 from plateviz.plots.workspace import OrbitWorkspace
 
 
@@ -103,10 +103,7 @@ class OrbitPage(pn.viewable.Viewer):
             self._grids[one] = explore.grid
             return explore.__panel__()
         is_first = one is OrbitWorkspace.VERDICT
-        among = [d for d in diagnostics() if (d.is_key if is_first else d.workspace is one)]
-        if self._session.store.simulation is None:
-            among = [d for d in among if not d.is_of_simulation]
-        views = {d: self._figure_view(d) for d in among}
+        views = {d: self._figure_view(d) for d in figures_of(self._session, one)}
         others, above = [], []
         if one is OrbitWorkspace.ORDERS:
             views = {BOTH: self._figure_view(BOTH), **views}
@@ -145,21 +142,13 @@ class OrbitPage(pn.viewable.Viewer):
         )
 
     def _plot(self, diagnostic: Diagnostic) -> Figure | None:
-        session, shown = self._session, self._session.shown
-        if shown is None:
+        chosen = chosen_of(self._session)
+        if chosen is None:
             return None
-        chosen = Chosen(
-            result=shown.result,
-            instrument=session.store.instrument,
-            exposures=tuple(session.selection.exposures_of(shown.result)),
-            detector=session.selection.detector_id,
-            other=session.other.result if session.other else None,
-            simulation=session.store.simulation,
-        )
         figure = diagnostic.plot(chosen)
         if diagnostic is BOTH and self._compare is not None:
             figure = figure_of_both(self._compare.figure, chosen)
-        return session.units.figure(figure)
+        return self._session.units.figure(figure)
 
     def _show_workspace(self, *_: object) -> None:
         self._stack.show(self._navigation.orbit_workspace)
@@ -181,8 +170,9 @@ class OrbitPage(pn.viewable.Viewer):
             grid.show_selected(self._session.selection.ids)
 
     def _mark_stale(self, *_: object) -> None:
-        for grid in self._grids.values():
-            grid.mark_stale(self._session.stage is Stage.STALE)
+        with pn.io.hold():
+            for grid in self._grids.values():
+                grid.mark_stale(self._session.stage is Stage.STALE)
         if self._session.shown is None:
             # What is said instead of the figures depends on the stage.
             self._change()

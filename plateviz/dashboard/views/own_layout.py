@@ -11,12 +11,15 @@ class OwnLayout(pn.custom.JSComponent):
     size from the style sheets, and hears of every change of it; nothing else concerns its figure.
     """
 
-    # What begins a layout of the card, and the steps of it that a container would take.
+    # What begins a layout of the card (two of them are of `components.js`), and the steps of it that a
+    # container would take.
     _esm = """
     export function render({ view }) {
       const card = view.parent
       let depth = 0
-      for (const name of ["compute_layout", "invalidate_layout"]) {
+      card.has_own_layout = true
+      const begins = ["compute_layout", "invalidate_layout", "compute_layout_now", "write_layout"]
+      for (const name of begins.filter(name => name in card)) {
         const begin = card[name].bind(card)
         card[name] = () => {
           depth++

@@ -1,5 +1,6 @@
 """PointActions: a tap opens an orbit; a tap, box or lasso selects what the points are of."""
 
+import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import MappingProxyType
@@ -13,6 +14,7 @@ from plateviz.dashboard.selected import NO_IDS, SelectedIds
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.bokeh_frame import BokehFrame
 from plateviz.figures.bokeh_glyphs import SELECTED_BY, BokehGlyphs
+from plateviz.figures.figure import HANDLES
 from plateviz.tables.labels import labelled_exposure
 
 Links = Mapping[str, Callable[[str], object]]
@@ -25,6 +27,7 @@ SelectArea = Callable[[np.ndarray], object]
 """
 
 _MOST_CORNERS = 500
+_ONE_TAP_SECONDS = 0.5
 NO_LINKS: Links = MappingProxyType({})
 
 
@@ -45,13 +48,16 @@ class PointActions:
     ) -> None:
         """Begin without a figure; `select` is for points of sources."""
         self._links, self._select_area = links, select_area
-        selects = zip(SELECTED_BY, (select, select_detectors, select_exposures), strict=True)
+        selects = zip(SELECTED_BY, (select, select_exposures, select_detectors), strict=True)
         self._selects = {column: one for column, one in selects if one is not None}
         self._followed: set[str] = set()
         self._frames: dict[str, _FrameTools] = {}
         self._selectable: list[list[BokehGlyphs]] = []
         self._selected: SelectedIds = NO_IDS
         self._is_showing = False
+        # Stars lie on most outlines. A tap on an outline is not one on the stars below it, which
+        # the browser tells next.
+        self._outline_until = 0.0
 
     def follow(self, drawn: BokehFigure) -> None:
         """Make the points of a figure act, those among them that are new."""
@@ -75,12 +81,16 @@ class PointActions:
 
     def show(self, selected: SelectedIds) -> None:
         """Show what is selected: rows of a selected source, exposure or detector stand out."""
-        self._selected, self._is_showing = selected, True
+        self._selected = selected
+        for glyphs in (one for frame in self._selectable for one in frame):
+            self._show_rows(glyphs)
+
+    def _show_rows(self, glyphs: BokehGlyphs) -> None:
+        self._is_showing = True
         try:
-            for glyphs in (one for frame in self._selectable for one in frame):
-                rows = sorted(_rows(glyphs, selected))
-                if glyphs.source.selected.indices != rows:
-                    glyphs.source.selected.indices = rows
+            rows = sorted(_rows(glyphs, self._selected))
+            if glyphs.source.selected.indices != rows:
+                glyphs.source.selected.indices = rows
         finally:
             self._is_showing = False
 
@@ -92,20 +102,28 @@ class PointActions:
             if self._is_showing or among is None or column not in self._selects:
                 return
             same = [one for one in among if selected_column(one) == column]
+            if glyphs.kind == "points" and time.monotonic() < self._outline_until:
+                self._show_rows(glyphs)
+                return
             chosen = frozenset(text for one in same for text in self._chosen(one))
             if chosen == self._selected.get(column):
                 # Nothing else will show the other rows of what is chosen again.
                 self.show(self._selected)
             items = (_item(column, text) for text in chosen)
             self._selects[column](frozenset(item for item in items if item is not None))
+            if glyphs.renderer.name == HANDLES and new:
+                self._outline_until = time.monotonic() + _ONE_TAP_SECONDS
 
         glyphs.source.selected.on_change("indices", take)
         if glyphs.kind == "points":
             self._tools_of(frame).select_among(glyphs.renderer)
+        elif glyphs.renderer.name == HANDLES:
+            self._tools_of(frame).tap_among(glyphs.renderer)
 
     def _chosen(self, glyphs: BokehGlyphs) -> Iterable[str]:
         """Return the ids that a person has chosen among points; other glyphs only follow them."""
-        if glyphs.kind != "points" or not glyphs.renderer.visible:
+        is_chosen_among = glyphs.kind == "points" or glyphs.renderer.name == HANDLES
+        if not is_chosen_among or not glyphs.renderer.visible:
             return ()
         column = selected_column(glyphs) or ""
         ids, rows = glyphs.source.data[column], set(glyphs.source.selected.indices)

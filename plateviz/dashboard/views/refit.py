@@ -10,13 +10,19 @@ from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.state import default_widths
-from plateviz.dashboard.views.code_window import CodeWindow
+from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.fit_controls import TIGHT, controls, width_input
 from plateviz.dashboard.views.solution_window import SolutionWindow
 from solver.data.parameter_group import Group
 from solver.data.parameters import OPTIONAL_GROUPS, PARAMETERS
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
 from solver.data.text_setting import LeftOut, PriorShifts
+
+# Each picture of the moving bar takes time from a solver on the same machine; a what-if is over
+# before the bar moves.
+_UNHURRIED = {
+    "& .MuiLinearProgress-bar": {"animationDelay": "1s", "animationFillMode": "backwards"}
+}
 
 
 class RefitView(pn.viewable.Viewer):
@@ -35,13 +41,14 @@ class RefitView(pn.viewable.Viewer):
         self._stop = pmui.Button(
             label="Cancel", color="warning", variant="outlined", sizing_mode="stretch_width"
         )
-        self._bar = pmui.LinearProgress(variant="indeterminate", sizing_mode="stretch_width")
+        self._bar = pmui.LinearProgress(
+            variant="indeterminate", sizing_mode="stretch_width", sx=_UNHURRIED
+        )
         self._message = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
-        self._code = CodeWindow(session)
         self._list = SolutionWindow(navigation)
         self._open_list = pmui.Button(label="All solutions", variant="text", size="small")
-        self._reproduce = pmui.Button(label="Reproduce", variant="text", size="small")
+        self._reproduce, code_place = code_button(navigation)
         self._column = pmui.Column(
             pmui.Switch.from_param(
                 session.choices.param.what_if_at_once,
@@ -58,7 +65,7 @@ class RefitView(pn.viewable.Viewer):
             self._keep,
             self._solutions,
             pmui.Row(self._open_list, self._reproduce, margin=0),
-            self._code,
+            code_place,
             self._list,
             sizing_mode="stretch_width",
             margin=0,
@@ -76,7 +83,6 @@ class RefitView(pn.viewable.Viewer):
         self._keep.on_click(lambda _: session.keep())
         self._reset.on_click(self._reset_priors)
         self._open_list.on_click(lambda _: self._list.open())
-        self._reproduce.on_click(lambda _: self._code.open())
         self._solutions.param.watch(self._select, "value")
         session.choices.param.watch(self._show_widths, "prior_widths")
         session.param.watch(self._show_stage, ["stage", "message"])

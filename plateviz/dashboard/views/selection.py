@@ -48,9 +48,11 @@ def _orbit_control(navigation: Navigation, **style: Any) -> pmui.Select:  # noqa
 
     def choose(event: object) -> None:
         if event.new != selection.orbit:  # type: ignore[attr-defined]
-            navigation.choose_orbit(event.new)  # type: ignore[attr-defined]
-            # An orbit that cannot be read is not selected.
-            orbit.value = selection.orbit
+            # What follows from it is sent as one message.
+            with pn.io.hold():
+                navigation.choose_orbit(event.new)  # type: ignore[attr-defined]
+                # An orbit that cannot be read is not selected.
+                orbit.value = selection.orbit
 
     orbit.param.watch(choose, "value")
     selection.param.watch(lambda _: orbit.param.update(value=selection.orbit), "orbit")

@@ -10,6 +10,7 @@ from astropy.table import Table
 
 from plateviz.dashboard.downloads import described
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import (
@@ -71,6 +72,8 @@ class SourcePage(pn.viewable.Viewer):
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
         self._invitation = _INVITATION
+        self._tables: SourceTables | None = None
+        self._are_numbers_old = True
         self._head, self._strip, self._motion = markup_pane(), markup_pane(), markup_pane()
         self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row, units=self._session.units)
         self._save = SaveButton(
@@ -102,6 +105,7 @@ class SourcePage(pn.viewable.Viewer):
             *run_selector(navigation),
             self._entry,
             unit_selector(self._session),
+            *code_button(navigation),
             sizing_mode="stretch_width",
             margin=0,
         )
@@ -152,14 +156,16 @@ class SourcePage(pn.viewable.Viewer):
         )
 
     def _show_workspace(self, *_: object) -> None:
+        self._show_numbers()
         self._stack.show(self._navigation.source_workspace)
 
     def _plot(self, figure: SourceFigure) -> Figure | None:
         found = self._navigation.found
         if found is None:
             return None
-        tables = SourceTables(found.history, found.motion)
-        return self._session.units.figure(figure.plot(tables))
+        if self._tables is None or self._tables.history is not found.history:
+            self._tables = SourceTables(found.history, found.motion)
+        return self._session.units.figure(figure.plot(self._tables))
 
     def _list_sources(self, *_: object) -> None:
         run = self._navigation.run
@@ -173,6 +179,11 @@ class SourcePage(pn.viewable.Viewer):
             self._list.show(sources)
 
     def _show(self, *_: object) -> None:
+        # All of it is sent as one message.
+        with pn.io.hold():
+            self._show_source()
+
+    def _show_source(self) -> None:
         theme, found = self._session.theme, self._navigation.found
         units = self._session.units
         self._save.theme = theme
@@ -189,14 +200,24 @@ class SourcePage(pn.viewable.Viewer):
         self._head.object = themed(f"<div class='head'>{verdict}{title}</div>", theme)
         items = units.text(strip(source_strip(found.history, found.motion)))
         self._strip.object = themed(items, theme)
+        self._are_numbers_old = True
+        self._show_numbers()
+        self.figures.change(theme)
+
+    def _show_numbers(self) -> None:
+        """Fill the tables of the workspace on the screen, which are read less often than others."""
+        found, theme = self._navigation.found, self._session.theme
+        is_shown = self._navigation.source_workspace is SourceWorkspace.ORBITS
+        if found is None or not (self._are_numbers_old and is_shown):
+            return
+        self._are_numbers_old = False
         if found.motion is None:
             words = "Motions are fitted once all orbits of the run are fitted."
             self._motion.object = paragraph(words, "caption", theme)
         else:
-            table = units.rows(motion_table(found.motion))
+            table = self._session.units.rows(motion_table(found.motion))
             self._motion.object = themed(numbers(in_words(table, MOTION)), theme)
         self._orbits.show(source_orbits(found.history), theme)
-        self.figures.change(theme)
 
     def _open_row(self, row: pd.Series) -> None:
         self._open_orbit(str(row["orbit_id"]))

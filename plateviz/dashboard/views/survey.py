@@ -12,6 +12,7 @@ from plateviz.dashboard.downloads import described
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.row_origins import RunRows
 from plateviz.dashboard.selected import KINDS
+from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.explore import ExploreView
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
@@ -79,6 +80,7 @@ class SurveyPage(pn.viewable.Viewer):
             heading("Shown"),
             *run_selector(navigation),
             unit_selector(self._session),
+            *code_button(navigation),
             sizing_mode="stretch_width",
             margin=0,
         )

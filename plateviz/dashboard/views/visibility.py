@@ -1,16 +1,22 @@
-"""Visibility: whether a part of the page is on or near the screen, and how large it is."""
+"""Visibility: whether a part of the page is on or near the screen, how large it is, and faded."""
 
 import panel as pn
 import param
+
+FADING = "fading"
+"""CSS class of what is faded."""
 
 
 class Visibility(pn.custom.JSComponent):
     """A background of its container, of the same size, that reports that size and where it is.
 
     A part without a layout, such as one in a hidden view, is not near, and keeps its last size.
+    It fades what has the class `FADING` in its container; a change of its styles would let Bokeh
+    measure the page for each part.
     """
 
     is_near = param.Boolean(default=False, doc="whether it is on the screen or close to it")
+    is_faded = param.Boolean(default=False, doc="whether its container shows what is out of date")
     room = param.List(default=[0, 0], item_type=int, doc="width and height, screen pixels")
 
     # The page scrolls inside a container, beyond whose edge only `scrollMargin` reaches. A browser
@@ -18,12 +24,21 @@ class Visibility(pn.custom.JSComponent):
     _esm = """
     export function render({ model, el }) {
       const near = "300px 0px", host = el.getRootNode().host
+      const fade = () => {
+        for (const { style } of host.getRootNode().querySelectorAll(".fading")) {
+          // What follows within 0.4 s is not faded before.
+          style.transition = model.is_faded ? "opacity 0s 0.4s" : ""
+          style.opacity = model.is_faded ? 0.45 : 1
+        }
+      }
+      model.on("is_faded", fade)
       const measure = box => {
         const room = [Math.round(box.width), Math.round(box.height)]
         if (room[0] > 0 && room[1] > 0 && `${room}` !== `${model.room}`) model.room = room
       }
       const place = new IntersectionObserver(entries => {
         const last = entries.at(-1)
+        fade()
         if (last.isIntersecting) measure(last.boundingClientRect)
         model.is_near = last.isIntersecting
       }, { rootMargin: near, scrollMargin: near })

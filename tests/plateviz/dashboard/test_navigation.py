@@ -272,7 +272,7 @@ def test_invalid_address_is_reported_in_one_notice_and_shows_the_rest(navigation
 
 def test_files_and_a_survey_that_was_not_fitted_have_no_runs(tmp_path, made_survey):
     runs = {
-        origin: SolutionStore.runs(SimpleNamespace(origin=origin, _read_shared=None))
+        origin: SolutionStore.runs(SimpleNamespace(origin=origin, _of_runs=None))
         for origin in (OrbitFiles("o.fits", "r.fits"), SurveyFolder(str(Path(made_survey))))
     }
     assert list(runs.values()) == [[], []]

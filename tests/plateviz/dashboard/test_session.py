@@ -28,6 +28,7 @@ class FakeStore:
 
     orbits = (0, 1)
     instrument = MINI_MOCK
+    simulation = None
     title = "store"
 
     def __init__(self, result):

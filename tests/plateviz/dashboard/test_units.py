@@ -6,6 +6,7 @@ import pytest
 from plateviz.dashboard.units import NAMES, Units
 from plateviz.dashboard.views.selection_list import SelectionList
 from plateviz.dashboard.views.source import SourcePage
+from plateviz.plots.workspace import SourceWorkspace
 from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE
 from solver.data.instrument import MINI_MOCK
 
@@ -60,7 +61,11 @@ def test_page_of_a_source_follows_the_unit(navigation, survey):
     source = int(survey.motions["source_id"].iloc[0])
     navigation.open_source(str(source))
     page = SourcePage(navigation, lambda *_: None)
+    assert page._orbits._table.value.empty
+    # The tables are filled when they are looked at.
+    navigation.turn_to_workspace(SourceWorkspace.ORBITS)
     before = page._orbits._table.value["sigma_ra_marginal"]
+    assert len(before) > 0
     assert " mas" in page._strip.object
     navigation.session.units.unit = "µas"
     (table,) = page._orbits.__panel__()

@@ -14,11 +14,16 @@ from typer.testing import CliRunner
 import plateviz
 from plateviz.cli.options import fit_settings, takes_settings
 from plateviz.notebook.keywords import settings_with
+from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.gallery import diagnostics
+from plateviz.reports.summary_strip import strip
 from plateviz.runs.queries import open_run
-from plateviz.solving.as_code import as_command, as_python
+from plateviz.solving.as_code import as_command, as_python, figures_as_python, report_command
 from plateviz.solving.origin import OrbitFiles, SurveyFolder
+from plateviz.tables import summary_strip
 from solver.data.engine_settings import engine_settings
 from solver.data.exclusions import Exclusions
+from solver.data.instrument import MINI_MOCK
 from solver.data.settings import SETTINGS, FitSettings
 
 SURVEY = SurveyFolder("/data/my sky")
@@ -118,18 +123,52 @@ def test_survey_needs_an_orbit():
         as_command(SURVEY, None, FitSettings())
 
 
+@pytest.mark.parametrize(
+    ("origin", "words"),
+    [
+        (SURVEY, ["/data/my sky", "--run", "reproduced", "--orbit", "12", "--other", "second"]),
+        (FILES, ["reproduced.fits", "--other", "second.fits"]),
+        (
+            OrbitFiles("o.fits", "r.fits", instrument="a camera.toml"),
+            ["reproduced.fits", "--instrument", "a camera.toml", "--other", "second.fits"],
+        ),
+    ],
+    ids=["survey", "files", "camera"],
+)
+def test_report_is_of_what_the_commands_make(origin, words):
+    found = words_of(report_command(origin, 12, "second"))
+    assert found == ["plateviz", "report", *words, "-o", "reproduced.html"]
+    assert "second" in as_command(origin, 12, FitSettings(), "second")
+
+
 @pytest.mark.slow
-def test_command_and_python_make_the_same_numbers(small_survey, tmp_path):
+@pytest.mark.usefixtures("few_figures")
+def test_command_and_python_make_the_same_numbers(small_survey, tmp_path, run, monkeypatch):
     survey = tmp_path / "a sky"
     survey.symlink_to(small_survey)
     origin = SurveyFolder(str(survey))
     settings = FitSettings(order=6, prior_widths={"distortion_x": 2.5})
     command = words_of(as_command(origin, 1, settings))
     subprocess.run([sys.executable, "-m", "plateviz.cli.main", *command[1:]], check=True)
-    by_command = open_run(Path(survey), "reproduced").result(1).sources
+    by_command = open_run(Path(survey), "reproduced").result(1)
     namespace = {}
-    exec(as_python(origin, 1, settings), namespace)
+    drawn = figures_as_python("solution", [("residual-map", {"exposures": [(0, 3)]})])
+    exec(f"{as_python(origin, 1, settings)}\n{drawn}", namespace)
     by_python = namespace["solution"].sources
     for name in ("ra", "dec"):
         # Degrees; the number of threads of the linear algebra changes the last digit.
-        np.testing.assert_allclose(by_command[name], by_python[name], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(by_command.sources[name], by_python[name], rtol=0, atol=1e-12)
+    (diagnostic,) = [one for one in diagnostics() if one.name == "residual-map"]
+    expected = diagnostic.plot(Chosen(by_command, MINI_MOCK, ((0, 3),)))[0]["tails"].columns
+    found = namespace["figures"][0]._plot()[0]["tails"].columns
+    assert len(expected["x"]) > 10
+    for name, values in expected.items():
+        if values.dtype.kind == "f":
+            np.testing.assert_allclose(found[name], values, rtol=1e-6, atol=1e-6)
+        else:
+            np.testing.assert_array_equal(found[name], values)
+    monkeypatch.chdir(tmp_path)
+    assert run(*words_of(report_command(origin, 1))[1:])[0] == 0
+    page = (tmp_path / "reproduced.html").read_text(encoding="utf-8")
+    assert "<title>Orbit 1 " in page
+    assert strip(summary_strip(by_command)) in page

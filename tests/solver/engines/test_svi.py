@@ -17,7 +17,7 @@ from solver.engines.svi import blocks, rate, start_state, variational
 from solver.engines.svi_guide import Means, MirroredElbo, draws, guide
 from solver.errors import CancelledError
 from solver.fit import OrbitFitter
-from solver.linear.leverage import covariances
+from solver.linear.covariances import covariances
 from solver.linear.whitening import whitened
 from solver.problem.problem import build_problem
 

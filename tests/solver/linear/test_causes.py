@@ -13,7 +13,8 @@ from solver.engines.gauss_newton import objective
 from solver.engines.numpyro_model import evidence_of, plate_analysis
 from solver.errors import InputError
 from solver.linear.chi2 import gradient
-from solver.linear.leverage import covariances, residuals
+from solver.linear.covariances import covariances
+from solver.linear.leverage import residuals
 from solver.linear.normal_equations import accumulate
 from solver.linear.source_elimination import eliminate_sources
 from solver.linear.update import update_equations

@@ -3,7 +3,8 @@ import pytest
 from scipy import stats
 
 from solver.data.settings import FitSettings
-from solver.linear.leverage import covariances, residuals
+from solver.linear.covariances import covariances
+from solver.linear.leverage import residuals
 from solver.linear.normal_equations import accumulate
 from solver.linear.source_elimination import eliminate_sources
 from solver.problem.problem import build_problem
@@ -29,8 +30,14 @@ def test_covariances_equal_the_dense_ones(reduced, dense, problem):
     np.testing.assert_allclose(found.theta / np.outer(sigma[:n], sigma[:n]), theta, atol=1e-8)
     scale = sigma[:n, None, None]
     cross = dense.covariance[:n, n:].reshape(n, problem.n_src, 2).swapaxes(1, 2) / scale
-    in_order = found.cross[:, :, found.source_blocks.position]
-    np.testing.assert_allclose(in_order / scale, cross, atol=1e-8 * sigma[n:].max())
+    position, blocks = found.source_blocks.position, found.source_blocks.blocks
+    is_own = np.zeros((n, problem.n_src), dtype=bool)
+    for block in blocks:
+        is_own[block.columns, block.places] = True
+    expected = np.where(is_own[:, None, position], cross, 0.0)
+    assert len(blocks) > 1
+    in_order = found.own_cross[:, :, position]
+    np.testing.assert_allclose(in_order / scale, expected, atol=1e-8 * sigma[n:].max())
 
 
 def test_leverage_equals_the_dense_one(at_point, hat):
@@ -103,7 +110,7 @@ def test_measurement_that_determines_its_own_prediction_has_no_standardised_resi
 def test_leverage_above_one_gives_no_standardised_residual(problem, reduced, expansion_point, hat):
     """With both eigenvalues of H above one, the determinant of I - H is positive."""
     found = covariances(reduced)
-    fields = ("source", "theta", "cross")
+    fields = ("source", "theta", "own_cross")
     tripled = found._replace(**{name: 3.0 * getattr(found, name) for name in fields})
     found = residuals(problem, *expansion_point, tripled)
     above = np.linalg.eigvalsh(3.0 * hat).min(axis=1) > 1.0

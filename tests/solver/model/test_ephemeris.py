@@ -4,6 +4,7 @@ from astropy import units as u
 from astropy.coordinates import get_body_barycentric, get_body_barycentric_posvel
 from astropy.time import Time
 
+from solver.model.apparent_motion import motion_design, parallax_factors
 from solver.model.ephemeris import observer_at
 
 MJD = np.array([61_800.0, 61_822.3, 62_100.7])
@@ -39,3 +40,13 @@ def test_time_scale_is_barycentric_coordinate_time():
     moved = observer_at(as_tdb).position - observer_at(MJD).position
     kilometres = np.linalg.norm(moved, axis=1) * u.au.to(u.km)
     np.testing.assert_allclose(kilometres, 25.0 * 29.8, rtol=0.05)
+
+
+def test_parallax_of_a_motion_is_that_of_its_times_and_place():
+    """The positions of the Earth are kept, and another source and other times have their own."""
+    for ra, dec, mjd in ((266.4, -28.9, MJD), (10.0, 40.0, MJD), (10.0, 40.0, MJD + 91.0)):
+        expected = parallax_factors(ra, dec, observer_at(mjd).position)
+        for _ in range(2):
+            design = motion_design(ra, dec, mjd, 2028.0)
+            np.testing.assert_array_equal(design[:, :, 2].T, expected)
+            design[:] = 0.0

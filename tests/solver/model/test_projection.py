@@ -4,7 +4,7 @@ from astropy.wcs import WCS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.model.directions import tangent_frame, unproject
+from solver.model.directions import displaced, tangent_frame, unproject
 from solver.model.projection import displace, focal_axes, project
 from tests.solver.small_orbit import ideal_plane, standard_coordinates
 
@@ -106,3 +106,11 @@ def test_optical_axis_falls_on_the_origin():
 def test_x_points_west_and_y_north_at_position_angle_zero():
     x, y = project_one((10.1, 20.1), (10.0, 20.0), 0.0)
     assert x < 0 < y
+
+
+def test_displacement_in_numpy_equals_that_in_jax():
+    rng = np.random.default_rng(0)
+    frame = tangent_frame(rng.uniform(0.0, 360.0, 5), rng.uniform(-80.0, 80.0, 5))
+    east, north = rng.normal(0.0, 1e-3, (2, 5))
+    expected = displace(jnp.asarray(frame), jnp.asarray(east), jnp.asarray(north))
+    np.testing.assert_allclose(displaced(frame, east, north), expected, rtol=0.0, atol=1e-15)

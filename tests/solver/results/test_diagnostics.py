@@ -6,7 +6,7 @@ from scipy import stats
 
 from solver.data.settings import FitSettings
 from solver.linear.chi2 import gradient
-from solver.linear.leverage import covariances
+from solver.linear.covariances import covariances
 from solver.results.diagnostics import (
     deviation_freedom,
     effective_parameters,

@@ -6,7 +6,7 @@ import pytest
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERROR_BUDGET, HISTORY, N_DRAWS, SHARED_ERRORS
 from solver.fit import OrbitFitter
-from solver.linear.leverage import covariances
+from solver.linear.covariances import covariances
 from solver.linear.normal_equations import accumulate
 from solver.linear.source_elimination import eliminate_sources
 from solver.results.shared_errors import (

@@ -11,7 +11,7 @@ from numpyro.infer import Trace_ELBO
 from solver.data.parameters import SOURCES
 from solver.engines.numpyro_model import evidence_of, in_coordinates
 from solver.engines.svi_guide import SITES, Means, guide
-from solver.linear.leverage import covariances
+from solver.linear.covariances import covariances
 from solver.linear.source_elimination import eliminate_sources
 from solver.linear.whitening import in_bare_units, whitened
 from solver.results.diagnostics import error_budget, log_evidence

@@ -102,13 +102,13 @@ def test_figure_on_the_screen_stays_while_the_next_is_made(view, executor, navig
     navigation.survey_exploration.x = "nx"
     view.grid.draw_due()
     assert title(view) == "residual_x against focal_x"
-    assert card(view)._body.styles["opacity"] != "1"
+    assert card(view).visibility.is_faded
     navigation.survey_exploration.x = "ny"
     view.grid.draw_due()
     assert len(executor.waiting) == 1
     draw(view, executor)
     assert title(view) == "residual_x against ny"
-    assert card(view)._body.styles["opacity"] == "1"
+    assert not card(view).visibility.is_faded
 
 
 def test_zoom_asks_for_the_part_on_the_screen_and_is_in_the_address(view, executor, navigation):

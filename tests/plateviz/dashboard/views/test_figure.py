@@ -14,6 +14,7 @@ from plateviz.figures import glyphs
 from plateviz.figures.figure import Axis, Ramp, framed
 from plateviz.figures.glyphs import points
 from plateviz.plots.arrows import Field, arrows
+from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.gallery import diagnostics
 
 
@@ -46,8 +47,8 @@ def plot(view):
     return view._body[0].object.children[0][0]
 
 
-def opacity(view):
-    return view._body.styles["opacity"]
+def is_faded(view):
+    return view.visibility.is_faded
 
 
 def text(view):
@@ -105,14 +106,14 @@ def test_drawn_figure_follows_its_room_without_being_plotted_again(view, drawn):
 def test_change_away_from_the_screen_waits_and_fades_the_figure(view, drawn):
     come_near(view)
     view.draw()
-    assert opacity(view) == "1"
+    assert not is_faded(view)
     view.visibility.is_near = False
     view.change("dark")
     assert not view.is_due
-    assert opacity(view) != "1"
+    assert is_faded(view)
     view.visibility.is_near = True
     view.draw()
-    assert opacity(view) == "1"
+    assert not is_faded(view)
     assert len(drawn) == 2
 
 
@@ -225,10 +226,54 @@ def test_points_without_sources_select_exposures_or_detectors():
     _, source, chosen = selecting(measurements(), [("exposure", "@{exposure}")])
     source.selected.indices = [0, 1]
     assert chosen == [("exposures", frozenset({(0, 3), (0, 4)}))]
+    # A point of an exposure on a detector is one of the exposure.
     hover = [("exposure", "@{exposure}"), ("detector", "@{detector_id}")]
+    _, source, chosen = selecting(measurements(detector_id=[2, 2, 1]), hover)
+    source.selected.indices = [0]
+    assert chosen == [("exposures", frozenset({(0, 3)}))]
+    hover = [("detector", "@{detector_id}")]
     _, source, chosen = selecting(measurements(detector_id=[2, 2, 1]), hover)
     source.selected.indices = [0, 1]
     assert chosen == [("detectors", frozenset({2}))]
+
+
+def test_tap_on_an_outline_of_the_footprint_selects_the_detector(fit_result, instrument):
+    footprint = diagnostics()[0]
+    chosen = []
+    actions = PointActions(
+        select=lambda items: chosen.append(("sources", items)),
+        select_detectors=lambda items: chosen.append(("detectors", items)),
+    )
+    figure = footprint.plot(Chosen(fit_result, instrument))
+    view = FigureView(footprint, lambda: figure, actions=actions)
+    come_near(view)
+    view.draw()
+    named = {one.name: one for one in plot(view).renderers}
+    handles, outlines, sources = (named[name] for name in ("handles", "outlines", "sources"))
+    by_type = {type(tool).__name__: tool for tool in plot(view).tools}
+    assert by_type["TapTool"].renderers == [handles, sources]
+    # A box among the sources leaves the detectors.
+    assert by_type["BoxSelectTool"].renderers == [sources]
+    ids = outlines.data_source.data["detector_id"]
+    (second,) = {d.detector_id for d in instrument.detectors[1:2]}
+    handles.data_source.selected.indices = [list(ids).index(second)]
+    # The same tap has hit a star below the line, which it was not meant for.
+    sources.data_source.selected.indices = [3]
+    assert chosen == [("detectors", frozenset({second}))]
+    assert sources.data_source.selected.indices == []
+    view.show_selected({"detector_id": frozenset({str(second)})})
+    view.draw()
+    # It stands out in every field; what is tapped is never seen.
+    assert outlines.data_source.selected.indices == np.flatnonzero(ids == second).tolist()
+    assert len(outlines.data_source.selected.indices) == 4
+    assert outlines.nonselection_glyph is not None
+    assert handles.nonselection_glyph is None
+    assert sources.data_source.selected.indices == []
+    handles.data_source.selected.indices = []
+    assert chosen[1:] == [("detectors", frozenset())]
+    actions._outline_until = 0.0
+    sources.data_source.selected.indices = [3]
+    assert [kind for kind, _ in chosen] == ["detectors", "detectors", "sources"]
 
 
 def test_measurement_stands_out_for_its_source_exposure_or_detector():
@@ -258,9 +303,9 @@ def test_other_rows_of_what_is_selected_again_stay_marked():
 def test_stale_figure_is_faded(view):
     view.draw()
     view.mark_stale(True)
-    assert opacity(view) != "1"
+    assert is_faded(view)
     view.mark_stale(False)
-    assert opacity(view) == "1"
+    assert not is_faded(view)
 
 
 def test_figure_is_explained_in_words_and_as_tables(view, monkeypatch):

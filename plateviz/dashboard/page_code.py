@@ -1,0 +1,137 @@
+"""The command line and the Python that make the solution and the figures on the screen again."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.orbit_figures import chosen_of, figures_of
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.solution import Solution
+from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.gallery import source_figures, survey_figures
+from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace, title_of
+from plateviz.runs.queries import SurveyRun
+from plateviz.solving.as_code import (
+    NAME,
+    PREAMBLE,
+    FigureCall,
+    as_command,
+    as_python,
+    figures_as_python,
+    report_command,
+    report_of_run,
+)
+from solver.errors import InputError
+
+_OTHER = f"{NAME}-other"
+_EXPLORED = (OrbitWorkspace.EXPLORE, SurveyWorkspace.EXPLORE)
+_OF_WHAT_IF = "It is a what-if; a fit agrees with it to a thousandth of each uncertainty."
+_OF_EXPLORE = "The figure of Explore is drawn again by the address of this page, or by Save view."
+_OF_OTHER_ORBIT = "The report does not compare with another orbit; the Python does."
+
+
+class PageCode(NamedTuple):
+    """What makes the screen again.
+
+    Attributes
+    ----------
+    about : what it makes, and what it does not
+    command : lines of a shell
+    python : lines of Python
+    """
+
+    about: str
+    command: str
+    python: str
+
+
+def page_code(navigation: Navigation) -> PageCode:
+    """Return the code of the view on the screen.
+
+    Raises
+    ------
+    InputError
+        If the view shows nothing yet.
+    """
+    if navigation.view is View.ORBIT:
+        return _of_solution(navigation)
+    run = navigation.run
+    if run is None:
+        raise InputError(navigation.why_no_run.rstrip("."))
+    if navigation.view is View.SURVEY:
+        names = [one.name for one in survey_figures() if one.workspace is navigation.workspace]
+        return _of_run(navigation, run, names, "survey", "", "--survey")
+    found = navigation.found
+    if found is None:
+        raise InputError("no source is shown yet; choose one first")
+    names = [one.name for one in source_figures() if one.workspace is navigation.workspace]
+    source = f".source({found.source_id})"
+    return _of_run(navigation, run, names, "source", source, "--source", str(found.source_id))
+
+
+def _of_solution(navigation: Navigation) -> PageCode:
+    session, workspace = navigation.session, navigation.orbit_workspace
+    chosen, shown = chosen_of(session), session.shown
+    if chosen is None or shown is None:
+        raise InputError("no solution is shown yet")
+    figures = [one for one in figures_of(session, workspace) if one.has_data(chosen)]
+    is_compared = workspace is OrbitWorkspace.ORDERS and session.other is not None
+    other = session.other if is_compared else None
+    calls = [
+        (one.name, _keywords(session, chosen if one.follows_shown else None)) for one in figures
+    ]
+    origin = session.store.origin
+    commands = [as_command(origin, shown.orbit, shown.settings)]
+    compared = other is not None and other.orbit == shown.orbit
+    if other is not None and compared:
+        commands.append(as_command(origin, other.orbit, other.settings, _OTHER))
+    commands.append(report_command(origin, shown.orbit, _OTHER if compared else None))
+    python = [as_python(origin, shown.orbit, shown.settings)]
+    if other is not None:
+        second = as_python(origin, other.orbit, other.settings, "other").removeprefix(PREAMBLE)
+        python += [second, "solution = solution.compared_with(other)"]
+    python.append(figures_as_python("solution", calls))
+    words = [_about(navigation, f"the solution ({shown.settings.describe()})", figures)]
+    words += [_OF_WHAT_IF] if _is_step(shown, other) else []
+    words += [_OF_OTHER_ORBIT] if other is not None and not compared else []
+    return PageCode(" ".join(words), "\n".join(commands), "\n".join(filter(None, python)))
+
+
+def _of_run(
+    navigation: Navigation,
+    run: SurveyRun,
+    names: Sequence[str],
+    variable: str,
+    call: str,
+    *options: str,
+) -> PageCode:
+    calls: list[FigureCall] = [(one, _keywords(navigation.session, None)) for one in names]
+    survey = str(run.survey)
+    opened = f"{PREAMBLE}{variable} = plateviz.open({survey!r}, run={run.name!r}){call}"
+    python = "\n".join(filter(None, [opened, figures_as_python(variable, calls)]))
+    about = _about(navigation, f"what is shown of run {run.name}", names)
+    return PageCode(about, report_of_run(survey, run.name, *options), python)
+
+
+def _about(navigation: Navigation, what: str, figures: Sequence[object]) -> str:
+    title = title_of(navigation.workspace)
+    drawn = f" and the figures of {title}, each in its own unit" if figures else ""
+    about = f"These make {what} on the screen again{drawn}. The report has all figures."
+    return f"{about} {_OF_EXPLORE}" if navigation.workspace in _EXPLORED else about
+
+
+def _is_step(shown: Solution, other: Solution | None) -> bool:
+    return shown.is_step or (other is not None and other.is_step)
+
+
+def _keywords(session: Session, chosen: Chosen | None) -> dict[str, object]:
+    """Return the keywords of a figure; `chosen` if it depends on the shown exposures."""
+    theme: dict[str, object] = {} if session.theme == "light" else {"theme": session.theme}
+    if chosen is None:
+        return theme
+    keywords: dict[str, object] = {}
+    if len(chosen.exposures) < len(chosen.result.exposures):
+        keywords["exposures"] = list(chosen.exposures)
+    if chosen.detector is not None:
+        keywords["detector"] = chosen.detector
+    return keywords | theme

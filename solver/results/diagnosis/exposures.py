@@ -1,0 +1,113 @@
+"""Tests of the exposures one by one: patterns that each exposure may have of its own."""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.results.diagnosis.rows import Camera, Rows
+
+# Waves of the pointing while the rows of the detectors are read.
+WAVES = 4
+_SMOOTH = 6
+_SIZE = _SMOOTH + 2 * WAVES
+# Added to the diagonal, relative: an exposure with few measurements has fewer directions.
+_RIDGE = 1e-6
+
+
+class ExposureChi2(NamedTuple):
+    """How much chi2 of each exposure would fall with patterns of its own, shape (exposures,).
+
+    Attributes
+    ----------
+    stretch : focal lengths along x and y that differ, one degree of freedom
+    shear : axes that are not at right angles, one
+    quadratic : quadratic distortion, six
+    swing : pointing that changes while the detectors are read, `4 WAVES`
+    """
+
+    stretch: np.ndarray
+    shear: np.ndarray
+    quadratic: np.ndarray
+    swing: np.ndarray
+
+
+def exposure_chi2(camera: Camera, rows: Rows) -> ExposureChi2:
+    """Return the chi2 of patterns of each exposure, with pointing, roll and scale fitted.
+
+    The positions of the sources take a share of each residual, which the weights allow for. The
+    chi2 are divided by that of the exposure per degree of freedom, unless that is below one, so
+    that an exposure with more noise does not stand out.
+    """
+    gram, along = _sums(camera, rows)
+    turn, scale = [(2, 0, -1.0), (1, 1, 1.0)], [(1, 0, 1.0), (2, 1, 1.0)]
+    base = _pairs([(0, 0, 1.0)], [(0, 1, 1.0)], turn, scale)
+    stretch = _pairs([(1, 0, 1.0), (2, 1, -1.0)])
+    shear = _pairs([(2, 0, 1.0), (1, 1, 1.0)])
+    quadratic = _pairs(*([(i, axis, 1.0)] for i in range(3, _SMOOTH) for axis in (0, 1)))
+    swing = _pairs(*([(i, axis, 1.0)] for i in range(_SMOOTH, _SIZE) for axis in (0, 1)))
+    linear = np.concatenate([base, stretch, shear], axis=1)
+    smooth = np.concatenate([linear, quadratic], axis=1)
+    typical = _scale(rows)
+    return ExposureChi2(
+        _gain(gram, along, base, stretch) / typical,
+        _gain(gram, along, base, shear) / typical,
+        _gain(gram, along, linear, quadratic) / typical,
+        _gain(gram, along, smooth, swing) / typical,
+    )
+
+
+def _scale(rows: Rows) -> np.ndarray:
+    """Return chi2 over its expected value of each exposure, at least one, without outliers."""
+    n, kept = len(rows.first) - 1, ~rows.is_far
+    chi2 = np.bincount(rows.exposure, kept * np.square(rows.whitened).sum(axis=1), n)
+    dof = np.bincount(rows.exposure, kept * 2.0 * rows.left, n)
+    return np.maximum(chi2 / np.maximum(dof, 1e-9), 1.0)
+
+
+def _sums(camera: Camera, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+    """Return the products of the scalar functions of each exposure, and with the residuals.
+
+    Shapes (exposures, size, size) and (exposures, 2 size), those along x first.
+    """
+    n = len(rows.first) - 1
+    gram, along = np.zeros((n, _SIZE, _SIZE)), np.zeros((n, 2 * _SIZE))
+    read = np.pi * (rows.pixel[:, 1] / camera.half[rows.detector, 1] + 1.0)
+    for e, (first, last) in enumerate(itertools.pairwise(rows.first)):
+        x, y = rows.at[first:last].T
+        # Harmonics of a wave by multiplication, four times as fast as sines.
+        wave = np.exp(1j * read[first:last])
+        waves = np.cumprod(np.tile(wave, (WAVES, 1)), axis=0)
+        smooth = (np.ones_like(x), x, y, x * x, x * y, y * y)
+        functions = np.concatenate([smooth, waves.real, waves.imag])
+        weight, left = rows.weight[first:last], rows.left[first:last] * ~rows.is_far[first:last]
+        gram[e] = (functions * (weight * left)) @ functions.T
+        along[e] = ((functions * weight) @ rows.residual[first:last]).T.ravel()
+    return gram, along
+
+
+def _pairs(*columns: list[tuple[int, int, float]]) -> np.ndarray:
+    """Return patterns as columns: coefficients of the functions along x, then along y."""
+    found = np.zeros((2 * _SIZE, len(columns)))
+    for number, parts in enumerate(columns):
+        for function, axis, value in parts:
+            found[axis * _SIZE + function, number] = value
+    return found
+
+
+def _gain(
+    gram: np.ndarray, along: np.ndarray, fitted: np.ndarray, tested: np.ndarray
+) -> np.ndarray:
+    """Return how much chi2 of each exposure falls by the tested patterns after the fitted ones."""
+    both = np.concatenate([fitted, tested], axis=1)
+    halves = both.reshape(2, _SIZE, -1)
+    along_x, along_y = halves
+    matrix = along_x.T @ gram @ along_x + along_y.T @ gram @ along_y
+    diagonal = np.einsum("epp->ep", matrix)
+    diagonal += _RIDGE * diagonal.max(axis=1, keepdims=True) + 1e-300
+    vector = along @ both
+    n = fitted.shape[1]
+    whole = np.einsum("ep,ep->e", vector, np.linalg.solve(matrix, vector[:, :, None])[:, :, 0])
+    before = vector[:, :n]
+    part = np.linalg.solve(matrix[:, :n, :n], before[:, :, None])[:, :, 0]
+    return np.maximum(whole - np.einsum("ep,ep->e", before, part), 0.0)

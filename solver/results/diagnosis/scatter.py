@@ -1,0 +1,100 @@
+"""Tests of the size of the residuals: overall, by exposure, source and magnitude, and the tails."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import gammainc
+
+from solver.results.diagnosis.rate import log_chance, log_chance_normal
+from solver.results.diagnosis.rows import Rows
+
+# Chance of a good residual beyond `rows.FAR` on either axis.
+_FAR_BY_CHANCE = 4.0e-9
+# Degrees of freedom below which a chi2 says nothing.
+_FEWEST = 2.0
+
+
+class Scatter(NamedTuple):
+    """A test of the size of the residuals.
+
+    Attributes
+    ----------
+    name : of the test
+    value, expected, scatter : of the statistic, the last two for a good solution
+    log_chance : logarithm of the probability of a value as far as this by chance
+    """
+
+    name: str
+    value: float
+    expected: float
+    scatter: float
+    log_chance: float
+
+
+def scatter_tests(
+    rows: Rows, magnitude: np.ndarray, explained: float = 0.0, without: np.ndarray | None = None
+) -> list[Scatter]:
+    """Return the tests of the size of the residuals; the outliers have their own.
+
+    Parameters
+    ----------
+    magnitude : of each source; NaN where unknown
+    explained : chi2 that other causes explain
+    without : indices of exposures to leave out
+    """
+    used = ~rows.is_far
+    if without is not None:
+        used &= ~np.isin(rows.exposure, without)
+    chi2, dof = used * np.square(rows.whitened).sum(axis=1), used * 2.0 * rows.left
+    total, freedom = float(chi2.sum()) - explained, max(float(dof.sum()), 1.0)
+    scale = max(total / freedom, 1e-300)
+    whole = float(_normalised(np.array([total]), np.array([freedom]))[0])
+    spread = float(np.sqrt(2.0 / freedom))
+    found = [
+        Scatter("noise", scale, 1.0, spread, log_chance_normal(whole)),
+        _dispersion("exposures", rows.exposure, chi2 / scale, dof),
+        _dispersion("sources", rows.source, chi2 / scale, dof),
+        _dispersion("detectors", rows.detector, chi2 / scale, dof),
+    ]
+    slope = _slope(rows.source, magnitude, chi2 / scale, dof)
+    count, expected = int(rows.is_far.sum()), _FAR_BY_CHANCE * rows.n
+    # Poisson: the chance of as many or more.
+    chance = float(gammainc(count, expected)) if count else 1.0
+    log_far = np.log(chance) if chance > 0.0 else count * np.log(expected / count) + count
+    far = Scatter("outliers", count, expected, float(np.sqrt(expected)), float(log_far))
+    return [*found, *([slope] if slope else []), far]
+
+
+def _normalised(chi2: np.ndarray, dof: np.ndarray) -> np.ndarray:
+    """Return chi2 values as unit normal ones (Wilson and Hilferty)."""
+    spread = 2.0 / (9.0 * dof)
+    return (np.cbrt(np.maximum(chi2, 0.0) / dof) - (1.0 - spread)) / np.sqrt(spread)
+
+
+def _dispersion(name: str, group: np.ndarray, chi2: np.ndarray, dof: np.ndarray) -> Scatter:
+    """Return whether the chi2 of groups scatter about their expected values as by chance."""
+    of_chi2, of_dof = np.bincount(group, chi2), np.bincount(group, dof)
+    known = of_dof > _FEWEST
+    z = _normalised(of_chi2[known], of_dof[known])
+    freedom = max(float(known.sum()) - 1.0, 0.0)
+    squares = float(np.sum(z**2))
+    log_p = log_chance(squares, freedom) if freedom else 0.0
+    value = squares / freedom if freedom else 1.0
+    return Scatter(name, value, 1.0, float(np.sqrt(2.0 / max(freedom, 1.0))), log_p)
+
+
+def _slope(
+    source: np.ndarray, magnitude: np.ndarray, chi2: np.ndarray, dof: np.ndarray
+) -> Scatter | None:
+    """Return whether chi2 over its expected value changes with the magnitude, per magnitude."""
+    of_chi2 = np.bincount(source, chi2, len(magnitude))
+    of_dof = np.bincount(source, dof, len(magnitude))
+    known = np.isfinite(magnitude) & (of_dof > 0.0)
+    if not known.any() or float(np.ptp(magnitude[known])) == 0.0:
+        return None
+    weight, at = of_dof[known], magnitude[known]
+    centred = at - np.average(at, weights=weight)
+    squares = float(np.sum(weight * centred**2))
+    value = float(np.sum(centred * of_chi2[known]) / squares)
+    scatter = float(np.sqrt(2.0 / squares))
+    return Scatter("magnitudes", value, 0.0, scatter, log_chance_normal(value / scatter))

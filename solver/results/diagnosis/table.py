@@ -1,0 +1,200 @@
+"""All tests of one solution, with their chance, in one table."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.special import chdtri
+
+from solver.data.result import FitResult
+from solver.results.diagnosis.exposures import WAVES, ExposureChi2, exposure_chi2
+from solver.results.diagnosis.patterns import Family, Patterns
+from solver.results.diagnosis.projection import Projection, project
+from solver.results.diagnosis.rate import discoveries, log_chance, of_many, sigmas
+from solver.results.diagnosis.references import (
+    ReferenceChi2,
+    deviation_chance,
+    reference_chi2,
+)
+from solver.results.diagnosis.rows import Camera, Rows, camera_rows
+from solver.results.diagnosis.scatter import scatter_tests
+
+# If all is well, the probability that any test is a discovery: a solution to be used with care,
+# and one that is not to be trusted.
+CARE_RATE, BAD_RATE = 0.02, 0.002
+# An exposure stands out if chance makes one like it in so many orbits.
+_OF_EXPOSURES = np.log(1e-3)
+# If more of the exposures swing than this share, it is not the pointing of some.
+_MOST_SWINGING = 0.3
+
+
+class Test(NamedTuple):
+    """One test of a solution.
+
+    Attributes
+    ----------
+    name : of the test
+    subject : what it is about, the key of its meaning
+    what : degree, step, detector or axis
+    statistic, expected, scatter : value, and what a good solution has
+    log_chance : logarithm of the probability of a value as far by chance
+    sigma : the same as the distance of a normal value
+    size_um : rms displacement of the pattern, um; NaN if the test is not about one
+    """
+
+    # pytest collects classes with this name otherwise.
+    __test__ = False
+
+    name: str
+    subject: str
+    what: tuple[int, ...]
+    statistic: float
+    expected: float
+    scatter: float
+    log_chance: float
+    sigma: float
+    size_um: float = float("nan")
+
+
+class Diagnosis(NamedTuple):
+    """The tests of one solution and what they were computed from.
+
+    Attributes
+    ----------
+    tests : the table
+    camera, rows, patterns, projection : see there; the rows of exposures that swing are zero
+    magnitude : of each source, NaN where unknown
+    scale : chi2 per degree of freedom without outliers and exposures that swing, at least 1
+    exposures : chi2 of patterns of each exposure
+    swinging : indices of the exposures whose pointing changed while they were read
+    references : chi2 of each reference star
+    """
+
+    tests: tuple[Test, ...]
+    camera: Camera
+    rows: Rows
+    patterns: Patterns
+    projection: Projection
+    magnitude: np.ndarray
+    scale: float
+    exposures: ExposureChi2
+    swinging: np.ndarray
+    references: ReferenceChi2
+
+    def found(self, rate: float) -> tuple[Test, ...]:
+        """Return the tests that are discoveries at a rate of false alarms over all tests."""
+        far = discoveries(np.array([test.log_chance for test in self.tests]), rate)
+        return tuple(test for test, is_far in zip(self.tests, far, strict=True) if is_far)
+
+    def frame(self) -> pd.DataFrame:
+        """Return the tests as a table, a row each."""
+        return pd.DataFrame(self.tests, columns=list(Test._fields))
+
+
+def diagnose(result: FitResult) -> Diagnosis:
+    """Return the tests of a solution."""
+    camera, rows = camera_rows(result)
+    magnitude = source_magnitudes(result)
+    exposures = exposure_chi2(camera, rows)
+    swings, swinging = _swings(exposures)
+    scatter = scatter_tests(rows, magnitude, without=swinging)
+    scale = max(scatter[0].value, 1.0)
+    still = np.isin(rows.exposure, swinging, invert=True)
+    rows = rows._replace(residual=rows.residual * still[:, None])
+    patterns = Patterns(camera, int(result.summary["order"]), magnitude)
+    projection = project(result, camera, rows, patterns)
+    references = reference_chi2(result.sources)
+    tests = [
+        *(Test(one.name, one.name, (), *one[1:], sigmas(one.log_chance)) for one in scatter),
+        *(pattern_test(projection, family, scale) for family in patterns.families),
+        *_of_exposures(exposures, swinging),
+        swings,
+        *_of_references(result, references),
+    ]
+    return Diagnosis(
+        tuple(tests),
+        camera,
+        rows,
+        patterns,
+        projection,
+        magnitude,
+        scale,
+        exposures,
+        swinging,
+        references,
+    )
+
+
+def source_magnitudes(result: FitResult) -> np.ndarray:
+    """Return the magnitude of each source, NaN where unknown."""
+    if "magnitude" not in result.sources:
+        return np.full(len(result.sources), np.nan)
+    return result.sources["magnitude"].to_numpy(dtype=float)
+
+
+def pattern_test(projection: Projection, family: Family, scale: float) -> Test:
+    """Return the test of a family of patterns.
+
+    Parameters
+    ----------
+    scale : chi2 per degree of freedom of the residuals, by which that of the patterns is divided
+    """
+    found = projection.evidence(family)
+    chi2, dof = found.chi2 / scale, float(found.dof)
+    chance = log_chance(chi2, dof)
+    return Test(
+        family.name,
+        family.subject,
+        family.what,
+        chi2,
+        dof,
+        float(np.sqrt(2.0 * dof)),
+        chance,
+        sigmas(chance),
+        found.size,
+    )
+
+
+def _of_exposures(found: ExposureChi2, swinging: np.ndarray) -> list[Test]:
+    """Return the tests of patterns that all exposures may have, each its own."""
+    tests = []
+    for subject, chi2, each in (
+        ("stretch", found.stretch, 1),
+        ("shear", found.shear, 1),
+        ("quadratic", found.quadratic, 6),
+    ):
+        others = np.delete(chi2, swinging)
+        total, dof = float(others.sum()), float(each * len(others))
+        chance = log_chance(total, dof)
+        name = f"{subject} of each exposure"
+        scatter = float(np.sqrt(2.0 * dof))
+        tests.append(Test(name, subject, (), total, dof, scatter, chance, sigmas(chance)))
+    return tests
+
+
+def _swings(found: ExposureChi2) -> tuple[Test, np.ndarray]:
+    """Return the test of the largest swing of an exposure, and which exposures swing."""
+    dof, n = 4.0 * WAVES, len(found.swing)
+    chances = np.array([of_many(log_chance(one, dof), n) for one in found.swing])
+    swinging = np.flatnonzero(chances < _OF_EXPOSURES)
+    if len(swinging) > _MOST_SWINGING * n:
+        swinging = swinging[:0]
+    largest, chance = float(found.swing.max(initial=0.0)), float(chances.min(initial=0.0))
+    typical, scatter = float(chdtri(dof, 0.5 / n)), float(np.sqrt(2.0 * dof))
+    name = "pointing while an exposure is read"
+    return Test(name, "swing", (), largest, typical, scatter, chance, sigmas(chance)), swinging
+
+
+def _of_references(result: FitResult, found: ReferenceChi2) -> list[Test]:
+    """Return the tests of the reference stars."""
+    tests = []
+    for number, axis in enumerate(("ra", "dec")):
+        value, expected, scatter, chance = deviation_chance(result, axis)
+        numbers = value, expected, scatter, chance, sigmas(chance)
+        tests.append(Test("reference stars, all", "references", (number,), *numbers))
+    if len(found.chi2):
+        largest, n = float(found.chi2.max()), len(found.chi2)
+        chance = of_many(-0.5 * largest, n)
+        numbers = largest, 2.0 * float(np.log(n / np.log(2.0))), 2.6, chance, sigmas(chance)
+        tests.append(Test("reference star that is furthest off", "reference", (), *numbers))
+    return tests

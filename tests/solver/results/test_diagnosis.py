@@ -1,0 +1,168 @@
+"""Tests of solutions: their calibration, and the causes that they name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.data.instrument import MINI_MOCK
+from solver.data.orbit import OrbitData
+from solver.data.settings import FitSettings
+from solver.fit import fit_orbit
+from solver.results.diagnosis.causes import find_causes
+from solver.results.diagnosis.patterns import Patterns
+from solver.results.diagnosis.projection import project
+from solver.results.diagnosis.rows import camera_rows, onto_focal_plane
+from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, diagnose
+from solver.simulate.catalogue import reference_catalogue, truth_catalogue
+from solver.simulate.defects.stages import defective_catalogue
+from solver.simulate.measure import measure_orbit
+from solver.simulate.settings import SurveySettings
+from tests.solver.conftest import TIGHT_PRIORS
+
+ORDER = 5
+# Some 700 sources, with 25,000 measurements.
+SETTINGS = replace(SurveySettings(orbits=100, seed=4).scaled(14_000), magnitudes=True)
+
+
+def fitted(*defects, orbit=0):
+    """Return the solution of a simulated orbit with defects."""
+    settings = replace(SETTINGS, defects=defects)
+    truth = truth_catalogue(settings)
+    catalogue, _ = defective_catalogue(reference_catalogue(truth, settings), truth, settings)
+    rows = measure_orbit(orbit, truth, settings)
+    measured = truth["source_id"].isin(rows.measurements["source_id"])
+    tables = (table[measured].reset_index(drop=True) for table in (catalogue, truth))
+    return fit_orbit(OrbitData(rows.measurements, rows.exposures, *tables))
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return fitted()
+
+
+def test_covariance_of_patterns_is_that_of_the_whole_problem(small_orbit, problem, dense):
+    """The projection with its own light model, against the Jacobian of the model."""
+    settings = FitSettings(prior_widths=TIGHT_PRIORS)
+    fit = fit_orbit(small_orbit.data, small_orbit.instrument, settings)
+    camera, rows = camera_rows(fit)
+    patterns = Patterns(camera, ORDER, np.full(len(fit.sources), np.nan))
+    projection = project(fit, camera, rows, patterns)
+    input_rows = np.argsort(fit.exposure_index, kind="stable")
+    working = np.empty(problem.n_obs, dtype=int)
+    working[problem.measurements.row] = np.arange(problem.n_obs)
+    columns = patterns.of_rows(rows).transpose(2, 1, 0)
+    # Back to the detectors' axes, in units of the uncertainty.
+    back = onto_focal_plane(
+        np.stack([columns[:, 0].ravel(), columns[:, 1].ravel()], axis=1),
+        -np.repeat(camera.turn[rows.detector], len(patterns)),
+    )
+    pixels = back.reshape(rows.n, len(patterns), 2).transpose(0, 2, 1)
+    pixels *= np.sqrt(rows.weight)[:, None, None]
+    whitened = np.empty_like(pixels)
+    whitened[working[input_rows]] = pixels
+    whitened = whitened.reshape(2 * problem.n_obs, -1)
+    along = dense.jacobian.T @ whitened
+    exact = whitened.T @ whitened - along.T @ dense.covariance @ along
+    # Those of the pixel phase are for sources in many exposures; some cells have no stars.
+    slow = np.setdiff1d(np.flatnonzero(np.diag(projection.total)), patterns.fast)
+    total, left, exact = (
+        matrix[np.ix_(slow, slow)] for matrix in (projection.total, projection.left, exact)
+    )
+    scale = np.sqrt(np.diag(total))
+    assert (np.diag(exact) / np.diag(total)).max() > 0.3
+    found, expected = (one / np.outer(scale, scale) for one in (left, exact))
+    # Cells at the edge hold a few measurements, whose uncertainties along x and y differ.
+    np.testing.assert_allclose(found, expected, atol=0.1)
+    assert np.diag(found).mean() == pytest.approx(np.diag(expected).mean(), rel=0.02)
+
+
+def test_good_solution_has_no_cause(clean):
+    diagnosis = diagnose(clean)
+    assert not diagnosis.found(BAD_RATE)
+    assert clean.sources["magnitude"].between(5.0, 21.0).all()
+    if not diagnosis.found(CARE_RATE):
+        assert not find_causes(diagnosis).found
+
+
+def test_tests_of_a_good_solution_are_those_of_chance(clean):
+    chances = np.exp([test.log_chance for test in diagnose(clean).tests])
+    assert 0.2 < np.mean(chances) < 0.8
+    assert np.all((chances >= 0.0) & (chances <= 1.0))
+
+
+@pytest.mark.parametrize(
+    ("defect", "subject"),
+    [
+        ("distortion-drift=0.3um", "drift"),
+        ("noise=10%", "noise"),
+    ],
+)
+def test_cause_is_named(defect, subject):
+    diagnosis = diagnose(fitted(defect))
+    causes = find_causes(diagnosis)
+    assert diagnosis.found(BAD_RATE)
+    assert causes.found[0].test.subject == subject
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("defect", "subject"),
+    [
+        ("detector-turn=5arcsec", "turn"),
+        ("outliers=0.3%", "outliers"),
+        ("distortion-orbital=0.3um", "bend"),
+        ("distortion-step=0.2um", "step"),
+        ("distortion-order=0.2um", "order"),
+        ("focal-anisotropy=6ppm", "stretch"),
+        ("pointing-jitter=10mas", "swing"),
+        ("detector-shift=0.2um", "shift"),
+        ("charge-transfer=8mpix", "magnitude"),
+        ("pixel-phase=6mpix", "phase"),
+        ("noise-exposure=30%", "exposures"),
+        ("noise-magnitude=30%", "magnitudes"),
+        ("binaries=5", "reference"),
+        ("reference-errors=500%", "references"),
+    ],
+)
+def test_every_cause_is_named(defect, subject):
+    assert find_causes(diagnose(fitted(defect))).found[0].test.subject == subject
+
+
+def test_outliers_are_found_and_left_out_of_the_patterns(clean):
+    residuals = clean.residuals.copy()
+    residuals.loc[[10, 500, 900], "residual_x"] += 40.0 * residuals["sx"].iloc[0]
+    _, rows = camera_rows(replace(clean, residuals=residuals))
+    assert rows.is_far.sum() == 3
+    assert not rows.residual[rows.is_far].any()
+
+
+def test_exposure_that_swings_is_found(clean):
+    residuals = clean.residuals.copy()
+    chosen = clean.exposure_index == 7
+    wave = 2.0 * np.sin(2.0 * np.pi * residuals["ny"] / np.ptp(residuals["ny"])) * residuals["sx"]
+    # All detectors swing along x of the focal plane.
+    rotation = np.radians(clean.values_on("det")["detector_rotation"].to_numpy())
+    turn = rotation[MINI_MOCK.index_of(residuals["detector_id"].to_numpy())]
+    residuals["residual_x"] += chosen * wave * np.cos(turn)
+    residuals["residual_y"] += chosen * wave * np.sin(turn)
+    diagnosis = diagnose(replace(clean, residuals=residuals))
+    assert diagnosis.swinging.tolist() == [7]
+    assert find_causes(diagnosis).found[0].items == (7,)
+
+
+def test_order_of_the_rows_does_not_matter(clean):
+    shuffled = clean.residuals.sample(frac=1.0, random_state=1, ignore_index=True)
+    a, b = (diagnose(replace(clean, residuals=rows)) for rows in (clean.residuals, shuffled))
+    assert [one.statistic for one in a.tests] == pytest.approx(
+        [one.statistic for one in b.tests], rel=1e-6
+    )
+
+
+def test_wrong_reference_star_is_named(clean):
+    sources = clean.sources.copy()
+    wrong = int(np.flatnonzero(sources["is_reference"])[3])
+    sources.loc[wrong, "offset_ra"] += 12.0 * sources.loc[wrong, "prior_sigma_ra"]
+    found = find_causes(diagnose(replace(clean, sources=sources))).found
+    assert found[0].test.subject == "reference"
+    assert found[0].items == (int(sources.loc[wrong, "source_id"]),)

@@ -1,0 +1,37 @@
+"""Whether many marks, which are painted as copies of their looks, are where each would be drawn."""
+
+# Paint 600 marks of a figure at once and a hundred at a time, which are drawn one by one.
+_BOTH = """() => {
+  const glyphs = [];
+  const walk = view => {
+    if (view.model.type === "GlyphRenderer" && view.glyph.model.type === "Scatter")
+      glyphs.push(view.glyph);
+    [...(view.renderer_views?.values() ?? []), ...(view.child_views ?? [])].forEach(walk);
+  };
+  for (const view of Bokeh.index) walk(view);
+  const [glyph] = glyphs.filter(one => one.data_size > 20 && one.sx[0] !== undefined);
+  const indices = Array.from({ length: 600 }, (_, k) => k % glyph.data_size);
+  const opacities = count => {
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [900, 900];
+    const context = canvas.getContext("2d");
+    context.scale(1.5, 1.5);
+    for (let k = 0; k < indices.length; k += count)
+      glyph._paint(context, indices.slice(k, k + count));
+    return context.getImageData(0, 0, 900, 900).data.filter((_, at) => at % 4 === 3);
+  };
+  const [together, alone] = [opacities(600), opacities(100)];
+  const sum = values => values.reduce((total, value) => total + value / 255, 0);
+  const differences = together.map((opacity, at) => Math.abs(opacity - alone[at]));
+  return [sum(together), sum(alone), sum(differences), differences.some(one => one > 0)];
+}"""
+
+
+def require_marks_where_they_are(page):
+    """Fail if marks that are painted together cover other pixels than each of them alone."""
+    together, alone, differing, are_copied = page.evaluate(_BOTH)
+    assert are_copied
+    assert alone > 100
+    assert abs(together - alone) < 0.02 * alone
+    # Each copy is within an eighth of a pixel of its mark.
+    assert differing < 0.1 * alone

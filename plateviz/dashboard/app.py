@@ -1,5 +1,7 @@
 """The dashboard: one page per browser session, over a shared solution store."""
 
+from contextvars import Context
+from functools import partial
 from html import escape
 
 import panel as pn
@@ -192,7 +194,10 @@ class _Ticker:
         def begin() -> None:
             self._navigation, self._pages = navigation, pages
             self._document, self._loop = pn.state.curdoc, IOLoop.current()
-            later = None if self._document is None else self._document.add_timeout_callback
+            # A timer of this page's context would keep the page until its time has come.
+            later = (
+                None if self._document is None else partial(Context().run, self._loop.call_later)
+            )
             self._rest = AtRest(session.prepare_what_ifs, _REST_SECONDS, later)
             self.wake()
             self._follow_run()

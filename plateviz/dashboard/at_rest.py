@@ -2,9 +2,10 @@
 
 import time
 from collections.abc import Callable
+from weakref import WeakMethod
 
-Later = Callable[[Callable[[], None], int], object]
-"""Calls a function after some milliseconds, as `Document.add_timeout_callback` does."""
+Later = Callable[[float, Callable[[], None]], object]
+"""Calls a function after some seconds, as `IOLoop.call_later` does."""
 
 
 class AtRest:
@@ -36,7 +37,9 @@ class AtRest:
     def _wait(self, seconds: float) -> None:
         if self._later is not None:
             self._is_waiting = True
-            self._later(self._look, round(1000 * seconds))
+            # A page that is closed meanwhile is not kept for it.
+            look = WeakMethod(self._look)
+            self._later(seconds, lambda: _call(look))
 
     def _look(self) -> None:
         self._is_waiting = False
@@ -46,3 +49,9 @@ class AtRest:
             self._wait(left)
         else:
             self._act()
+
+
+def _call(method: WeakMethod[Callable[[], None]]) -> None:
+    found = method()
+    if found is not None:
+        found()

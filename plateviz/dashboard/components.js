@@ -1,7 +1,8 @@
 // Components of a page: compiled once for all of a kind, and laid out together.
 //
-// Panel compiles the script of a component for each one of its kind that there is. Whenever a container gets a part, Panel lays out all that is in the container, at every depth of
-// the page anew, and each time the browser has to work out where everything is. Here containers
+// Panel compiles the script of a component for each one of its kind that there is. Whenever a
+// container gets a part, Panel lays out all that is in the container anew, and then all that is in
+// the one around it, and each time the browser has to work out where everything is. Here containers
 // wait for the next picture of the screen, and are laid out together: those that are in another one
 // with it, except for cards, which have layouts of their own (see `own_layout.py`).
 

@@ -1,7 +1,8 @@
 """Returned memory: what a closed page took goes back to the machine.
 
-Two things are in the way. Panel keeps the first page of a process for ever, and the C library keeps
-what Python has freed, in case that it is asked for it again.
+Three things are in the way. Panel keeps the first page of a process for ever, and makes Bokeh's
+default document the page that was at work when another one began. The C library keeps what Python
+has freed, in case that it is asked for it again.
 """
 
 import ctypes
@@ -10,6 +11,8 @@ from collections.abc import Callable
 from typing import Any
 
 import panel as pn
+from bokeh.document import Document
+from bokeh.io.state import curstate
 from tornado.ioloop import IOLoop
 
 # Panel collects what refers to itself within ten seconds after the end of a page.
@@ -44,6 +47,7 @@ class ReturnedMemory:
     def follow(self) -> None:
         """Follow the page that is being made to its end."""
         pn.state.on_session_destroyed(lambda _: self.note_end())
+        self._loop.add_callback(_keep_no_page_as_default)
 
     def note_end(self) -> None:
         """Give memory back later, when a page that has just ended is collected."""
@@ -61,6 +65,10 @@ class ReturnedMemory:
         if time.monotonic() - self._last_end < _SECONDS:
             # What that page took may not be collected yet.
             self._wait()
+
+
+def _keep_no_page_as_default() -> None:
+    curstate().document = Document()
 
 
 def _trim_of_library() -> None:

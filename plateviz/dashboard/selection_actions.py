@@ -1,8 +1,11 @@
 """SelectionActions: what can be done with the selection of a session, without Panel."""
 
+from contextlib import suppress
+
 from plateviz.dashboard.selected import NOTHING, Selected, checked_name
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
+from plateviz.runs.kept_selections import TakenError
 from solver.errors import InputError
 
 # Selections that a session keeps.
@@ -50,20 +53,52 @@ class SelectionActions:
         """Include the selection in the next fit, which shows a what-if."""
         self._exclude(self._left_out - self._selection.selected)
 
-    def keep(self, name: str) -> None:
+    def look(self) -> None:
+        """Take over what others have kept by now; a notice says where it cannot be read."""
+        try:
+            found = self._session.store.selections.all()
+        except InputError as error:
+            self._session.note([str(error)])
+            return
+        kept = {}
+        for name, items in found.items():
+            # They come from a file.
+            with suppress(InputError):
+                kept[checked_name(name)] = Selected.of(items)
+        merged = {**self._selection.kept, **kept}
+        if merged != self._selection.kept:
+            self._selection.kept = merged
+
+    def keep(self, name: str) -> str:
         """Keep the selection under a name, in place of one that has that name.
+
+        Returns
+        -------
+        Why it is kept in this session only; empty if it is on disk.
 
         Raises
         ------
         InputError
-            If the name is invalid, nothing is selected, or too many are kept.
+            If the name is invalid or somebody else has kept another selection under it, nothing is
+            selected, or too many are kept.
         """
         name, kept = checked_name(name), self._selection.kept
         if not self._selection.selected:
             raise InputError("nothing is selected that could be kept")
         if name not in kept and len(kept) >= _MOST_KEPT:
             raise InputError(f"{_MOST_KEPT} selections are kept; forget one first")
-        self._selection.kept = {**kept, name: self._selection.selected}
+        selected, before = self._selection.selected, kept.get(name)
+        why = ""
+        try:
+            self._session.store.selections.keep(
+                name, selected.exclusions, None if before is None else before.exclusions
+            )
+        except TakenError:
+            raise
+        except InputError as error:
+            why = str(error)
+        self._selection.kept = {**kept, name: selected}
+        return why
 
     def take_up(self, name: str) -> None:
         """Select again what is kept under a name; nothing happens if there is none."""
@@ -73,6 +108,10 @@ class SelectionActions:
     def forget(self, name: str) -> None:
         """Keep nothing under a name any more; what is selected stays selected."""
         kept = self._selection.kept
+        if name in kept:
+            # What cannot be written is forgotten in this session.
+            with suppress(InputError):
+                self._session.store.selections.forget(name, kept[name].exclusions)
         self._selection.kept = {one: items for one, items in kept.items() if one != name}
 
     @property

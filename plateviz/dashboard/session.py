@@ -97,6 +97,8 @@ class Session(RequestState):
         self.selection.orbit = orbit
         if self.shown is None or self.shown.orbit != orbit:
             self.solutions = []
+            if self.shown is not None:
+                self.store.leave(self.shown.orbit)
         self.chosen = self.other = None
         self._later = solutions
         self._show_next()

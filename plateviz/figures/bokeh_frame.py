@@ -10,10 +10,11 @@ from bokeh.core.property.vectorization import Field, Value
 from plateviz.figures.bokeh_glyphs import BokehGlyphs
 from plateviz.figures.figure import Axis, Frame
 from plateviz.figures.theme import FONT, LABEL_SIZE, SMALL_SIZE, TITLE_SIZE, Theme
+from plateviz.figures.tick_count import columns_of_ticks, rows_of_ticks
 from plateviz.figures.words import Words
 
-# Least room to the left of a frame, and room for a tick label, screen pixels.
-_LEFT, _TICK = 5, 70
+# Least room to the left of a frame, screen pixels.
+_LEFT = 5
 # Milliseconds without a turn of the wheel after which a person has chosen new limits.
 _SETTLED = 40
 # Shows an image while the reach of the frame's limits is between those in its tags.
@@ -104,14 +105,15 @@ class BokehFrame:
             frame_height=frame.frame_height,
             # Without it, the frame is cut off where another in its column has wider labels.
             min_border_right=frame.margin,
-            min_border_left=_LEFT + frame.indent,
+            min_border_left=max(_LEFT, frame.indent + frame.beside),
             background_fill_color=theme.background,
             border_fill_color=theme.background,
             outline_line_color=theme.muted,
         )
         self._box.match_aspect = frame.height is None
-        _follow_axis(self._x, self.x_range, frame.x, frame.width, theme)
-        _follow_axis(self._y, self.y_range, frame.y, 2 * frame.frame_height, theme)
+        columns = columns_of_ticks(frame.x, frame.width)
+        _follow_axis(self._x, self.x_range, frame.x, columns, theme)
+        _follow_axis(self._y, self.y_range, frame.y, rows_of_ticks(frame.frame_height), theme)
         for grid in self._grids:
             grid.grid_line_color = theme.grid
         self._follow_glyphs(frame, theme)
@@ -228,7 +230,7 @@ def _follow_axis(
     drawn: models.LinearAxis | models.LogAxis,
     limits: models.Range1d,
     axis: Axis,
-    length: int,
+    ticks: int,
     theme: Theme,
 ) -> None:
     start, end = axis.limits
@@ -241,7 +243,12 @@ def _follow_axis(
     elif isinstance(drawn.ticker, models.FixedTicker):
         drawn.update(ticker=models.LogTicker() if axis.is_log else models.BasicTicker())
     if isinstance(drawn.ticker, models.BasicTicker):
-        drawn.ticker.desired_num_ticks = min(6, max(3, length // _TICK))
+        drawn.ticker.desired_num_ticks = ticks
+    # Ticks that suit a large frame may be too close to each other in a small one. Turned labels
+    # lie beside each other, although the rectangles around them overlap.
+    policy = models.AllLabels if axis.rotation else models.NoOverlap
+    if not isinstance(drawn.major_label_policy, policy):
+        drawn.update(major_label_policy=policy())
     drawn.update(
         axis_label=axis.label,
         major_label_overrides=dict(axis.ticks or ()),

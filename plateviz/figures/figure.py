@@ -154,7 +154,8 @@ class Frame:
     legend_columns : columns of the legend, which is below the frame so that it covers no data;
         0 for no legend
     margin : room to the right of the frame, over which its words may reach, screen pixels
-    indent : room to the left of the frame that its axis does not need, screen pixels
+    beside : room to the left of the frame for the axis, screen pixels
+    indent : room to the left of that, screen pixels
     corner : width of what covers the right end of the title's room, screen pixels
     """
 
@@ -167,6 +168,7 @@ class Frame:
     height: int | None = None
     legend_columns: int = 0
     margin: int = MARGIN
+    beside: int = 0
     indent: int = 0
     corner: int = 0
 

@@ -1,26 +1,41 @@
 """A figure in another size."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise, zip_longest
+from typing import NamedTuple
 
 from plateviz.figures.figure import MARGIN, Axis, Figure, Frame, Ramp
-from plateviz.figures.text_width import text_width
+from plateviz.figures.fitting_texts import with_fitting_texts
+from plateviz.figures.text_width import has_room_for_words, text_width, wrapped
 from plateviz.figures.theme import LABEL_SIZE, SMALL_SIZE, TITLE_SIZE
-from plateviz.figures.words import words_of
+from plateviz.figures.words import words_of_row
 
 # Screen pixels around a frame: label of the left axis, its shortest tick labels, margin on the
 # right, colour bar.
 _LEFT, _TICKS, _RIGHT, _BAR = 32, 34, 18, 72
 # A line of the title, the toolbar beside the subtitle, space around its lines, one of these lines,
-# the lower axis with its labels.
-_TITLE, _TOOLBAR, _SPACE, _LINE, _BELOW = 19, 38, 18, 15, 54
+# the lower axis with its labels, the label of that axis, space below it.
+_TITLE, _TOOLBAR, _SPACE, _LINE, _BELOW, _LABEL, _FREE = 19, 38, 18, 15, 48, 18, 8
 # A row of the legend, the mark of one of its labels.
 _ROW, _MARK = 26, 32
-_LEAST = 60
-# Words that would leave a frame less than this share of its height are left out.
-_SHARE = 0.55
+# Words that would leave a frame less than this height, in screen pixels, or less than this share of
+# its height, are left out.
+_ENOUGH, _SHARE = 110, 0.65
 # How much higher a frame is that is clearly larger.
 _GAIN = 1.12
+# Lines of the label of an axis, at most.
+_X_LINES, _Y_LINES = 2, 3
+
+Rows = list[list[Frame]]
+
+
+class _Column(NamedTuple):
+    """Room for the frames of a column, screen pixels."""
+
+    left: int
+    width: int
 
 
 def resized(figure: Figure, width: int, height: int, *, corner: int = 0) -> Figure:
@@ -29,7 +44,8 @@ def resized(figure: Figure, width: int, height: int, *, corner: int = 0) -> Figu
     Frames with equal scales of both axes keep them. Frames that share no x axis are arranged in
     as many columns as leave them largest. Those that are narrower than the area are in its middle,
     or to its left where their words need the room. Subtitles or legends are left out where they
-    would take much of the height.
+    would take much of the height. An axis has no label that the next frame to the left or below
+    repeats.
 
     Parameters
     ----------
@@ -42,7 +58,7 @@ def resized(figure: Figure, width: int, height: int, *, corner: int = 0) -> Figu
     candidates = [
         _arranged(_free(figure, n, corner), n, width, height) for n in dict.fromkeys(columns)
     ]
-    return max(candidates, key=_least_side)
+    return max(candidates, key=_quality)
 
 
 def _free(figure: Figure, columns: int, corner: int) -> Figure:
@@ -53,11 +69,10 @@ def _free(figure: Figure, columns: int, corner: int) -> Figure:
 
 
 def _arranged(figure: Figure, columns: int, width: int, height: int) -> Figure:
-    room = (width // columns, height // math.ceil(len(figure) / columns))
     frames = replace(figure, columns=columns)
-    best = _wordy(frames, room, is_leaning=False)
+    best = _wordy(frames, width, height, is_leaning=False)
     if any(frame.height is None for frame in figure):
-        leaning = _wordy(frames, room, is_leaning=True)
+        leaning = _wordy(frames, width, height, is_leaning=True)
         best = leaning if _is_better(leaning, best) else best
     return best
 
@@ -73,98 +88,178 @@ def _words(figure: Figure) -> int:
     return sum(bool(frame.subtitle) + bool(frame.legend_columns) for frame in figure)
 
 
-def _wordy(figure: Figure, room: tuple[int, int], *, is_leaning: bool) -> Figure:
+def _wordy(figure: Figure, width: int, height: int, *, is_leaning: bool) -> Figure:
     """Return the figure with its words above, without those that would take much of the height."""
     no_subtitle, no_legend = {"subtitle": ""}, {"legend_columns": 0}
-    candidates = [
-        _fitted([replace(one, **without) for one in figure], figure, room, is_leaning=is_leaning)
-        for without in ({}, no_subtitle, no_legend, no_subtitle | no_legend)
-    ]
+    candidates = []
+    for without in ({}, no_subtitle, no_legend, no_subtitle | no_legend):
+        frames = tuple(replace(frame, **without) for frame in figure)
+        one = replace(figure, frames=frames)
+        candidates.append(_fitted(one, width, height, is_leaning=is_leaning))
     *wordy, bare = candidates
-    enough = max(_LEAST, _SHARE * _least_height(bare))
+    enough = max(_ENOUGH, _SHARE * _least_height(bare))
     return next((one for one in wordy if _least_height(one) >= enough), bare)
 
 
-def _fitted(
-    frames: list[Frame], figure: Figure, room: tuple[int, int], *, is_leaning: bool
-) -> Figure:
-    """Return a figure of `frames`, arranged as `figure`."""
-    first = range(0, len(frames), figure.columns)
-    rows = [frames[number : number + figure.columns] for number in first]
-    fitted = (one for row in rows for one in _fitted_row(row, *room, is_leaning=is_leaning))
-    return replace(figure, frames=tuple(fitted))
+def _fitted(figure: Figure, width: int, height: int, *, is_leaning: bool) -> Figure:
+    first = range(0, len(figure), figure.columns)
+    rows = [list(figure.frames[number : number + figure.columns]) for number in first]
+    labelled = _with_outer_labels(rows)
+    fitted = _fitted_rows(labelled, width, height, is_leaning=is_leaning)
+    # How long the label of a left axis may be follows from the height of its frame.
+    wrapped_rows = [
+        [replace(one, y=_with_lines(one.y, _y_room(row), _Y_LINES)) for one in frames]
+        for frames, row in zip(labelled, fitted, strict=True)
+    ]
+    if any("\n" in frame.y.label for row in wrapped_rows for frame in row):
+        fitted = _fitted_rows(wrapped_rows, width, height, is_leaning=is_leaning)
+    return replace(figure, frames=tuple(with_fitting_texts(one) for row in fitted for one in row))
 
 
-def _fitted_row(row: list[Frame], width: int, height: int, *, is_leaning: bool) -> list[Frame]:
-    """Return the frames of a row, whose titles, subtitles and legends are of one height.
+def _with_outer_labels(rows: Rows) -> Rows:
+    """Return the frames, without labels that all of the next column or row repeat."""
+    columns = list(zip_longest(*rows))
+    without_x = [_is_alike(*pair, "x") for pair in pairwise(rows)] + [False]
+    without_y = [False] + [_is_alike(right, left, "y") for left, right in pairwise(columns)]
+    return [
+        [
+            replace(
+                frame,
+                x=replace(frame.x, label="" if is_x else frame.x.label),
+                y=replace(frame.y, label="" if is_y else frame.y.label),
+            )
+            for frame, is_y in zip(row, without_y, strict=False)
+        ]
+        for row, is_x in zip(rows, without_x, strict=True)
+    ]
+
+
+def _is_alike(some: Sequence[Frame | None], others: Sequence[Frame | None], axis: str) -> bool:
+    """Return whether each of some frames has a neighbour with the same label of an axis."""
+    return len(some) <= len(others) and all(
+        other is not None and getattr(one, axis).label == getattr(other, axis).label
+        for one, other in zip(some, others, strict=False)
+        if one is not None
+    )
+
+
+def _fitted_rows(rows: Rows, width: int, height: int, *, is_leaning: bool) -> Rows:
+    """Return frames of one height, those of a row with as many lines of words.
 
     Parameters
     ----------
     is_leaning : whether all the room that is left is to the right of a frame, for its words, and
         the frame is not in the middle
     """
-    widest = [max(_LEAST, width - _beside(frame)) for frame in row]
-    frames = [_of_width(*one, width) for one in zip(row, widest, strict=True)]
+    numbers = range(len(rows[0]))
+    left, right = (
+        [max(taken(row[n]) for row in rows if n < len(row)) for n in numbers]
+        for taken in (_left, _right)
+    )
+    wide = max(1, (width - sum(left) - sum(right)) // len(left))
+    columns = [_Column(taken, wide) for taken in left]
+    rows = [
+        [_of_width(frame, wide, column) for frame, column in zip(row, columns, strict=False)]
+        for row in rows
+    ]
     # Words are wrapped to the frame, whose width may follow from its height.
-    for _ in range(3 if any(frame.height is None for frame in row) else 1):
-        words = [words_of(frame) for frame in frames]
-        title, subtitle = (max(map(len, lines)) for lines in zip(*words, strict=True))
-        above = _TITLE * title + max(_TOOLBAR, _SPACE + _LINE * subtitle)
-        below = _BELOW + max(_rise(frame.x) + _ROW * _legend_rows(frame) for frame in frames)
-        high = max(1, height - above - below)
-        frames = [_of_height(frame, high, width, is_leaning=is_leaning) for frame in frames]
-    return [_towards_the_middle(frame) for frame in frames] if is_leaning else frames
+    for _ in range(3 if any(frame.height is None for row in rows for frame in row) else 1):
+        around = sum(_above(row) + _below(row) for row in rows)
+        high = max(1, (height - around) // len(rows))
+        rows = [
+            [
+                _of_height(frame, high, column, is_leaning=is_leaning)
+                for frame, column in zip(row, columns, strict=False)
+            ]
+            for row in rows
+        ]
+    return [[_towards_the_middle(f) for f in row] for row in rows] if is_leaning else rows
+
+
+def _above(row: list[Frame]) -> int:
+    (title, subtitle), *_ = words_of_row(row)
+    return _TITLE * len(title) + max(_TOOLBAR, _SPACE + _LINE * len(subtitle))
+
+
+def _below(row: list[Frame]) -> int:
+    lines = max(frame.x.label.count("\n") if frame.x.label else -1 for frame in row)
+    label = _LINE * lines if lines >= 0 else -_LABEL
+    return _BELOW + label + max(_rise(f.x) + _ROW * _legend_rows(f) for f in row)
 
 
 def _towards_the_middle(frame: Frame) -> Frame:
     """Return a frame at the left of its room, moved as far to the middle as its words allow."""
-    words = words_of(frame)
+    (words,) = words_of_row([frame])
+    label = max(text_width(line, LABEL_SIZE) for line in frame.x.label.split("\n"))
     needed = max(
         *(text_width(line, TITLE_SIZE, is_bold=True) + frame.corner for line in words.title),
         *(text_width(line, SMALL_SIZE) for line in words.subtitle),
         frame.legend_columns * _legend_entry(frame),
-        (text_width(frame.x.label, LABEL_SIZE) + frame.width) / 2,
+        (label + frame.width) / 2,
     )
     at_least = MARGIN + (frame.margin - MARGIN) // 2
     margin = min(frame.margin, max(at_least, math.ceil(needed) - frame.width))
     return replace(frame, margin=margin, indent=frame.margin - margin)
 
 
-def _of_height(frame: Frame, height: int, room: int, *, is_leaning: bool) -> Frame:
+def _of_height(frame: Frame, height: int, column: _Column, *, is_leaning: bool) -> Frame:
     if frame.height is not None:
         return replace(frame, height=height)
     wide = max(1, round(height * frame.x.length / frame.y.length))
-    return _of_width(frame, min(room - _beside(frame), wide), room, is_leaning=is_leaning)
+    return _of_width(frame, min(column.width, wide), column, is_leaning=is_leaning)
 
 
-def _of_width(frame: Frame, width: int, room: int, *, is_leaning: bool = False) -> Frame:
-    left = max(0, room - _beside(frame) - width)
+def _of_width(frame: Frame, width: int, column: _Column, *, is_leaning: bool = False) -> Frame:
+    left = column.width - width
     indent = 0 if is_leaning else left // 2
     margin = MARGIN + left - indent
     # A label is in the middle below the frame, and is cut off at either edge.
-    reach = min(margin, _LEFT + _TICKS + indent)
-    fits = text_width(frame.x.label, LABEL_SIZE) < width + 2 * reach
+    reach = min(margin, column.left + indent)
     return replace(
         frame,
-        x=replace(frame.x, label=frame.x.label if fits else ""),
+        x=_with_lines(frame.x, width + 2 * reach, _X_LINES),
         width=width,
         margin=margin,
+        beside=column.left,
         indent=indent,
         legend_columns=_legend_columns(frame, width + margin),
     )
 
 
-def _least_side(figure: Figure) -> float:
-    return min(min(frame.width, 2 * frame.frame_height) for frame in figure)
+def _with_lines(axis: Axis, room: int, most: int) -> Axis:
+    """Return an axis with its label in lines of a width; with none if it needs too many."""
+    label = axis.label.replace("\n", " ")
+    lines = wrapped(label, room, LABEL_SIZE)
+    fits = len(lines) <= most and has_room_for_words(label, room, LABEL_SIZE)
+    return replace(axis, label="\n".join(lines) if fits else "")
+
+
+def _y_room(row: list[Frame]) -> int:
+    """Return the height for the label of a left axis, which is in the middle beside its frame."""
+    return row[0].frame_height + 2 * (min(_above(row), _below(row)) - _FREE)
+
+
+def _quality(figure: Figure) -> float:
+    """Return the shortest side of a frame, less where a word of a title has to be broken."""
+    least = min(min(frame.width, 2 * frame.frame_height) for frame in figure)
+    is_whole = all(
+        has_room_for_words(frame.title, frame.width + frame.margin, TITLE_SIZE, is_bold=True)
+        for frame in figure
+    )
+    return least if is_whole else least / 2.0
 
 
 def _least_height(figure: Figure) -> float:
     return min(frame.frame_height for frame in figure)
 
 
-def _beside(frame: Frame) -> int:
+def _left(frame: Frame) -> int:
     ticks = max(_TICKS, round(_longest_tick(frame.y)) + 10)
-    return _LEFT + ticks + _RIGHT + (_BAR if _has_bar(frame) else 0)
+    return ticks + (_LEFT + _LINE * frame.y.label.count("\n") if frame.y.label else 0)
+
+
+def _right(frame: Frame) -> int:
+    return _RIGHT + (_BAR if _has_bar(frame) else 0)
 
 
 def _has_bar(frame: Frame) -> bool:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from plateviz.figures.figure import Frame
-from plateviz.figures.text_width import wrapped
+from plateviz.figures.text_width import has_room_for_words, wrapped
 from plateviz.figures.theme import SMALL_SIZE, TITLE_SIZE
 
 # Bokeh drops empty lines, but not one with a space of no width.
@@ -26,7 +26,8 @@ def words_of(frame: Frame) -> Words:
         for room in (width, width - frame.corner)
     )
     # Beside what covers the corner, or below it where there is too little room beside it.
-    title = beside if len(beside) <= len(title) + 1 else [_EMPTY, *title]
+    is_whole = has_room_for_words(frame.title, width - frame.corner, TITLE_SIZE, is_bold=True)
+    title = beside if is_whole and len(beside) <= len(title) + 1 else [_EMPTY, *title]
     return Words(title, wrapped(frame.subtitle, width, SMALL_SIZE))
 
 
@@ -40,5 +41,8 @@ def words_of_row(row: Sequence[Frame]) -> list[Words]:
 
 
 def _filled(texts: list[list[str]]) -> list[list[str]]:
+    """Return texts with as many lines each, all of which begin on one line."""
+    if any(lines[:1] == [_EMPTY] for lines in texts):
+        texts = [lines if lines[:1] == [_EMPTY] else [_EMPTY, *lines] for lines in texts]
     most = max(map(len, texts))
     return [[*lines, *[_EMPTY] * (most - len(lines))] for lines in texts]

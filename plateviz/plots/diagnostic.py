@@ -61,6 +61,7 @@ class Diagnostic:
     is_of_simulation : whether the Orbit page shows it for a simulated survey only
     is_key : whether the Verdict workspace shows it, small
     equation : what is drawn, as text
+    least_height : that it needs on the page, screen pixels; 0 where any card's height is enough
     """
 
     name: str
@@ -75,6 +76,7 @@ class Diagnostic:
     is_of_simulation: bool = False
     is_key: bool = False
     equation: str = ""
+    least_height: int = 0
 
     @property
     def document(self) -> str:

@@ -68,7 +68,7 @@ def _panel(rows: pd.DataFrame, title: str, scale: float, field: Field, width: in
             ),
             *key(length / _MAS_PER_ARCMIN, length_text, scale=scale, field=field),
         ],
-        title=f"{title}: shifts of {angle_text(rms_length(rows) * _MAS_PER_ARCMIN)} rms",
+        title=f"{title}: {angle_text(rms_length(rows) * _MAS_PER_ARCMIN)} rms",
         subtitle=f"Arrows enlarged {scale:,.0f} times\n{rows['name'].iloc[0]}",
         x=Axis(_XLABEL, field.x),
         y=Axis(_YLABEL, field.ylim),
@@ -91,6 +91,7 @@ DIAGNOSTICS = (
         85,
         _plot,
         is_wide=True,
+        least_height=460,
         equation="shift of a source = J v, with the shift J per parameter, and vᵀ S v = 1",
     ),
 )

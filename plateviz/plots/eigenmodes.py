@@ -222,6 +222,7 @@ DIAGNOSTICS = (
         83,
         _plot_deciders,
         is_wide=True,
+        least_height=460,
         equation=(
             "shares of vᵀ S v: of measurements, reference sources, other sources and "
             "priors of the calibration; they add up to 1"

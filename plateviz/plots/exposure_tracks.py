@@ -136,6 +136,7 @@ DIAGNOSTICS = (
         75,
         _plot,
         is_wide=True,
+        least_height=400,
         equation=(
             "fitted − prior centre; the pointing as Δα cos δ and Δδ in the plane "
             "tangent to the sky there"

@@ -85,6 +85,7 @@ SURVEY_FIGURES = (
         60,
         _plot,
         is_wide=True,
+        least_height=420,
         equation="(fitted − true) / σ, for position, parallax and proper motion",
     ),
 )

@@ -89,6 +89,7 @@ DIAGNOSTICS = (
         OrbitWorkspace.CALIBRATION,
         81,
         _plot,
+        least_height=320,
         equation="share = σ²(marginal) / σ²(prior)",
     ),
 )

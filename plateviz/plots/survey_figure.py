@@ -28,6 +28,7 @@ class SurveyFigure:
     plot : function of the tables that returns the figure
     is_wide : whether it takes the whole width of its workspace, or of a report
     equation : what is drawn, as text
+    least_height : that it needs on the page, screen pixels; 0 where any card's height is enough
     """
 
     name: str
@@ -38,6 +39,7 @@ class SurveyFigure:
     plot: Callable[[SurveyTables], Figure]
     is_wide: bool = False
     equation: str = ""
+    least_height: int = 0
 
     @property
     def document(self) -> str:
@@ -57,6 +59,7 @@ class SourceFigure:
     plot: Callable[[SourceTables], Figure]
     is_wide: bool = False
     equation: str = ""
+    least_height: int = 0
 
     @property
     def document(self) -> str:

@@ -68,7 +68,6 @@ def plot_uncertainty(
 def _panel(
     rows: pd.DataFrame, coordinate: str, limits: tuple[Limits, Limits], width: int
 ) -> Figure:
-    label = f"σ of {_NAMES[coordinate]} (mas)"
     reduced = len(rows) > ROW_LIMIT
     drawn_rows = uncertainty_by_count(rows) if reduced else rows
     marks = _medians(drawn_rows) if reduced else [_points(drawn_rows)]
@@ -76,10 +75,10 @@ def _panel(
     what = "median and 16–84 % range at each N" if reduced else "one point per source"
     return framed(
         [_law(single, limits[0]), *marks],
-        title=f"Uncertainty of {_NAMES[coordinate]} against N",
+        title=f"Uncertainty of {_NAMES[coordinate]}",
         subtitle=f"{rows['source_id'].nunique():,} sources, {what}",
         x=Axis(_XLABEL, limits[0], is_log=True, ticks=log_ticks(limits[0], whole=True)),
-        y=Axis(label, limits[1], is_log=True, ticks=log_ticks(limits[1])),
+        y=Axis("σ (mas)", limits[1], is_log=True, ticks=log_ticks(limits[1])),
         width=width,
         height=width,
         legend_columns=2,

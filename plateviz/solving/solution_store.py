@@ -14,6 +14,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 from plateviz.runs.column_cache import ColumnCache
+from plateviz.runs.kept_selections import KeptSelections
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.queries import SurveyRun, survey_runs
@@ -42,6 +43,7 @@ class SolutionStore:
     instrument : that took them
     simulation : settings with which they were simulated; None for others
     kept : solutions that people have kept on disk
+    selections : selections that people have kept on disk
     made : which solutions each browser session has made
     columns : the columns of runs that were read last
     background : runs what takes a while, for all sessions
@@ -54,9 +56,12 @@ class SolutionStore:
         self.instrument: Instrument = origin.read_instrument()
         self.simulation = origin.read_simulation()
         self.kept = KeptSolutions(origin.solutions)
+        self.selections = KeptSelections(origin.solutions)
         self.made = MadeSolutions()
         self._solver = solver
         self._lock = threading.Lock()
+        # The orbit for which preparations were asked for last, unless they were given up.
+        self._prepared: int | None = None
         self._jobs: dict[Path, Job] = {}
         temporary = temporary_folder()
         with writing(temporary, "to make a folder for the solutions"):
@@ -111,7 +116,17 @@ class SolutionStore:
         answers what-ifs.
         """
         if settings.engine == ENGINES[0]:
+            self._prepared = orbit
             self._solver.prepare(self._fit_of(orbit, settings))
+
+    def leave(self, orbit: int | None) -> None:
+        """Give up what is prepared for an orbit that a page leaves: the page needs the cores.
+
+        What was asked for later, of another orbit, is not given up.
+        """
+        if self._prepared == orbit:
+            self._prepared = None
+            self._solver.rest()
 
     def cancel(self, job: Job) -> bool:
         """Give up a job that was requested; stop it, and return True, if nobody else holds it."""

@@ -39,6 +39,10 @@ class Solver(Protocol):
         """Send a request for preparations, which give way to every job."""
         ...
 
+    def rest(self) -> None:
+        """Let processes give up what they prepare."""
+        ...
+
     def hurry(self) -> bool:
         """Let processes do at once what they have put off; return whether there is a process."""
         ...
@@ -87,6 +91,13 @@ class SolverPool:
             queue = self._warm.get(_orbit(request), self._queues[0])
             self._warm[_orbit(request)] = queue
         queue.prepare(request)
+
+    def rest(self) -> None:
+        """Let processes give up what they prepare."""
+        with self._lock:
+            queues = list(self._queues)
+        for queue in queues:
+            queue.rest()
 
     def hurry(self) -> bool:
         """Let processes do at once what they have put off; return whether there is a process."""

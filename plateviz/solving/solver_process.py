@@ -8,8 +8,8 @@ on standard error; `plateviz.solving.solver_queue` reports that and starts anoth
 Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory"},
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
 "directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}, and without events
-{"do": "prepare", "origin", "orbit", "settings"}: fit while idle what a what-if starts from, and
-{"do": "hurry"}: do at once what was put off.
+{"do": "prepare", "origin", "orbit", "settings"}: fit while idle what a what-if starts from,
+{"do": "rest"}: give up what is being prepared, and {"do": "hurry"}: do at once what was put off.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -93,6 +93,8 @@ def _serve_all() -> None:
             put_off.finish()
         elif request["do"] == "prepare":
             speculative = _prepare(request, requests)
+        elif request["do"] == "rest":
+            speculative = iter(())
         else:
             speculative = _serve(request, send, cancellations, put_off)
 

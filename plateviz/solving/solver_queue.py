@@ -82,6 +82,12 @@ class SolverQueue:
         with self._lock:
             self._send({"do": "prepare", **request})
 
+    def rest(self) -> None:
+        """Let the process give up what it prepares."""
+        with self._lock:
+            if self._process is not None:
+                self._send({"do": "rest"})
+
     def hurry(self) -> bool:
         """Let the process do at once what it has put off; return whether there is a process."""
         with self._lock:

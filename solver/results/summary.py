@@ -72,8 +72,9 @@ def truth_summary(sources: pd.DataFrame, places: pd.DataFrame) -> dict[str, dict
     class -> numbers; means and rms in mas, pulls with the marginal sigmas. `induced_*` is
     the mean shift due to errors of the reference sources.
     """
-    joined = sources.merge(places, on="source_id", suffixes=("", "_true"))
-    joined = joined[joined["n_obs"] >= MIN_OBS]
+    joined = sources.loc[sources["n_obs"] >= MIN_OBS, _DEVIATING].merge(
+        places, on="source_id", suffixes=("", "_true")
+    )
     cos_dec = np.cos(np.radians(joined["dec"]))
     # Wrapped, because a field may extend across 0h.
     joined["deviation_ra"] = (
@@ -88,6 +89,11 @@ def truth_summary(sources: pd.DataFrame, places: pd.DataFrame) -> dict[str, dict
 
 
 MIN_OBS = 10
+# What the numbers of a class of sources are computed from.
+_DEVIATING = [
+    *("source_id", "is_reference", "is_artificial", "ra", "dec"),
+    *("sigma_ra_marginal", "sigma_dec_marginal"),
+]
 
 
 def class_members(sources: pd.DataFrame) -> dict[str, pd.Series]:

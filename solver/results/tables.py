@@ -153,7 +153,7 @@ def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.Dat
         "prior_share": priors.hessian_diagonal(theta) * marginal,
     }
     pointing = _pointing(problem, theta)
-    frames = []
+    of_groups = []
     for group in problem.layout.groups:
         columns = problem.layout.columns(group)
         centre = priors.centre[columns] / group.per_value_unit
@@ -168,8 +168,11 @@ def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.Dat
             "unit": np.full(len(columns), group.unit),
             **{name: values[columns] for name, values in by_column.items()},
         }
-        frames.append(_frame(values_by_name, CALIBRATION))
-    return pd.concat(frames, ignore_index=True)
+        of_groups.append(values_by_name)
+    columns = {
+        name: np.concatenate([values[name] for values in of_groups]) for name in CALIBRATION.names
+    }
+    return _frame(columns, CALIBRATION)
 
 
 def trace_table(mode: Mode) -> pd.DataFrame:

@@ -212,6 +212,9 @@ class _Store:
     def prepare(self, *request: object) -> None:
         pass
 
+    def leave(self, orbit: object) -> None:
+        pass
+
     def cancel(self, job: Job) -> None:
         job.cancel()
 

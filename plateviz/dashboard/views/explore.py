@@ -55,6 +55,7 @@ class _Text(NamedTuple):
     title: str = "Any column against any other"
     is_wide: bool = True
     equation: str = ""
+    least_height: int = 0
 
 
 class _Drawn(NamedTuple):

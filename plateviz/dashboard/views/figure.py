@@ -26,6 +26,8 @@ from solver.errors import InputError
 
 # Screen pixels between the edge of a card and its figure, and width of its three buttons there.
 _INSET, _CORNER = 4, 76
+# Least height of a card: two rows of cards fill a screen 768 pixels high.
+_LEAST_HEIGHT = 290
 # Fills its card, whatever it shows.
 _BODY = {
     "position": "absolute",
@@ -97,7 +99,8 @@ class FigureView(pn.viewable.Viewer):
         self._tools = CardTools(figure, self._text_tables)
         choices = figure_choices(figure.name, self._on_screen, saved or Saved())
         self._save = SaveButton(figure.title, choices, place="corner")
-        self._card = _card(self.visibility, self._body, name=figure.name)
+        least = max(_LEAST_HEIGHT, figure.least_height)
+        self._card = _card(self.visibility, self._body, name=figure.name, least_height=least)
         self.change(theme)
         self._show_text("Being drawn.")
 
@@ -252,13 +255,19 @@ def card(content: Part, name: str) -> pmui.Paper:
     return _card(pn.Column(content, styles=_BODY, margin=0), name=name)
 
 
-def _card(*contents: Part, name: str) -> pmui.Paper:
+def _card(*contents: Part, name: str, least_height: int = _LEAST_HEIGHT) -> pmui.Paper:
     return pmui.Paper(
         OwnLayout(),
         *contents,
         css_classes=["card", "figure", f"figure-{name}"],
         # A card that begins with its figure would have the width of its contents, which fill it.
-        styles={"align-self": "stretch", "width": "100%", "min-width": "0", "height": "auto"},
+        styles={
+            "align-self": "stretch",
+            "width": "100%",
+            "min-width": "0",
+            "height": "auto",
+            "min-height": f"{least_height}px",
+        },
         stylesheets=[".paper { height: 100%; }"],
         margin=0,
         sx={"height": "100%", "position": "relative", "zIndex": 0},

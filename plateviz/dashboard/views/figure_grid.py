@@ -56,7 +56,8 @@ class FigureGrid(pn.viewable.Viewer):
                     "xl": f"repeat({columns_if_wide or columns}, minmax(0, 1fr))",
                 },
                 "gridAutoFlow": "dense",
-                "gridAutoRows": "minmax(250px, 1fr)",
+                # Each card says how high it is at least.
+                "gridAutoRows": "minmax(auto, 1fr)",
             },
             styles={"align-self": "stretch", "height": "auto"},
             stylesheets=[".flex-box { height: 100%; }"],

@@ -35,3 +35,8 @@ class FigureText(Protocol):
     def is_wide(self) -> bool:
         """Whether the figure takes a whole row where the number of cards is odd."""
         ...
+
+    @property
+    def least_height(self) -> int:
+        """Height that its card needs, screen pixels; 0 where the height of any card is enough."""
+        ...

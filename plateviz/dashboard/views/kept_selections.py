@@ -1,5 +1,7 @@
 """KeptSelections: a window in which selections are kept under names and taken up again."""
 
+from html import escape
+
 import panel as pn
 import panel_material_ui as pmui
 
@@ -10,7 +12,7 @@ from solver.errors import InputError
 
 
 class KeptSelections(pn.viewable.Viewer):
-    """A name for the selection, and the list of those that are kept in this session."""
+    """A name for the selection, and the list of those that are kept, by others too."""
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow the selection of the session of `navigation`."""
@@ -39,13 +41,16 @@ class KeptSelections(pn.viewable.Viewer):
 
     def open(self) -> None:
         """Open the window."""
+        self._actions.look()
         self._name.value = self._selection.name_of_selected or ""
         self._show()
         self._window.open = True
 
     def _keep_it(self) -> None:
         try:
-            self._actions.keep(self._name.value_input or self._name.value)
+            why = self._actions.keep(self._name.value_input or self._name.value)
+            if why:
+                self._say(f"It is kept in this session only: {escape(why)}.", "warning")
         except InputError as error:
             self._say(f"It was not kept: {error}.", "error")
 

@@ -11,8 +11,8 @@ class OwnLayout(pn.custom.JSComponent):
     size from the style sheets, and hears of every change of it; nothing else concerns its figure.
     """
 
-    # What begins a layout of the card (two of them are of `components.js`), and the steps of it that a
-    # container would take.
+    # What begins a layout of the card, of which `components.js` has two, and the steps of it that
+    # a container would take.
     _esm = """
     export function render({ view }) {
       const card = view.parent

@@ -21,15 +21,19 @@ _TO_THE_TOP = """
 for (const host of document.querySelectorAll("*"))
   host.shadowRoot?.querySelector(".main-content")?.scrollTo(0, 0)
 """
+# In a narrow window the buttons take two lines; none is cut off.
 _SWITCH = {
+    "flexWrap": "wrap",
     "& .MuiToggleButton-root": {
         "textTransform": "none",
         "fontSize": "14px",
         "px": 1.5,
         "py": 0.5,
         "whiteSpace": "nowrap",
-    }
+        "width": "auto",
+    },
 }
+_WITHIN_PAGE = {"max-width": "100%"}
 # Its grey on grey would be hard to read; a rule of the theme would take precedence over one "&".
 _SELECTED = {
     "&& .MuiToggleButton-root.Mui-selected, && .MuiToggleButton-root.Mui-selected:hover": {
@@ -129,6 +133,7 @@ class Pages(pn.viewable.Viewer):
             color="primary",
             margin=(6, 24, 6, 2),
             sx=_SWITCH,
+            styles=_WITHIN_PAGE,
         )
         switch.jscallback(value=_TO_THE_TOP)
         switch.param.watch(lambda event: navigation.turn_to(event.new), "value")
@@ -138,7 +143,12 @@ class Pages(pn.viewable.Viewer):
     def _workspace_switch(self) -> pmui.RadioButtonGroup:
         navigation = self._navigation
         switch = pmui.RadioButtonGroup(
-            options={}, size="small", color="default", margin=(6, 2), sx={**_SWITCH, **_SELECTED}
+            options={},
+            size="small",
+            color="default",
+            margin=(6, 2),
+            sx={**_SWITCH, **_SELECTED},
+            styles=_WITHIN_PAGE,
         )
 
         def follow(*_: object) -> None:

@@ -41,6 +41,7 @@ class SelectionBar(pn.viewable.Viewer):
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
         self._actions = SelectionActions(navigation.session)
+        self._actions.look()
         self._row = pmui.Row(margin=0, sx={"alignItems": "center"})
         self.windows = pmui.Column(margin=0)
         self._parts: list[pn.viewable.Viewable] = []

@@ -120,8 +120,11 @@ class SurveyPage(pn.viewable.Viewer):
         grid = FigureGrid(views, self._wake, columns=1 if is_first else 2)
         self._grids[one] = grid
         self._show_selected()
-        above = [self._strip, NotableSourceLink(self._navigation), self._table, self._save]
-        return workspace(grid, *(above if is_first else ()))
+        if not is_first:
+            return workspace(grid)
+        above = [self._strip, NotableSourceLink(self._navigation)]
+        # The health of all orbits is seen at a glance, without scrolling; the table is long.
+        return workspace(grid, *above, below=[self._table, self._save])
 
     def _subject(self) -> str:
         return f"run-{self._navigation.run_name}"

@@ -1,5 +1,7 @@
 """A workspace: cards that fill the screen below what stands above them."""
 
+from collections.abc import Sequence
+
 import panel_material_ui as pmui
 
 from plateviz.dashboard.views.figure import Part
@@ -9,17 +11,18 @@ from plateviz.dashboard.views.figure_grid import FigureGrid
 _ABOVE = 170
 
 
-def workspace(grid: FigureGrid, *above: Part) -> pmui.FlexBox:
+def workspace(grid: FigureGrid, *above: Part, below: Sequence[Part] = ()) -> pmui.FlexBox:
     """Return a workspace as high as the rest of the window, or higher where its cards need it.
 
     Parameters
     ----------
-    above : what stands above the cards
+    above, below : what stands above and below the cards
     """
-    rows = ["auto"] * len(above) + ["minmax(0, 1fr)"]
+    rows = ["auto"] * len(above) + ["minmax(0, 1fr)"] + ["auto"] * len(below)
     return pmui.FlexBox(
         *above,
         grid,
+        *below,
         sx={
             "display": "grid",
             "gridTemplateColumns": "minmax(0, 1fr)",

@@ -12,8 +12,8 @@ class Timers:
     def __init__(self):
         self.now, self.waiting = 0.0, []
 
-    def later(self, call, milliseconds):
-        self.waiting.append((self.now + milliseconds / 1000.0, call))
+    def later(self, seconds, call):
+        self.waiting.append((self.now + seconds, call))
 
     def pass_to(self, now):
         while self.waiting and self.waiting[0][0] <= now:
@@ -43,6 +43,15 @@ def test_it_waits_until_nothing_has_happened_for_a_while(timers):
     rest.begin()
     timers.pass_to(30.0)
     assert done == [5.0, 23.0]
+
+
+def test_nothing_is_done_for_a_page_that_is_gone(timers):
+    done = []
+    rest = AtRest(lambda: done.append(1), 3.0, timers.later)
+    rest.begin()
+    del rest
+    timers.pass_to(4.0)
+    assert done == []
 
 
 def test_without_timers_it_is_done_at_once():

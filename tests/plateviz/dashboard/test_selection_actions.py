@@ -7,6 +7,7 @@ from plateviz.dashboard.selection_actions import SelectionActions
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.state import default_widths
+from plateviz.runs.kept_selections import KeptSelections
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from tests.plateviz.dashboard.test_session import FakeStore, finish
@@ -107,6 +108,47 @@ def test_selection_is_kept_under_a_name_and_taken_up_again(live, actions):
     actions.take_up("corner")
     assert live.selection.kept == {}
     assert live.selection.detectors == frozenset({1})
+
+
+def test_kept_selection_is_there_for_others_and_after_a_reload(live, actions, fit_result, tmp_path):
+    live.store.selections = KeptSelections(tmp_path / "solutions")
+    corner = frozenset({(0, 1)})
+    live.selection.select_exposures(corner)
+    assert actions.keep("<b>corner</b>") == ""
+    other = Session(FakeStore(fit_result))
+    other.store.selections = KeptSelections(tmp_path / "solutions")
+    others = SelectionActions(other)
+    others.look()
+    assert other.selection.kept == {"<b>corner</b>": Selected(exposures=corner)}
+    # The other one changes it; what the first has in mind under that name is another selection.
+    other.selection.select_detectors(frozenset({2}))
+    assert others.keep("<b>corner</b>") == ""
+    live.selection.select_sources(frozenset({5}))
+    with pytest.raises(InputError, match="somebody else has kept another selection"):
+        actions.keep("<b>corner</b>")
+    actions.look()
+    assert live.selection.kept == other.selection.kept
+    actions.keep("<b>corner</b>")
+    # What somebody has changed in the meantime is not forgotten for all.
+    others.forget("<b>corner</b>")
+    assert KeptSelections(tmp_path / "solutions").all() == {
+        "<b>corner</b>": Selected(frozenset({5}), corner).exclusions
+    }
+    actions.forget("<b>corner</b>")
+    assert KeptSelections(tmp_path / "solutions").all() == {}
+
+
+def test_selection_that_cannot_be_written_is_kept_in_the_session(live, actions, tmp_path):
+    live.store.selections = KeptSelections(tmp_path / "solutions")
+    live.selection.select_sources(frozenset(range(30_001)))
+    assert "30,000 items" in actions.keep("all")
+    assert list(live.selection.kept) == ["all"]
+    (tmp_path / "solutions" / "selections.json").write_text("{", encoding="utf-8")
+    live.selection.select_sources(frozenset({1}))
+    assert "selections.json" in actions.keep("one")
+    actions.look()
+    assert "selections.json" in live.notice
+    assert list(live.selection.kept) == ["all", "one"]
 
 
 def test_nothing_and_too_much_is_not_kept(live, actions):

@@ -1,6 +1,7 @@
 """Session: its rules, with a fake store whose jobs are ended by the test."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -34,8 +35,10 @@ class FakeStore:
     def __init__(self, result):
         self._result = result
         self.requested, self.prepared, self.cancelled, self.abandoned = [], [], [], []
+        self.left = []
         self.is_shared = False
         self.made, self.kept = MadeSolutions(), KeptSolutions(Path("nowhere"))
+        self.selections = SimpleNamespace(all=dict, keep=lambda *_: None, forget=lambda *_: None)
 
     def request(self, orbit, settings, what_if=False):
         self.requested.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
@@ -43,6 +46,9 @@ class FakeStore:
 
     def prepare(self, orbit, settings):
         self.prepared.append((orbit, settings))
+
+    def leave(self, orbit):
+        self.left.append(orbit)
 
     def cancel(self, job):
         self.cancelled.append(job)
@@ -98,6 +104,15 @@ def test_solution_of_a_run_is_prepared_once_for_what_ifs(fit_result):
     session.prepare_what_ifs()
     session.prepare_what_ifs()
     assert session.store.prepared == [(0, fit_result.settings)]
+
+
+def test_preparations_for_an_orbit_are_given_up_when_it_is_left(fit_result):
+    session = Session(FakeStore(fit_result))
+    session.show_result(of_run(fit_result))
+    session.show_orbit(0, FitSettings(order=2))
+    assert session.store.left == []
+    session.show_result(of_run(fit_result, 1))
+    assert session.store.left == [0]
 
 
 def test_nothing_is_prepared_for_what_is_no_longer_shown_or_not_wanted(fit_result):

@@ -111,6 +111,59 @@ def test_smallest_area_has_a_frame():
     assert min(sizes(resized(Figure(frame().frames * 4, 2), 0, 0))[0]) > 0
 
 
+def test_labels_that_the_next_frame_repeats_are_left_out():
+    four = resized(Figure(frame().frames * 4, 2), 600, 500)
+    assert [(bool(one.x.label), bool(one.y.label)) for one in four] == [
+        (False, True),
+        (False, False),
+        (True, True),
+        (True, False),
+    ]
+    assert len({(one.width, one.frame_height) for one in four}) == 1
+    other = replace(frame()[0], y=Axis("another", (0.0, 5.0)))
+    row = resized(Figure((frame()[0], other), 2, "x"), 600, 300)
+    assert all(one.y.label for one in row)
+
+
+def test_frames_of_a_column_begin_at_one_place():
+    labelled = replace(frame()[0], y=Axis("y", (0.0, 1.0), ticks=((0.5, "a long label"),)))
+    rows = resized(Figure((frame()[0], labelled), 1, "x"), 400, 600)
+    assert len({one.indent + one.beside for one in rows}) == 1
+
+
+@pytest.mark.parametrize("area", [(508, 282), (334, 282), (436, 412)])
+@pytest.mark.parametrize("count", [3, 4, 6, 9])
+def test_frames_do_not_reach_beyond_their_area(area, count):
+    figure = resized(Figure(frame(height=None, subtitle=WORDS).frames * count, 4), *area)
+    rows = [figure.frames[n : n + figure.columns] for n in range(0, count, figure.columns)]
+    for row in rows:
+        assert sum(one.indent + one.beside + one.width + one.margin for one in row) <= area[0]
+    assert sum(row[0].frame_height for row in rows) < area[1]
+
+
+def test_a_long_label_takes_lines_beside_and_below_its_frame():
+    long = "root mean square error of the mean, in one coordinate (mas)"
+    axes = {"x": Axis(long, (0.0, 1.0)), "y": Axis(long, (0.0, 1.0))}
+    (narrow,), (wide,) = (
+        resized(framed([], title="Marks", **axes, width=200, height=100), *area)
+        for area in ((320, 300), (900, 700))
+    )
+    assert (wide.x.label, wide.y.label) == (long, long)
+    assert narrow.x.label.split() == narrow.y.label.split() == long.split()
+    assert narrow.beside > wide.beside
+    lines = narrow.y.label.split("\n")
+    assert 2 <= len(lines) <= 3
+    assert max(text_width(line, 12) for line in lines) < 290
+
+
+def test_titles_of_a_row_begin_on_one_line():
+    first, last = (
+        replace(frame()[0], title=text, width=110) for text in ("Marks", "Non-reference")
+    )
+    words = words_of_row([first, replace(last, corner=76)])
+    assert [one.title for one in words] == [["\u200b", "Marks"], ["\u200b", "Non-reference"]]
+
+
 WORDS = "Field 0, exposure 0. 684 measurements, one arrow each. Arrows enlarged 20,000 times"
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from plateviz.figures.text_width import text_width, wrapped
+from plateviz.figures.text_width import has_room_for_words, text_width, wrapped
 
 WORDS = "Field 0, exposure 0. 684 measurements, one arrow each"
 
@@ -42,3 +42,21 @@ def test_a_word_without_a_place_to_break_is_broken():
     assert len(lines) > 2
     assert "".join(lines[1:]) == name
     assert wrapped("wide", 1, 11) == ["w", "i", "d", "e"]
+
+
+def test_a_word_is_broken_after_a_hyphen_first():
+    assert wrapped("Non-reference sources", text_width("reference", 13), 13) == [
+        "Non-",
+        "reference",
+        "sources",
+    ]
+    assert has_room_for_words("Non-reference", text_width("reference", 13), 13)
+    assert not has_room_for_words("Non-reference", text_width("referenc", 13), 13)
+
+
+def test_the_last_line_has_more_than_a_word_where_it_can():
+    text = "1,000 sources; noise of 1 orbit 0.71 mas; floor at 94 orbits 19 µas"
+    width = text_width(text, 11) - 1
+    first, last = wrapped(text, width, 11)
+    assert f"{first} {last}" == text
+    assert last.split()[-2:] == ["19", "µas"]

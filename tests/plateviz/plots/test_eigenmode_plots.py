@@ -7,6 +7,7 @@ import pytest
 
 from plateviz import plots, tables
 from plateviz.figures.bokeh_figure import BokehFigure
+from plateviz.figures.resized import resized
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.eigenmode_groups import _amount
 from plateviz.plots.gallery import diagnostics
@@ -124,6 +125,14 @@ def test_diagnostics_are_in_the_gallery(fit_result, instrument, name, theme):
     figure = diagnostic.plot(Chosen(fit_result, instrument))
     assert figure.message is None
     assert len(BokehFigure(figure, theme).model.children) == len(figure)
+
+
+@pytest.mark.parametrize("name", ["weak-directions", "eigenmode-groups", "prior-shares"])
+def test_rows_of_texts_have_room_in_a_small_window(fit_result, instrument, name):
+    (diagnostic,) = [d for d in diagnostics() if d.name == name]
+    figure = diagnostic.plot(Chosen(fit_result, instrument))
+    (frame,) = resized(figure, 508, diagnostic.least_height - 8, corner=76)
+    assert frame.frame_height >= 12 * len(frame.y.ticks)
 
 
 @pytest.mark.parametrize("name", NAMES[:-1])

@@ -80,7 +80,9 @@ def test_what_if_goes_where_its_orbit_was_fitted(pool, queues):
 def test_preparations_go_where_the_what_ifs_will(pool, queues):
     pool.submit(fit(0, "svi"))
     pool.prepare({"origin": "sky", "orbit": 3})
-    assert queues[0].sent == ["prepare"]
+    queues[0]._process = object()
+    pool.rest()
+    assert queues[0].sent == ["prepare", "rest"]
     assert pool.submit(fit(3, what_if=True)) in queues[0].jobs
 
 

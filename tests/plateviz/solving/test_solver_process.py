@@ -134,8 +134,9 @@ def test_fit_that_cannot_serve_is_replaced(prepare, fitted):
         ({"do": "fit", "what_if": True, "orbit": 1}, False),
         ({"do": "fit", "what_if": False}, False),
         ({"do": "prepare", "orbit": 1}, False),
+        ({"do": "rest"}, False),
     ],
-    ids=["its-what-if", "what-if-of-another-orbit", "fit", "another-orbit"],
+    ids=["its-what-if", "what-if-of-another-orbit", "fit", "another-orbit", "rest"],
 )
 def test_preparation_gives_way_to_all_but_its_what_ifs(prepare, requests, change, is_fitted):
     requests.put({**PREPARED, **change})

@@ -13,12 +13,14 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, find_mode
+from solver.engines.noise import estimate_noise
 from solver.engines.robust import find_outliers, outlier_table
 from solver.engines.run_engine import Resumption, run_engine
 from solver.engines.warm_starts import WarmStart, likely, nearest
 from solver.engines.what_if import linearised, solve_what_if
 from solver.errors import FitError, InputError
 from solver.linear.covariances import Covariances
+from solver.problem.noise import Noise
 from solver.problem.problem import Problem, orders_held, rebuilt
 from solver.problem.problem_cache import ProblemCache
 from solver.results.orbit_result import PartialResult, partial_result
@@ -66,6 +68,7 @@ class _LastFit(NamedTuple):
     mode: Mode
     covariance: Covariances
     outliers: pd.DataFrame | None
+    noise: Noise | None
     orders: pd.DataFrame | None
 
 
@@ -105,6 +108,9 @@ class OrbitFitter:
         if settings.robust:
             outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
             data, problem = self._cache.get(settings, outliers)
+        noise = estimate_noise(problem, settings, progress) if settings.has_noise_model else None
+        if noise is not None:
+            data, problem = self._cache.get(settings, outliers, noise)
         prepared = time.perf_counter()
         estimate = run_engine(problem, settings, progress, resumption or self._resumption(settings))
         found = partial_result(
@@ -116,11 +122,17 @@ class OrbitFitter:
         orders = self._compare_orders(problem, settings, progress)
         if estimate.mode.status.is_solution:
             self._last_fit = _LastFit(
-                settings, problem, estimate.mode, found.solution.covariance, outliers, orders
+                settings,
+                problem,
+                estimate.mode,
+                found.solution.covariance,
+                outliers,
+                noise,
+                orders,
             )
             self._starts = [WarmStart(settings, problem, estimate.mode)]
             self._attempted = [settings]
-        result = _with_outliers(result, outliers)
+        result = _with_noise(_with_outliers(result, outliers), noise)
         return _with_orders(result, orders, time.perf_counter() - fitted)
 
     @property
@@ -131,8 +143,8 @@ class OrbitFitter:
     def what_if(self, settings: FitSettings) -> FitResult | None:
         """Return the solution under other settings without a refit.
 
-        The outliers are those of the last fit. So is the comparison of distortion orders, if
-        only the order differs.
+        The outliers and the noise model are those of the last fit. So is the comparison of
+        distortion orders, if only the order differs.
 
         Returns
         -------
@@ -148,7 +160,7 @@ class OrbitFitter:
         if last is None or not last.settings.what_if_holds(settings):
             return None
         start = time.perf_counter()
-        data, problem = self._cache.get(settings, last.outliers)
+        data, problem = self._cache.get(settings, last.outliers, last.noise)
         prepared = time.perf_counter()
         base = nearest(self._starts, settings)
         mode = base and solve_what_if(base.mode, base.problem, problem, settings)
@@ -160,7 +172,8 @@ class OrbitFitter:
         )
         same_but_order = settings == last.settings.with_(order=settings.order)
         orders = last.orders if same_but_order else None
-        result = replace(_with_outliers(found.result, last.outliers), orders=orders)
+        result = _with_noise(_with_outliers(found.result, last.outliers), last.noise)
+        result = replace(result, orders=orders)
         return found._replace(result=result)
 
     def history(self, result: FitResult) -> pd.DataFrame:
@@ -210,7 +223,7 @@ class OrbitFitter:
     def _warm_start(self, last: _LastFit, settings: FitSettings) -> list[WarmStart]:
         """Return a warm start for `settings`, in a list; an empty list if there is no solution."""
         try:
-            _, problem = self._cache.get(settings, last.outliers)
+            _, problem = self._cache.get(settings, last.outliers, last.noise)
         except InputError:
             # A prior is shifted for a term that the lower order lacks, or too few data remain.
             return []
@@ -245,6 +258,12 @@ def _with_outliers(result: FitResult, outliers: pd.DataFrame | None) -> FitResul
         return result
     summary = {**result.summary, "n_outliers": len(outliers)}
     return replace(result, summary=summary, outliers=outliers.reset_index(drop=True))
+
+
+def _with_noise(result: FitResult, noise: Noise | None) -> FitResult:
+    if noise is None:
+        return result
+    return replace(result, summary={**result.summary, "noise": noise.entry})
 
 
 def _with_orders(result: FitResult, orders: pd.DataFrame | None, seconds: float) -> FitResult:

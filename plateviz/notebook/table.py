@@ -8,7 +8,7 @@ import pandas as pd
 from astropy.table import QTable
 
 from solver.data.columns import Column
-from solver.data.parameters import Axis, groups_on
+from solver.data.parameters import Axis
 from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES
 from solver.units import unit_named
@@ -52,7 +52,7 @@ def result_tables(result: FitResult) -> dict[str, OpenTable]:
 
 def _fitted(result: FitResult, axis: Axis) -> OpenTable:
     """Return the fitted calibration on one axis, a row per element."""
-    groups = groups_on(axis)
+    groups = result.groups_on(axis)
     columns = [Column("element", "str", "", "exposure, detector or distortion term")]
     names = [group.name for group in groups]
     rows = result.calibration[result.calibration["group"].isin(names)]

@@ -6,7 +6,7 @@ from numpy.polynomial import legendre
 
 from plateviz.tables.labels import element_labels, unit_text
 from solver.data.instrument import Instrument
-from solver.data.parameters import Axis, groups_on
+from solver.data.parameters import Axis
 from solver.data.result import FitResult
 from solver.units import RAD_PER_MAS
 
@@ -15,6 +15,11 @@ _TITLES: tuple[tuple[str, Axis], ...] = (
     ("Exposures", "exp"),
     ("Detectors", "det"),
     ("Distortion", "coef"),
+    ("Drift of the distortion", "drift"),
+    ("Breathing of the distortion", "breathing"),
+    ("Distortion of each field", "field"),
+    ("Distortion of each detector", "own"),
+    ("Motion of the detectors", "motion"),
 )
 
 
@@ -86,13 +91,19 @@ def calibration_tables(result: FitResult) -> dict[str, pd.DataFrame]:
     -------
     "Exposures", "Detectors" and "Distortion" -> a row per exposure, detector or
     coefficient pair, named in the column `element`; for each group its value, marginal
-    sigma and prior share. Column names give the unit in brackets.
+    sigma and prior share. Column names give the unit in brackets. Of the axes of optional
+    groups, those of the fit follow.
     """
-    return {title: _display_table(result, axis) for title, axis in _TITLES}
+    always = {"exp", "det", "coef"}
+    return {
+        title: _display_table(result, axis)
+        for title, axis in _TITLES
+        if axis in always or result.groups_on(axis)
+    }
 
 
 def _display_table(result: FitResult, axis: Axis) -> pd.DataFrame:
-    groups = groups_on(axis)
+    groups = result.groups_on(axis)
     columns: dict[str, pd.Series] = {}
     wide = {
         name: result.values_on(axis, name) for name in ("value", "sigma_marginal", "prior_share")

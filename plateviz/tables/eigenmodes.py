@@ -5,7 +5,7 @@ import pandas as pd
 
 from plateviz.tables.labels import element_labels, id_strings, unit_text
 from plateviz.tables.sky import mean_direction, offsets_arcmin
-from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS
+from solver.data.parameters import BY_NAME, PARAMETERS
 from solver.data.result import FitResult
 
 DATA, REFERENCES, SOURCES, CALIBRATION = (
@@ -54,7 +54,8 @@ def eigenmode_deciders(result: FitResult) -> pd.DataFrame:
         for decider, column in _COLUMNS.items()
     ]
     by_group = result.mode_parameters.groupby(["mode", "group"])["prior_share"].sum()
-    for group in CALIBRATION_GROUPS:
+    known = set(result.mode_parameters["group"])
+    for group in (group for group in PARAMETERS if group.name in known):
         share = weak["mode"].map(by_group.xs(group.name, level="group"))
         part = {"decider": CALIBRATION, "what": f"prior of {group.label}", "share": share}
         parts.append(weak[["mode", "name"]].assign(**part))

@@ -12,7 +12,6 @@ from plateviz.tables.labels import exposure_labels
 from plateviz.tables.sources import chi2_per_dof, deviation, ordered_by_class
 from solver.data import schema
 from solver.data.columns import Column, Table
-from solver.data.parameters import groups_on
 from solver.data.result import FitResult
 
 CHI2_PER_DOF = Column("chi2_per_dof", "float64", "", "chi2 over its expectation")
@@ -135,7 +134,7 @@ def explorable_exposures(result: FitResult) -> ExplorableTable:
     added = [_TIME, CHI2_PER_DOF]
     for kind, of_kind in (("offset", "estimate minus prior"), ("sigma_marginal", "marginal sigma")):
         values = result.values_on("exp", kind)
-        for group in groups_on("exp"):
+        for group in result.groups_on("exp"):
             name = f"{group.name}_{kind}"
             frame[name] = values[group.name].to_numpy()
             added.append(Column(name, "float64", group.unit, f"{group.label}, {of_kind}"))

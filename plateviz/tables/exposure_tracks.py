@@ -5,7 +5,6 @@ import pandas as pd
 
 from plateviz.tables.exposures import minutes_since_first
 from plateviz.tables.labels import exposure_labels, unit_text
-from solver.data.parameters import groups_on
 from solver.data.result import FitResult
 
 _MAS_PER_ARCSEC = 1000.0
@@ -32,7 +31,7 @@ def exposure_tracks(result: FitResult) -> pd.DataFrame:
     """
     times = _times(result.exposures).reset_index(drop=True)
     tables = []
-    for group in groups_on("exp"):
+    for group in result.groups_on("exp"):
         rows = result.calibration[result.calibration["group"] == group.name]
         found = rows.assign(group=group.label).merge(times, left_on="element", right_index=True)
         if len(found):

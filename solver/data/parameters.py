@@ -3,88 +3,11 @@
 The blocks of the Gauss-Newton engine, the priors, the command line's `--prior`, the
 dashboard's controls and the result tables are derived from this table. A new group is one
 entry here and one term in `solver.model.forward`.
-
-Names of axes in array shapes, in all of the solver:
-
-| axis | one element per                                   |
-|------|---------------------------------------------------|
-| obs  | measurement                                       |
-| src  | source                                            |
-| exp  | exposure                                          |
-| det  | detector                                          |
-| coef | distortion term of one direction (`distortion.terms`) |
 """
 
-from dataclasses import dataclass
-from typing import Literal
-
-from solver.units import factor_between
-
-Axis = Literal["src", "exp", "coef", "det"]
-Family = Literal["normal", "gamma", "uniform"]
-
-
-@dataclass(frozen=True)
-class Published:
-    """A column of the published result layout that depends on the value of a group.
-
-    Attributes
-    ----------
-    column : name in the file
-    words : meaning, the comment of the column
-    factor : None if the column is the value of this group; otherwise the column belongs to
-        another group and is multiplied by 1 + `factor` times the value
-    """
-
-    column: str
-    words: str = ""
-    factor: float | None = None
-
-
-@dataclass(frozen=True)
-class Group:
-    """One parameter group.
-
-    Attributes
-    ----------
-    name : key in parameter sets, tables, `--prior` and the dashboard
-    label : name in labels and captions
-    symbol : the paper's symbol
-    axis : axis with one value per element
-    unit : unit of offsets, sigmas and prior widths
-    value_unit : unit of the full value, centre plus offset, in tables
-    family : prior distribution about its centre
-    width : standard deviation of the default prior, in `unit`
-    relative : whether `width` is a fraction of the centre
-    origin : origin of the prior's centre: the catalogue, a column of the environment table,
-        an attribute of the instrument's detectors, or zero
-    column : that column or attribute
-    published : columns of the published layout; by default one named after the group
-    """
-
-    name: str
-    label: str
-    symbol: str
-    axis: Axis
-    unit: str
-    value_unit: str
-    family: Family
-    width: float
-    relative: bool = False
-    origin: Literal["catalogue", "environment", "instrument", "zero"] = "zero"
-    column: str = ""
-    published: tuple[Published, ...] = ()
-
-    @property
-    def per_value_unit(self) -> float:
-        """Number of `unit` in one `value_unit`."""
-        return factor_between(self.value_unit, self.unit)
-
-    @property
-    def width_unit(self) -> str:
-        """Unit of the prior width in texts; "" for a fraction or a factor."""
-        return "" if self.relative or self.axis == "src" else self.unit
-
+from solver.data.parameter_group import TERM_AXES, Group, Published
+from solver.data.parameter_group import Axis as Axis
+from solver.data.parameter_group import Family as Family
 
 # The paper gives the prior of the focal length as a variance of 100 on a scale in um/deg. The
 # simulated scatter (1e-3) agrees with a standard deviation of 100 um/deg instead (1.2e-3).
@@ -102,7 +25,8 @@ SOURCES = Group(
     origin="catalogue",
 )
 
-PARAMETERS: tuple[Group, ...] = (
+# The groups of every fit.
+_ALWAYS: tuple[Group, ...] = (
     SOURCES,
     Group(
         "pointing_ra",
@@ -250,10 +174,113 @@ PARAMETERS: tuple[Group, ...] = (
     ),
 )
 
-CALIBRATION_GROUPS = tuple(g for g in PARAMETERS if g.axis != "src")
+
+def _pair(name: str, label: str, symbols: str, rest: tuple, setting: str) -> tuple[Group, Group]:
+    """Return the groups of both directions: of the distortion A and B, of detectors x and y.
+
+    Parameters
+    ----------
+    rest : axis, unit and width of the prior, which is normal about zero
+    """
+    axis, unit, width = rest
+    letters = "AB" if axis in TERM_AXES else "xy"
+    x, y = (
+        Group(
+            f"{name}_{direction}",
+            f"{label} {letter}",
+            symbol,
+            axis,
+            unit,
+            unit,
+            "normal",
+            width,
+            setting=setting,
+        )
+        for direction, letter, symbol in zip("xy", letters, symbols.split(), strict=True)
+    )
+    return x, y
+
+
+# Groups that a fit has if their setting is on: causes of errors that the paper's model lacks.
+OPTIONAL_GROUPS: tuple[Group, ...] = (
+    Group(
+        "focal_anisotropy",
+        "focal anisotropy",
+        "ε_F",
+        "exp",
+        "ppm",
+        "ppm",
+        "normal",
+        50.0,
+        published=(
+            Published("tel_f_loc_x", factor=-0.5),
+            Published("tel_f_loc_y", factor=0.5),
+        ),
+        setting="focal_anisotropy",
+    ),
+    *_pair("drift", "distortion drift", "A_kl,t B_kl,t", ("drift", "um", 1.0), "drift"),
+    *_pair(
+        "breathing", "distortion breathing", "A_kl,φ B_kl,φ", ("breathing", "um", 1.0), "breathing"
+    ),
+    *_pair(
+        "field_distortion",
+        "field distortion",
+        "A_kl,f B_kl,f",
+        ("field", "um", 1.0),
+        "field_distortion",
+    ),
+    *_pair(
+        "own_distortion",
+        "detector distortion",
+        "A_kl,det B_kl,det",
+        ("own", "um", 1.0),
+        "detector_distortion",
+    ),
+    Group(
+        "detector_skew",
+        "detector skew",
+        "κ_det",
+        "det",
+        "arcsec",
+        "deg",
+        "normal",
+        100.0,
+        setting="detector_distortion",
+    ),
+    *_pair(
+        "detector_motion",
+        "detector motion",
+        "X_det,f Y_det,f",
+        ("motion", "um", 1.0),
+        "detector_motion",
+    ),
+    Group(
+        "detector_turn",
+        "detector turn",
+        "θ_det,f",
+        "motion",
+        "arcsec",
+        "arcsec",
+        "normal",
+        10.0,
+        setting="detector_motion",
+    ),
+    *_pair(
+        "magnitude_shift", "magnitude shift", "m_x m_y", ("det", "mpix", 30.0), "magnitude_shift"
+    ),
+    *_pair(
+        "charge_transfer", "charge transfer", "c_x c_y", ("det", "mpix", 30.0), "charge_transfer"
+    ),
+    *_pair("phase_sine", "pixel phase sine", "s_x s_y", ("det", "mpix", 30.0), "pixel_phase"),
+    *_pair("phase_cosine", "pixel phase cosine", "p_x p_y", ("det", "mpix", 30.0), "pixel_phase"),
+)
+
+PARAMETERS = (*_ALWAYS, *OPTIONAL_GROUPS)
+# Without the sources and the optional groups.
+CALIBRATION_GROUPS = tuple(g for g in _ALWAYS if g.axis != "src")
 BY_NAME = {g.name: g for g in PARAMETERS}
 
 
 def groups_on(axis: Axis) -> tuple[Group, ...]:
-    """Return the groups with one value per element of `axis`, in table order."""
-    return tuple(g for g in PARAMETERS if g.axis == axis)
+    """Return the groups of every fit with one value per element of `axis`, in table order."""
+    return tuple(g for g in _ALWAYS if g.axis == axis)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from solver.data.parameters import groups_on
+from solver.data.parameter_group import Axis, Group
+from solver.data.parameters import PARAMETERS
 from solver.data.settings import FitSettings
 
 
@@ -103,19 +104,24 @@ class FitResult:
         order = np.argsort(known)
         return order[np.searchsorted(known[order], rows)]
 
-    def values_on(self, axis: str, column: str = "value") -> pd.DataFrame:
+    def groups_on(self, axis: Axis) -> tuple[Group, ...]:
+        """Return the parameter groups of the fit with one value per element of `axis`."""
+        known = set(self.calibration["group"])
+        return tuple(g for g in PARAMETERS if g.axis == axis and g.name in known)
+
+    def values_on(self, axis: Axis, column: str = "value") -> pd.DataFrame:
         """Return one column of `calibration` as a wide table.
 
         Parameters
         ----------
-        axis : "exp", "det" or "coef"
+        axis : an axis of the calibration, such as "exp", "det" or "coef"
         column : a column of `schema.CALIBRATION`
 
         Returns
         -------
         One row per element of the axis, in order, and one column per group on the axis.
         """
-        names = [group.name for group in groups_on(axis)]  # type: ignore[arg-type]
+        names = [group.name for group in self.groups_on(axis)]
         rows = self.calibration[self.calibration["group"].isin(names)]
         wide = rows.pivot(index="element", columns="group", values=column)
         return wide.reindex(columns=names).sort_index()

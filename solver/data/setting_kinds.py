@@ -41,6 +41,7 @@ class Setting:
     card : FITS keyword; "" for none
     phrase : text of a value in the description of a solution, with {} for the value
     is_always_described : whether the description includes the default value
+    is_cause : whether it adds an effect to the model that the paper's lacks
     """
 
     label: str
@@ -56,6 +57,7 @@ class Setting:
     card: str = ""
     phrase: str = "{}"
     is_always_described: bool = False
+    is_cause: bool = False
 
     def check(self, name: str, value: Any) -> None:  # noqa: ANN401 any setting
         """Raise `InputError` if `value` is invalid for the setting called `name`."""
@@ -106,6 +108,19 @@ class Whole(Setting):
         raise InputError(
             f"expected a {self.label.lower()} from {self.low} to {self.high}, found {value!r}"
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Degree(Whole):
+    """A degree from 2 to `high`, or 0 for none: lower distortion terms do not exist."""
+
+    low: int = 0
+
+    def check(self, name: str, value: object) -> None:
+        """Raise `InputError` for 1 as well."""
+        super().check(name, value)
+        if value == 1:
+            raise InputError(f"{self.label.lower()}: expected 0 or 2 to {self.high}, found 1")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,9 @@ from typing import Any
 
 from solver.data.engine_settings import NutsSettings, SviSettings
 from solver.data.exclusions import Exclusions
-from solver.data.parameters import BY_NAME, PARAMETERS
+from solver.data.model_settings import MAX_ORDER as MAX_ORDER
+from solver.data.model_settings import ModelSettings
+from solver.data.parameters import BY_NAME, OPTIONAL_GROUPS, PARAMETERS, Group
 from solver.data.setting_kinds import (
     Change,
     Choice,
@@ -21,7 +23,6 @@ from solver.data.setting_kinds import (
 )
 from solver.data.text_setting import LeftOut, PriorShifts, PriorWidths
 
-MAX_ORDER = 9
 # Engine -> unit of its progress.
 COUNTED = {"gauss-newton": "iteration", "svi": "step", "nuts": "sample"}
 ENGINES = tuple(COUNTED)
@@ -29,25 +30,9 @@ _GROUPS = ", ".join(group.name for group in PARAMETERS)
 
 
 @dataclass(frozen=True)
-class FitSettings:
+class FitSettings(ModelSettings):
     """The settings of one fit; `SETTINGS` describes each."""
 
-    order: int = setting(
-        5,
-        Whole(
-            label="Distortion order",
-            help=f"Distortion order, 0 to {MAX_ORDER}: the highest total degree of its terms.",
-            low=0,
-            high=MAX_ORDER,
-            keyword="order",
-            option="order",
-            control=True,
-            change=Change.WHAT_IF,
-            card="ORDER",
-            phrase="order {}",
-            is_always_described=True,
-        ),
-    )
     engine: str = setting(
         ENGINES[0],
         Choice(
@@ -58,19 +43,6 @@ class FitSettings:
             option="engine",
             control=True,
             card="ENGINE",
-        ),
-    )
-    aberration: bool = setting(
-        True,
-        Switch(
-            label="Stellar aberration",
-            help="Model the stellar aberration due to the observer's velocity.",
-            keyword="aberration",
-            option="aberration",
-            control=True,
-            change=Change.REFIT,
-            card="ABERR",
-            phrase="no aberration",
         ),
     )
     max_iterations: int = setting(
@@ -196,6 +168,17 @@ class FitSettings:
     def width(self, name: str) -> float:
         """Return the prior width of group `name`, in its `width_unit`."""
         return float(self.prior_widths.get(name, BY_NAME[name].width))
+
+    @property
+    def optional_groups(self) -> tuple[Group, ...]:
+        """The optional parameter groups that the fit has, in table order."""
+        return tuple(group for group in OPTIONAL_GROUPS if getattr(self, group.setting))
+
+    @property
+    def has_noise_model(self) -> bool:
+        """Whether uncertainties are estimated with the parameters."""
+        by_row = self.noise_scale or self.noise_by_exposure or self.noise_by_magnitude
+        return by_row or self.reference_scale
 
     @property
     def step_tolerance(self) -> float:

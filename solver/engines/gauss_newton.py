@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from solver.data.parameters import CALIBRATION_GROUPS
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines.attitude_start import attitude_start
@@ -252,7 +251,7 @@ def largest_step(
 
 
 def _parameter_name(problem: Problem, column: int) -> str:
-    for group in CALIBRATION_GROUPS:
+    for group in problem.layout.groups:
         place = np.flatnonzero(problem.layout.columns(group) == column)
         if len(place):
             return f"{group.label} [{place[0]}]"

@@ -15,7 +15,7 @@ import numpyro.distributions as dist
 from jaxtyping import Float
 from numpyro.distributions import constraints
 
-from solver.data.parameters import PARAMETERS, SOURCES, Group
+from solver.data.parameters import BY_NAME, SOURCES, Group
 from solver.linear.chi2 import half_chi2_of_chunks
 from solver.linear.whitening import Coordinates
 from solver.model.forward import AnyArray, Geometry, Index
@@ -71,7 +71,8 @@ def evidence_of(problem: Problem) -> Evidence:
 
 def plate_analysis(evidence: Evidence) -> None:
     """Define the posterior of an orbit: the numpyro model."""
-    offsets = {g.name: numpyro.sample(g.name, _prior(evidence, g)) for g in PARAMETERS}
+    groups = (SOURCES, *evidence.layout.groups)
+    offsets = {g.name: numpyro.sample(g.name, _prior(evidence, g)) for g in groups}
     half_chi2 = half_chi2_of_chunks(
         _padded(offsets, evidence.geometry),
         evidence.geometry,
@@ -128,7 +129,7 @@ _FAMILIES: dict[str, Callable[[AnyArray, AnyArray], dist.Distribution]] = {
 
 def _padded(offsets: dict[str, AnyArray], geometry: Geometry) -> dict[str, AnyArray]:
     """Return the offsets padded with zeros to the sizes of the geometry."""
-    lengths = {g.name: geometry.sizes.get(g.axis, len(offsets[g.name])) for g in PARAMETERS}
+    lengths = {n: geometry.sizes.get(BY_NAME[n].axis, len(v)) for n, v in offsets.items()}
     return {
         name: jnp.pad(values, [(0, lengths[name] - len(values)), *[(0, 0)] * (values.ndim - 1)])
         for name, values in offsets.items()

@@ -14,7 +14,7 @@ import pandas as pd
 
 from solver.data import eigenmode_schema as eigenmode_schema
 from solver.data import schema
-from solver.data.parameters import Axis, Published, groups_on
+from solver.data.parameters import Axis, Published
 from solver.data.result import FitResult
 from solver.units import MAS_PER_DEG, factor_between, unit_named
 
@@ -159,13 +159,13 @@ def _calibration_columns(result: FitResult, axis: Axis) -> list[Derived]:
     hdu, prefix = _HDUS[axis]
     values = result.values_on(axis)
     columns: dict[str, Derived] = {}
-    for group in groups_on(axis):
+    for group in result.groups_on(axis):
         value, unit = values[group.name].to_numpy(), group.value_unit
         named = [one for one in group.published if one.factor is None]
         for one in named or [Published(f"{prefix}_{group.name}_loc", group.label)]:
             shown = unit_named(unit).to_string("fits") if hdu == "TELESCOPE" else ""
             columns[one.column] = Derived(one.column, shown, f"[{unit}] {one.words}", value)
-    for group in groups_on(axis):
+    for group in result.groups_on(axis):
         for one in group.published:
             if one.factor is not None:
                 relative = one.factor * factor_between(group.value_unit, "") * values[group.name]

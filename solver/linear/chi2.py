@@ -20,7 +20,7 @@ from solver.model.forward import (
     ideal_position,
     image,
 )
-from solver.problem.parameter_vector import LOCAL_GROUPS, PER_COEFFICIENT
+from solver.problem.parameter_vector import local_groups
 from solver.problem.problem import Problem
 
 
@@ -32,8 +32,6 @@ class Gradient(NamedTuple):
     by_source: Float[np.ndarray, "src 2"]
 
 
-_NON_DIRECTING = tuple(g.name for g in LOCAL_GROUPS if g.name not in DIRECTING)
-_COEFFICIENTS = tuple(g.name for g in PER_COEFFICIENT)
 # Maximum number of chunks computed at once: a single one does not keep all cores busy, and all
 # chunks of a large orbit would need too much memory.
 _MAX_PENDING = 4
@@ -114,7 +112,8 @@ def _with_gradient(
         of_chunk = _value_and_gradient(sky, offsets, geometry, *chunk)
         return jax.tree.map(jnp.add, total, of_chunk), None
 
-    other_offsets = {name: offsets[name] for name in (*_NON_DIRECTING, *_COEFFICIENTS)}
+    undirecting = _non_directing(offsets) + [n for d in "xy" for n in geometry.term_groups(d)]
+    other_offsets = {name: offsets[name] for name in undirecting}
     zero = jax.tree.map(jnp.zeros_like, (jnp.zeros(()), sky, other_offsets))
     return _with_offset_gradient(jax.lax.scan(add, zero, chunks)[0], offsets, geometry)
 
@@ -144,7 +143,7 @@ def _value_and_gradient(
     ) -> tuple[Array, list[Array]]:
         return half_chi2(sky, {**offsets, **moved}, displacement, geometry, index, *values)
 
-    moved = {name: offsets[name] for name in _NON_DIRECTING}
+    moved = {name: offsets[name] for name in _non_directing(offsets)}
     (half, basis), (by_directions, by_touched, by_displacement) = jax.value_and_grad(
         half_chi2_at, argnums=(0, 1, 2), has_aux=True
     )(sky, moved, no_displacement)
@@ -153,11 +152,25 @@ def _value_and_gradient(
     pair = jnp.stack(by_displacement).reshape(2, -1)
     by_terms = [pair @ term.reshape(-1) for term in basis]
     by_coefficients = jnp.stack(by_terms, axis=1) if basis else jnp.zeros((2, 0))
-    return (
-        half,
-        by_directions,
-        {**by_touched, **dict(zip(_COEFFICIENTS, by_coefficients, strict=True))},
-    )
+    return half, by_directions, {**by_touched, **_by_group(by_coefficients, offsets, geometry)}
+
+
+def _non_directing(offsets: Offsets) -> list[str]:
+    """Return the local groups that the directions do not depend on."""
+    return [group.name for group in local_groups(offsets) if group.name not in DIRECTING]
+
+
+def _by_group(
+    by_terms: Float[Array, "2 term"], offsets: Offsets, geometry: Geometry
+) -> dict[str, Float[Array, " _"]]:
+    """Return the derivatives by the terms of both directions, by group."""
+    found = {}
+    for by_term, direction in zip(by_terms, "xy", strict=True):
+        first = 0
+        for name in geometry.term_groups(direction):
+            found[name] = by_term[first : first + len(offsets[name])]
+            first += len(offsets[name])
+    return found
 
 
 @jax.jit

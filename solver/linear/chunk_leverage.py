@@ -2,7 +2,7 @@
 
 A measurement depends on few parameters, and on the distortion's many coefficients only
 through the displacement that they add at its position; so the covariance C is projected onto the
-source, the parameters of `LOCAL_GROUPS` and that displacement. Three programs are compiled
+source, the parameters of the local groups and that displacement. Three programs are compiled
 instead of one, in which XLA would recompute the first two for each element of the result.
 """
 
@@ -18,6 +18,8 @@ from solver.model.forward import AnyArray, Pair
 _Slots = Float[AnyArray, "tile slot"]
 # Elements of symmetric 2 x 2 matrices.
 _ELEMENTS = ((0, 0), (0, 1), (1, 1))
+# Most terms whose products are compiled one by one; order 9 has 52.
+_MAX_UNROLLED = 52
 
 
 class SharedCovariances(NamedTuple):
@@ -79,6 +81,8 @@ def leverage(
 def _of_displacement(
     basis: list[_Slots], source: Int[AnyArray, "tile slot"], shared: SharedCovariances
 ) -> _OfDisplacement:
+    if len(basis) > _MAX_UNROLLED:
+        return _of_many_terms(jnp.stack(basis), source, shared)
     count = range(len(basis))
     own = [
         sum(basis[k] * sum(of[k, m] * basis[m] for m in count[k:]) for k in count)
@@ -86,6 +90,20 @@ def _of_displacement(
     ]
     with_source = [
         [sum(shared.source_terms[i, a, k][source] * basis[k] for k in count) for a in range(2)]
+        for i in range(2)
+    ]
+    return _OfDisplacement(own, with_source)
+
+
+def _of_many_terms(
+    basis: Float[Array, "coef tile slot"],
+    source: Int[AnyArray, "tile slot"],
+    shared: SharedCovariances,
+) -> _OfDisplacement:
+    """Return the same without a product for each pair of terms, which would compile slowly."""
+    own = [jnp.sum(basis * jnp.tensordot(of, basis, 1), axis=0) for of in shared.terms]
+    with_source = [
+        [jnp.sum(shared.source_terms[i, a][:, source] * basis, axis=0) for a in range(2)]
         for i in range(2)
     ]
     return _OfDisplacement(own, with_source)

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 
 from solver.linear.chi2 import Gradient
 from solver.linear.normal_equations import DetectorSums, NormalEquations, accumulate
-from solver.problem.parameter_vector import PER_DETECTOR, PER_EXPOSURE, VectorLayout
+from solver.problem.parameter_vector import VectorLayout
 from solver.problem.problem import Problem, of_rows
 
 
@@ -72,9 +72,10 @@ def _detectors_contribution(
     kept_share : 1 where other detectors contribute to the rows of an exposure, 0 elsewhere
     """
     owner = np.empty(layout.size, dtype=np.int64)
-    for groups, count in ((PER_EXPOSURE, layout.n_exp), (PER_DETECTOR, layout.n_det)):
-        for group in groups:
-            owner[layout.columns(group)] = np.arange(count)
+    for group in layout.local_groups:
+        columns = layout.columns(group)
+        count = layout.n_exp if group.axis == "exp" else layout.n_det
+        owner[columns] = np.repeat(np.arange(count), len(columns) // count)
     coefficients = sums.coefficients[detectors].sum(axis=0)
 
     def remaining_cross(column: int) -> Float[np.ndarray, "2 src"]:

@@ -6,13 +6,13 @@ parameters, H_k = J_k C J_k' (2 x 2). The expected chi2 of the measurement is
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from solver.linear.chunk_leverage import (
     Leverage,
@@ -126,22 +126,23 @@ def _standardised(
 
 
 def _shared_covariances(problem: Problem, covariance: Covariances) -> SharedCovariances:
-    sizes, shared, n_coef = (
+    sizes, shared, n_terms = (
         problem.geometry.sizes,
         problem.layout.coefficients(),
-        problem.layout.n_coef,
+        problem.layout.n_terms,
     )
+    places, n_padded = _basis_places(problem)
     source = covariance.source[:, [0, 0, 1], [0, 1, 1]]
     # From block order to that of the sources.
     n_sources = covariance.own_cross.shape[-1]
-    with_source = covariance.own_cross[shared].reshape(2 * n_coef * 2, n_sources)
+    with_source = covariance.own_cross[shared].reshape(2 * n_terms * 2, n_sources)
     with_source = np.take(with_source, covariance.source_blocks.position, axis=1)
-    with_source = with_source.reshape(2, n_coef, 2, n_sources).swapaxes(1, 2)
-    terms = covariance.theta[shared, shared].reshape(2, n_coef, 2, n_coef)
+    with_source = with_source.reshape(2, n_terms, 2, n_sources).swapaxes(1, 2)
+    terms = covariance.theta[shared, shared].reshape(2, n_terms, 2, n_terms)
     return SharedCovariances(
         pad(source, "src", sizes).T,
-        _with_zeros(_of_products(terms), (3, sizes["coef"], sizes["coef"])),
-        _with_zeros(with_source, (2, 2, sizes["coef"], sizes["src"])),
+        _with_zeros(_of_products(terms), (3, n_padded, n_padded), {1: places, 2: places}),
+        _with_zeros(with_source, (2, 2, n_padded, sizes["src"]), {2: places}),
     )
 
 
@@ -156,9 +157,9 @@ def _tile_covariances(
 ) -> Callable[[Index], TileCovariances]:
     """Return the function that looks up the covariances of the tiles of a chunk."""
     layout, cross = problem.layout, covariance.own_cross
-    n_coef, position = problem.geometry.sizes["coef"], covariance.source_blocks.position
-    terms = covariance.theta[:, layout.coefficients()].reshape(layout.size, 2, layout.n_coef)
-    terms = _with_zeros(terms, (layout.size, 2, n_coef))
+    position, (basis, n_padded) = covariance.source_blocks.position, _basis_places(problem)
+    terms = covariance.theta[:, layout.coefficients()].reshape(layout.size, 2, layout.n_terms)
+    terms = _with_zeros(terms, (layout.size, 2, n_padded), {2: basis})
 
     def of_chunk(index: Index) -> TileCovariances:
         own = layout.touched(index.exposure[:, 0], index.detector[:, 0])
@@ -173,12 +174,30 @@ def _tile_covariances(
     return of_chunk
 
 
+def _basis_places(problem: Problem) -> tuple[Int[np.ndarray, " term"], int]:
+    """Return the places of the terms in the basis of the geometry, and its length.
+
+    Those of the distortion are padded; those of optional groups follow the padding.
+    """
+    n_coef, n_padded = problem.layout.n_coef, problem.geometry.sizes["coef"]
+    end = n_padded + problem.layout.n_terms - n_coef
+    return np.r_[:n_coef, n_padded:end], end
+
+
 def _with_zeros(
-    values: Float[np.ndarray, "..."], shape: tuple[int, ...]
+    values: Float[np.ndarray, "..."],
+    shape: tuple[int, ...],
+    places: Mapping[int, Int[np.ndarray, " _"]],
 ) -> Float[np.ndarray, "..."]:
-    """Return an array of a larger shape, with zeros at the end of every axis."""
+    """Return an array of a larger shape, with zeros where it has no values.
+
+    Parameters
+    ----------
+    places : axis -> places of the values along it; at its beginning by default
+    """
     larger = np.zeros(shape)
-    larger[tuple(map(slice, values.shape))] = values
+    axes = [places.get(axis, np.arange(size)) for axis, size in enumerate(values.shape)]
+    larger[np.ix_(*axes)] = values
     return larger
 
 

@@ -28,14 +28,14 @@ from solver.model.forward import (
     ideal_position,
     image,
 )
-from solver.problem.parameter_vector import LOCAL_GROUPS
+from solver.problem.parameter_vector import local_groups
 
 
 class Linearised(NamedTuple):
     """A chunk of tiles, linearised; all but `prediction` divided by sigma, x and y separately.
 
     `residual` is measured minus predicted. The others are derivatives of the prediction:
-    by the source's two offsets (mas^-1), by the groups of `LOCAL_GROUPS` (per group unit),
+    by the source's two offsets (mas^-1), by the groups of `local_groups` (per group unit),
     and by a displacement on the focal plane (um^-1).
     """
 
@@ -45,9 +45,13 @@ class Linearised(NamedTuple):
     displacement: list[Pair]
     prediction: Prediction
 
-    def with_terms(self, n_coef: int) -> "Linearised":
-        """Return the same with the first `n_coef` distortion terms."""
-        kept = self.prediction._replace(basis=self.prediction.basis[:n_coef])
+    def with_terms(self, n_coef: int, n_padded: int) -> "Linearised":
+        """Return the same with `n_coef` of the distortion's terms, of which there are `n_padded`.
+
+        The terms after those of the distortion are kept.
+        """
+        basis = self.prediction.basis
+        kept = self.prediction._replace(basis=basis[:n_coef] + basis[n_padded:])
         return self._replace(prediction=kept)
 
 
@@ -174,7 +178,7 @@ def _derivatives(
     x, y = prediction.pixel
     residual = whiten(measured[0] - x, measured[1] - y)
     source = [whiten(*by_directions("source", tangent)) for tangent in turn.source]
-    local = [by_group(g.name) for g in LOCAL_GROUPS]
+    local = [by_group(g.name) for g in local_groups(offsets)]
     displacement = [whiten(*by) for by in _by_axes(displaced, jax.tree.map(jnp.zeros_like, ideal))]
     return residual, source, local, displacement
 

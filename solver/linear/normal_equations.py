@@ -19,9 +19,9 @@ from jaxtyping import Float, Int
 from solver.linear.chi2 import Gradient
 from solver.linear.derivative_products import Rows, one_by_one, rows_of
 from solver.linear.linearise import Linearised, linearise, turning
-from solver.linear.tile_sums import N_LOCAL, TileSums
+from solver.linear.tile_sums import TileSums
 from solver.model.forward import Index
-from solver.problem.parameter_vector import LOCAL_GROUPS, PER_DETECTOR, PER_EXPOSURE, VectorLayout
+from solver.problem.parameter_vector import VectorLayout
 from solver.problem.problem import Problem
 from solver.problem.source_blocks import SourceBlocks
 from solver.problem.tiles import Gathering
@@ -82,7 +82,7 @@ def chunks(
 
     def launch(i: int) -> Linearised:
         chunk = linearise(turn, offsets, geometry, *problem.measurements.tiles.chunk(i))
-        return chunk.with_terms(problem.layout.n_coef)
+        return chunk.with_terms(problem.layout.n_coef, problem.geometry.sizes["coef"])
 
     ahead = launch(0)
     for i in range(n_chunks):
@@ -106,12 +106,12 @@ def accumulate(
         they depend on the ideal positions, not on the distortion
     """
     layout, n_src, index = problem.layout, problem.n_src, problem.measurements.tiles.index
-    n_det, n_coef = layout.n_det, layout.n_coef
+    n_det, n_coef = layout.n_det, layout.n_terms
     cross = np.zeros((layout.size, 2, n_src))
     source, by_source = np.zeros((n_det, 2, 2, n_src)), np.zeros((n_det, 2, n_src))
     is_known = coefficients is not None
     term_blocks = coefficients if is_known else np.zeros((n_det, 2, n_coef, 2, n_coef))
-    sums = TileSums.empty(index.source.shape, n_coef)
+    sums = TileSums.empty(index.source.shape, len(layout.local_groups), n_coef)
     with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
         pending = helper.submit(lambda: None)
         for i, chunk in enumerate(chunks(problem, theta, sources)):
@@ -207,12 +207,11 @@ def _add_cross_local(
 ) -> None:
     """Add the blocks between the sources and the local parameters of their measurements."""
     n_src, flat = cross.shape[-1], cross.reshape(-1)
-    for number, groups in ((index.exposure, PER_EXPOSURE), (index.detector, PER_DETECTOR)):
-        for group in groups:
-            row = layout.columns(group)[number]
-            for a in range(2):
-                place = (2 * row + a) * n_src + index.source
-                np.add.at(flat, place.ravel(), by_row[LOCAL_GROUPS.index(group), a].ravel())
+    for number, group in enumerate(layout.local_groups):
+        row = layout.columns(group)[layout.element(group.axis, index.exposure, index.detector)]
+        for a in range(2):
+            place = (2 * row + a) * n_src + index.source
+            np.add.at(flat, place.ravel(), by_row[number, a].ravel())
 
 
 def _cross_coefficients(
@@ -249,7 +248,7 @@ def _assemble(
     Float[np.ndarray, "det calib calib"], Float[np.ndarray, "det calib"], Float[np.ndarray, " det"]
 ]:
     """Return Hessian, gradient and chi2 of the calibration for each detector."""
-    size, n_det, shared, local = layout.size, layout.n_det, layout.coefficients(), slice(N_LOCAL)
+    size, n_det, shared, local = layout.size, layout.n_det, layout.coefficients(), slice(-1)
     detector = index.detector[..., 0]
     columns = layout.touched(index.exposure[..., 0], detector)
     # Start of each detector's vector in the concatenated vectors.
@@ -260,7 +259,7 @@ def _assemble(
     hessian += _sum_at(rows + np.arange(size)[shared], sums.mixed[..., local, :], n_values)
     hessian = hessian.reshape(n_det, size, size)
     hessian[:, shared, :] = hessian[:, :, shared].swapaxes(1, 2)
-    hessian[:, shared, shared] = coefficients.reshape(n_det, 2 * layout.n_coef, 2 * layout.n_coef)
+    hessian[:, shared, shared] = coefficients.reshape(n_det, 2 * layout.n_terms, 2 * layout.n_terms)
     gradient = _sum_at(first + columns, sums.local[..., -1, local], n_det * size)
     gradient += _sum_at(first + np.arange(size)[shared], sums.mixed[..., -1, :], n_det * size)
     chi2 = _sum_at(detector, sums.local[..., -1, -1], n_det)

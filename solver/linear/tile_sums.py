@@ -7,9 +7,6 @@ from jaxtyping import Float
 
 from solver.linear.derivative_products import Rows, in_tiles, one_by_one
 from solver.linear.linearise import Linearised
-from solver.problem.parameter_vector import LOCAL_GROUPS
-
-N_LOCAL = len(LOCAL_GROUPS)
 
 
 @dataclass(frozen=True)
@@ -18,7 +15,7 @@ class TileSums:
 
     Attributes
     ----------
-    local : products between the derivatives by `LOCAL_GROUPS` and, last, the residual
+    local : products between the derivatives by the local groups and, last, the residual
     mixed : products of these with the derivatives by the distortion coefficients
     basis : distortion terms of each slot
     shared : products of the derivatives by displacement and by source, of each slot
@@ -30,9 +27,9 @@ class TileSums:
     shared: Float[np.ndarray, "2 2 chunk tile slot"]
 
     @classmethod
-    def empty(cls, shape: tuple[int, ...], n_coef: int) -> "TileSums":
+    def empty(cls, shape: tuple[int, ...], n_local: int, n_coef: int) -> "TileSums":
         """Return uninitialised arrays for a shape (chunk, tile, slot)."""
-        tiles, rows = shape[:2], N_LOCAL + 1
+        tiles, rows = shape[:2], n_local + 1
         return cls(
             np.empty((*tiles, rows, rows)),
             np.empty((*tiles, rows, 2 * n_coef)),
@@ -48,7 +45,7 @@ class TileSums:
 
     def sum_local(self, rows: Rows, i: int) -> None:
         """Fill in `local` of chunk `i`."""
-        flat = rows.local.reshape(len(rows.local), N_LOCAL + 1, -1)
+        flat = rows.local.reshape(*rows.local.shape[:2], -1)
         np.matmul(flat, flat.swapaxes(1, 2), out=self.local[i])
 
     def sum_mixed(self, rows: Rows, i: int) -> None:

@@ -12,19 +12,17 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from solver.data.parameter_group import Axis
 from solver.data.parameters import BY_NAME
 from solver.linear.chi2 import Gradient
 from solver.linear.contribution import Contribution, contribution_of
 from solver.linear.normal_equations import NormalEquations, accumulate
-from solver.problem.parameter_vector import (
-    PER_COEFFICIENT,
-    PER_DETECTOR,
-    PER_EXPOSURE,
-    VectorLayout,
-)
+from solver.problem.parameter_vector import VectorLayout
 from solver.problem.problem import Problem
 from solver.problem.source_blocks import SourceBlocks
 from solver.units import RAD_PER_MAS
+
+_OPTIONAL_AXES: tuple[Axis, ...] = ("drift", "breathing", "field", "own", "motion")
 
 
 def update_equations(
@@ -69,14 +67,35 @@ def _lower_term_blocks(
     if by_detector is None:
         return None
     term_blocks = by_detector.theta[:, shared, shared].reshape(
-        layout.n_det, *2 * (2, layout.n_coef)
+        layout.n_det, *2 * (2, layout.n_terms)
     )
-    return term_blocks[:, :, :n_coef, :, :n_coef].copy()
+    kept = layout.lower_terms(n_coef)
+    return term_blocks[:, :, kept][..., kept].copy()
 
 
 def _same_model(old: Problem, new: Problem) -> bool:
     aberrated = [bool(np.any(problem.geometry.velocity)) for problem in (old, new)]
-    return aberrated[0] == aberrated[1] and old.layout.n_det == new.layout.n_det
+    return (
+        aberrated[0] == aberrated[1]
+        and old.layout.n_det == new.layout.n_det
+        and _same_causes(old, new)
+    )
+
+
+def _same_causes(old: Problem, new: Problem) -> bool:
+    """Return whether both have the same optional groups with the same elements and functions."""
+    names = [[name for name, _ in problem.layout.optional] for problem in (old, new)]
+    if names[0] != names[1] or old.geometry.causes is None or new.geometry.causes is None:
+        return names[0] == names[1]
+    if any(old.elements[axis] != new.elements[axis] for axis in _OPTIONAL_AXES):
+        return False
+    # The exposures of the new problem are among the old ones.
+    kept = _kept_exposures(old, new)
+    families = zip(old.geometry.causes.families, new.geometry.causes.families, strict=True)
+    return all(
+        np.array_equal(before.factor[:, kept], after.factor[:, : len(kept)])
+        for before, after in families
+    )
 
 
 def _same_point(
@@ -129,14 +148,17 @@ def _without(
 
 def _columns(old: Problem, new: Problem) -> Int[np.ndarray, " calib"]:
     """Return the column of `old` of each calibration parameter of `new`."""
-    old_keys, new_keys = (p.exposures[["field_id", "plate_id"]].to_numpy() for p in (old, new))
-    exposures = (old_keys[:, None] == new_keys).all(axis=2).argmax(axis=0)
     columns = np.empty(new.layout.size, dtype=np.int64)
-    for groups, kept in (
-        (PER_EXPOSURE, exposures),
-        (PER_COEFFICIENT, np.arange(new.layout.n_coef)),
-        (PER_DETECTOR, np.arange(new.layout.n_det)),
-    ):
-        for group in groups:
-            columns[new.layout.columns(group)] = old.layout.columns(group)[kept]
+    kept = _kept_exposures(old, new)
+    for group in new.layout.groups:
+        own = old.layout.columns(group)
+        columns[new.layout.columns(group)] = (
+            own[kept] if group.axis == "exp" else own[: len(new.layout.columns(group))]
+        )
     return columns
+
+
+def _kept_exposures(old: Problem, new: Problem) -> Int[np.ndarray, " exp"]:
+    """Return the index in `old` of each exposure of `new`."""
+    old_keys, new_keys = (p.exposures[["field_id", "plate_id"]].to_numpy() for p in (old, new))
+    return (old_keys[:, None] == new_keys).all(axis=2).argmax(axis=0)

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Array, Float
 
-from solver.data.parameters import CALIBRATION_GROUPS, SOURCES
+from solver.data.parameters import SOURCES
 from solver.linear.source_elimination import ReducedSystem
 from solver.model.forward import AnyArray
 from solver.problem.parameter_vector import VectorLayout
@@ -104,7 +104,7 @@ def in_bare_units(
     """Return the published code's coordinates: degrees and micrometres, without mixing."""
     n_src = len(at[1])
     unit = np.empty(layout.size)
-    for group in CALIBRATION_GROUPS:
+    for group in layout.groups:
         unit[layout.columns(group)] = group.per_value_unit
     source = SOURCES.per_value_unit * np.eye(2)[:, :, None] * np.ones(n_src)
     return Coordinates(

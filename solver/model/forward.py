@@ -16,7 +16,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from solver.data.parameters import OPTIONAL_GROUPS
 from solver.model.aberration import Components, aberrate, lorentz_factor
+from solver.model.causes import Causes, anisotropic, moved_detector, shifted_on_detector
 from solver.model.detector import to_pixel
 from solver.model.distortion import basis, terms
 from solver.model.projection import displace, focal_axes, project
@@ -26,6 +28,7 @@ from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
 AnyArray = Any
 Offsets = Mapping[str, AnyArray]
 Pair = tuple[Float[AnyArray, "*obs"], Float[AnyArray, "*obs"]]
+_OPTIONAL = frozenset(group.name for group in OPTIONAL_GROUPS)
 
 
 class Geometry(eqx.Module):
@@ -41,6 +44,7 @@ class Geometry(eqx.Module):
     sun_distance : distance of the observer from the Sun, au
     distortion_scale : 1/s, um
     order : highest degree of the distortion
+    causes : inputs of the optional parameter groups; None for a fit without any
     """
 
     source_frame: Float[AnyArray, "src 3 3"]
@@ -50,6 +54,7 @@ class Geometry(eqx.Module):
     sun_distance: Float[AnyArray, " exp"]
     distortion_scale: Float[AnyArray, ""]
     order: int = eqx.field(static=True)
+    causes: Causes | None = None
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -63,6 +68,15 @@ class Geometry(eqx.Module):
     def value(self, offsets: Offsets, name: str) -> Float[Array, " _"]:
         """Return the value (origin plus offset) of a group, in its unit."""
         return self.origin[name] + offsets[name]
+
+    def optional(self, offsets: Offsets) -> dict[str, Float[Array, " _"]]:
+        """Return the values of the optional groups that the fit includes."""
+        return {name: self.value(offsets, name) for name in offsets if name in _OPTIONAL}
+
+    def term_groups(self, direction: str) -> list[str]:
+        """Return the groups of the coefficients of a direction, "x" or "y", in order."""
+        of_causes = self.causes.names(direction) if self.causes is not None else []
+        return [f"distortion_{direction}", *of_causes]
 
 
 class Index(NamedTuple):
@@ -132,7 +146,8 @@ def directions(offsets: Offsets, geometry: Geometry) -> Directions:
 def ideal_position(seen: Directions, offsets: Offsets, geometry: Geometry, index: Index) -> Pair:
     """Return positions on the undistorted focal plane, um."""
     focal_length = geometry.value(offsets, "focal_length")[index.exposure]
-    return project(_apparent(seen, geometry, index), focal_length)
+    ideal = project(_apparent(seen, geometry, index), focal_length)
+    return anisotropic(ideal, geometry.optional(offsets), index.exposure)
 
 
 def image(
@@ -152,7 +167,9 @@ def image(
     """
     x, y = ideal
     values = basis(x / geometry.distortion_scale, y / geometry.distortion_scale, geometry.order)
-    coefficients = _pair(offsets, geometry, "distortion")
+    if geometry.causes is not None:
+        values += geometry.causes.terms(ideal, index.exposure, index.detector)
+    coefficients = [_coefficients(offsets, geometry, direction) for direction in "xy"]
     focal_x, focal_y = (
         ideal[axis] + (sum(c * b for c, b in zip(terms, values, strict=True)) + shift)
         for axis, (terms, shift) in enumerate(zip(coefficients, displacement, strict=True))
@@ -161,10 +178,18 @@ def image(
     centre_x, centre_y = _pair(offsets, geometry, "detector")
     pitch_x, pitch_y = _pair(offsets, geometry, "pitch")
     rotation = RAD_PER_ARCSEC * geometry.value(offsets, "detector_rotation")
-    pixel = to_pixel(
-        (focal_x, focal_y), (centre_x[n], centre_y[n]), rotation[n], (pitch_x[n], pitch_y[n])
+    optional = geometry.optional(offsets)
+    centre, angle = moved_detector(
+        (centre_x[n], centre_y[n]), rotation[n], optional, geometry.causes, index.exposure, n
     )
+    pixel = to_pixel((focal_x, focal_y), centre, angle, (pitch_x[n], pitch_y[n]))
+    pixel = shifted_on_detector(pixel, optional, geometry.causes, index.source, n)
     return Prediction(ideal, (focal_x, focal_y), pixel, values)
+
+
+def _coefficients(offsets: Offsets, geometry: Geometry, direction: str) -> list[Float[Array, ""]]:
+    """Return the coefficients of all terms of a direction, in the order of `Prediction.basis`."""
+    return [c for name in geometry.term_groups(direction) for c in geometry.value(offsets, name)]
 
 
 def _pair(

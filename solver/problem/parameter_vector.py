@@ -1,85 +1,160 @@
 """VectorLayout: columns of the calibration parameters in the flat vector the engines solve for.
 
-Exposures come first, all groups of one exposure together, then the distortion's two
-directions, then the detectors, all groups of one detector together. The parameters that
-one measurement depends on therefore lie in three contiguous ranges.
+Exposures come first, all groups of one exposure together, then the two directions of the
+distortion and of its optional terms, then the detectors, all groups of one detector together,
+and last what moves from field to field. The parameters that one measurement depends on therefore
+lie in few contiguous ranges.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from jaxtyping import Int, Shaped
 
-from solver.data.parameters import CALIBRATION_GROUPS, Group, groups_on
+from solver.data.parameter_group import TERM_AXES, Axis, Group
+from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS, PARAMETERS, groups_on
 
 PER_EXPOSURE = groups_on("exp")
 PER_COEFFICIENT = groups_on("coef")
 PER_DETECTOR = groups_on("det")
 # A NumPy or JAX array.
 AnyArray = Any
-# Groups of which a measurement depends on one element each.
+# Groups of every fit of which a measurement depends on one element each.
 LOCAL_GROUPS = PER_EXPOSURE + PER_DETECTOR
+_LOCAL_AXES: tuple[Axis, ...] = ("exp", "det", "motion")
+
+
+def local_groups(names: Iterable[str]) -> tuple[Group, ...]:
+    """Return the groups among `names` of which a measurement depends on one element each."""
+    known = set(names)
+    return tuple(
+        group
+        for axis in _LOCAL_AXES
+        for group in PARAMETERS
+        if group.axis == axis and group.name in known
+    )
 
 
 @dataclass(frozen=True)
 class VectorLayout:
-    """Sizes of the calibration axes and the columns that follow from them."""
+    """Sizes of the calibration axes and the columns that follow from them.
+
+    Attributes
+    ----------
+    optional : names of the optional groups, in table order, and their numbers of elements
+    fields : for each exposure, the number of its field
+    """
 
     n_exp: int
     n_coef: int
     n_det: int
+    optional: tuple[tuple[str, int], ...] = ()
+    fields: tuple[int, ...] = ()
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """All groups except the sources, in table order."""
+        return CALIBRATION_GROUPS + tuple(BY_NAME[name] for name, _ in self.optional)
+
+    @cached_property
+    def local_groups(self) -> tuple[Group, ...]:
+        """Groups of which a measurement depends on one element each."""
+        return local_groups(group.name for group in self.groups)
+
+    def on(self, axis: Axis) -> tuple[Group, ...]:
+        """Return the groups with one value per element of `axis`."""
+        return tuple(group for group in self.groups if group.axis == axis)
 
     @property
     def size(self) -> int:
         """Number of calibration parameters."""
-        return self.first_detector + self.n_det * len(PER_DETECTOR)
+        return self.first_motion + sum(self._length(group) for group in self.on("motion"))
+
+    @property
+    def n_terms(self) -> int:
+        """Number of terms of one direction: the distortion's and the optional ones."""
+        return sum(self._length(group) for group in self._terms(0))
 
     @property
     def first_coefficient(self) -> int:
         """Column of the first distortion coefficient."""
-        return self.n_exp * len(PER_EXPOSURE)
+        return self.n_exp * len(self.on("exp"))
 
     @property
     def first_detector(self) -> int:
         """Column of the first detector parameter."""
-        return self.first_coefficient + self.n_coef * len(PER_COEFFICIENT)
+        return self.first_coefficient + 2 * self.n_terms
+
+    @property
+    def first_motion(self) -> int:
+        """Column of the first parameter that moves from field to field."""
+        return self.first_detector + self.n_det * len(self.on("det"))
 
     def coefficients(self) -> slice:
-        """Return the columns of the distortion, first all of A, then all of B."""
+        """Return the columns of all terms, first those of one direction, then of the other."""
         return slice(self.first_coefficient, self.first_detector)
+
+    def lower_terms(self, n_coef: int) -> Int[np.ndarray, " term"]:
+        """Return which terms of one direction remain with the first `n_coef` of the distortion."""
+        return np.r_[:n_coef, self.n_coef : self.n_terms]
+
+    def element(
+        self, axis: Axis, exposure: Int[np.ndarray, "*n"], detector: Int[np.ndarray, "*#n"]
+    ) -> Int[np.ndarray, "*n"]:
+        """Return the element of an axis of local groups that measurements depend on.
+
+        Nothing moves in the first field; its measurements are given any element.
+        """
+        if axis == "exp":
+            return exposure
+        if axis == "det":
+            return detector
+        n_moved = max(max(self.fields, default=0), 1)
+        field = np.asarray(self.fields)[exposure]
+        return n_moved * detector + np.maximum(field - 1, 0)
 
     def touched(
         self, exposure: Int[np.ndarray, "*n"], detector: Int[np.ndarray, "*n"]
     ) -> Int[np.ndarray, "*n local"]:
-        """Return the columns of `LOCAL_GROUPS`, as the last axis, of exposures and detectors."""
+        """Return the columns of `local_groups`, as the last axis, of exposures and detectors."""
         return np.stack(
             [
-                self.columns(group)[exposure if group.axis == "exp" else detector]
-                for group in LOCAL_GROUPS
+                self.columns(group)[self.element(group.axis, exposure, detector)]
+                for group in self.local_groups
             ],
             axis=-1,
         )
 
     def columns(self, group: Group) -> np.ndarray:
         """Return the columns of one group, in the order of its axis."""
-        if group.axis == "coef":
-            first = self.first_coefficient + PER_COEFFICIENT.index(group) * self.n_coef
-            return np.arange(first, first + self.n_coef)
-        members, first, count = (
-            (PER_EXPOSURE, 0, self.n_exp)
-            if group.axis == "exp"
-            else (PER_DETECTOR, self.first_detector, self.n_det)
-        )
-        return first + members.index(group) + len(members) * np.arange(count)
+        length = self._length(group)
+        if group.is_term:
+            of_y = group.name.endswith("_y")
+            before = self._terms(of_y)[: self._terms(of_y).index(group)]
+            first = self.first_coefficient + of_y * self.n_terms
+            return first + sum(map(self._length, before)) + np.arange(length)
+        members = self.on(group.axis)
+        first = {"exp": 0, "det": self.first_detector, "motion": self.first_motion}[group.axis]
+        return first + members.index(group) + len(members) * np.arange(length)
 
     def gather(self, values: dict[str, Shaped[np.ndarray, " _"]]) -> Shaped[np.ndarray, " calib"]:
         """Return the flat vector from values per group."""
         flat = np.empty(self.size)
-        for group in CALIBRATION_GROUPS:
+        for group in self.groups:
             flat[self.columns(group)] = values[group.name]
         return flat
 
     def scatter(self, flat: Shaped[AnyArray, " calib"]) -> dict[str, Shaped[AnyArray, " _"]]:
         """Return the values per group from a flat NumPy or JAX vector."""
-        return {group.name: flat[self.columns(group)] for group in CALIBRATION_GROUPS}
+        return {group.name: flat[self.columns(group)] for group in self.groups}
+
+    def _length(self, group: Group) -> int:
+        sizes = {"exp": self.n_exp, "coef": self.n_coef, "det": self.n_det}
+        return dict(self.optional)[group.name] if group.setting else sizes[group.axis]
+
+    def _terms(self, of_y: int) -> list[Group]:
+        """Return the groups of the terms of one direction, in the order of their columns."""
+        return [group for axis in TERM_AXES for group in self.on(axis)[of_y : of_y + 1]]

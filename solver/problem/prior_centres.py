@@ -7,16 +7,21 @@ import pandas as pd
 from jaxtyping import Float
 
 from solver.data.instrument import Instrument
-from solver.data.parameters import CALIBRATION_GROUPS, SOURCES, Axis, Group
+from solver.data.parameter_group import Group
+from solver.data.parameters import SOURCES
 from solver.data.prior_text import split_name
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.model.distortion import terms
+from solver.problem.elements import Elements
 from solver.problem.parameter_vector import VectorLayout
 
 
 def calibration_centres(
-    exposures: pd.DataFrame, instrument: Instrument, layout: VectorLayout, settings: FitSettings
+    exposures: pd.DataFrame,
+    instrument: Instrument,
+    layout: VectorLayout,
+    settings: FitSettings,
+    elements: Elements,
 ) -> dict[str, Float[np.ndarray, " _"]]:
     """Return the prior centres of every calibration group, in the group's unit.
 
@@ -26,17 +31,17 @@ def calibration_centres(
         If the settings shift the prior centre of an element that does not exist.
     """
     centres = {}
-    elements = _elements(exposures, instrument, settings.order)
     # The settings give a shift of the pointing in RA as a distance on the sky.
     stretch = {"pointing_ra": 1.0 / np.cos(np.radians(exposures["dec_est"].to_numpy()))}
-    for group in CALIBRATION_GROUPS:
+    for group in layout.groups:
         if group.origin == "environment":
             values = exposures[group.column].to_numpy(dtype=np.float64)
         elif group.origin == "instrument":
             values = np.array([getattr(d, group.column) for d in instrument.detectors], float)
         else:
             values = np.zeros(len(layout.columns(group)))
-        shift = _shift(group, elements[group.axis], settings.prior_shifts)
+        names = [element.name for element in elements[group.axis]]
+        shift = _shift(group, names, settings.prior_shifts)
         centres[group.name] = values * group.per_value_unit + shift * stretch.get(group.name, 1.0)
     return centres
 
@@ -44,16 +49,6 @@ def calibration_centres(
 def catalogue_shift(settings: FitSettings) -> Float[np.ndarray, " 2"]:
     """Return the shift of all sources' prior positions, (alpha*, delta), mas."""
     return _shift(SOURCES, ["ra", "dec"], settings.prior_shifts)
-
-
-def _elements(exposures: pd.DataFrame, instrument: Instrument, order: int) -> dict[Axis, list[str]]:
-    """Return the names of the elements of each axis, as written in the settings."""
-    plates = zip(exposures["field_id"], exposures["plate_id"], strict=True)
-    return {
-        "exp": [f"{field}/{plate}" for field, plate in plates],
-        "coef": [f"{k}/{j}" for k, j in terms(order)],
-        "det": [str(detector.detector_id) for detector in instrument.detectors],
-    }
 
 
 def _shift(

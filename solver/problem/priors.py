@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from solver.data.parameters import CALIBRATION_GROUPS
+from solver.data.parameters import BY_NAME
 from solver.data.settings import FitSettings
 
 
@@ -93,9 +93,8 @@ def group_widths(
     centres : group name -> absolute values at offset zero, in the group's unit
     """
     widths = {}
-    for group in CALIBRATION_GROUPS:
-        width = settings.width(group.name)
-        centre = centres[group.name]
+    for name, centre in centres.items():
+        group, width = BY_NAME[name], settings.width(name)
         widths[group.name] = (
             width * np.abs(centre) if group.relative else np.full_like(centre, width)
         )

@@ -13,15 +13,19 @@ from jaxtyping import Bool, Float
 
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
-from solver.data.parameters import CALIBRATION_GROUPS, PARAMETERS, SOURCES
+from solver.data.parameters import BY_NAME, SOURCES
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import InputError
 from solver.model.astrometry import propagate, sky_position
+from solver.model.causes import Causes
 from solver.model.directions import displaced, tangent_frame
 from solver.model.distortion import terms
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry
+from solver.problem.causes import causes_of, padded
+from solver.problem.elements import Elements, elements, field_numbers
 from solver.problem.measurements import KEY, Measurements, sort_measurements
+from solver.problem.padding import pad
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.prior_centres import calibration_centres, catalogue_shift
 from solver.problem.priors import Priors, group_widths
@@ -46,6 +50,7 @@ class Problem:
     priors : in offsets from the origins
     layout : columns of the calibration parameters
     epoch : mean epoch, MJD in TCB
+    elements : elements of the calibration axes
     """
 
     order: int
@@ -56,6 +61,7 @@ class Problem:
     priors: Priors
     layout: VectorLayout
     epoch: float
+    elements: Elements
 
     @property
     def n_obs(self) -> int:
@@ -77,14 +83,14 @@ class Problem:
     ) -> dict[str, Float[np.ndarray, "..."]]:
         """Return the parameters as `solver.model.forward.predict` expects them, padded."""
         values = {**self.layout.scatter(theta), SOURCES.name: sources}
-        return {g.name: pad(values[g.name], g.axis, self.geometry.sizes) for g in PARAMETERS}
+        return {n: pad(v, BY_NAME[n].axis, self.geometry.sizes) for n, v in values.items()}
 
     def gathered(
         self, offsets: Mapping[str, Float[np.ndarray, "..."]]
     ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
         """Return calibration and sources from padded parameters: the inverse of `offsets`."""
         sizes = {"exp": self.layout.n_exp, "coef": self.layout.n_coef}
-        values = {g.name: offsets[g.name][: sizes.get(g.axis)] for g in CALIBRATION_GROUPS}
+        values = {g.name: offsets[g.name][: sizes.get(g.axis)] for g in self.layout.groups}
         return self.layout.gather(values), offsets[SOURCES.name][: self.n_src]
 
 
@@ -100,9 +106,13 @@ def thinned(problem: Problem, keep: Bool[np.ndarray, " src"]) -> Problem:
     """
     frames = problem.geometry.source_frame
     kept_first = np.argsort(~np.pad(keep, (0, len(frames) - len(keep))), kind="stable")
+    geometry = replace(problem.geometry, source_frame=frames[kept_first])
+    if (causes := geometry.causes) is not None:
+        of_kept = replace(causes, faintness=causes.faintness[kept_first])
+        geometry = replace(geometry, causes=of_kept)
     return replace(
         problem,
-        geometry=replace(problem.geometry, source_frame=frames[kept_first]),
+        geometry=geometry,
         measurements=problem.measurements.of_sources(keep, problem.exposures),
         sources=problem.sources[keep].reset_index(drop=True),
         priors=problem.priors._replace(precision=problem.priors.precision[keep]),
@@ -164,21 +174,36 @@ def _build(
     instrument: Instrument,
     settings: FitSettings,
 ) -> Problem:
-    layout = VectorLayout(len(exposures), len(terms(settings.order)), measurements.n_det)
+    axes = elements(exposures, instrument, settings)
+    layout = VectorLayout(
+        len(exposures),
+        len(axes["coef"]),
+        measurements.n_det,
+        tuple((group.name, len(axes[group.axis])) for group in settings.optional_groups),
+        tuple(field_numbers(exposures).tolist()),
+    )
     _check_freedom(len(measurements.row), len(sources), layout, settings.order)
     epoch = float(exposures["obstime"].mean())
     places = propagate(sources, epoch, observer_at(np.array([epoch])).position[0])
-    centres = calibration_centres(exposures, instrument, layout, settings)
+    centres = calibration_centres(exposures, instrument, layout, settings, axes)
     frame = _shifted(places.frame, catalogue_shift(settings))
     return Problem(
         order=settings.order,
-        geometry=_geometry(frame, exposures, centres, instrument, settings),
+        geometry=_geometry(
+            frame,
+            exposures,
+            centres,
+            instrument,
+            settings,
+            causes_of(exposures, sources, instrument, settings),
+        ),
         measurements=measurements,
         sources=sources,
         exposures=exposures,
         priors=_priors(places.covariance, centres, settings, layout),
         layout=layout,
         epoch=epoch,
+        elements=axes,
     )
 
 
@@ -221,6 +246,7 @@ def _geometry(
     centres: dict[str, Float[np.ndarray, " _"]],
     instrument: Instrument,
     settings: FitSettings,
+    causes: Causes | None,
 ) -> Geometry:
     satellite = exposures[[f"satellite_v{axis}" for axis in "xyz"]].to_numpy()
     observer = observer_at(exposures["obstime"].to_numpy(), satellite)
@@ -237,14 +263,15 @@ def _geometry(
         source_frame=pad(source_frame, "src", sizes),
         pointing_frame=pad(pointing, "exp", sizes),
         origin={
-            group.name: pad(centres[group.name], group.axis, sizes)
-            for group in CALIBRATION_GROUPS
-            if not group.name.startswith("pointing")
+            name: pad(values, BY_NAME[name].axis, sizes)
+            for name, values in centres.items()
+            if not name.startswith("pointing")
         },
         velocity=pad(observer.velocity * settings.aberration, "exp", sizes),
         sun_distance=pad(observer.sun_distance, "exp", sizes),
         distortion_scale=np.array(instrument.distortion_scale_um),
         order=order,
+        causes=None if causes is None else padded(causes, sizes),
     )
 
 
@@ -255,10 +282,10 @@ def _priors(
     layout: VectorLayout,
 ) -> Priors:
     is_gamma = {
-        g.name: np.full(
-            len(centres[g.name]), g.family == "gamma" and np.isfinite(settings.width(g.name))
+        name: np.full(
+            len(values), BY_NAME[name].family == "gamma" and np.isfinite(settings.width(name))
         )
-        for g in CALIBRATION_GROUPS
+        for name, values in centres.items()
     }
     return Priors(
         centre=layout.gather(centres),
@@ -266,19 +293,6 @@ def _priors(
         is_gamma=layout.gather(is_gamma).astype(bool),
         precision=np.linalg.inv(covariance * settings.width(SOURCES.name) ** 2),
     )
-
-
-def pad(
-    values: Float[np.ndarray, "n ..."], axis: str, sizes: Mapping[str, int]
-) -> Float[np.ndarray, "m ..."]:
-    """Return `values` padded to the size of their axis, if `sizes` has one for it.
-
-    No measurement depends on the padding, which repeats the last row; added coefficients are
-    zero, because they act on all measurements.
-    """
-    missing = max(sizes.get(axis, 0) - len(values), 0)
-    padding = np.zeros(missing) if axis == "coef" else np.repeat(values[-1:], missing, axis=0)
-    return np.concatenate([values, padding])
 
 
 def _rounded_up(length: int, step: int) -> int:

@@ -13,6 +13,7 @@ from solver.data.exclusions import of_rows, thinned_orbit
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
+from solver.problem.noise import Noise
 from solver.problem.problem import Problem, build_problem, rebuilt, remaining
 
 # One problem for the fit and one for the what-ifs that follow it.
@@ -22,11 +23,18 @@ _CAPACITY = 2
 class _Entry(NamedTuple):
     selection: tuple[object, ...]
     outliers: pd.DataFrame | None
+    noise: Noise | None
     data: OrbitData
     problem: Problem
 
-    def matches(self, settings: FitSettings, outliers: pd.DataFrame | None) -> bool:
-        return self.selection == settings.selection() and self.outliers is outliers
+    def matches(
+        self,
+        settings: FitSettings,
+        outliers: pd.DataFrame | None,
+        noise: Noise | None,
+    ) -> bool:
+        is_same = self.outliers is outliers and self.noise is noise
+        return is_same and self.selection == settings.selection()
 
 
 class ProblemCache:
@@ -39,13 +47,17 @@ class ProblemCache:
         self._entries: list[_Entry] = []
 
     def get(
-        self, settings: FitSettings, outliers: pd.DataFrame | None = None
+        self,
+        settings: FitSettings,
+        outliers: pd.DataFrame | None = None,
+        noise: Noise | None = None,
     ) -> tuple[OrbitData, Problem]:
         """Return the tables after exclusions and thinning, and their problem.
 
         Parameters
         ----------
         outliers : further measurements to leave out, by the labels of the orbit's table
+        noise : uncertainties in place of those of the tables
 
         Raises
         ------
@@ -54,22 +66,28 @@ class ProblemCache:
             remaining measurements are too few for the distortion order.
         """
         for entry in self._entries:
-            if entry.matches(settings, outliers):
+            if entry.matches(settings, outliers, noise):
                 self._keep(entry)
                 return entry.data, rebuilt(entry.problem, self._instrument, settings)
         data = settings.exclusions.without(self._data)
         data = thinned_orbit(data, self._data, settings.thin)
         if outliers is not None:
             data = of_rows(data, ~data.measurements.index.isin(outliers.index))
-        problem = self._of_fewer_rows(data, settings)
+        if noise is not None:
+            data = noise.applied(data)
+        problem = self._of_fewer_rows(data, settings, noise)
         if problem is None:
             problem = build_problem(data, self._instrument, settings)
-        self._keep(_Entry(settings.selection(), outliers, data, problem))
+        self._keep(_Entry(settings.selection(), outliers, noise, data, problem))
         return data, problem
 
-    def _of_fewer_rows(self, data: OrbitData, settings: FitSettings) -> Problem | None:
+    def _of_fewer_rows(
+        self, data: OrbitData, settings: FitSettings, noise: Noise | None
+    ) -> Problem | None:
         """Return the problem of some tables, made from that of a table with more rows."""
         for entry in self._entries:
+            if entry.noise is not noise:
+                continue
             rows = entry.data.measurements.index
             if not 0 < len(data.measurements) < len(rows) or not rows.is_unique:
                 continue

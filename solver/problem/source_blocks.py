@@ -151,6 +151,6 @@ def _columns_of(
 ) -> Int[np.ndarray, " touched"]:
     """Return the columns of the given exposures, and those that belong to no exposure."""
     is_touched = np.ones(layout.size, dtype=bool)
-    for group in PER_EXPOSURE:
+    for group in layout.on("exp"):
         is_touched[layout.columns(group)] = exposures
     return np.flatnonzero(is_touched)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from solver.data.parameters import CALIBRATION_GROUPS, Group
+from solver.data.parameters import PARAMETERS, Group
 
 # Minimum share of the eigenmode for a family of groups to be named.
 _MIN_SHARE = 0.09
@@ -72,7 +72,7 @@ def pattern(member: GroupShare) -> str:
     """
     moves = member.moves
     count, total = len(moves), float(moves @ moves)
-    if total <= 0.0 or member.group.axis == "coef":
+    if total <= 0.0 or member.group.is_term:
         return _NAMED
     if count * float(moves.mean()) ** 2 >= _MIN_COMMON * total:
         return "common"
@@ -111,9 +111,9 @@ def _family_pieces(members: list[GroupShare]) -> list[tuple[str, str]]:
 
 
 def _groups(kind: str, same_kind: list[GroupShare]) -> str:
-    first, *others = sorted(same_kind, key=lambda member: CALIBRATION_GROUPS.index(member.group))
+    first, *others = sorted(same_kind, key=lambda member: PARAMETERS.index(member.group))
     if kind == _NAMED:
-        stem = _family(first.group) if first.group.axis == "coef" else ""
+        stem = _family(first.group) if first.group.is_term else ""
         return f"{stem} {', '.join(map(_elements, (first, *others)))}".strip()
     text = first.group.label
     for member in others:
@@ -128,7 +128,7 @@ def _elements(member: GroupShare) -> str:
     largest = np.argsort(squares)[::-1]
     named = [i for i in largest if squares[i] >= _MIN_AMONG_SEVERAL * squares.sum()] or largest[:1]
     names = ", ".join(member.labels[i] for i in named)
-    return names if member.group.axis == "coef" else f"{member.group.label} of {names}"
+    return names if member.group.is_term else f"{member.group.label} of {names}"
 
 
 def _companions(pieces: list[tuple[str, str]]) -> list[str]:

@@ -6,7 +6,7 @@ from jaxtyping import Float
 
 from solver.data.eigenmode_schema import MODE_PARAMETERS, MODE_SHIFTS, MODES
 from solver.data.instrument import Instrument
-from solver.data.parameters import CALIBRATION_GROUPS, Axis, Group
+from solver.data.parameters import PARAMETERS, Axis, Group
 from solver.linear.source_elimination import ReducedSystem
 from solver.results.eigenmode_names import GroupShare, eigenmode_name
 from solver.results.eigenmodes import MAX_NAMED, Eigenmodes, find_eigenmodes
@@ -68,7 +68,7 @@ def _parameter_table(
 ) -> pd.DataFrame:
     problem, count = solution.problem, weak.shape[1]
     # The rows of the calibration table are ordered by group.
-    columns = np.concatenate([problem.layout.columns(group) for group in CALIBRATION_GROUPS])
+    columns = np.concatenate([problem.layout.columns(group) for group in problem.layout.groups])
     moves = weak[columns]
     squares = moves**2 * np.diag(solution.reduced.theta)[columns, None]
     prior_hessian = problem.priors.hessian_diagonal(solution.reduced.at[0])[columns, None]
@@ -117,7 +117,7 @@ def _name(rows: pd.DataFrame, places: dict[Axis, Float[np.ndarray, "n 2"]]) -> s
                 rows_of_group[group.name]["label"].tolist(),
                 places.get(group.axis),
             )
-            for group in CALIBRATION_GROUPS
+            for group in PARAMETERS
             if group.name in rows_of_group
         ]
     )
@@ -127,4 +127,4 @@ def _moves(group: Group, rows: pd.DataFrame) -> Float[np.ndarray, " n"]:
     """Return the moves of the elements of a group in comparable units."""
     move = rows["move"].to_numpy()
     # High distortion orders need larger coefficients for the same effect.
-    return np.sign(move) * np.sqrt(rows["share"].to_numpy()) if group.axis == "coef" else move
+    return np.sign(move) * np.sqrt(rows["share"].to_numpy()) if group.is_term else move

@@ -17,7 +17,6 @@ import numpy as np
 import scipy.linalg as sl
 from jaxtyping import Bool, Float
 
-from solver.data.parameters import CALIBRATION_GROUPS
 from solver.linear.source_elimination import ReducedSystem
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.priors import Priors
@@ -177,7 +176,7 @@ def _simple_axes(
 def _group_grams(
     vectors: Float[np.ndarray, "calib n"], layout: VectorLayout
 ) -> list[Float[np.ndarray, "n n"]]:
-    by_group = (vectors[layout.columns(group)] for group in CALIBRATION_GROUPS)
+    by_group = (vectors[layout.columns(group)] for group in layout.groups)
     return [rows.T @ rows for rows in by_group]
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 from jaxtyping import Float, Int
 
 from solver.data.instrument import Instrument
-from solver.data.parameters import CALIBRATION_GROUPS, Group
+from solver.data.parameter_group import Group
 from solver.data.schema import (
     CALIBRATION,
     EXPOSURES,
@@ -25,7 +25,6 @@ from solver.linear.leverage import Residuals, residuals
 from solver.linear.source_elimination import ReducedSystem
 from solver.model.astrometry import frames_at, sky_position
 from solver.model.directions import displaced
-from solver.model.distortion import terms
 from solver.model.ephemeris import observer_at
 from solver.problem.problem import Problem
 from solver.results.diagnostics import induced_shift
@@ -155,14 +154,14 @@ def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.Dat
     }
     pointing = _pointing(problem, theta)
     of_groups = []
-    for group in CALIBRATION_GROUPS:
+    for group in problem.layout.groups:
         columns = problem.layout.columns(group)
         centre = priors.centre[columns] / group.per_value_unit
         value = pointing.get(group.name, centre + theta[columns] / group.per_value_unit)
         values_by_name = {
             "group": np.full(len(columns), group.name),
             "element": np.arange(len(columns)),
-            "label": np.array(_labels(group, problem, instrument), dtype=object),
+            "label": np.array(_labels(group, problem), dtype=object),
             "value": value,
             "prior_centre": centre,
             "value_unit": np.full(len(columns), group.value_unit),
@@ -249,14 +248,10 @@ def _pointing(
     return {"pointing_ra": ra, "pointing_dec": dec}
 
 
-def _labels(group: Group, problem: Problem, instrument: Instrument) -> list[str]:
-    if group.axis == "exp":
-        rows = zip(problem.exposures["field_id"], problem.exposures["plate_id"], strict=True)
-        return [f"field {f} plate {p}" for f, p in rows]
-    if group.axis == "det":
-        return [f"detector {d.detector_id}" for d in instrument.detectors]
-    letter = group.symbol[0]
-    return [f"{letter}({k},{j})" for k, j in terms(problem.order)]
+def _labels(group: Group, problem: Problem) -> list[str]:
+    """Return the elements of a group in words; those of terms begin with A or B."""
+    letter = group.label[-1] if group.is_term else ""
+    return [letter + element.words for element in problem.elements[group.axis]]
 
 
 def _sigmas(covariance: Float[np.ndarray, "src 2 2"]) -> Float[np.ndarray, "src 2"]:

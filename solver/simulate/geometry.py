@@ -7,12 +7,13 @@ import pandas as pd
 from jaxtyping import Array, Float
 
 from solver.data.instrument import Instrument
-from solver.data.parameters import CALIBRATION_GROUPS, PARAMETERS
+from solver.data.parameters import CALIBRATION_GROUPS, SOURCES
 from solver.data.settings import FitSettings
 from solver.model.directions import tangent_frame
 from solver.model.distortion import terms
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry
+from solver.problem.elements import elements
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.prior_centres import calibration_centres
 from solver.simulate.placement import place_detectors
@@ -47,7 +48,9 @@ def true_geometry(
         focal_length=attitude["true_focal_length"],
     )
     placed = place_detectors(instrument, settings)
-    origin = calibration_centres(true_exposures, placed, layout, FitSettings(order=order))
+    nominal = FitSettings(order=order)
+    axes = elements(true_exposures, placed, nominal)
+    origin = calibration_centres(true_exposures, placed, layout, nominal, axes)
     for k, j, a, b in settings.distortion_um:
         origin["distortion_x"][terms(order).index((k, j))] = a
         origin["distortion_y"][terms(order).index((k, j))] = b
@@ -67,7 +70,7 @@ def zero_offsets(geometry: Geometry) -> dict[str, Float[Array, "..."]]:
     """Return offsets of zero for all parameter groups."""
     offsets = {name: jnp.zeros_like(values) for name, values in geometry.origin.items()}
     number = {"src": (len(geometry.source_frame), 2), "exp": (len(geometry.pointing_frame),)}
-    for group in PARAMETERS:
+    for group in (SOURCES, *CALIBRATION_GROUPS):
         if group.name not in offsets:
             offsets[group.name] = jnp.zeros(number[group.axis])
     return offsets

@@ -161,10 +161,10 @@ def test_parameter_group_is_fitted(tree, run_in):
     assert set(add("Add a parameter group", tree)) == GROUP_FILES
     (use,) = uses_in("Add a parameter group")
     printed = run_in(tree, "-c", use.text)
-    found, sigma = map(float, re.fullmatch(r"(\S+) ± (\S+) arcsec\n", printed).groups())
-    assert found == pytest.approx(5.0, abs=4.0 * sigma)
-    assert sigma < 4.0
-    assert "detector_skew" in run_in(tree, "-m", "plateviz.cli.main", "fit", "--help")
+    found, sigma = map(float, re.fullmatch(r"(\S+) ± (\S+) ppm\n", printed).groups())
+    assert found == pytest.approx(40.0, abs=4.0 * sigma)
+    assert sigma < 10.0
+    assert "detector_taper" in run_in(tree, "-m", "plateviz.cli.main", "fit", "--help")
 
 
 @pytest.mark.full
@@ -174,12 +174,12 @@ def test_group_on_exposures_is_fitted_and_published(tree, plateviz_in, workplace
     (block,) = blocks_in("Add a parameter group", "sh")
     (line,) = block.commands()
     assert json.loads(plateviz_in(tree, line, "--json"))["converged"]
-    calibration = Table.read(workplace / "ANISOTROPY.fits", "CALIBRATION")
-    rows = calibration[calibration["group"] == "focal_anisotropy"]
+    calibration = Table.read(workplace / "STRETCHED.fits", "CALIBRATION")
+    rows = calibration[calibration["group"] == "focal_stretch"]
     assert (rows["prior_sigma"] == 20.0).all()
     assert rows["prior_centre"][0] == 5.0
     assert (rows["sigma_marginal"] < 20.0).all()
-    telescope = Table.read(workplace / "ANISOTROPY.fits", "TELESCOPE")
+    telescope = Table.read(workplace / "STRETCHED.fits", "TELESCOPE")
     ratio = np.asarray(telescope["tel_f_loc_y"] / telescope["tel_f_loc_x"])
     np.testing.assert_allclose(1e6 * (ratio - 1.0), rows["value"], atol=1e-6)
 

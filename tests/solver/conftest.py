@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
-from solver.data.parameters import CALIBRATION_GROUPS, SOURCES
+from solver.data.parameters import SOURCES
 from solver.data.settings import FitSettings
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import find_mode
@@ -144,7 +144,7 @@ def dense_jacobian(problem, theta, sources):
     blocks = _dense_jacobian(offsets, unpadded(problem), problem.measurements.index)
     n_rows = 2 * problem.n_obs
     jacobian = np.zeros((n_rows, problem.layout.size + sources.size))
-    for group in CALIBRATION_GROUPS:
+    for group in problem.layout.groups:
         block = np.asarray(blocks[group.name])
         jacobian[:, problem.layout.columns(group)] = block.reshape(n_rows, -1)
     jacobian[:, problem.layout.size :] = np.asarray(blocks[SOURCES.name]).reshape(n_rows, -1)
@@ -162,7 +162,7 @@ def unpadded(problem):
             group.name: geometry.origin[group.name][:n_exp]
             if group.axis == "exp"
             else geometry.origin[group.name]
-            for group in CALIBRATION_GROUPS
+            for group in problem.layout.groups
             if group.name in geometry.origin
         },
         velocity=geometry.velocity[:n_exp],

@@ -16,7 +16,6 @@ from numpy.polynomial.legendre import legval, legval2d
 
 from solver.data.instrument import MINI_MOCK, Instrument
 from solver.data.orbit import OrbitData
-from solver.data.parameters import CALIBRATION_GROUPS
 
 FIRST_ID = 4_057_482_027_171_038_209
 ORBIT_ID = 7
@@ -389,7 +388,6 @@ def true_offsets(orbit, problem):
     order = pd.Index(orbit.data.catalogue["source_id"]).get_indexer(problem.sources["source_id"])
     sources = tangent_offsets(truth.ra[order], truth.dec[order], *prior, MAS)
     # A group that the truth has nothing of is true where its prior is centred.
-    zero = {
-        group.name: np.zeros(len(problem.layout.columns(group))) for group in CALIBRATION_GROUPS
-    }
+    layout = problem.layout
+    zero = {group.name: np.zeros(len(layout.columns(group))) for group in layout.groups}
     return problem.layout.gather({**zero, **values}), sources

@@ -30,7 +30,8 @@ from sphinx.util.docutils import SphinxDirective
 
 from plateviz.notebook.keywords import KEYWORDS
 from solver.data.columns import Column, Table
-from solver.data.parameters import PARAMETERS, Group
+from solver.data.parameter_group import Axis, Group
+from solver.data.parameters import PARAMETERS
 from solver.data.prior_text import format_width
 from solver.io import header
 from solver.io import published_layout as layout
@@ -39,7 +40,17 @@ from solver.io.published_layout import Derived, PublishedTable
 from solver.simulate.defects.defect import Defect
 from solver.simulate.defects.table import DEFECTS
 
-_AXES = {"src": "source", "exp": "exposure", "coef": "distortion term", "det": "detector"}
+_AXES: dict[Axis, str] = {
+    "src": "source",
+    "exp": "exposure",
+    "coef": "distortion term",
+    "drift": "term and degree in time",
+    "breathing": "term, cosine and sine",
+    "field": "term and field",
+    "own": "term and detector",
+    "det": "detector",
+    "motion": "detector and field",
+}
 _DERIVED: dict[str, Callable] = {
     "RESULT": lambda result: layout.source_sigmas(result.sources),
     "TELESCOPE": layout.exposure_columns,
@@ -113,11 +124,17 @@ def keywords(name: str) -> nodes.table:
 
 def parameters() -> nodes.table:
     """Return the parameter groups."""
-    headings = ("group", "in the paper", "one per", "unit", "default prior", "its centre")
+    headings = (
+        *("group", "symbol", "one per", "unit", "default prior", "its centre"),
+        "only with the setting",
+    )
     return table(
         headings,
         (
-            (f"`{g.name}`", g.symbol, _AXES[g.axis], _per_unit(g), _prior(g), _centre(g))
+            (
+                *(f"`{g.name}`", g.symbol, _AXES[g.axis], _per_unit(g), _prior(g), _centre(g)),
+                f"`{g.setting}`" if g.setting else "",
+            )
             for g in PARAMETERS
         ),
     )

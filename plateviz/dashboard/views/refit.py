@@ -1,5 +1,6 @@
 """RefitView: request fits and what-ifs of the orbit, show their progress, and cancel them."""
 
+from collections.abc import Callable, Iterable
 from html import escape
 
 import panel as pn
@@ -8,16 +9,15 @@ import panel_material_ui as pmui
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.stage import Stage
-from plateviz.dashboard.state import CONTROLS, FitChoices, default_widths
+from plateviz.dashboard.state import default_widths
 from plateviz.dashboard.views.code_window import code_button
+from plateviz.dashboard.views.fit_controls import TIGHT, controls, width_input
 from plateviz.dashboard.views.solution_window import SolutionWindow
-from solver.data.parameters import PARAMETERS, Group
+from solver.data.parameter_group import Group
+from solver.data.parameters import OPTIONAL_GROUPS, PARAMETERS
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
-from solver.data.settings import SETTINGS
-from solver.data.text_setting import LeftOut, PriorShifts, Texts
+from solver.data.text_setting import LeftOut, PriorShifts
 
-# Margin of a control close to the next one.
-_TIGHT = (0, 10)
 # Each picture of the moving bar takes time from a solver on the same machine; a what-if is over
 # before the bar moves.
 _UNHURRIED = {
@@ -53,11 +53,12 @@ class RefitView(pn.viewable.Viewer):
             pmui.Switch.from_param(
                 session.choices.param.what_if_at_once,
                 label="What-if at every change",
-                margin=_TIGHT,
+                margin=TIGHT,
             ),
-            *_controls(session.choices, Whole, Positive, Switch),
-            self._priors_card(),
-            *_controls(session.choices, LeftOut, Choice),
+            *controls(session.choices, Whole, Positive, Switch).values(),
+            self._card("Priors", self._fill_priors),
+            self._card("Causes of errors", self._fill_causes),
+            *controls(session.choices, LeftOut, Choice).values(),
             pmui.Row(self._fit, self._stop, sizing_mode="stretch_width", margin=0),
             self._bar,
             self._message,
@@ -89,9 +90,10 @@ class RefitView(pn.viewable.Viewer):
         self._show_stage()
         self._show_solutions()
 
-    def _priors_card(self) -> pmui.Card:
+    def _card(self, title: str, fill: Callable[[], list[pn.viewable.Viewable]]) -> pmui.Card:
+        """Return a closed card that is filled when it is opened: most people never open it."""
         card = pmui.Card(
-            title="Priors",
+            title=title,
             collapsed=True,
             sizing_mode="stretch_width",
             margin=(8, 10),
@@ -99,31 +101,41 @@ class RefitView(pn.viewable.Viewer):
             variant="outlined",
         )
 
-        def fill(*_: object) -> None:
-            if not self._widths:
-                self._widths = {group.name: self._width_input(group) for group in PARAMETERS}
-                shifts = _controls(self._session.choices, PriorShifts)
-                card[:] = [*self._widths.values(), *shifts, self._reset]
+        def opened(*_: object) -> None:
+            if not len(card.objects):
+                card[:] = fill()
 
-        # They are many; most people never open them.
-        card.param.watch(fill, "collapsed")
+        card.param.watch(opened, "collapsed")
         return card
 
-    def _width_input(self, group: Group) -> pmui.TextInput:
-        entry = pmui.TextInput(
-            label=f"{group.label} ({group.symbol})",
-            value=self._session.choices.prior_widths[group.name],
-            description=_explanation(group),
-            size="small",
-            sizing_mode="stretch_width",
-        )
+    def _fill_priors(self) -> list[pn.viewable.Viewable]:
+        widths = self._width_inputs(group for group in PARAMETERS if not group.setting)
+        shifts = controls(self._session.choices, PriorShifts).values()
+        return [*widths, *shifts, self._reset]
 
-        def take(event: object) -> None:
-            widths = self._session.choices.prior_widths
-            self._session.choices.prior_widths = {**widths, group.name: event.new}  # type: ignore[attr-defined]
+    def _fill_causes(self) -> list[pn.viewable.Viewable]:
+        """Return the controls of the causes, each followed by the priors of its groups."""
+        choices, filled = self._session.choices, []
+        for name, control in controls(choices, Setting, is_cause=True).items():
+            widths = self._width_inputs(group for group in OPTIONAL_GROUPS if group.setting == name)
+            filled += [control, *widths]
+            self._show_if_on(name, widths)
+        return filled
 
-        entry.param.watch(take, "value")
-        return entry
+    def _show_if_on(self, name: str, widths: list[pmui.TextInput]) -> None:
+        """Show the prior widths of a cause while its setting is on."""
+
+        def show(*_: object) -> None:
+            for entry in widths:
+                entry.visible = bool(getattr(self._session.choices, name))
+
+        self._session.choices.param.watch(show, name)
+        show()
+
+    def _width_inputs(self, groups: Iterable[Group]) -> list[pmui.TextInput]:
+        inputs = {group.name: width_input(self._session.choices, group) for group in groups}
+        self._widths |= inputs
+        return list(inputs.values())
 
     def _reset_priors(self, _: object) -> None:
         self._session.choices.param.update(prior_widths=default_widths(), prior_shifts="")
@@ -163,59 +175,3 @@ class RefitView(pn.viewable.Viewer):
         chosen = event.new  # type: ignore[attr-defined]
         if isinstance(chosen, Solution):
             self._session.bring_up(chosen)
-
-
-def _control(choices: FitChoices, name: str) -> pn.viewable.Viewable:
-    """Return the control of a setting."""
-    one, parameter = SETTINGS[name], choices.param[name]
-    if isinstance(one, Switch):
-        return pmui.Switch.from_param(parameter, label=one.label, margin=_TIGHT)
-    if isinstance(one, Whole) and one.high is None:
-        return pmui.IntInput.from_param(
-            parameter,
-            label=one.label,
-            description=one.help,
-            size="small",
-            sizing_mode="stretch_width",
-        )
-    if isinstance(one, Whole):
-        return pmui.IntSlider.from_param(parameter, label=one.label, sizing_mode="stretch_width")
-    if isinstance(one, Positive):
-        return pmui.FloatInput.from_param(
-            parameter,
-            label=f"{one.label} ({one.unit})" if one.unit else one.label,
-            description=one.help,
-            size="small",
-            sizing_mode="stretch_width",
-        )
-    if isinstance(one, Choice):
-        return pmui.Select.from_param(
-            parameter, label=one.label, size="small", sizing_mode="stretch_width"
-        )
-    return pmui.TextInput.from_param(
-        parameter,
-        label=one.label,
-        placeholder=one.example if isinstance(one, Texts) else "",
-        description=one.help,
-        size="small",
-        sizing_mode="stretch_width",
-    )
-
-
-def _controls(choices: FitChoices, *kinds: type[Setting]) -> list[pn.viewable.Viewable]:
-    """Return the controls of the settings of some kinds, in the order of the kinds."""
-    return [
-        _control(choices, name)
-        for kind in kinds
-        for name, one in CONTROLS.items()
-        if isinstance(one, kind)
-    ]
-
-
-def _explanation(group: Group) -> str:
-    """Return the tooltip of the control of a prior width."""
-    if group.axis == "src":
-        return "Factor on the catalogue's own uncertainties."
-    if group.relative:
-        return "Standard deviation as a fraction of the nominal value, or flat."
-    return f"Standard deviation in {group.unit} or another unit that is given, or flat."

@@ -1,8 +1,16 @@
 import numpy as np
 import pytest
 
-from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS, PARAMETERS, Group, groups_on
+from solver.data.parameters import (
+    BY_NAME,
+    CALIBRATION_GROUPS,
+    OPTIONAL_GROUPS,
+    PARAMETERS,
+    Group,
+    groups_on,
+)
 from solver.data.prior_text import format_shift, format_width, parse_shift, parse_width
+from solver.data.settings import SETTINGS, FitSettings
 from solver.units import factor_between
 
 
@@ -11,12 +19,20 @@ def test_names_are_unique():
 
 
 def test_every_group_but_the_sources_is_calibration():
-    assert {g.name for g in PARAMETERS} - {g.name for g in CALIBRATION_GROUPS} == {"sources"}
+    named = {g.name for g in (*CALIBRATION_GROUPS, *OPTIONAL_GROUPS)}
+    assert {g.name for g in PARAMETERS} - named == {"sources"}
+
+
+def test_optional_groups_are_those_of_a_setting():
+    assert all(g.setting in SETTINGS and SETTINGS[g.setting].is_cause for g in OPTIONAL_GROUPS)
+    assert not FitSettings().optional_groups
+    assert {g.name for g in FitSettings(drift=2).optional_groups} == {"drift_x", "drift_y"}
 
 
 def test_every_group_is_on_one_axis():
     axes = [groups_on(axis) for axis in ("src", "exp", "coef", "det")]
-    assert sorted(g.name for groups in axes for g in groups) == sorted(BY_NAME)
+    optional = {g.name for g in OPTIONAL_GROUPS}
+    assert sorted(g.name for groups in axes for g in groups) == sorted(set(BY_NAME) - optional)
 
 
 @pytest.mark.parametrize(
@@ -49,8 +65,8 @@ def test_focal_length_width_is_a_hundred_um_per_degree():
 
 @pytest.mark.parametrize("group", PARAMETERS, ids=lambda g: g.name)
 def test_value_unit_is_converted(group):
-    factors = {"mas": 3.6e6, "arcsec": 3600.0, "um": 1.0}
-    assert group.per_value_unit == factors[group.unit]
+    factors = {("mas", "deg"): 3.6e6, ("arcsec", "deg"): 3600.0}
+    assert group.per_value_unit == factors.get((group.unit, group.value_unit), 1.0)
 
 
 @pytest.mark.parametrize("group", PARAMETERS, ids=lambda g: g.name)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpyro.infer.util import log_density
 
-from solver.data.parameters import PARAMETERS, SOURCES
+from solver.data.parameters import SOURCES
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import objective
 from solver.engines.numpyro_model import (
@@ -44,7 +44,7 @@ def test_density_equals_that_of_the_posterior(small_orbit, expansion_point, widt
 
 
 def test_every_group_has_a_site(problem):
-    names = {group.name for group in PARAMETERS}
+    names = {group.name for group in (SOURCES, *problem.layout.groups)}
     values = {**problem.layout.scatter(np.zeros(problem.layout.size))}
     values[SOURCES.name] = np.zeros((problem.n_src, 2))
     trace = log_density(plate_analysis, (evidence_of(problem),), {}, values)[1]

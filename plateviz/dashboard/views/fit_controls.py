@@ -1,0 +1,94 @@
+"""Controls of the settings of a fit, made from the table of settings and that of parameters."""
+
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.dashboard.state import CONTROLS, FitChoices
+from solver.data.parameter_group import Group
+from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
+from solver.data.settings import SETTINGS
+from solver.data.text_setting import Texts
+
+# Margin of a control close to the next one.
+TIGHT = (0, 10)
+
+
+def controls(
+    choices: FitChoices, *kinds: type[Setting], is_cause: bool = False
+) -> dict[str, pn.viewable.Viewable]:
+    """Return the controls of the settings of some kinds, in the order of the kinds, by name.
+
+    Parameters
+    ----------
+    is_cause : whether the settings add causes to the model
+    """
+    return {
+        name: _control(choices, name)
+        for kind in kinds
+        for name, one in CONTROLS.items()
+        if isinstance(one, kind) and one.is_cause == is_cause
+    }
+
+
+def width_input(choices: FitChoices, group: Group) -> pmui.TextInput:
+    """Return the control of the prior width of a group."""
+    entry = pmui.TextInput(
+        label=f"{group.label} ({group.symbol})",
+        value=choices.prior_widths[group.name],
+        description=_explanation(group),
+        size="small",
+        sizing_mode="stretch_width",
+    )
+
+    def take(event: object) -> None:
+        widths = choices.prior_widths
+        choices.prior_widths = {**widths, group.name: event.new}  # type: ignore[attr-defined]
+
+    entry.param.watch(take, "value")
+    return entry
+
+
+def _control(choices: FitChoices, name: str) -> pn.viewable.Viewable:
+    """Return the control of a setting."""
+    one, parameter = SETTINGS[name], choices.param[name]
+    if isinstance(one, Switch):
+        return pmui.Switch.from_param(parameter, label=one.label, margin=TIGHT)
+    if isinstance(one, Whole) and one.high is None:
+        return pmui.IntInput.from_param(
+            parameter,
+            label=one.label,
+            description=one.help,
+            size="small",
+            sizing_mode="stretch_width",
+        )
+    if isinstance(one, Whole):
+        return pmui.IntSlider.from_param(parameter, label=one.label, sizing_mode="stretch_width")
+    if isinstance(one, Positive):
+        return pmui.FloatInput.from_param(
+            parameter,
+            label=f"{one.label} ({one.unit})" if one.unit else one.label,
+            description=one.help,
+            size="small",
+            sizing_mode="stretch_width",
+        )
+    if isinstance(one, Choice):
+        return pmui.Select.from_param(
+            parameter, label=one.label, size="small", sizing_mode="stretch_width"
+        )
+    return pmui.TextInput.from_param(
+        parameter,
+        label=one.label,
+        placeholder=one.example if isinstance(one, Texts) else "",
+        description=one.help,
+        size="small",
+        sizing_mode="stretch_width",
+    )
+
+
+def _explanation(group: Group) -> str:
+    """Return the tooltip of the control of a prior width."""
+    if group.axis == "src":
+        return "Factor on the catalogue's own uncertainties."
+    if group.relative:
+        return "Standard deviation as a fraction of the nominal value, or flat."
+    return f"Standard deviation in {group.unit} or another unit that is given, or flat."

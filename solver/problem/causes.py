@@ -1,0 +1,126 @@
+"""Inputs of the optional parameter groups: functions of time, field and detector as arrays."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+from numpy.polynomial import legendre
+
+from solver.data.instrument import Instrument
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+from solver.model.causes import Causes, TermFamily
+from solver.problem.elements import field_numbers
+from solver.problem.padding import pad
+
+_MINUTES_PER_DAY = 1440.0
+# Magnitude at which a shift by magnitude has the size of its parameter.
+REFERENCE_MAGNITUDE = 17.0
+
+
+def causes_of(
+    exposures: pd.DataFrame, sources: pd.DataFrame, instrument: Instrument, settings: FitSettings
+) -> Causes | None:
+    """Return the inputs of the causes that the settings include, or None if they include none.
+
+    Raises
+    ------
+    InputError
+        If no source has a magnitude and the settings need it.
+    """
+    if not settings.optional_groups:
+        return None
+    field, n_det = field_numbers(exposures), len(instrument.detectors)
+    n_moved = max(int(field.max()), 1)
+    moves = np.repeat((field > 0).astype(float)[:, None], n_det, axis=1)
+    return Causes(
+        families=_families(exposures, instrument, settings),
+        element=n_moved * np.arange(n_det) + np.maximum(field - 1, 0)[:, None],
+        moves=moves,
+        faintness=_faintness(sources, settings),
+        pixels=np.array([(d.n_x, d.n_y) for d in instrument.detectors], dtype=float),
+    )
+
+
+def _families(
+    exposures: pd.DataFrame, instrument: Instrument, settings: FitSettings
+) -> tuple[TermFamily, ...]:
+    """Return the families in the order of `parameter_group.TERM_AXES`."""
+    n_exp, n_det = len(exposures), len(instrument.detectors)
+    field = field_numbers(exposures)
+    time = exposures["obstime"].to_numpy()
+    angle = 2.0 * np.pi * _MINUTES_PER_DAY * (time - _middle(time)) / settings.breathing_period
+    by_exposure = {
+        "drift": (settings.drift, _polynomials(time, settings.drift_in_time)),
+        "breathing": (settings.breathing, np.array([np.cos(angle), np.sin(angle)])),
+        "field_distortion": (
+            settings.field_distortion,
+            (field == np.arange(1, field.max() + 1)[:, None]).astype(float),
+        ),
+    }
+    centre, scale = np.zeros((n_det, 2)), np.full(n_det, instrument.distortion_scale_um)
+    found = [
+        TermFamily(name, order, np.repeat(factor[:, :, None], n_det, axis=2), centre, scale)
+        for name, (order, factor) in by_exposure.items()
+        if order
+    ]
+    if settings.detector_distortion:
+        factor = np.repeat(np.eye(n_det)[:, None], n_exp, axis=1)
+        own = [(d.x_um, d.y_um) for d in instrument.detectors]
+        half = [0.5 * max(d.n_x * d.pitch_x_um, d.n_y * d.pitch_y_um) for d in instrument.detectors]
+        found.append(
+            TermFamily(
+                "own_distortion",
+                settings.detector_distortion,
+                factor,
+                np.array(own, dtype=float),
+                np.array(half, dtype=float),
+            )
+        )
+    return tuple(found)
+
+
+def _polynomials(time: Float[np.ndarray, " exp"], degree: int) -> Float[np.ndarray, "degree exp"]:
+    """Return the Legendre polynomials of degree one and more in the time since the middle.
+
+    The time is scaled to -1 at the first exposure and 1 at the last.
+    """
+    half = max(0.5 * float(np.ptp(time)), 1e-9)
+    scaled = (time - _middle(time)) / half
+    return legendre.legvander(scaled, degree)[:, 1:].T.copy()
+
+
+def _middle(time: Float[np.ndarray, " exp"]) -> float:
+    """Return the time halfway between the first and the last exposure."""
+    return 0.5 * float(time.min() + time.max())
+
+
+def _faintness(sources: pd.DataFrame, settings: FitSettings) -> Float[np.ndarray, " src"]:
+    """Return flux^(-1/2) of the sources, zero without a magnitude."""
+    if not (settings.magnitude_shift or settings.charge_transfer):
+        return np.zeros(len(sources))
+    magnitude = (
+        sources["magnitude"].to_numpy(dtype=float) if "magnitude" in sources else np.array([])
+    )
+    if not np.isfinite(magnitude).any():
+        raise InputError(
+            "shift by magnitude: expected a column magnitude in the catalogue, found none"
+        )
+    return np.nan_to_num(10.0 ** (0.2 * (magnitude - REFERENCE_MAGNITUDE)))
+
+
+def padded(causes: Causes, sizes: Mapping[str, int]) -> Causes:
+    """Return the inputs of the causes padded along exp and src."""
+    families = (
+        replace(family, factor=pad(family.factor.swapaxes(0, 1), "exp", sizes).swapaxes(0, 1))
+        for family in causes.families
+    )
+    return replace(
+        causes,
+        families=tuple(families),
+        element=pad(causes.element, "exp", sizes),
+        moves=pad(causes.moves, "exp", sizes),
+        faintness=pad(causes.faintness, "src", sizes),
+    )

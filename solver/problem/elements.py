@@ -1,0 +1,78 @@
+"""Elements: the elements of every calibration axis of an orbit under given settings, in order."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Int
+
+from solver.data.instrument import Instrument
+from solver.data.parameter_group import Axis
+from solver.data.settings import FitSettings
+from solver.model.distortion import terms
+
+
+class Element(NamedTuple):
+    """One element of an axis: its name in settings, and its words in labels.
+
+    The words of a distortion term follow the letter of its direction, "A" or "B".
+    """
+
+    name: str
+    words: str
+
+
+Elements = dict[Axis, list[Element]]
+
+
+def elements(exposures: pd.DataFrame, instrument: Instrument, settings: FitSettings) -> Elements:
+    """Return the elements of all axes; an axis that the fit has no groups on has none.
+
+    Parameters
+    ----------
+    exposures : in order of (field_id, plate_id)
+    """
+    plates = list(zip(exposures["field_id"], exposures["plate_id"], strict=True))
+    detectors = [str(detector.detector_id) for detector in instrument.detectors]
+    later = [str(field) for field in np.unique(exposures["field_id"])[1:]]
+    times = [Element(f"t{k}", "t" if k == 1 else f"t^{k}") for k in _degrees(settings)]
+    phases = [Element("cos", "cos"), Element("sin", "sin")]
+    motions = [(d, f) for d in detectors for f in later] if settings.detector_motion else []
+    return {
+        "exp": [
+            Element(f"{field}/{plate}", f"field {field} plate {plate}") for field, plate in plates
+        ],
+        "coef": _terms(settings.order),
+        "drift": _products(settings.drift, times),
+        "breathing": _products(settings.breathing, phases),
+        "field": _products(settings.field_distortion, _called("field", later)),
+        "own": _products(settings.detector_distortion, _called("detector", detectors)),
+        "det": _called("detector", detectors),
+        "motion": [Element(f"{d}/{f}", f"detector {d} field {f}") for d, f in motions],
+    }
+
+
+def field_numbers(exposures: pd.DataFrame) -> Int[np.ndarray, " exp"]:
+    """Return the number of the field of each exposure, from 0."""
+    return np.unique(exposures["field_id"].to_numpy(), return_inverse=True)[1]
+
+
+def _degrees(settings: FitSettings) -> range:
+    return range(1, settings.drift_in_time + 1)
+
+
+def _terms(order: int) -> list[Element]:
+    return [Element(f"{k}/{j}", f"({k},{j})") for k, j in terms(order)]
+
+
+def _called(word: str, names: list[str]) -> list[Element]:
+    return [Element(name, f"{word} {name}") for name in names]
+
+
+def _products(order: int, functions: list[Element]) -> list[Element]:
+    """Return the terms of each function: those of a function are adjacent."""
+    return [
+        Element(f"{term.name}/{function.name}", f"{term.words} {function.words}")
+        for function in functions
+        for term in _terms(order)
+    ]

@@ -1,0 +1,19 @@
+"""Padding of arrays to a few fixed shapes, because JAX compiles once for each shape."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Shaped
+
+
+def pad(
+    values: Shaped[np.ndarray, "n ..."], axis: str, sizes: Mapping[str, int]
+) -> Shaped[np.ndarray, "m ..."]:
+    """Return `values` padded to the size of their axis, if `sizes` has one for it.
+
+    No measurement depends on the padding, which repeats the last row; added coefficients are
+    zero, because they act on all measurements.
+    """
+    missing = max(sizes.get(axis, 0) - len(values), 0)
+    padding = np.zeros(missing) if axis == "coef" else np.repeat(values[-1:], missing, axis=0)
+    return np.concatenate([values, padding])

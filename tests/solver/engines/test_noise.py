@@ -1,0 +1,92 @@
+"""The noise model of the measurements and the reference stars, on small orbits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+from solver.fit import OrbitFitter, fit_orbit
+from tests.solver.small_orbit import make_orbit
+
+
+def understated(data, factor):
+    """Return the tables with stated uncertainties too small by a factor of each measurement."""
+    rows = data.measurements
+    return replace(data, measurements=rows.assign(sx=rows["sx"] / factor, sy=rows["sy"] / factor))
+
+
+def factor_of(result, name):
+    """Return an estimated factor, and the uncertainty of its logarithm."""
+    noise = result.summary["noise"]
+    assert noise["converged"]
+    return np.exp(noise["log_factor"][name]), noise["sigma"][name]
+
+
+def test_scale_of_the_noise_is_recovered_and_applied(small_orbit):
+    data = understated(small_orbit.data, 3.0)
+    fitter = OrbitFitter(data, small_orbit.instrument)
+    result = fitter.fit(FitSettings(noise_scale=True))
+    factor, sigma = factor_of(result, "all")
+    assert np.log(factor / 3.0) == pytest.approx(0.0, abs=4.0 * sigma)
+    assert result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=1e-3)
+    # The result states the estimated uncertainties; those of the given tables are as they were.
+    stated = data.measurements["sx"].to_numpy()
+    np.testing.assert_allclose(result.residuals["sx"].to_numpy(), factor * stated)
+    assert fit_orbit(data, small_orbit.instrument).summary["chi2_per_dof"] > 7.0
+    # A what-if keeps the noise model of its fit.
+    what_if = fitter.what_if(FitSettings(noise_scale=True, prior_widths={"pitch_x": 0.005}))
+    assert what_if.summary["noise"] == result.summary["noise"]
+    assert what_if.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_noise_of_each_exposure_is_recovered(small_orbit):
+    data = small_orbit.data
+    true = 1.0 + 2.0 * (data.measurements["plate_id"] == 1).to_numpy()
+    result = fit_orbit(
+        understated(data, true), small_orbit.instrument, FitSettings(noise_by_exposure=True)
+    )
+    for exposure in data.exposures.itertuples():
+        name = f"exposure {exposure.field_id}/{exposure.plate_id}"
+        factor, sigma = factor_of(result, name)
+        expected = 3.0 if exposure.plate_id == 1 else 1.0
+        assert np.log(factor / expected) == pytest.approx(0.0, abs=4.0 * sigma)
+
+
+def test_noise_by_magnitude_is_recovered(small_orbit):
+    data = small_orbit.data
+    magnitude = np.random.default_rng(0).uniform(10.0, 19.0, len(data.catalogue))
+    catalogue = data.catalogue.assign(magnitude=magnitude)
+    of_row = catalogue.set_index("source_id")["magnitude"][data.measurements["source_id"]]
+    true = np.exp(0.2 * (of_row.to_numpy() - 14.0))
+    given = replace(understated(data, true), catalogue=catalogue)
+    result = fit_orbit(given, small_orbit.instrument, FitSettings(noise_by_magnitude=True))
+    factor, sigma = factor_of(result, "per magnitude")
+    assert np.log(factor) == pytest.approx(0.2, abs=4.0 * sigma)
+    assert sigma < 0.02
+
+
+@pytest.mark.full
+def test_scale_of_the_reference_errors_is_recovered():
+    logarithms = []
+    for seed in range(3):
+        orbit = make_orbit(seed=seed)
+        catalogue = orbit.data.catalogue
+        errors = {name: 0.2 * catalogue[name] for name in catalogue if name.endswith("_error")}
+        data = replace(orbit.data, catalogue=catalogue.assign(**errors))
+        settings = FitSettings(reference_scale=True)
+        result = fit_orbit(data, orbit.instrument, settings)
+        factor, sigma = factor_of(result, "references")
+        logarithms.append(np.log(factor / 5.0) / sigma)
+        is_reference = result.sources["is_reference"].to_numpy()
+        before = fit_orbit(data, orbit.instrument).sources
+        ratio = result.sources["prior_sigma_ra"] / before["prior_sigma_ra"]
+        np.testing.assert_allclose(ratio[is_reference], factor, rtol=1e-6)
+        np.testing.assert_allclose(ratio[~is_reference], 1.0)
+    assert np.abs(logarithms).max() < 4.0
+
+
+def test_noise_by_magnitude_needs_magnitudes(small_orbit):
+    with pytest.raises(InputError, match="expected a column magnitude in the catalogue"):
+        fit_orbit(small_orbit.data, small_orbit.instrument, FitSettings(noise_by_magnitude=True))

@@ -1,0 +1,162 @@
+"""A fit that models a cause recovers its truth, and its uncertainties hold again."""
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from solver.data.instrument import MINI_MOCK
+from solver.data.orbit import OrbitData
+from solver.data.settings import FitSettings
+from solver.fit import fit_orbit
+from solver.simulate.catalogue import reference_catalogue, truth_catalogue
+from solver.simulate.defects.defect import Case
+from solver.simulate.measure import measure_orbit
+from tests.campaigns.defects import SETTINGS, pulls
+
+pytestmark = pytest.mark.full
+
+SEED = 0
+# Five times the amplitudes at which the pulls are 1.1, and how the fit models them.
+CAUSES = {
+    "focal-anisotropy": ("20ppm", {"focal_anisotropy": True}),
+    "distortion-drift": ("0.43um", {"drift": 2}),
+    "distortion-orbital": ("0.63um", {"breathing": 2}),
+    "distortion-step": ("0.34um", {"field_distortion": 3}),
+    "charge-transfer": ("12mpix", {"charge_transfer": True}),
+    "pixel-phase": ("29mpix", {"pixel_phase": True}),
+}
+
+
+@cache
+def orbit(*defects):
+    """Return a sparse orbit with defects."""
+    settings = replace(SETTINGS, seed=SEED, defects=defects)
+    truth = truth_catalogue(settings)
+    measured = measure_orbit(0, truth, settings)
+    used = truth["source_id"].isin(measured.measurements["source_id"])
+    catalogue = reference_catalogue(truth, settings)
+    tables = (table[used].reset_index(drop=True) for table in (catalogue, truth))
+    return OrbitData(measured.measurements, measured.exposures, *tables)
+
+
+def pull_of(result):
+    """Return the rms pull of the non-reference sources with many measurements."""
+    return float(np.sqrt(np.mean(pulls(result.sources, result.true_places) ** 2)))
+
+
+def deviations(result, group, truth):
+    """Return the deviations of a group from the truth in marginal sigmas."""
+    rows = result.calibration[result.calibration["group"] == group]
+    return (rows["offset"].to_numpy() - truth) / rows["sigma_marginal"].to_numpy()
+
+
+def true_terms(name, amplitude, degree):
+    """Return the coefficients of a defect of the distortion, x and y in rows, um."""
+    # The same numbers as the simulator's, which are those of the survey.
+    case = Case(name, amplitude, replace(SETTINGS, seed=SEED))
+    found = case.survey_rng().standard_normal((degree + 1, 2))
+    return (amplitude * found / np.linalg.norm(found)).T
+
+
+def truth_of(name, amplitude, exposures):
+    """Return group -> true values of a defect."""
+    if name == "focal-anisotropy":
+        case = Case(name, 1e-6 * amplitude, replace(SETTINGS, seed=SEED))
+        return {
+            "focal_anisotropy": 1e6
+            * case.amplitude
+            * case.orbit_rng().standard_normal(len(exposures))
+        }
+    if name == "distortion-drift":
+        # From -1/2 to 1/2 over the orbit; the polynomial of first degree goes from -1 to 1.
+        x, y = 0.5 * true_terms(name, amplitude, 2)
+        return {"drift_x": x, "drift_y": y}
+    if name == "distortion-step":
+        # Degree two does not change, nor does the second of the four fields.
+        still = np.zeros(3)
+        x, y = (
+            np.concatenate([np.zeros(7), *[np.r_[still, cubic]] * 2])
+            for cubic in true_terms(name, amplitude, 3)
+        )
+        return {"field_distortion_x": x, "field_distortion_y": y}
+    if name == "charge-transfer":
+        return {"charge_transfer_x": 0.0, "charge_transfer_y": amplitude}
+    if name == "pixel-phase":
+        one = dict.fromkeys(("phase_sine_x", "phase_sine_y"), amplitude)
+        return one | dict.fromkeys(("phase_cosine_x", "phase_cosine_y"), 0.0)
+    return {}
+
+
+@pytest.mark.parametrize("name", CAUSES)
+def test_modelled_cause_is_recovered(name):
+    text, modelled = CAUSES[name]
+    data = orbit(f"{name}={text}")
+    assert pull_of(fit_orbit(data)) > 2.0
+    result = fit_orbit(data, settings=FitSettings(**modelled))
+    assert result.summary["converged"]
+    assert result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.015)
+    # The rms of some 2,600 pulls is uncertain by 0.014.
+    assert pull_of(result) == pytest.approx(1.0, abs=0.03)
+    amplitude = float(re.match(r"[\d.]+", text)[0])
+    for group, truth in truth_of(name, amplitude, data.exposures).items():
+        found = deviations(result, group, truth)
+        assert np.abs(found).max() < 4.0, group
+        assert np.sqrt(np.mean(found**2)) < 2.0, group
+
+
+def test_phase_of_the_breathing_is_recovered():
+    text, modelled = CAUSES["distortion-orbital"]
+    result = fit_orbit(orbit(f"distortion-orbital={text}"), settings=FitSettings(**modelled))
+    terms = true_terms("distortion-orbital", float(text.rstrip("um")), 2)
+    rows = result.calibration.set_index("group")["offset"]
+    found = np.stack([rows["breathing_x"], rows["breathing_y"]]).reshape(2, 2, 3)
+    amplitude = np.hypot(found[:, 0], found[:, 1])
+    np.testing.assert_allclose(amplitude, np.abs(terms), atol=0.05)
+
+
+def test_detectors_that_move_between_fields_are_recovered():
+    data, shift_um, turn = orbit(), np.array([0.3, -0.4]), np.radians(4.0 / 3600.0)
+    rows = data.measurements.copy()
+    detector = MINI_MOCK.detectors[1]
+    moved = (rows["field_id"] >= 2) & (rows["detector_id"] == detector.detector_id)
+    pixel = rows.loc[moved, ["nx", "ny"]].to_numpy()
+    # The detector moves, so that the star moves back on it.
+    back = pixel - shift_um / (detector.pitch_x_um, detector.pitch_y_um)
+    c, s = np.cos(turn), np.sin(turn)
+    rows.loc[moved, ["nx", "ny"]] = back @ np.array([(c, s), (-s, c)])
+    moving = replace(data, measurements=rows)
+    assert pull_of(fit_orbit(moving)) > 1.3
+    result = fit_orbit(moving, settings=FitSettings(detector_motion=True))
+    assert pull_of(result) == pytest.approx(1.0, abs=0.03)
+    # Detectors by fields 1, 2, 3.
+    truth = np.zeros((4, 3))
+    truth[1, 1:] = 1.0
+    for group, value in (
+        ("detector_motion_x", shift_um[0]),
+        ("detector_motion_y", shift_um[1]),
+        ("detector_turn", 4.0),
+    ):
+        found = deviations(result, group, value * truth.ravel())
+        assert np.abs(found).max() < 4.0, group
+
+
+def test_own_distortion_of_detectors_stands_for_a_higher_order():
+    """The distortion is of order 5; a fit of order 3 needs the detectors' own terms."""
+    data = orbit()
+    results = [
+        fit_orbit(data, settings=FitSettings(order=3, detector_distortion=own)) for own in (0, 3)
+    ]
+    without, modelled = (error_of(result) for result in results)
+    assert without > 3.0
+    assert modelled < 1.6
+
+
+def error_of(result):
+    """Return the rms error of the non-reference sources in one coordinate, mas."""
+    rows = result.sources.merge(result.true_places, on="source_id", suffixes=("", "_true"))
+    rows = rows[~rows["is_reference"] & (rows["n_obs"] >= 10)]
+    ra = (rows["ra"] - rows["ra_true"]) * np.cos(np.radians(rows["dec"]))
+    return float(3.6e6 * np.sqrt(0.5 * np.mean(ra**2 + (rows["dec"] - rows["dec_true"]) ** 2)))

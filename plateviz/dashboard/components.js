@@ -5,6 +5,8 @@
 // the one around it, and each time the browser has to work out where everything is. Here containers
 // wait for the next picture of the screen, and are laid out together: those that are in another one
 // with it, except for cards, which have layouts of their own (see `own_layout.py`).
+//
+// A table follows its model from when it is drawn.
 
 // The loader of components sends the event a second time.
 document.addEventListener("DOMContentLoaded", () => {
@@ -22,17 +24,21 @@ document.addEventListener("DOMContentLoaded", () => {
   const { compute_layout, invalidate_layout } = views
   // View -> whether its style sheets have to be written before.
   const waiting = new Map()
-  const isCovered = view => {
+  const isCovered = (view, among) => {
     while (!view.has_own_layout && (view = view.parent) != null)
-      if (waiting.has(view)) return true
+      if (among.has(view)) return true
     return false
   }
   const layOut = () => {
-    const found = [...waiting].filter(([view]) => !view.is_destroyed && !isCovered(view))
+    const found = [...waiting.keys()].filter(view => !view.is_destroyed)
+    const written = new Set(found.filter(view => waiting.get(view)))
+    const laidOut = new Set(found)
     waiting.clear()
-    // The browser works out the places once, after the last change of a style sheet.
-    for (const [view, isNew] of found) if (isNew) view.write_layout()
-    for (const [view] of found) {
+    // The browser works out the places once, after the last change of a style sheet. The part of a
+    // container may be new although the container is not.
+    for (const view of written) if (!isCovered(view, written)) view.write_layout()
+    for (const view of laidOut) {
+      if (isCovered(view, laidOut)) continue
       view.compute_layout_now()
       view.notify_finished()
     }
@@ -50,5 +56,17 @@ document.addEventListener("DOMContentLoaded", () => {
   views.invalidate_layout = function () {
     if (this.is_managed) invalidate_layout.call(this)
     else wait(this, true)
+  }
+
+  // A table that is not drawn yet takes what it shows when it is; Panel would change it before.
+  const table = Bokeh.Models.get("panel.models.tabulator.DataTabulator").prototype.default_view
+  const { connect_signals, render } = table.prototype
+  table.prototype.connect_signals = function () {}
+  table.prototype.render = function () {
+    if (!this.is_following) {
+      this.is_following = true
+      connect_signals.call(this)
+    }
+    return render.call(this)
   }
 }, { once: true })

@@ -216,9 +216,8 @@ class Navigation(param.Parameterized):
         """Let the orbit of the run be read ahead that is likely to be asked for next."""
         selection, shown = self.session.selection, self.session.shown
         run = self._runs.get(shown.run) if shown is not None else None
-        orbit = self._next_orbit.after(selection.orbit, selection.param["orbit"].objects)
-        if run is not None and orbit is not None:
-            run.expect(orbit)
+        if run is not None:
+            run.expect(self._next_orbit.after(selection.orbit, selection.param["orbit"].objects))
 
     def find_source(self, text: str) -> None:
         """Search the run for a source by its id as text."""

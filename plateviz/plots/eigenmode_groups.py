@@ -123,7 +123,7 @@ DIAGNOSTICS = (
         84,
         _plot_groups,
         is_wide=True,
-        least_height=460,
+        least_height=450,
         equation=(
             "move = v with vᵀ S v = 1, one sigma long; share = Σ (v / σ(conditional))² "
             "of the group over that of all groups"

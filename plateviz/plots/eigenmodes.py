@@ -222,7 +222,7 @@ DIAGNOSTICS = (
         83,
         _plot_deciders,
         is_wide=True,
-        least_height=460,
+        least_height=450,
         equation=(
             "shares of vᵀ S v: of measurements, reference sources, other sources and "
             "priors of the calibration; they add up to 1"

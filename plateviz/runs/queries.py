@@ -183,9 +183,9 @@ class SurveyRun:
         read = read_fitted_orbit if self._cache is None else self._cache.read
         return read(self._run.orbit_directory(orbit))
 
-    def expect(self, orbit: int) -> None:
+    def expect(self, orbit: int | None) -> None:
         """Read a fitted orbit ahead, which is likely to be asked for next, if it exists."""
-        if self._cache is not None and self.has_fitted(orbit):
+        if orbit is not None and self._cache is not None and self.has_fitted(orbit):
             self._cache.expect(self._run.orbit_directory(orbit))
 
     @cached_property

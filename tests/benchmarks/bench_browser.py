@@ -143,7 +143,7 @@ def next_prior(page: Page, number: int, least: float = 2.0) -> Taken:
     """Change the width of the sources' prior to a factor that grows from `least`."""
     entry = page.get_by_role("textbox", name="source positions")
     if not entry.is_visible():
-        page.get_by_role("button", name="show more").click()
+        page.get_by_role("button", name="show more: Priors").click()
     entry.fill(f"{least + 0.02 * number:.2f}")
     return answered(page, lambda: entry.press("Enter"))
 

@@ -193,7 +193,9 @@ def tangent_offset(
 
 def _displacements(placed: Instrument) -> dict[str, np.ndarray]:
     """Return the offsets of the true detectors from the nominal ones."""
-    columns = {name: group.column for name, group in BY_NAME.items() if group.axis == "det"}
+    columns = {
+        name: group.column for name, group in BY_NAME.items() if group.origin == "instrument"
+    }
     pairs = list(zip(placed.detectors, MINI_MOCK.detectors, strict=True))
     return {
         name: BY_NAME[name].per_value_unit

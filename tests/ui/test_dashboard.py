@@ -15,6 +15,7 @@ from solver.simulate.survey import simulate_survey
 from tests.ui.accessibility import require_accessible
 from tests.ui.conftest import (
     BACKGROUNDS,
+    LARGE,
     VIEWS,
     drag,
     explored,
@@ -101,6 +102,8 @@ def walked(served, browser):
     with opening_pages(browser) as open_at:
         page = opened(served, open_at)
         assert page.locator(".figure-convergence").count() == 0
+        usual = page.viewport_size
+        page.set_viewport_size(LARGE)
         # The first is on the screen already, and the address has it only when it is shown again.
         for workspace in reversed(OrbitWorkspace):
             turn_to_workspace(page, workspace)
@@ -109,6 +112,7 @@ def walked(served, browser):
             for diagnostic in diagnostics():
                 if diagnostic.workspace is workspace:
                     see(page, diagnostic.name)
+        page.set_viewport_size(usual)
         turn_to_workspace(page, OrbitWorkspace.VERDICT)
         yield page
 
@@ -279,7 +283,7 @@ def select_exposures_too(page):
     expect(box.nth(1)).to_be_checked()
     page.wait_for_url("**exposures=0/1**")
     see(page, "exposure-tracks")
-    drag(page, "exposure-tracks", (0.25, 0.55), (0.95, 0.95))
+    drag(page, "exposure-tracks", (0.45, 0.6), (0.95, 0.85))
     expect(page.get_by_text(re.compile(r"sources?, .*exposures .*selected$"))).to_be_visible()
     until(page, lambda: selected(page, "exposure-tracks", "exposure")[0] > 0)
     button(page, "Keep").click()
@@ -351,7 +355,7 @@ def test_what_is_left_out_is_left_out_and_a_wrong_prior_is_refused(page):
     entry.press("Enter")
     expect(shown(page)).to_contain_text("without detector 1")
     assert int(value(page, "Measurements").replace(",", "")) < before
-    page.get_by_role("button", name="show more").click()
+    page.get_by_role("button", name="show more: Priors").click()
     entry = page.get_by_role("textbox", name="distortion A")
     entry.fill("1 deg")
     entry.press("Enter")

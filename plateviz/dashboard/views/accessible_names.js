@@ -44,6 +44,12 @@ const complete = root => {
   // Places of titles that drawers do not have.
   for (const title of root.querySelectorAll("h5"))
     if (!title.textContent.trim()) put(title, { role: "presentation" })
+  // Cards open by buttons that are all called the same.
+  for (const header of root.querySelectorAll(".MuiCardHeader-root")) {
+    const title = header.querySelector(".MuiCardHeader-content")?.textContent.trim()
+    const opens = header.querySelector("button[aria-expanded]")
+    if (title && opens) put(opens, { "aria-label": `show more: ${title}` })
+  }
   nameFields(root)
 }
 

@@ -37,10 +37,9 @@ from plateviz.plots.style import ROW_LIMIT
 from plateviz.tables.explore import ExplorableTable
 from solver.errors import InputError
 
-_STEPS = 200
+_STEPS, _BETWEEN = 200, "between"
 # Columns that say what a saved row is of, besides the id of its source.
 _KEYS = ("orbit_id", "field_id", "plate_id", "detector_id")
-_BETWEEN = "between"
 MOST_SELECTED = 250_000
 """Sources that an area can select."""
 _MOST_SAVED = 1_000_000

@@ -41,6 +41,22 @@ OF_SURVEYS = [
         )
     ),
     FitSettings(engine="nuts", **engine_settings(seed=4)),
+    FitSettings(
+        focal_anisotropy=True,
+        drift=2,
+        drift_in_time=3,
+        breathing=3,
+        breathing_period=90.5,
+        field_distortion=4,
+        detector_distortion=3,
+        detector_motion=True,
+        charge_transfer=True,
+        magnitude_shift=True,
+        pixel_phase=True,
+        noise_scale=True,
+        reference_scale=True,
+    ),
+    FitSettings(noise_by_exposure=True, noise_by_magnitude=True),
 ]
 OF_FILES = [
     FitSettings(compare_orders=True),

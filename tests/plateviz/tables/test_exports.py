@@ -8,8 +8,8 @@ import pandas as pd
 
 from plateviz import tables
 
-# Helpers that modify a given table.
-SHARED = {"in_words", "ordered_by_class"}
+# Helpers that make a table of given ones.
+SHARED = {"in_words", "ordered_by_class", "series_of", "sky_track_of"}
 
 
 def test_every_function_that_returns_a_table_is_exported():

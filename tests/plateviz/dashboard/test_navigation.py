@@ -51,8 +51,7 @@ class FakeRun:
         return self._result
 
     def expect(self, orbit):
-        if orbit is not None:
-            self.expected.append(orbit)
+        self.expected += [] if orbit is None else [orbit]
 
     def history(self, source_id):
         rows = self._survey.history

@@ -29,17 +29,14 @@ class LatestAnswer(Generic[Value]):
     after it replace each other, and its answer is discarded if it is no longer asked for.
     """
 
-    def __init__(
-        self, executor: Executor | None, ready: Callable[[], object] | None = None
-    ) -> None:
+    def __init__(self, executor: Executor | None) -> None:
         """Begin without a request.
 
         Parameters
         ----------
         executor : makes the answers; None to make each at once
-        ready : called by the executor's thread when an answer has been made
         """
-        self._executor, self._ready = executor, ready
+        self._executor = executor
         self._last: _Request[Value] | None = None
 
     def answer(self, key: object, make: Callable[[], Value]) -> Value | Pending:
@@ -53,11 +50,7 @@ class LatestAnswer(Generic[Value]):
         if self._executor is None:
             return make()
         if self._last is None or (self._last.key != key and self._last.answer.done()):
-            future = self._executor.submit(make)
-            self._last = _Request(key, future)
-            if self._ready is not None:
-                ready = self._ready
-                future.add_done_callback(lambda _: ready())
+            self._last = _Request(key, self._executor.submit(make))
         if self._last.key == key and self._last.answer.done():
             return self._last.answer.result()
         return PENDING

@@ -90,8 +90,7 @@ class ExploreView(pn.viewable.Viewer):
         super().__init__(**params)
         self._origin, self._session, self._wake = origin, session, wake
         self._exploration = origin.exploration
-        self._document = pn.state.curdoc
-        self._latest: LatestAnswer[_Drawn] = LatestAnswer(origin.executor, self._draw_soon)
+        self._latest: LatestAnswer[_Drawn] = LatestAnswer(origin.executor)
         self._selecting: LatestAnswer[frozenset[int]] = LatestAnswer(origin.executor)
         self._drawn: _Drawn | None = None
         self._table: object = None
@@ -190,11 +189,6 @@ class ExploreView(pn.viewable.Viewer):
             self._extent = known = (key, extent_of(table, chosen))
         figure = explored_figure(table, chosen, selected=selected, extent=known[1])
         return _Drawn(figure, table, chosen, known[1])
-
-    def _draw_soon(self) -> None:
-        """Draw an answer as soon as it is made, not at the page's next tick; on any thread."""
-        if self._document is not None:
-            self._document.add_next_tick_callback(self.grid.draw_due)
 
     def _rows(self) -> dict[str, Table]:
         """Return the rows between the limits, with the columns that are drawn and those of keys."""

@@ -72,14 +72,5 @@ def test_failure_is_raised_for_its_request_only(latest, executor):
     assert latest.answer("b", str) == 2
 
 
-def test_answer_that_is_made_is_announced(executor):
-    told = []
-    latest = LatestAnswer(executor, lambda: told.append(1))
-    latest.answer("a", str)
-    assert told == []
-    executor.work()
-    assert told == [1]
-
-
 def test_without_an_executor_every_answer_is_made_at_once():
     assert LatestAnswer(None).answer("a", lambda: 3) == 3

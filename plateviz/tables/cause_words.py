@@ -12,9 +12,8 @@ from solver.results.diagnosis.causes import Causes, Found
 from solver.results.diagnosis.table import Diagnosis
 
 _NM_PER_UM = 1000.0
-_MOST_NAMED = 8
 _ORDINALS = {2: "second", 3: "third"}
-_HIGHEST_ORDER = 9
+_MOST_NAMED, _HIGHEST_ORDER = 8, 9
 
 
 class Case(NamedTuple):
@@ -54,23 +53,13 @@ def _degree(case: Case) -> str:
     return f"terms of the {_ORDINALS[case.found.test.what[0]]} degree"
 
 
-def _drift(case: Case) -> Said:
-    return Said(
-        "distortion-drifts",
-        "the distortion drifts",
-        f"The {_degree(case)} change steadily from the first exposure to the last: "
-        f"{_size(case)}; {_fall(case)}.",
-        "solve the beginning and the end of the orbit apart, by leaving out the other exposures",
-    )
+def _changes(name: str, title: str, how: str, verb: str, option: str) -> Callable[[Case], Said]:
+    def said(case: Case) -> Said:
+        words = f"The {_degree(case)} {how}: {_size(case)}; {_fall(case)}."
+        options = (f"{option} {case.found.test.what[0]}",)
+        return Said(name, title, words, f"let the distortion {verb} in the fit", options)
 
-
-def _bend(case: Case) -> Said:
-    return Said(
-        "distortion-oscillates",
-        "the distortion changes to and fro, as with the phase of the orbit about the Earth",
-        f"The {_degree(case)} follow a curve in time: {_size(case)}; {_fall(case)}.",
-        "solve parts of the orbit apart, by leaving out the other exposures",
-    )
+    return said
 
 
 def _step(case: Case) -> Said:
@@ -82,7 +71,8 @@ def _step(case: Case) -> Said:
         "distortion-steps",
         f"the distortion changes at field {first}",
         f"The {_degree(case)} are not the same before and after: {_size(case)}; {_fall(case)}.",
-        f"solve the fields before field {first} and the others apart",
+        "give each field a distortion of its own in the fit",
+        (f"--field-distortion {case.found.test.what[0]}",),
     )
 
 
@@ -138,28 +128,15 @@ def _cells(case: Case) -> Said:
     )
 
 
-def _axis(case: Case) -> str:
-    return "xy"[case.found.test.what[0]]
+def _along(name: str, title: str, words: str, action: str, option: str) -> Callable[[Case], Said]:
+    """Return what is said of a shift along an axis of the detectors, "{}" in the title."""
 
+    def said(case: Case) -> Said:
+        axis = "xy"[case.found.test.what[0]]
+        evidence = f"{words}: {_size(case)}; {_fall(case)}."
+        return Said(f"{name}-{axis}", title.format(axis), evidence, action, (option,))
 
-def _phase(case: Case) -> Said:
-    axis = _axis(case)
-    return Said(
-        f"pixel-phase-{axis}",
-        f"measured positions depend on the place within the pixel, along {axis}",
-        f"The residuals follow a wave with the period of a pixel: {_size(case)}; {_fall(case)}.",
-        "correct the centring of the images (its model of the point spread) and measure again",
-    )
-
-
-def _magnitude(case: Case) -> Said:
-    axis = _axis(case)
-    return Said(
-        f"charge-transfer-{axis}",
-        f"faint stars are shifted along {axis} of the detectors, as charge transfer does",
-        f"The shift grows along the axis: {_size(case)}; {_fall(case)}.",
-        "correct the measured positions for charge transfer",
-    )
+    return said
 
 
 def _noise(case: Case) -> Said:
@@ -169,20 +146,19 @@ def _noise(case: Case) -> Said:
         "noise",
         f"the noise is {'larger' if is_larger else 'smaller'} than stated",
         f"It is {factor:.3f} times the stated uncertainties, in all exposures and sources alike.",
-        f"multiply the uncertainties sx and sy by {factor:.3f}",
+        f"let the fit estimate the noise, or multiply sx and sy by {factor:.3f}",
+        ("--noise-scale",),
     )
 
 
-def _noise_of(name: str, words: str, action: str) -> Callable[[Case], Said]:
+def _noise_of(name: str, words: str, action: str, *options: str) -> Callable[[Case], Said]:
     def said(case: Case) -> Said:
         test = case.found.test
-        return Said(
-            name,
-            words,
+        evidence = (
             f"χ² scatters by more than chance: {test.statistic:.3g}, expected "
-            f"{test.expected:.3g} ± {test.scatter:.2g}.",
-            action,
+            f"{test.expected:.3g} ± {test.scatter:.2g}."
         )
+        return Said(name, words, evidence, action, options)
 
     return said
 
@@ -198,14 +174,15 @@ def _outliers(case: Case) -> Said:
     )
 
 
-def _of_each(name: str, words: str) -> Callable[[Case], Said]:
+def _of_each(
+    name: str,
+    words: str,
+    action: str = "the model has no term for it; take its size as an error of the positions",
+    *options: str,
+) -> Callable[[Case], Said]:
     def said(case: Case) -> Said:
-        return Said(
-            name,
-            words,
-            f"Each exposure has its own amount; {_fall(case)}.",
-            "the model has no term for it; take its size as an error of the positions",
-        )
+        evidence = f"Each exposure has its own amount; {_fall(case)}."
+        return Said(name, words, evidence, action, options)
 
     return said
 
@@ -248,8 +225,20 @@ def _reference(case: Case) -> Said:
 
 
 _WORDS: dict[str, Callable[[Case], Said]] = {
-    "drift": _drift,
-    "bend": _bend,
+    "drift": _changes(
+        "distortion-drifts",
+        "the distortion drifts",
+        "change steadily from the first exposure to the last",
+        "drift",
+        "--drift",
+    ),
+    "bend": _changes(
+        "distortion-oscillates",
+        "the distortion changes to and fro, as with the phase of the orbit about the Earth",
+        "follow a curve in time",
+        "breathe",
+        "--breathing",
+    ),
     "step": _step,
     "velocity": _velocity,
     "order": _order,
@@ -257,18 +246,32 @@ _WORDS: dict[str, Callable[[Case], Said]] = {
     "turn": _moves("detector-turns", "turns"),
     "cells": _cells,
     "map": _cells,
-    "phase": _phase,
-    "magnitude": _magnitude,
+    "phase": _along(
+        "pixel-phase",
+        "measured positions depend on the place within the pixel, along {}",
+        "The residuals follow a wave with the period of a pixel",
+        "include the shift in the fit, or correct the centring of the images",
+        "--pixel-phase",
+    ),
+    "magnitude": _along(
+        "charge-transfer",
+        "faint stars are shifted along {} of the detectors, as charge transfer does",
+        "The shift grows along the axis",
+        "include the shift in the fit, or correct the measured positions",
+        "--charge-transfer",
+    ),
     "noise": _noise,
     "exposures": _noise_of(
         "noise-of-exposures",
         "the noise differs between exposures",
-        "look at χ² of each exposure and leave out the worst, or state their noise",
+        "let the fit estimate the noise of each exposure, or leave out the worst",
+        "--noise-by-exposure",
     ),
     "magnitudes": _noise_of(
         "noise-of-magnitudes",
         "the noise depends on magnitude otherwise than stated",
-        "state the uncertainties sx and sy as a function of magnitude",
+        "let the fit estimate how the noise depends on magnitude",
+        "--noise-by-magnitude",
     ),
     "detectors": _noise_of(
         "noise-of-detectors",
@@ -281,7 +284,12 @@ _WORDS: dict[str, Callable[[Case], Said]] = {
         "look at the sources that scatter most; they may be double or wrongly identified",
     ),
     "outliers": _outliers,
-    "stretch": _of_each("anisotropy", "focal lengths along x and y differ"),
+    "stretch": _of_each(
+        "anisotropy",
+        "focal lengths along x and y differ",
+        "give each axis a focal length of its own in the fit",
+        "--focal-anisotropy",
+    ),
     "shear": _of_each("shear", "the axes of the focal plane are not at right angles"),
     "quadratic": _of_each("distortion-of-exposures", "the distortion changes between exposures"),
     "swing": _swing,

@@ -208,7 +208,7 @@ def turn_dark(page, figures):
     page.get_by_label("Toggle theme").click()
     for figure in figures:
         see(page, figure.name)
-        until(page, lambda name=figure.name: page.evaluate(BACKGROUNDS)[name] == "#121212")
+        until(page, lambda name=figure.name: page.evaluate(BACKGROUNDS).get(name) == "#121212")
 
 
 @pytest.fixture

@@ -1,10 +1,13 @@
-// Components of a page: compiled once for all of a kind, and laid out together.
+// Components of a page: compiled once for all of a kind, laid out together, and never out of date.
 //
 // Panel compiles the script of a component for each one of its kind that there is. Whenever a
 // container gets a part, Panel lays out all that is in the container anew, and then all that is in
 // the one around it, and each time the browser has to work out where everything is. Here containers
 // wait for the next picture of the screen, and are laid out together: those that are in another one
 // with it, except for cards, which have layouts of their own (see `own_layout.py`).
+//
+// A component of React is drawn first and follows its model a moment later. What the server changed
+// in between, Panel would not show until it changes again; here it is read again then.
 //
 // A table follows its model from when it is drawn.
 
@@ -18,6 +21,12 @@ document.addEventListener("DOMContentLoaded", () => {
     if (this.bundle != null) return compile.call(this)
     if (!compiled.has(this.esm)) compiled.set(this.esm, compile.call(this))
     return compiled.get(this.esm)
+  }
+  const { watch } = models
+  models.watch = function (view, name, callback, isState) {
+    watch.call(this, view, name, callback, isState)
+    // The state of React does not change if the value is the same.
+    if (isState) callback()
   }
   const container = Bokeh.Models.get("panel.models.esm.ReactComponent").prototype.default_view
   const views = Object.getPrototypeOf(container.prototype)

@@ -183,7 +183,9 @@ def metrics_of(page):
 
 def drag(page, name, start, end):
     """Drag across a figure, from one place to another in shares of its width and height."""
-    box = page.locator(f".figure-{name}:visible canvas").first.bounding_box()
+    canvas = page.locator(f".figure-{name}:visible canvas").first
+    canvas.scroll_into_view_if_needed()
+    box = _resting_box(page, canvas)
     (x, y), last = (
         (box["x"] + across * box["width"], box["y"] + down * box["height"])
         for across, down in (start, end)
@@ -192,6 +194,15 @@ def drag(page, name, start, end):
     page.mouse.down()
     page.mouse.move(*last, steps=8)
     page.mouse.up()
+
+
+def _resting_box(page, canvas):
+    """Where a canvas is once the page has laid it out: the same twice."""
+    before = None
+    while (box := canvas.bounding_box()) != before:
+        before = box
+        page.wait_for_timeout(100)
+    return box
 
 
 def explored(page):

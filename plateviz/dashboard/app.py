@@ -35,7 +35,7 @@ from plateviz.solving.solution_store import SolutionStore
 
 # Milliseconds between two looks at what a running job says.
 _PROGRESS_MILLISECONDS = 250
-# Milliseconds between two questions for a figure that another thread makes.
+# Milliseconds between two questions for what another thread makes.
 _PENDING_MILLISECONDS = 50
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
@@ -244,17 +244,19 @@ class _Ticker:
         # What follows from a new solution is sent as one message.
         with pn.io.hold():
             session.poll()
+            session.judging.look()
             self._pages.draw_due()
         job = session.job
         if job is not None and job is not self._watched:
             self._watched = job
             job.watch(self._call)
             self._start_looking()
-        if self._pages.is_pending and self._document is not None:
-            # Another thread makes a figure, and would wait for a page that asks without a pause.
+        is_pending = self._pages.is_pending or session.judging.is_pending
+        if is_pending and self._document is not None:
+            # Another thread is at work, and would wait for a page that asks without a pause.
             self._is_to_tick = True
             self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
-        elif self._pages.is_due or (job is None and self._pages.complete()):
+        elif is_pending or self._pages.is_due or (job is None and self._pages.complete()):
             self.wake()
         elif job is None:
             if self._progress.running:

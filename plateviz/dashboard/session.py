@@ -6,6 +6,7 @@ The last solution stays on the screen until the next one is complete; then both 
 import param
 
 from plateviz.dashboard.journal import Journal
+from plateviz.dashboard.judging import Judging
 from plateviz.dashboard.solution import Request, Solution, what_if_settings
 from plateviz.dashboard.stage import RequestState, Stage
 from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices, Selection
@@ -36,6 +37,7 @@ class Session(RequestState):
         self.choices = FitChoices()
         self.units = Units(store.instrument)
         self.journal = Journal(store.made)
+        self.judging = Judging(self, store.judge)
         self.selection.offer_orbits(store.orbits)
         self._detectors = store.instrument.detector_ids
         self._job: Job | None = None

@@ -59,6 +59,7 @@ class Diagnostic:
     is_wide : whether it takes the whole width of its workspace, or of a report
     has_data : whether there is anything to draw, such as a truth or another solution
     is_of_simulation : whether the Orbit page shows it for a simulated survey only
+    needs_verdict : whether it rests on the verdict, which may follow the solution
     is_key : whether the Verdict workspace shows it, small
     equation : what is drawn, as text
     least_height : that it needs on the page, screen pixels; 0 where any card's height is enough
@@ -74,6 +75,7 @@ class Diagnostic:
     is_wide: bool = False
     has_data: Callable[[Chosen], bool] = _always
     is_of_simulation: bool = False
+    needs_verdict: bool = False
     is_key: bool = False
     equation: str = ""
     least_height: int = 0

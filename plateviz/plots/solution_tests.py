@@ -79,6 +79,7 @@ DIAGNOSTICS = (
         OrbitWorkspace.PATTERNS,
         27,
         _plot,
+        needs_verdict=True,
         equation="σ of a normal value with the same probability by chance",
     ),
 )

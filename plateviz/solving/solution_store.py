@@ -20,6 +20,7 @@ from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.runs.scratch_result import is_written, read_scratch_result
 from plateviz.solving.job import Job, JobStatus
+from plateviz.solving.judge import Judge
 from plateviz.solving.made_solutions import MadeSolution, MadeSolutions
 from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
 from plateviz.solving.solver_pool import Solver
@@ -47,6 +48,7 @@ class SolutionStore:
     made : which solutions each browser session has made
     columns : the columns of runs that were read last
     background : runs what takes a while, for all sessions
+    judge : of the solutions that are shown
     """
 
     def __init__(self, origin: Origin, solver: Solver) -> None:
@@ -71,6 +73,7 @@ class SolutionStore:
         self._of_runs = OrbitCache()
         self.columns = ColumnCache()
         self.background = ThreadPoolExecutor(_READERS, thread_name_prefix="reader")
+        self.judge = Judge(self.background)
 
     @property
     def title(self) -> str:

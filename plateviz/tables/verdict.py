@@ -1,17 +1,14 @@
 """The verdict on a solution, a run or a source as text: whether to trust it, and why."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
 import pandas as pd
 from scipy.special import chdtrc
 
 from plateviz.tables.causes import Cause, causes_in_words
-from plateviz.tables.labels import id_strings
-from plateviz.tables.outliers import outlier_sentences
-from plateviz.tables.pulls import exposure_chi2
+from plateviz.tables.notable_in_orbit import notable_sentences
 from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
@@ -20,8 +17,8 @@ from solver.data.result import FitResult
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Diagnosis, Test, diagnose
 
-# Probability that a good orbit has any exposure, or any source, reported as far off.
-_BY_CHANCE = 0.01
+# Of the verdict in the summary of a result.
+_NAME = "verdict"
 # Tail probabilities of a single chi2: three and four sigmas of a normal, one-sided.
 _UNLIKELY, _FAR_OFF = 1.35e-3, 3.2e-5
 _MOST_NAMED, _MOST_ORBITS = 3, 20
@@ -68,15 +65,32 @@ def with_verdict(result: FitResult) -> FitResult:
         "causes": [one._asdict() for one in verdict.causes],
         "tests": [one._asdict() for one in verdict.tests],
     }
-    return replace(result, summary={**result.summary, "verdict": plain})
+    return replace(result, summary={**result.summary, _NAME: plain})
+
+
+def is_judged(result: FitResult) -> bool:
+    """Return whether there is a verdict on a result, so that `orbit_verdict` takes no time."""
+    return _NAME in result.derived or _stored(result) is not None
 
 
 def orbit_verdict(result: FitResult) -> Verdict:
-    """Return the verdict on one fitted orbit; that of the result itself, if it has one."""
-    stored = result.summary.get("verdict")
-    # Those of older versions lack the tests.
-    if stored is None or set(stored) != set(Verdict._fields):
-        return _judge(result)
+    """Return the verdict on one fitted orbit: that of the result itself, or a new one, once.
+
+    A new one of a full orbit takes half a second.
+    """
+    if _NAME not in result.derived:
+        stored = _stored(result)
+        result.derived[_NAME] = _judge(result) if stored is None else _from_plain(stored)
+    return result.derived[_NAME]
+
+
+def _stored(result: FitResult) -> Mapping[str, Any] | None:
+    """Return the verdict that a result was written with; None without the tests, as of old."""
+    stored = result.summary.get(_NAME)
+    return stored if stored is not None and set(stored) == set(Verdict._fields) else None
+
+
+def _from_plain(stored: Mapping[str, Any]) -> Verdict:
     causes = [Cause(**{**one, "options": tuple(one["options"])}) for one in stored["causes"]]
     tests = [TestInWords(**one) for one in stored["tests"]]
     return Verdict(**{**stored, "causes": causes, "tests": tests})
@@ -109,7 +123,7 @@ def _judge(result: FitResult) -> Verdict:
     if found and not causes:
         faults.append(_tested(diagnosis, found))
     tests = tests_in_words(diagnosis)
-    return Verdict(state, headline, reasons, _notable(result), faults, causes, tests)
+    return Verdict(state, headline, reasons, notable_sentences(result), faults, causes, tests)
 
 
 def _tested(diagnosis: Diagnosis, found: Sequence[Test]) -> str:
@@ -249,48 +263,3 @@ def _common_error(result: FitResult) -> str:
         f"All sources except reference sources share an error of {errors} (one sigma), which "
         "comes from the reference catalogue and does not decrease with more measurements."
     )
-
-
-def _notable(result: FitResult) -> list[str]:
-    return [
-        *_far_exposures(result),
-        *_far_sources(result),
-        *outlier_sentences(result),
-        *_unknown_truth(result),
-    ]
-
-
-def _far_exposures(result: FitResult) -> list[str]:
-    table = exposure_chi2(result)
-    expected = result.exposures.reset_index(drop=True)
-    above = chdtrc(expected["dof"], expected["chi2"])
-    far = table[2.0 * np.minimum(above, 1.0 - above) < _BY_CHANCE / max(len(table), 1)]
-    far = far.sort_values("z", key=np.abs, ascending=False)
-    if far.empty:
-        return []
-    named = "; ".join(
-        f"{row.exposure} (χ²/dof {row.chi2_per_dof:.3f} ± {row.expected_sd:.3f})"
-        for row in far.head(_MOST_NAMED).itertuples()
-    )
-    return [f"Exposures with a χ² too high or too low to be chance: {len(far):,}. {named}."]
-
-
-def _far_sources(result: FitResult) -> list[str]:
-    sources = result.sources[result.sources["dof"] > 0]
-    above = chdtrc(sources["dof"], sources["chi2"])
-    far = sources.assign(above=above)[above < _BY_CHANCE / max(len(sources), 1)]
-    far = far.sort_values("above")
-    if far.empty:
-        return []
-    worst_ids = id_strings(far["source_id"].head(_MOST_NAMED))
-    named = "; ".join(
-        f"{name} (χ² {row.chi2:.0f}, expected {row.dof:.0f})"
-        for name, row in zip(worst_ids, far.head(_MOST_NAMED).itertuples(), strict=True)
-    )
-    return [f"Sources that scatter by more than their errors: {len(far):,}. {named}."]
-
-
-def _unknown_truth(result: FitResult) -> list[str]:
-    if result.true_places is not None:
-        return []
-    return ["There is no truth to compare with; the figures and numbers that need one are absent."]

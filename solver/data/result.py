@@ -64,6 +64,7 @@ class FitResult:
     modes, mode_parameters, mode_shifts : the eigenmodes, and the parameters and sources that
         the weak ones move, as in `solver.data.eigenmode_schema`; None in a result of an older
         version without them
+    derived : what was computed from the result and is kept with it, by name; written nowhere
     """
 
     sources: pd.DataFrame
@@ -81,6 +82,7 @@ class FitResult:
     mode_parameters: pd.DataFrame | None = None
     mode_shifts: pd.DataFrame | None = None
     orders: pd.DataFrame | None = None
+    derived: dict[str, Any] = field(default_factory=dict, init=False, compare=False)
 
     def __repr__(self) -> str:
         """Return a short text: a widget makes it of every solution that it offers."""

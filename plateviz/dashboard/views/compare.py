@@ -55,6 +55,7 @@ class CompareView(pn.viewable.Viewer):
         self._is_offering = False
         self._other.param.watch(self._choose, "value")
         self._session.param.watch(self._fill, ["shown", "other", "theme"])
+        self._session.judging.param.watch(self._fill, "is_pending")
         self._session.param.watch(self._offer, ["shown", "other"])
         self._session.journal.param.watch(self._offer, "made")
         navigation.param.watch(self._offer, ["run_name", "orbit_workspace"])
@@ -101,6 +102,11 @@ class CompareView(pn.viewable.Viewer):
         if self._message or shown is None or other is None:
             text = self._message or "Fit with other settings, or choose what to compare with."
             self._table.object = paragraph(text, "empty", session.theme)
+            return
+        if session.judging.is_pending:
+            self._table.object = paragraph(
+                "The solutions are being judged.", "empty", session.theme
+            )
             return
         table = solution_changes(other.result, shown.result).rename(columns=_TITLES)
         self._table.object = themed(numbers(table), session.theme)

@@ -6,6 +6,7 @@ from functools import partial
 import panel as pn
 import panel_material_ui as pmui
 
+from plateviz.dashboard.latest_answer import PENDING, Pending
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.orbit_figures import chosen_of, figures_of
 from plateviz.dashboard.row_origins import OrbitRows
@@ -141,7 +142,9 @@ class OrbitPage(pn.viewable.Viewer):
             theme=self._session.theme,
         )
 
-    def _plot(self, diagnostic: Diagnostic) -> Figure | None:
+    def _plot(self, diagnostic: Diagnostic) -> Figure | Pending | None:
+        if diagnostic.needs_verdict and self._session.judging.is_pending:
+            return PENDING
         chosen = chosen_of(self._session)
         if chosen is None:
             return None

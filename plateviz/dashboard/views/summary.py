@@ -11,8 +11,11 @@ from plateviz.dashboard.views.state_text import missing_text, outdated_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.reports.summary_strip import strip
 from plateviz.tables import summary_strip
-from plateviz.tables.verdict import Verdict, orbit_verdict
+from plateviz.tables.verdict import orbit_verdict
 from solver.data.result import FitResult
+
+# As high as the headline of a verdict, so that nothing moves when this comes.
+_BEING_JUDGED = "<p class='verdict judging'>This solution is being judged.</p>"
 
 
 class HeadView(pn.viewable.Viewer):
@@ -26,8 +29,8 @@ class HeadView(pn.viewable.Viewer):
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
         self._head = markup_pane()
-        self._judged: tuple[FitResult, Verdict] | None = None
         self._session.param.watch(self._write, ["shown", "other", "stage", "theme"])
+        self._session.judging.param.watch(self._write, "is_pending")
         self._session.units.param.watch(self._write, "unit")
         navigation.param.watch(self._write, "orbit_workspace")
         self._write()
@@ -47,17 +50,17 @@ class HeadView(pn.viewable.Viewer):
         if other is not None:
             names.append(_name(other, "(A) Compared with solution"))
         stale = " stale" if session.stage is Stage.STALE else ""
-        verdict = session.units.text(judged(self._verdict(shown.result), is_open=is_open))
+        verdict = session.units.text(self._verdict(shown.result, is_open))
         head = f"<div class='head {session.theme}{stale}'>{verdict}{''.join(names)}</div>"
         outdated = outdated_text(session)
         if outdated:
             head += paragraph(outdated, "outdated", session.theme)
         self._head.object = head
 
-    def _verdict(self, result: FitResult) -> Verdict:
-        if self._judged is None or self._judged[0] is not result:
-            self._judged = (result, orbit_verdict(result))
-        return self._judged[1]
+    def _verdict(self, result: FitResult, is_open: bool) -> str:
+        if not self._session.store.judge.has_judged(result):
+            return _BEING_JUDGED
+        return judged(orbit_verdict(result), is_open=is_open)
 
 
 class StripView(pn.viewable.Viewer):

@@ -36,6 +36,7 @@ class FakeStore:
         self._result = result
         self.requested, self.prepared, self.cancelled, self.abandoned = [], [], [], []
         self.left = []
+        self.judge = SimpleNamespace(has_judged=lambda _: True)
         self.is_shared = False
         self.made, self.kept = MadeSolutions(), KeptSolutions(Path("nowhere"))
         self.selections = SimpleNamespace(all=dict, keep=lambda *_: None, forget=lambda *_: None)

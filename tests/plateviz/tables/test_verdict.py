@@ -11,6 +11,7 @@ from scipy.special import chdtri
 from plateviz.tables import verdict
 from plateviz.tables.outliers import swapped
 from plateviz.tables.verdict import (
+    is_judged,
     orbit_verdict,
     run_verdict,
     source_verdict,
@@ -38,7 +39,7 @@ def test_worst_state_decides(states, expected):
 
 
 def with_chances(monkeypatch, fit_result, **chances):
-    """Let the tests of a result have these logarithms of their chance by subject, else one half."""
+    """Return a result whose tests have these logarithms of their chance, by subject."""
     found = diagnose(fit_result)
     tests = [
         one._replace(
@@ -47,11 +48,11 @@ def with_chances(monkeypatch, fit_result, **chances):
         for one in found.tests
     ]
     monkeypatch.setattr(verdict, "diagnose", lambda _: found._replace(tests=tuple(tests)))
+    return replace(fit_result)
 
 
 def test_good_solution_can_be_trusted(monkeypatch, fit_result):
-    with_chances(monkeypatch, fit_result)
-    judged = orbit_verdict(fit_result)
+    judged = orbit_verdict(with_chances(monkeypatch, fit_result))
     assert judged.state == "good"
     assert judged.headline == "This solution can be trusted."
     assert judged.reasons[0].startswith("The fit converged after")
@@ -61,8 +62,7 @@ def test_good_solution_can_be_trusted(monkeypatch, fit_result):
 
 
 def test_solution_with_a_flaw_names_its_cause_first(monkeypatch, fit_result):
-    with_chances(monkeypatch, fit_result, stretch=-40.0)
-    judged = orbit_verdict(fit_result)
+    judged = orbit_verdict(with_chances(monkeypatch, fit_result, stretch=-40.0))
     assert judged.state in ("warn", "bad")
     assert judged.causes
     assert judged.headline.endswith(f": {judged.causes[0].title}.")
@@ -103,9 +103,19 @@ def test_verdict_of_a_result_is_read_again(fit_result):
     judged = with_verdict(fit_result)
     stored = json.loads(json.dumps(judged.summary))
     read = orbit_verdict(replace(judged, summary=stored))
-    assert read == orbit_verdict(fit_result)
+    assert read == orbit_verdict(replace(fit_result))
     assert read.causes
     assert isinstance(read.causes[0].sentence(), str)
+
+
+def test_result_is_judged_once_and_a_changed_one_anew(monkeypatch, fit_result):
+    result = replace(fit_result)
+    assert not is_judged(result)
+    first = orbit_verdict(result)
+    monkeypatch.setattr(verdict, "diagnose", lambda _: pytest.fail("judged again"))
+    assert is_judged(result)
+    assert orbit_verdict(result) is first
+    assert not is_judged(with_summary(result, verdict={"state": "good"}))
 
 
 def test_solution_that_has_not_converged_is_not_trusted(fit_result):

@@ -12,6 +12,7 @@ from plateviz.dashboard.views.source import SourcePage
 from plateviz.dashboard.views.summary import HeadView, StripView
 from plateviz.dashboard.views.survey import SurveyPage
 from plateviz.plots.gallery import diagnostics
+from plateviz.plots.workspace import OrbitWorkspace
 from solver.errors import InputError
 from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
 from tests.plateviz.dashboard.test_session import finish
@@ -79,6 +80,29 @@ def test_panes_of_an_orbit_go_through_their_states(fresh):
         assert "<0>" not in pane.object
     assert not view._tools.is_stale
     assert tabs.visible
+
+
+def test_solution_is_shown_while_it_is_being_judged(fresh):
+    session = fresh.session
+    session.store.judge.has_judged = lambda _: False
+    head, strip = HeadView(fresh).__panel__(), StripView(session).__panel__()
+    finish(session)
+    page = OrbitPage(fresh, wake)
+    fresh.turn_to_workspace(OrbitWorkspace.PATTERNS)
+    tests = figure(page, "solution-tests")
+    assert "This solution is being judged." in head.object
+    assert "cell" in strip.object
+    assert tests.is_pending
+    fresh.turn_to_workspace(OrbitWorkspace.ORDERS)
+    session.compare_with(session.shown._replace(orbit=5))
+    assert "The solutions are being judged." in page._compare._table.object
+
+    session.store.judge.has_judged = lambda _: True
+    session.judging.look()
+    assert "<summary>This solution" in head.object
+    assert "Verdict" in page._compare._table.object
+    tests.draw()
+    assert tests.is_drawn
 
 
 def test_first_solution_that_failed_says_what_to_do(fresh):

@@ -1,0 +1,28 @@
+"""Judging: whether the solutions on the screen of a session have their verdicts, without Panel."""
+
+from typing import Any
+
+import param
+
+from plateviz.solving.judge import Judge
+
+
+class Judging(param.Parameterized):
+    """Follows the solution on the screen and the one that it is compared with.
+
+    A solution is shown before it is judged; what needs its verdict waits.
+    """
+
+    is_pending = param.Boolean(default=False, doc="whether a solution is being judged")
+
+    def __init__(self, session: Any, judge: Judge) -> None:  # noqa: ANN401 it imports this module
+        """Follow `shown` and `other` of `session`."""
+        super().__init__()
+        self._session, self._judge = session, judge
+        session.param.watch(self.look, ["shown", "other"])
+
+    def look(self, *_: object) -> None:
+        """Look whether the verdicts are there; called again and again while they are not."""
+        both = (self._session.shown, self._session.other)
+        has_verdict = [self._judge.has_judged(one.result) for one in both if one is not None]
+        self.is_pending = not all(has_verdict)

@@ -1,0 +1,34 @@
+"""Judge: verdicts on the solutions that pages show, made in another thread, once for all pages."""
+
+from concurrent.futures import Executor, Future
+from weakref import finalize
+
+from plateviz.tables.verdict import Verdict, is_judged, orbit_verdict
+from solver.data.result import FitResult
+
+
+class Judge:
+    """Judges solutions that come without a verdict, such as those of older versions."""
+
+    def __init__(self, executor: Executor) -> None:
+        """Begin without a solution.
+
+        Parameters
+        ----------
+        executor : runs what takes a while
+        """
+        self._executor = executor
+        self._begun: dict[int, Future[Verdict]] = {}
+
+    def has_judged(self, result: FitResult) -> bool:
+        """Return whether `orbit_verdict` takes no time any more; if not, another thread is at it.
+
+        Called from one thread. Of a solution that cannot be judged, `orbit_verdict` says why.
+        """
+        if is_judged(result):
+            return True
+        key = id(result)
+        if key not in self._begun:
+            self._begun[key] = self._executor.submit(orbit_verdict, result)
+            finalize(result, self._begun.pop, key, None)
+        return self._begun[key].done()

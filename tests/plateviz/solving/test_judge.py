@@ -1,0 +1,59 @@
+"""Solutions are judged in another thread, once for all pages."""
+
+import gc
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import replace
+
+import pytest
+
+from plateviz.solving.judge import Judge
+from plateviz.tables.verdict import is_judged, orbit_verdict, with_verdict
+
+
+class Waiting(Executor):
+    """Keeps what is to be run."""
+
+    def __init__(self):
+        self.waiting = []
+
+    def submit(self, work, /, *arguments):
+        self.waiting.append((work, arguments))
+        return Future()
+
+
+def test_solution_is_judged_once_for_all_pages(fit_result):
+    waiting, result = Waiting(), replace(fit_result)
+    judge = Judge(waiting)
+    assert not judge.has_judged(result)
+    assert not judge.has_judged(result)
+    ((work, arguments),) = waiting.waiting
+    work(*arguments)
+    assert is_judged(result)
+    assert judge.has_judged(result)
+    assert len(waiting.waiting) == 1
+
+
+def test_solution_that_comes_with_its_verdict_is_not_judged_again(fit_result):
+    waiting = Waiting()
+    assert Judge(waiting).has_judged(with_verdict(fit_result))
+    assert not waiting.waiting
+
+
+def test_solution_that_cannot_be_judged_says_so_where_its_verdict_is_used(fit_result):
+    broken = replace(fit_result, summary={})
+    with ThreadPoolExecutor(1) as threads:
+        judge = Judge(threads)
+        judge.has_judged(broken)
+    assert judge.has_judged(broken)
+    with pytest.raises(KeyError, match="order"):
+        orbit_verdict(broken)
+
+
+def test_judge_forgets_a_solution_that_nobody_shows(fit_result):
+    waiting = Waiting()
+    judge, result = Judge(waiting), replace(fit_result)
+    judge.has_judged(result)
+    waiting.waiting.clear()
+    del result
+    gc.collect()
+    assert judge._begun == {}

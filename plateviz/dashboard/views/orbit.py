@@ -19,6 +19,7 @@ from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import heading
 from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.refit import RefitView
+from plateviz.dashboard.views.remedies import RemediesView
 from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.dashboard.views.stack import Stack
@@ -51,6 +52,7 @@ class OrbitPage(pn.viewable.Viewer):
         self._following: list[FigureView] = []
         self._compare: CompareView | None = None
         self._is_complete = False
+        self._head = HeadView(navigation)
         self._stack = Stack({one: partial(self._workspace, one) for one in OrbitWorkspace})
         self.sidebar = pmui.Column(
             heading("Shown"),
@@ -60,9 +62,7 @@ class OrbitPage(pn.viewable.Viewer):
             sizing_mode="stretch_width",
             margin=0,
         )
-        self._column = pmui.Column(
-            HeadView(navigation), self._stack, sizing_mode="stretch_width", margin=0
-        )
+        self._column = pmui.Column(self._head, self._stack, sizing_mode="stretch_width", margin=0)
         session.param.watch(self._change, ["shown", "other", "theme"])
         session.param.watch(self._mark_stale, ["stage"])
         session.units.param.watch(self._change, "unit")
@@ -113,7 +113,7 @@ class OrbitPage(pn.viewable.Viewer):
             others = [card(CalibrationView(self._session), "tables")]
         self._following += [view for d, view in views.items() if d.follows_shown]
         if is_first:
-            above = [StripView(self._session)]
+            above = [RemediesView(self._session, self._head.verdict), StripView(self._session)]
         # Six square cards fill a large screen in two rows.
         are_six = one is OrbitWorkspace.CALIBRATION and len(views) + len(others) == 6
         grid = FigureGrid(

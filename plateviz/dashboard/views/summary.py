@@ -1,6 +1,7 @@
 """HeadView: the verdict on the solution on the screen; StripView: the numbers that it rests on."""
 
 import panel as pn
+import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Session
@@ -18,23 +19,29 @@ from solver.data.result import FitResult
 class HeadView(pn.viewable.Viewer):
     """The verdict on the solution on the screen, and which solutions are shown.
 
-    In the Verdict workspace the reasons are open, unless the verdict is good.
+    In the Verdict workspace the reasons are open, unless the verdict is good or has causes, which
+    stand below it.
     """
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow `navigation` and its session."""
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
-        self._head = markup_pane()
+        self._head, self._outdated = markup_pane(), markup_pane()
+        self._column = pmui.Column(
+            self._head, self._outdated, sizing_mode="stretch_width", margin=0
+        )
         self._judged: tuple[FitResult, Verdict] | None = None
         self._session.param.watch(self._write, ["shown", "other", "stage", "theme"])
         self._session.units.param.watch(self._write, "unit")
+        self._session.param.watch(self._write_outdated, ["shown", "stage", "message", "theme"])
         navigation.param.watch(self._write, "orbit_workspace")
         self._write()
+        self._write_outdated()
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Return the head."""
-        return self._head
+        """Return the verdict, and why it is not that of the requested solution."""
+        return self._column
 
     def _write(self, *_: object) -> None:
         session = self._session
@@ -47,14 +54,20 @@ class HeadView(pn.viewable.Viewer):
         if other is not None:
             names.append(_name(other, "(A) Compared with solution"))
         stale = " stale" if session.stage is Stage.STALE else ""
-        verdict = session.units.text(judged(self._verdict(shown.result), is_open=is_open))
-        head = f"<div class='head {session.theme}{stale}'>{verdict}{''.join(names)}</div>"
-        outdated = outdated_text(session)
-        if outdated:
-            head += paragraph(outdated, "outdated", session.theme)
-        self._head.object = head
+        found = self.verdict(shown.result)
+        verdict = session.units.text(judged(found, is_open=is_open and not found.causes))
+        self._head.object = (
+            f"<div class='head {session.theme}{stale}'>{verdict}{''.join(names)}</div>"
+        )
 
-    def _verdict(self, result: FitResult) -> Verdict:
+    def _write_outdated(self, *_: object) -> None:
+        # Apart from the verdict, whose reasons would close with each step of a fit.
+        words = outdated_text(self._session)
+        markup = paragraph(words, "outdated", self._session.theme) if words else ""
+        self._outdated.param.update(object=markup, visible=bool(words))
+
+    def verdict(self, result: FitResult) -> Verdict:
+        """Return the verdict on a solution; that on the last one is remembered."""
         if self._judged is None or self._judged[0] is not result:
             self._judged = (result, orbit_verdict(result))
         return self._judged[1]

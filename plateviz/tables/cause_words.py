@@ -201,12 +201,14 @@ def _swing(case: Case) -> Said:
 
 
 def _references(case: Case) -> Said:
+    # The deviations are in units of the prior's sigmas, which the fit may have widened already.
+    factor = max(case.found.size, 1.1) * case.result.settings.width("sources")
     return Said(
         "reference-errors",
         "the reference stars are further from the catalogue than it states",
         f"Typical deviations are {case.found.size:.2f} times what its uncertainties allow.",
         "widen the prior of the reference stars",
-        (f"--prior sources={max(case.found.size, 1.1):.2f}",),
+        (f"--prior sources={factor:.2f}",),
     )
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from plateviz.tables.cause_words import Case, said_of
+from plateviz.tables.remedy import remedied
 from solver.data.result import FitResult
 from solver.results.diagnosis.causes import Causes
 from solver.results.diagnosis.table import Diagnosis
@@ -99,10 +100,12 @@ def _in_words(case: Case) -> Cause:
             f" It is not noise: with the patterns named here in the model, χ² per degree of "
             f"freedom would be {case.causes.left.value:.3f}."
         )
+    action, options = said.action, said.options
+    if options and remedied(case.result.settings, options) is None:
+        action = f"the fit has {' '.join(options)} already; look at what remains in the residuals"
+        options = ()
     sigma = float(case.found.test.sigma)
-    return Cause(
-        said.name, said.title, words, sigma, spoils, said.action, said.options, bool(is_large)
-    )
+    return Cause(said.name, said.title, words, sigma, spoils, action, options, bool(is_large))
 
 
 def _harm(case: Case) -> tuple[str, bool]:

@@ -38,6 +38,14 @@ class Exclusions:
         """Whether anything is excluded."""
         return bool(self.sources or self.exposures or self.detectors)
 
+    def __or__(self, other: "Exclusions") -> "Exclusions":
+        """Return what either excludes."""
+        return Exclusions(
+            self.sources | other.sources,
+            self.exposures | other.exposures,
+            self.detectors | other.detectors,
+        )
+
     def without(self, data: OrbitData) -> OrbitData:
         """Return the orbit without the excluded measurements; row labels stay those of `data`.
 

@@ -63,6 +63,11 @@ def parse_setting_words(words: Iterable[str]) -> FitSettings:
     InputError
         If a word is no setting, or its value is invalid.
     """
+    return FitSettings(**setting_values(words))
+
+
+def setting_values(words: Iterable[str]) -> dict[str, Any]:
+    """Return the fields of `FitSettings` that words give, by name; `InputError` as above."""
     fields: dict[str, Any] = {}
     texts: dict[str, list[str]] = {}
     engines: dict[str, Any] = {}
@@ -79,7 +84,7 @@ def parse_setting_words(words: Iterable[str]) -> FitSettings:
         else:
             fields[name] = _plain(one, value)
     fields |= {name: SETTINGS[name].parse(given) for name, given in texts.items()}  # type: ignore[attr-defined]
-    return FitSettings(**fields, **engine_settings(**engines))
+    return fields | (engine_settings(**engines) if engines else {})
 
 
 def _options(one: Setting, value: Any) -> list[Option]:  # noqa: ANN401 any setting

@@ -20,6 +20,7 @@ from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import heading
 from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.dashboard.views.refit import RefitView
+from plateviz.dashboard.views.remedies import RemediesView
 from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.dashboard.views.stack import Stack
@@ -114,7 +115,7 @@ class OrbitPage(pn.viewable.Viewer):
             others = [card(CalibrationView(self._session), "tables")]
         self._following += [view for d, view in views.items() if d.follows_shown]
         if is_first:
-            above = [StripView(self._session)]
+            above = [RemediesView(self._session), StripView(self._session)]
         # Six square cards fill a large screen in two rows.
         are_six = one is OrbitWorkspace.CALIBRATION and len(views) + len(others) == 6
         grid = FigureGrid(

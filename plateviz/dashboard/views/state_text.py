@@ -18,7 +18,8 @@ def outdated_text(session: Session) -> str:
     if session.shown is None:
         return ""
     if session.stage is Stage.STALE:
-        return "Another solution is being computed; this is still the last one."
+        so_far = f": {session.message}" if session.message else ""
+        return f"Another solution is being computed{so_far}. This is still the last one."
     if session.stage is Stage.FAILED:
         return f"The last request has no solution, and this one stays. {session.message}"
     return ""

@@ -1,6 +1,7 @@
 """HeadView: the verdict on the solution on the screen; StripView: the numbers that it rests on."""
 
 import panel as pn
+import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Session
@@ -21,23 +22,29 @@ _BEING_JUDGED = "<p class='verdict judging'>This solution is being judged.</p>"
 class HeadView(pn.viewable.Viewer):
     """The verdict on the solution on the screen, and which solutions are shown.
 
-    In the Verdict workspace the reasons are open, unless the verdict is good.
+    In the Verdict workspace the reasons are open, unless the verdict is good or has causes, which
+    stand below it.
     """
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow `navigation` and its session."""
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
-        self._head = markup_pane()
+        self._head, self._outdated = markup_pane(), markup_pane()
+        self._column = pmui.Column(
+            self._head, self._outdated, sizing_mode="stretch_width", margin=0
+        )
         self._session.param.watch(self._write, ["shown", "other", "stage", "theme"])
         self._session.judging.param.watch(self._write, "is_pending")
         self._session.units.param.watch(self._write, "unit")
+        self._session.param.watch(self._write_outdated, ["shown", "stage", "message", "theme"])
         navigation.param.watch(self._write, "orbit_workspace")
         self._write()
+        self._write_outdated()
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Return the head."""
-        return self._head
+        """Return the verdict, and why it is not that of the requested solution."""
+        return self._column
 
     def _write(self, *_: object) -> None:
         session = self._session
@@ -51,16 +58,21 @@ class HeadView(pn.viewable.Viewer):
             names.append(_name(other, "(A) Compared with solution"))
         stale = " stale" if session.stage is Stage.STALE else ""
         verdict = session.units.text(self._verdict(shown.result, is_open))
-        head = f"<div class='head {session.theme}{stale}'>{verdict}{''.join(names)}</div>"
-        outdated = outdated_text(session)
-        if outdated:
-            head += paragraph(outdated, "outdated", session.theme)
-        self._head.object = head
+        self._head.object = (
+            f"<div class='head {session.theme}{stale}'>{verdict}{''.join(names)}</div>"
+        )
+
+    def _write_outdated(self, *_: object) -> None:
+        # Apart from the verdict, whose reasons would close with each step of a fit.
+        words = outdated_text(self._session)
+        markup = paragraph(words, "outdated", self._session.theme) if words else ""
+        self._outdated.param.update(object=markup, visible=bool(words))
 
     def _verdict(self, result: FitResult, is_open: bool) -> str:
         if not self._session.store.judge.has_judged(result):
             return _BEING_JUDGED
-        return judged(orbit_verdict(result), is_open=is_open)
+        verdict = orbit_verdict(result)
+        return judged(verdict, is_open=is_open and not verdict.causes)
 
 
 class StripView(pn.viewable.Viewer):

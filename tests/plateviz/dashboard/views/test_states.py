@@ -49,7 +49,7 @@ def figure(page, name="residual-map"):
 
 def test_panes_of_an_orbit_go_through_their_states(fresh):
     session = fresh.session
-    head, strip = HeadView(fresh).__panel__(), StripView(session).__panel__()
+    (head, outdated), strip = HeadView(fresh).__panel__(), StripView(session).__panel__()
     calibration, page = CalibrationView(session), OrbitPage(fresh, wake)
     words, tabs = tables(calibration)
     view = figure(page)
@@ -68,14 +68,14 @@ def test_panes_of_an_orbit_go_through_their_states(fresh):
 
     session.refit()
     assert session.stage is Stage.STALE
-    assert STALE in head.object
+    assert f"{STALE}: {session.message}." in outdated.object
     assert STALE in words.object
     assert "stale" in strip.object
     assert view._tools.is_stale
 
     session.job.take({"event": "failed", "message": "orbit <0>: no exposure"})
     session.poll()
-    for pane in (head, words):
+    for pane in (outdated, words):
         assert "The last request has no solution, and this one stays." in pane.object
         assert "<0>" not in pane.object
     assert not view._tools.is_stale
@@ -85,7 +85,7 @@ def test_panes_of_an_orbit_go_through_their_states(fresh):
 def test_solution_is_shown_while_it_is_being_judged(fresh):
     session = fresh.session
     session.store.judge.has_judged = lambda _: False
-    head, strip = HeadView(fresh).__panel__(), StripView(session).__panel__()
+    head, strip = HeadView(fresh).__panel__()[0], StripView(session).__panel__()
     finish(session)
     page = OrbitPage(fresh, wake)
     fresh.turn_to_workspace(OrbitWorkspace.PATTERNS)
@@ -107,7 +107,7 @@ def test_solution_is_shown_while_it_is_being_judged(fresh):
 
 def test_first_solution_that_failed_says_what_to_do(fresh):
     session = fresh.session
-    head, page = HeadView(fresh).__panel__(), OrbitPage(fresh, wake)
+    head, page = HeadView(fresh).__panel__()[0], OrbitPage(fresh, wake)
     words, tabs = tables(CalibrationView(session))
     view = figure(page)
     session.job.take({"event": "failed", "message": "no reference source"})

@@ -36,6 +36,7 @@ def summarise(
         "reason": mode.status.value,
         "engine": settings.engine,
         "order": settings.order,
+        "distortion_scale_um": float(problem.geometry.distortion_scale),
         "iterations": mode.trace[-1].iteration,
         "orbit": int(problem.exposures["orbit_id"].iloc[0]),
         "epoch_mjd": problem.epoch,

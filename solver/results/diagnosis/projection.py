@@ -18,12 +18,13 @@ import pandas as pd
 from scipy import linalg, sparse
 
 from solver.data.result import FitResult
+from solver.results.diagnosis.modelled import has_anisotropy, modelled
 from solver.results.diagnosis.patterns import Family, Patterns, legendre_at
 from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
 
 # Measurements from which the covariance is computed, and exposures of each field.
 _MOST_ROWS, _LEAST_EXPOSURES = 12_000, 4
-_ARCSEC_RAD = np.pi / 180.0 / 3600.0
+_ARCSEC_RAD, _PPM = np.pi / 180.0 / 3600.0, 1e-6
 # Directions of which the fit leaves less than this share are not tested.
 _LEAST_LEFT = 0.02
 # Highest degree of a distortion.
@@ -100,7 +101,7 @@ def project(result: FitResult, camera: Camera, rows: Rows, patterns: Patterns) -
     of_patterns = (patterns.of_rows(some) * root).reshape(shape)
     shared, precision = _shared(result, camera, some)
     dense = np.concatenate([of_patterns, (shared * root).reshape(shape)])
-    own = _of_exposures(some, root)
+    own, own_precision = _of_exposures(result, camera, some, root)
     sources, places = _of_sources(result, camera, some, root)
     # All sums over the rows, less what the positions of the sources absorb.
     with_sources = np.asarray(sources @ dense.T)
@@ -118,7 +119,7 @@ def project(result: FitResult, camera: Camera, rows: Rows, patterns: Patterns) -
     fitted[n_own:, n_own:] = gram[n:, n:]
     cross = ratio * np.concatenate([between[:, :n], gram[n:, :n]])
     fitted *= ratio
-    fitted[np.diag_indices(len(fitted))] += np.concatenate([np.zeros(n_own), precision])
+    fitted[np.diag_indices(len(fitted))] += np.concatenate([own_precision, precision])
     # Shifts of all exposures against those of all detectors may have no prior.
     fitted[np.diag_indices(len(fitted))] *= 1.0 + 1e-9
     factor = linalg.cho_factor(fitted, lower=True, check_finite=False)
@@ -127,6 +128,8 @@ def project(result: FitResult, camera: Camera, rows: Rows, patterns: Patterns) -
     fast = np.ix_(patterns.fast, patterns.fast)
     kept = of_patterns[patterns.fast] * np.tile(np.sqrt(some.left), 2)
     left[fast] = ratio * (kept @ kept.T)
+    if result.settings.pixel_phase:
+        left[patterns.fast] = left[:, patterns.fast] = 0.0
     return Projection(patterns.products(rows), total, left, float(rows.weight.sum()))
 
 
@@ -156,9 +159,10 @@ def _subset(rows: Rows, camera: Camera, n_sources: int) -> tuple[Rows, float]:
 
 
 def _shared(result: FitResult, camera: Camera, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
-    """Return the columns of the detectors and of the distortion, and the precision of their priors.
+    """Return the columns of what exposures share, and the precision of their priors.
 
-    Shapes (columns, 2, n) and (columns,); per um, rad, um and um.
+    These are the detectors, the distortion and the causes that the fit includes. Shapes
+    (columns, 2, n) and (columns,); per um, rad, um and um, and per unit of each cause.
     """
     calibration = result.calibration
     width = {name: rows_["prior_sigma"].to_numpy() for name, rows_ in calibration.groupby("group")}
@@ -191,22 +195,38 @@ def _shared(result: FitResult, camera: Camera, rows: Rows) -> tuple[np.ndarray, 
             vector[axis] = value
             columns.append(vector)
             sigmas.append(width[name][number])
+    for cause in modelled(result, camera, rows):
+        columns.append(np.stack([cause.x, cause.y]))
+        sigmas.append(cause.sigma)
     return np.stack(columns), 1.0 / np.square(np.maximum(sigmas, 1e-12))
 
 
-def _of_exposures(rows: Rows, root: np.ndarray) -> sparse.csr_matrix:
-    """Return shift along x and y, turn and scale of each exposure, shape (4 exposures, 2 n).
+def _of_exposures(
+    result: FitResult, camera: Camera, rows: Rows, root: np.ndarray
+) -> tuple[sparse.csr_matrix, np.ndarray]:
+    """Return the columns of each exposure, and the precision of their priors.
 
-    Exposures without rows have none.
+    They are shift along x and y, turn, scale and, where the fit has it, the anisotropy; shapes
+    (columns, 2 n) and (columns,). Exposures without rows have none.
     """
     n, x, y = rows.n, *(root * rows.at.T)
+    none = np.zeros(n)
+    parts = [(root, none), (none, root), (-y, x), (x, y)]
+    precision = [0.0] * len(parts)
+    if has_anisotropy(result):
+        parts.append((-x, y))
+        rows_of = result.calibration["group"] == "focal_anisotropy"
+        width = float(result.calibration.loc[rows_of, "prior_sigma"].iloc[0])
+        precision.append((0.5 * _PPM * width * camera.scale) ** -2)
     code, taken = pd.factorize(rows.exposure)
-    number = 4 * code
-    line = np.concatenate([number, number + 2, number + 3, number + 1, number + 2, number + 3])
-    along = np.tile(np.arange(n), 3)
-    value = np.concatenate([root, -y, x, root, x, y])
-    place = (line, np.concatenate([along, n + along]))
-    return sparse.csr_matrix((value, place), shape=(4 * len(taken), 2 * n))
+    line = np.concatenate([len(parts) * code + number for number in range(len(parts))])
+    along = np.tile(np.arange(n), len(parts))
+    in_x, in_y = (np.concatenate([part[axis] for part in parts]) for axis in (0, 1))
+    lines, places = np.concatenate([line, line]), np.concatenate([along, n + along])
+    shape = (len(parts) * len(taken), 2 * n)
+    columns = sparse.csr_matrix((np.concatenate([in_x, in_y]), (lines, places)), shape=shape)
+    columns.eliminate_zeros()
+    return columns, np.tile(precision, len(taken))
 
 
 def _of_sources(

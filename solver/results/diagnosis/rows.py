@@ -13,6 +13,7 @@ from solver.units import RAD_PER_MAS
 FAR = 6.0
 # Median of the larger of two chi2 with one degree of freedom each.
 _MEDIAN_OF_LARGER = 1.1063
+_MINUTES_PER_DAY = 1440.0
 # Residuals of which the fit leaves less than this share are rounding errors.
 _LEAST_LEFT = 1e-6
 
@@ -25,7 +26,7 @@ class Rows(NamedTuple):
     exposure, detector, source : index into the exposures, the detectors and the sources of the
         result, shape (n,); exposures ascend
     first : row of the first measurement of each exposure, and n, shape (exposures + 1,)
-    at : position on the focal plane over the largest coordinate of any, shape (n, 2)
+    at : position on the focal plane over `Camera.scale`, shape (n, 2)
     pixel : measured position, from the centre of the detector, pixels, shape (n, 2)
     residual : measured minus predicted, um, shape (n, 2)
     weight : inverse variance of a measurement along one axis, um^-2, shape (n,)
@@ -67,9 +68,11 @@ class Camera(NamedTuple):
     turn : rotation of each detector, rad
     pitch : of each detector along x and y, um, shape (detectors, 2)
     half : largest coordinate of a measurement on each detector, pixels, shape (detectors, 2)
-    scale : what `Rows.at` is divided by, um
+    centre : nominal place of each detector, um, shape (detectors, 2)
+    scale : unit of the distortion's coordinates, um
     roll : position angle of each exposure, from that of the first, rad
     time : of each exposure, from -0.5 for the first to 0.5 for the last
+    minutes : the same in minutes
     field : number of the field of each exposure, from 0, in order of time
     um_per_mas : on the focal plane
     """
@@ -77,9 +80,11 @@ class Camera(NamedTuple):
     turn: np.ndarray
     pitch: np.ndarray
     half: np.ndarray
+    centre: np.ndarray
     scale: float
     roll: np.ndarray
     time: np.ndarray
+    minutes: np.ndarray
     field: np.ndarray
     um_per_mas: float
 
@@ -108,7 +113,9 @@ def camera_rows(result: FitResult) -> tuple[Camera, Rows]:
     first = np.searchsorted(exposure, np.arange(len(result.exposures) + 1))
     left = 1.0 - np.clip(0.5 * table["leverage"].to_numpy()[by_exposure], 0.0, 1.0)
     is_far = _far(residual / sigma, left, first)
-    scale = float(np.abs(focal).max(initial=1.0))
+    # Older results lack it; the largest coordinate is near.
+    largest = np.abs(focal).max(initial=1.0)
+    scale = float(result.summary.get("distortion_scale_um", largest))
     half = np.array(
         [np.abs(pixel[detector == one]).max(axis=0, initial=1.0) for one in range(len(turn))]
     )
@@ -165,9 +172,11 @@ def _camera(
         turn,
         pitch,
         half,
+        result.values_on("det", "prior_centre")[["detector_x", "detector_y"]].to_numpy(),
         scale,
         roll - roll[0],
         (days - days.min()) / span - 0.5,
+        _MINUTES_PER_DAY * (days - 0.5 * (days.min() + days.max())),
         np.unique(start.to_numpy(), return_inverse=True)[1],
         float(fitted["focal_length"].mean()) * RAD_PER_MAS,
     )

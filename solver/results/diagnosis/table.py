@@ -8,6 +8,7 @@ from scipy.special import chdtri
 
 from solver.data.result import FitResult
 from solver.results.diagnosis.exposures import WAVES, ExposureChi2, exposure_chi2
+from solver.results.diagnosis.modelled import is_adjusted
 from solver.results.diagnosis.patterns import Family, Patterns
 from solver.results.diagnosis.projection import Projection, project
 from solver.results.diagnosis.rate import discoveries, log_chance, of_many, sigmas
@@ -110,6 +111,11 @@ def diagnose(result: FitResult) -> Diagnosis:
         *_of_exposures(exposures, swinging),
         swings,
         *_of_references(result, references),
+    ]
+    # A test that the fit itself adjusts counts, but never alarms.
+    tests = [
+        one._replace(log_chance=0.0, sigma=0.0) if is_adjusted(result, one.subject) else one
+        for one in tests
     ]
     return Diagnosis(
         tuple(tests),

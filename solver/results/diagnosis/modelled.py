@@ -1,0 +1,167 @@
+"""Columns of the causes that a fit includes: what its optional parameters can take up.
+
+A fit with a cause leaves less of the residuals to the tests: the expected values are exact only if
+the parameters of the cause are among those that `solver.results.diagnosis.projection` eliminates.
+A group that is not known here counts as not fitted, so that the tests find less, never more.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from solver.data.result import FitResult
+from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
+from solver.units import RAD_PER_ARCSEC
+
+# Magnitude at which a shift by magnitude has the size of its parameter.
+_REFERENCE_MAGNITUDE = 17.0
+_PIX_PER_MPIX = 1e-3
+
+
+class Column(NamedTuple):
+    """The displacement by one parameter: along x and y of the focal plane, per unit of `sigma`.
+
+    Attributes
+    ----------
+    x, y : of each row, um, shape (n,)
+    sigma : width of the parameter's prior
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    sigma: float
+
+
+def has_anisotropy(result: FitResult) -> bool:
+    """Return whether each exposure has a focal length for each axis."""
+    return bool((result.calibration["group"] == "focal_anisotropy").any())
+
+
+def modelled(result: FitResult, camera: Camera, rows: Rows) -> Iterator[Column]:
+    """Yield the columns of the causes that a fit includes, but for those of each exposure."""
+    widths = {
+        name: group["prior_sigma"].to_numpy() for name, group in result.calibration.groupby("group")
+    }
+    yield from _of_terms(result, camera, rows, widths)
+    yield from _of_detectors(camera, rows, widths, _faintness(result)[rows.source])
+    yield from _of_motion(result, camera, rows, widths)
+
+
+def _of_terms(
+    result: FitResult, camera: Camera, rows: Rows, widths: dict[str, np.ndarray]
+) -> Iterator[Column]:
+    """Yield the columns of terms of the distortion that drift, breathe, or are of a part."""
+    settings, at = result.settings, camera.scale * rows.at
+    field = np.unique(result.exposures["field_id"].to_numpy(), return_inverse=True)[1]
+    angle = camera.minutes * 2.0 * np.pi / settings.breathing_period
+    later, detectors = np.arange(1, field.max() + 1), np.arange(len(camera.turn))
+    in_time = legendre.legvander(2.0 * camera.time, settings.drift_in_time)[:, 1:].T
+    own = at - camera.centre[rows.detector]
+    half = (camera.half * camera.pitch).max(axis=1)[rows.detector, None]
+    families = (
+        ("drift", settings.drift, in_time[:, rows.exposure], rows.at),
+        (
+            "breathing",
+            settings.breathing,
+            np.array([np.cos(angle), np.sin(angle)])[:, rows.exposure],
+            rows.at,
+        ),
+        (
+            "field_distortion",
+            settings.field_distortion,
+            (field[rows.exposure] == later[:, None]).astype(float),
+            rows.at,
+        ),
+        (
+            "own_distortion",
+            settings.detector_distortion,
+            (rows.detector == detectors[:, None]).astype(float),
+            own / half,
+        ),
+    )
+    zeros = np.zeros(rows.n)
+    for name, order, factors, place in families:
+        sigmas = widths.get(f"{name}_x", np.empty(0)), widths.get(f"{name}_y", np.empty(0))
+        terms = [(n - j, j) for n in range(2, order + 1) for j in range(n + 1)]
+        if len(sigmas[0]) != len(factors) * len(terms):
+            continue
+        in_x, in_y = (legendre.legvander(along, order).T for along in place.T)
+        values = (factor * in_x[k] * in_y[j] for factor in factors for k, j in terms)
+        for number, value in enumerate(values):
+            yield Column(value, zeros, sigmas[0][number])
+            yield Column(zeros, value, sigmas[1][number])
+
+
+def _of_detectors(
+    camera: Camera, rows: Rows, widths: dict[str, np.ndarray], faintness: np.ndarray
+) -> Iterator[Column]:
+    """Yield the columns of the groups with one parameter of each detector."""
+    pixel = rows.pixel
+    crossed = 0.5 * pixel / camera.half[rows.detector] + 0.5
+    angle, none = 2.0 * np.pi * pixel, np.zeros(rows.n)
+    shift = _PIX_PER_MPIX * faintness
+    shifts: dict[str, tuple[np.ndarray, int]] = {"detector_skew": (RAD_PER_ARCSEC * pixel[:, 1], 0)}
+    for axis, direction in enumerate("xy"):
+        along = {
+            "magnitude_shift": shift,
+            "charge_transfer": shift * crossed[:, axis],
+            "phase_sine": _PIX_PER_MPIX * np.sin(angle[:, axis]),
+            "phase_cosine": _PIX_PER_MPIX * np.cos(angle[:, axis]),
+        }
+        shifts |= {f"{name}_{direction}": (value, axis) for name, value in along.items()}
+    for name, (value, axis) in shifts.items():
+        if name not in widths:
+            continue
+        pixels = np.stack([value, none] if axis == 0 else [none, value], axis=1)
+        x, y = onto_focal_plane(pixels * camera.pitch[rows.detector], camera.turn[rows.detector]).T
+        for detector, sigma in enumerate(widths[name]):
+            on = rows.detector == detector
+            yield Column(x * on, y * on, sigma)
+
+
+def _of_motion(
+    result: FitResult, camera: Camera, rows: Rows, widths: dict[str, np.ndarray]
+) -> Iterator[Column]:
+    """Yield the columns of detectors that move and turn from field to field."""
+    if "detector_turn" not in widths:
+        return
+    field = np.unique(result.exposures["field_id"].to_numpy(), return_inverse=True)[1]
+    of_row, none = field[rows.exposure], np.zeros(rows.n)
+    pixel = RAD_PER_ARCSEC * rows.pixel * camera.pitch[rows.detector]
+    turned = np.stack([-pixel[:, 1], pixel[:, 0]], axis=1)
+    x, y = onto_focal_plane(turned, camera.turn[rows.detector]).T
+    later = max(int(field.max()), 1)
+    for element in range(len(camera.turn) * later):
+        moved = (rows.detector == element // later) & (of_row == element % later + 1)
+        on = moved.astype(float)
+        yield Column(on, none, widths["detector_motion_x"][element])
+        yield Column(none, on, widths["detector_motion_y"][element])
+        yield Column(x * on, y * on, widths["detector_turn"][element])
+
+
+def _faintness(result: FitResult) -> np.ndarray:
+    """Return flux^(-1/2) of the sources, zero without a magnitude."""
+    if "magnitude" not in result.sources:
+        return np.zeros(len(result.sources))
+    magnitude = result.sources["magnitude"].to_numpy(dtype=float)
+    return np.nan_to_num(10.0 ** (0.2 * (magnitude - _REFERENCE_MAGNITUDE)))
+
+
+# What a fit adjusts until a test of the size of the residuals finds nothing.
+_ADJUSTED: dict[str, Callable[[FitResult], bool]] = {
+    "noise": lambda result: (
+        result.settings.noise_scale
+        or result.settings.noise_by_exposure
+        or result.settings.noise_by_magnitude
+    ),
+    "exposures": lambda result: result.settings.noise_by_exposure,
+    "magnitudes": lambda result: result.settings.noise_by_magnitude,
+    "stretch": has_anisotropy,
+}
+
+
+def is_adjusted(result: FitResult, subject: str) -> bool:
+    """Return whether the fit adjusts what a test is about, which then says nothing."""
+    return subject in _ADJUSTED and _ADJUSTED[subject](result)

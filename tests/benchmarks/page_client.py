@@ -64,6 +64,7 @@ class PageClient:
         self._seen_cards: set[str] = set()
         self._new_cards: list[str] = []
         self._telling: set[asyncio.Task] = set()
+        self._writing = asyncio.Lock()
         self.errors = 0
 
     async def open(self, *, with_files: bool = False) -> Self:
@@ -222,8 +223,10 @@ class PageClient:
 
     async def _write(self, kind: str, content: Mapping[str, object]) -> None:
         header = {"msgid": f"{time.perf_counter_ns():x}", "msgtype": kind}
-        for part in (header, {}, content):
-            await self.send_text(json.dumps(part))
+        # Another task may send a message meanwhile.
+        async with self._writing:
+            for part in (header, {}, content):
+                await self.send_text(json.dumps(part))
 
     async def _listen(self) -> None:
         receiver = Receiver(Protocol())

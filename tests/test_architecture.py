@@ -64,6 +64,7 @@ JAX = ("jax", "jaxlib", "equinox", "numpyro", "optax")
 WITHOUT_JAX = ("solver.data", "solver.io", "plateviz")
 # The process that fits, and what `plateviz survey` imports once it fits.
 WITH_JAX = (
+    "plateviz.solving.fitters",
     "plateviz.solving.solver_process",
     "plateviz.runs.fit_survey",
     "plateviz.runs.watch",

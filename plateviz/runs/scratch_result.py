@@ -5,17 +5,18 @@ No user interface and no JAX. A directory has an uncompressed Arrow file for eac
 and no other program reads it: nothing is flushed to the disk, and nothing has a checksum.
 `plateviz.runs.fitted_orbit` writes what is kept.
 
-The eigenmodes may follow later. Who uses them waits for them.
+The eigenmodes and the verdict may follow later. Who uses them waits for them.
 """
 
 import json
+import math
 import shutil
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 import pyarrow as pa
@@ -28,19 +29,23 @@ from solver.io.disk import writing
 from solver.io.failures import reading
 from solver.io.settings import parse_settings
 
-_HEAD = "result.json"
+_HEAD, _JUDGEMENT = "result.json", "verdict.json"
+_VERDICT = "verdict"
 _LATER = tuple(table.name for table in EIGENMODE_TABLES)
 # Windows removes no file that is read in place.
 _IS_IN_PLACE = sys.platform != "win32"
 _PATIENCE_SECONDS, _LOOK_SECONDS = 10.0, 0.005
 
 
-def write_scratch_result(directory: Path, result: FitResult, *, is_partial: bool = False) -> None:
+def write_scratch_result(
+    directory: Path, result: FitResult, *, is_partial: bool = False, is_judged: bool = True
+) -> None:
     """Write a result; an existing directory is not changed.
 
     Parameters
     ----------
     is_partial : whether `write_eigenmodes` follows
+    is_judged : False if `write_verdict` follows
 
     Raises
     ------
@@ -61,6 +66,7 @@ def write_scratch_result(directory: Path, result: FitResult, *, is_partial: bool
                 "summary": dict(result.summary),
                 "provenance": dict(result.provenance),
                 "is_partial": is_partial,
+                "is_judged": is_judged,
             }
             (staging / _HEAD).write_text(json.dumps(head), encoding="utf-8")
             if not directory.exists():
@@ -77,6 +83,24 @@ def write_eigenmodes(directory: Path, tables: Mapping[str, pd.DataFrame]) -> Non
             (directory / f"{name}.part").rename(directory / f"{name}.arrow")
 
 
+def write_verdict(directory: Path, verdict: Mapping[str, Any]) -> None:
+    """Add the verdict to a result that was written without; errors as above.
+
+    Parameters
+    ----------
+    verdict : as `plateviz.tables.verdict.with_verdict` adds it to a summary
+    """
+    with writing(directory, "to write the verdict on a fit"):
+        part = directory / f"{_VERDICT}.part"
+        part.write_text(json.dumps(verdict), encoding="utf-8")
+        part.rename(directory / _JUDGEMENT)
+
+
+def is_judged_later(result: FitResult) -> bool:
+    """Return whether the verdict on a result is to come, and is not there yet."""
+    return isinstance(result.summary, _JudgedLater) and result.summary.is_to_come
+
+
 def is_written(directory: Path) -> bool:
     """Return whether a directory has a result, which is whole from the first moment on."""
     return (directory / _HEAD).is_file()
@@ -89,7 +113,7 @@ def read_scratch_result(
 
     Parameters
     ----------
-    hurry : called when eigenmodes are used that have not been written yet; whether they will be
+    hurry : called when something is used that has not been written yet; whether it will be
 
     Raises
     ------
@@ -105,31 +129,72 @@ def read_scratch_result(
             else _read_table(directory / f"{table.name}.arrow")
             for table in RESULT_TABLES
         }
+        summary = head["summary"]
+        if not head["is_judged"]:
+            summary = _JudgedLater(summary, _Awaited(directory / _JUDGEMENT, hurry))
         return ScratchResult(
             **tables,  # type: ignore[arg-type]
-            summary=head["summary"],
+            summary=summary,
             settings=parse_settings(head["settings"], str(directory / _HEAD)),
             provenance=head["provenance"],
         )
 
 
 class _Awaited(NamedTuple):
-    """A table whose file may not be there yet."""
+    """A file that may not be there yet."""
 
     path: Path
     hurry: Callable[[], bool]
 
-    def read(self) -> pd.DataFrame | None:
-        is_to_come = self.path.is_file() or self.hurry()
-        end = time.monotonic() + _PATIENCE_SECONDS
-        while not self.path.is_file():
-            if not is_to_come or time.monotonic() > end:
-                raise InputError(
-                    f"{self.path}: expected the eigenmodes of the solution, found that the solver "
-                    "ended before it wrote them; fit again"
-                )
+    @property
+    def is_there(self) -> bool:
+        return self.path.is_file()
+
+    def wait(self, end: float) -> bool:
+        """Wait for it until some `time.monotonic`; return whether it is there."""
+        is_to_come = self.is_there or self.hurry()
+        while is_to_come and not self.is_there and time.monotonic() < end:
             time.sleep(_LOOK_SECONDS)
+        return self.is_there
+
+    def table(self) -> pd.DataFrame | None:
+        """Return the table in it once it is there."""
+        if not self.wait(time.monotonic() + _PATIENCE_SECONDS):
+            raise InputError(
+                f"{self.path}: expected the eigenmodes of the solution, found that the solver "
+                "ended before it wrote them; fit again"
+            )
         return _read_table(self.path)
+
+
+class _JudgedLater(Mapping[str, Any]):
+    """The summary of a result whose verdict follows; if it does not in time, there is none."""
+
+    def __init__(self, known: dict[str, Any], verdict: _Awaited) -> None:
+        self._known, self._verdict = known, verdict
+        self._end = time.monotonic() + _PATIENCE_SECONDS
+
+    @property
+    def is_to_come(self) -> bool:
+        is_known = _VERDICT in self._known or self._verdict.is_there
+        return not is_known and time.monotonic() < self._end
+
+    def __getitem__(self, key: str) -> Any:  # noqa: ANN401 whatever a summary holds
+        return (self._whole() if key == _VERDICT else self._known)[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._whole())
+
+    def __len__(self) -> int:
+        return len(self._whole())
+
+    def _whole(self) -> dict[str, Any]:
+        if self.is_to_come and not self._verdict.wait(self._end):
+            self._end = -math.inf
+        if _VERDICT not in self._known and self._verdict.is_there:
+            text = self._verdict.path.read_text(encoding="utf-8")
+            self._known[_VERDICT] = json.loads(text)
+        return self._known
 
 
 class _Later:
@@ -143,7 +208,7 @@ class _Later:
             return None
         value = result.__dict__[self._name]
         if isinstance(value, _Awaited):
-            value = result.__dict__[self._name] = value.read()
+            value = result.__dict__[self._name] = value.table()
         return value
 
     def __set__(self, result: FitResult, value: object) -> None:

@@ -1,8 +1,9 @@
-"""Judge: verdicts on the solutions that pages show, made in another thread, once for all pages."""
+"""Judge: verdicts on the solutions that pages show, made elsewhere, once for all pages."""
 
 from concurrent.futures import Executor, Future
 from weakref import finalize
 
+from plateviz.runs.scratch_result import is_judged_later
 from plateviz.tables.verdict import Verdict, is_judged, orbit_verdict
 from solver.data.result import FitResult
 
@@ -21,10 +22,13 @@ class Judge:
         self._begun: dict[int, Future[Verdict]] = {}
 
     def has_judged(self, result: FitResult) -> bool:
-        """Return whether `orbit_verdict` takes no time any more; if not, another thread is at it.
+        """Return whether `orbit_verdict` takes no time any more; if not, somebody is at it.
 
-        Called from one thread. Of a solution that cannot be judged, `orbit_verdict` says why.
+        That is the solver process, if it has just made the solution, or another thread. Called
+        from one thread. Of a solution that cannot be judged, `orbit_verdict` says why.
         """
+        if is_judged_later(result):
+            return False
         if is_judged(result):
             return True
         key = id(result)

@@ -6,21 +6,42 @@ from collections.abc import Callable
 # What such work needs is large: some 100 MB for the eigenmodes of a full orbit.
 _MOST = 2
 
+Work = Callable[[], object]
+
 
 class PutOff:
-    """Work of the solver process that waits until it is idle, such as the eigenmodes."""
+    """Work of the solver process that waits until no request does, such as the verdict.
+
+    What a page waits for is done next; the rest, such as the eigenmodes, once the process is idle.
+    """
 
     def __init__(self) -> None:
         """Begin without work."""
-        self._waiting: deque[Callable[[], object]] = deque()
+        self._next: deque[Work] = deque()
+        self._waiting: deque[Work] = deque()
 
-    def add(self, work: Callable[[], object]) -> None:
-        """Put work off; if too much waits, do the oldest now."""
-        self._waiting.append(work)
-        if len(self._waiting) > _MOST:
-            self._waiting.popleft()()
+    def add(self, work: Work, *, is_next: bool = False) -> None:
+        """Put work off; if too much of its kind waits, do the oldest now.
+
+        Parameters
+        ----------
+        is_next : whether a page waits for it
+        """
+        of_its_kind = self._next if is_next else self._waiting
+        of_its_kind.append(work)
+        if len(of_its_kind) > _MOST:
+            of_its_kind.popleft()()
+
+    def finish_next(self) -> None:
+        """Do what a page waits for."""
+        _finish(self._next)
 
     def finish(self) -> None:
         """Do all of it."""
-        while self._waiting:
-            self._waiting.popleft()()
+        self.finish_next()
+        _finish(self._waiting)
+
+
+def _finish(waiting: deque[Work]) -> None:
+    while waiting:
+        waiting.popleft()()

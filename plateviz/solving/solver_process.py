@@ -21,17 +21,15 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
-from functools import lru_cache
 from pathlib import Path
 from typing import TextIO
 
 from plateviz.cache import keep_compilations
-from plateviz.runs.scratch_result import write_eigenmodes, write_scratch_result
-from plateviz.solving.origin import origin_from_dict
+from plateviz.runs.scratch_result import write_eigenmodes, write_scratch_result, write_verdict
+from plateviz.solving.fitters import Request, base_settings, fitter_of, prepare
 from plateviz.solving.put_off import PutOff
 from plateviz.tables.verdict import with_verdict
-from solver.data.exclusions import Exclusions
+from solver.data.result import FitResult
 from solver.data.settings import COUNTED, FitSettings
 from solver.engines.gauss_newton import Iteration
 from solver.errors import CancelledError, FitError, InputError
@@ -42,7 +40,6 @@ from solver.runtime.termination import EXIT_CODE, ending_on_sigterm
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 
-Request = dict
 Send = Callable[[dict], None]
 # Work in steps that speeds up likely next requests; done while no request waits.
 Speculative = Iterator[None]
@@ -92,7 +89,7 @@ def _serve_all() -> None:
         if request["do"] == "hurry":
             put_off.finish()
         elif request["do"] == "prepare":
-            speculative = _prepare(request, requests)
+            speculative = prepare(request, requests)
         elif request["do"] == "rest":
             speculative = iter(())
         else:
@@ -103,6 +100,8 @@ def _next_request(
     requests: queue.Queue[Request | None], speculative: Speculative, put_off: PutOff
 ) -> Request | None:
     """Wait for a request; do what was put off and speculative work once the process is idle."""
+    if requests.empty():
+        put_off.finish_next()
     try:
         # A page that has received a solution may send a request, too.
         return requests.get(timeout=_IDLE_S)
@@ -166,45 +165,9 @@ def _serve(
     return iter(())
 
 
-def _prepare(request: Request, requests: "queue.Queue[Request | None]") -> Speculative:
-    """Fit an orbit and precompute its likely what-ifs; give way to requests for anything else."""
-
-    def give_way(_: Iteration) -> None:
-        with requests.mutex:
-            waiting = list(requests.queue)
-        if not all(_starts_from(request, later) for later in waiting):
-            raise CancelledError("another request waits")
-
-    # What is wrong with the orbit is said when something is asked of it.
-    with suppress(CancelledError, InputError, FitError):
-        fitter, settings = _fitter_of(request), _base(FitSettings.from_dict(request["settings"]))
-        if not _serves_what_ifs(fitter.fitted_settings, settings):
-            fitter.fit(settings, give_way)
-        yield from fitter.precompute(settings.order)
-
-
-def _starts_from(prepared: Request, later: Request | None) -> bool:
-    """Return whether a later request is a what-if that starts from the prepared fit."""
-    return (
-        later is not None
-        and bool(later.get("what_if"))
-        and all(later[key] == prepared[key] for key in ("origin", "orbit"))
-    )
-
-
-def _serves_what_ifs(fitted: FitSettings | None, settings: FitSettings) -> bool:
-    """Return whether what-ifs of `settings` can start from the last fit of their orbit."""
-    return (
-        fitted is not None
-        and not fitted.exclusions
-        and fitted.order >= settings.order
-        and fitted.what_if_holds(settings)
-    )
-
-
 def _fit(request: Request, progress: Callable[..., None], put_off: PutOff) -> Speculative:
     progress(stage="reading the orbit")
-    fitter = _fitter_of(request)
+    fitter = fitter_of(request)
     settings = FitSettings.from_dict(request["settings"])
 
     def on_iteration(iteration: Iteration) -> None:
@@ -219,10 +182,16 @@ def _fit(request: Request, progress: Callable[..., None], put_off: PutOff) -> Sp
     result = fitter.fit(settings, on_iteration) if found is None else found.result
     progress(stage="writing the result")
     directory = Path(request["directory"])
-    write_scratch_result(directory, with_verdict(result), is_partial=found is not None)
+    write_scratch_result(directory, result, is_partial=found is not None, is_judged=False)
+    put_off.add(lambda: _judge(directory, result), is_next=True)
     if found is not None:
         put_off.add(lambda: write_eigenmodes(directory, found.eigenmodes()))
     return fitter.precompute(settings.order)
+
+
+def _judge(directory: Path, result: FitResult) -> None:
+    """Write the verdict, for whose tests the figures of a solution do not wait."""
+    write_verdict(directory, with_verdict(result).summary["verdict"])
 
 
 def _what_if(
@@ -232,7 +201,7 @@ def _what_if(
     put_off: PutOff,
 ) -> PartialResult | None:
     """Return a solution by a step from a fit, or None if it needs a fit of its own."""
-    found, base = fitter.partial_what_if(settings), _base(settings)
+    found, base = fitter.partial_what_if(settings), base_settings(settings)
     if found is not None or not settings.exclusions or fitter.fitted_settings == base:
         return found
     put_off.finish()
@@ -241,14 +210,6 @@ def _what_if(
     except FitError:
         return None
     return fitter.partial_what_if(settings)
-
-
-def _base(settings: FitSettings) -> FitSettings:
-    """Return the settings of the fit that the what-ifs of `settings` start from.
-
-    A fit without some measurements is no start for a what-if without others; one of all is.
-    """
-    return settings.with_(exclusions=Exclusions(), compare_orders=False)
 
 
 def _simulate(request: Request, progress: Callable[..., None], _: PutOff) -> Speculative:
@@ -276,16 +237,6 @@ def _survey(request: Request, progress: Callable[..., None], _: PutOff) -> Specu
         progress=lambda now: progress(stage="fitting orbits", done=now.done, total=now.total),
     )
     return iter(())
-
-
-def _fitter_of(request: Request) -> OrbitFitter:
-    return _fitter(json.dumps(request["origin"], sort_keys=True), request["orbit"])
-
-
-@lru_cache(maxsize=4)
-def _fitter(origin_json: str, orbit: int | None) -> OrbitFitter:
-    origin = origin_from_dict(json.loads(origin_json))
-    return OrbitFitter(origin.read(orbit), origin.read_instrument())
 
 
 if __name__ == "__main__":

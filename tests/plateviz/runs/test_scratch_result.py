@@ -10,11 +10,14 @@ import pytest
 from plateviz.runs import scratch_result
 from plateviz.runs.fitted_orbit import read_fitted_orbit, write_fitted_orbit
 from plateviz.runs.scratch_result import (
+    is_judged_later,
     is_written,
     read_scratch_result,
     write_eigenmodes,
     write_scratch_result,
+    write_verdict,
 )
+from plateviz.tables.verdict import with_verdict
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
 from solver.data.schema import RESULT_TABLES
 from solver.errors import DiskError, InputError
@@ -127,3 +130,56 @@ def test_eigenmodes_that_never_come_are_an_error_at_once(partial):
         with pytest.raises(InputError, match="the solver ended before it wrote them; fit again"):
             getattr(result, name)
     assert len(result.sources)
+
+
+@pytest.fixture
+def unjudged(fit_result, tmp_path):
+    """A result whose verdict is to follow; the same with it; and the function that writes it."""
+    judged = with_verdict(fit_result)
+    write_scratch_result(tmp_path / "unjudged", fit_result, is_judged=False)
+
+    def finish():
+        write_verdict(tmp_path / "unjudged", judged.summary["verdict"])
+        return True
+
+    return tmp_path / "unjudged", judged, finish
+
+
+def test_verdict_that_follows_is_the_same(unjudged):
+    directory, judged, finish = unjudged
+    early = read_scratch_result(directory)
+    assert early.summary["converged"]
+    assert is_judged_later(early)
+    finish()
+    assert not is_judged_later(early)
+    for result in (early, read_scratch_result(directory)):
+        same(judged, result)
+        assert len(result.summary) == len(judged.summary)
+
+
+@pytest.mark.parametrize(
+    "use", [dict, len, lambda summary: summary.get("verdict")], ids=["all", "number", "verdict"]
+)
+def test_who_uses_the_verdict_waits_for_it(unjudged, use):
+    directory, judged, finish = unjudged
+    asked = []
+    result = read_scratch_result(directory, hurry=lambda: asked.append("verdict") or finish())
+    assert result.summary["engine"] == judged.summary["engine"]
+    assert not asked
+    assert use(result.summary) == use(json.loads(json.dumps(judged.summary)))
+    assert use(result.summary)
+    assert asked == ["verdict"]
+
+
+def test_result_whose_verdict_never_comes_has_none(fit_result, unjudged):
+    result = read_scratch_result(unjudged[0], hurry=lambda: False)
+    assert result.summary.get("verdict") is None
+    assert not is_judged_later(result)
+    same(fit_result, result)
+
+
+def test_overdue_verdict_is_not_waited_for(unjudged, monkeypatch):
+    monkeypatch.setattr(scratch_result, "_PATIENCE_SECONDS", 0.0)
+    result = read_scratch_result(unjudged[0])
+    assert not is_judged_later(result)
+    assert "verdict" not in result.summary

@@ -6,6 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from plateviz.runs import scratch_result
+from plateviz.runs.scratch_result import (
+    read_scratch_result,
+    write_scratch_result,
+    write_verdict,
+)
 from plateviz.solving.judge import Judge
 from plateviz.tables.verdict import is_judged, orbit_verdict, with_verdict
 
@@ -37,6 +43,28 @@ def test_solution_that_comes_with_its_verdict_is_not_judged_again(fit_result):
     waiting = Waiting()
     assert Judge(waiting).has_judged(with_verdict(fit_result))
     assert not waiting.waiting
+
+
+def test_solution_of_the_solver_is_judged_there(fit_result, tmp_path):
+    waiting = Waiting()
+    judge, judged = Judge(waiting), with_verdict(fit_result)
+    write_scratch_result(tmp_path / "result", fit_result, is_judged=False)
+    result = read_scratch_result(tmp_path / "result", hurry=lambda: pytest.fail("waited"))
+    assert not judge.has_judged(result)
+    write_verdict(tmp_path / "result", judged.summary["verdict"])
+    assert judge.has_judged(result)
+    assert orbit_verdict(result) == orbit_verdict(judged)
+    assert not waiting.waiting
+
+
+def test_solution_whose_solver_has_ended_is_judged_here(fit_result, tmp_path, monkeypatch):
+    monkeypatch.setattr(scratch_result, "_PATIENCE_SECONDS", 0.0)
+    waiting = Waiting()
+    write_scratch_result(tmp_path / "result", fit_result, is_judged=False)
+    result = read_scratch_result(tmp_path / "result")
+    assert not Judge(waiting).has_judged(result)
+    ((work, arguments),) = waiting.waiting
+    assert work(*arguments) == orbit_verdict(with_verdict(fit_result))
 
 
 def test_solution_that_cannot_be_judged_says_so_where_its_verdict_is_used(fit_result):

@@ -1,5 +1,6 @@
 """The solution store with a real solver process, which fits, cancels, dies and restarts."""
 
+import json
 import tempfile
 
 import pandas as pd
@@ -10,6 +11,7 @@ from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.origin import OrbitFiles, SurveyFolder, origin_from_dict, origin_to_dict
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_queue import SolverQueue
+from plateviz.tables.verdict import with_verdict
 from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
@@ -27,12 +29,18 @@ def store(small_survey):
     store.close()
 
 
+def plain(values):
+    return json.loads(json.dumps(values))
+
+
 def test_orbit_is_fitted_and_kept(store):
     job = store.request(0, FitSettings())
     assert job.wait(LONG) is JobStatus.DONE, job.message
     result = store.result(0, FitSettings())
     assert result.summary["converged"]
     assert result.true_places is not None
+    # It follows, and is waited for.
+    assert result.summary["verdict"] == plain(with_verdict(result).summary["verdict"])
     stages = [report["stage"] for report in job.progress]
     assert stages[0] == "reading the orbit"
     assert "iteration 1" in stages

@@ -4,10 +4,11 @@ import queue
 
 import pytest
 
-from plateviz.solving import solver_process
+from plateviz.solving import fitters
+from plateviz.solving.fitters import fitter_of, prepare
 from plateviz.solving.origin import SurveyFolder, origin_to_dict
 from plateviz.solving.put_off import PutOff
-from plateviz.solving.solver_process import _fitter_of, _next_request, _prepare
+from plateviz.solving.solver_process import _next_request
 from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
@@ -58,6 +59,18 @@ def test_speculative_work_is_finished_without_requests(requests):
     assert done == [0, 1, 2]
 
 
+def test_verdict_is_next_and_eigenmodes_are_when_idle(requests, monkeypatch):
+    done, put_off = [], PutOff()
+    put_off.add(lambda: done.append("eigenmodes"))
+    put_off.add(lambda: done.append("verdict"), is_next=True)
+    requests.put({"job": "1"})
+    _next_request(requests, iter(()), put_off)
+    assert done == []
+    monkeypatch.setattr(requests, "get", lambda timeout: {"job": "2"})
+    _next_request(requests, iter(()), put_off)
+    assert done == ["verdict"]
+
+
 def test_few_results_wait_for_their_eigenmodes():
     done, put_off = [], PutOff()
     for number in range(4):
@@ -87,31 +100,31 @@ PREPARED = {"do": "prepare", "origin": "here", "orbit": 0, "settings": SETTINGS.
 
 
 @pytest.fixture
-def prepare(monkeypatch, requests):
+def prepared_with(monkeypatch, requests):
     """Prepare an orbit that was fitted with some settings, or not; return the settings then."""
 
     def prepared(fitted=None):
         fitter = Fitter(fitted)
-        monkeypatch.setattr(solver_process, "_fitter_of", lambda request: fitter)
-        steps = list(_prepare(PREPARED, requests))
+        monkeypatch.setattr(fitters, "fitter_of", lambda request: fitter)
+        steps = list(prepare(PREPARED, requests))
         return fitter.fitted_settings, steps
 
     return prepared
 
 
-def test_orbit_is_fitted_and_its_likely_what_ifs_are_precomputed(prepare):
-    assert prepare() == (SETTINGS, [0, 1, 2])
+def test_orbit_is_fitted_and_its_likely_what_ifs_are_precomputed(prepared_with):
+    assert prepared_with() == (SETTINGS, [0, 1, 2])
 
 
-def test_all_measurements_are_fitted_and_no_orders_compared(prepare, monkeypatch):
+def test_all_measurements_are_fitted_and_no_orders_compared(prepared_with, monkeypatch):
     special = SETTINGS.with_(exclusions=Exclusions(detectors=frozenset([1])), compare_orders=True)
     monkeypatch.setitem(PREPARED, "settings", special.to_dict())
-    assert prepare()[0] == SETTINGS
+    assert prepared_with()[0] == SETTINGS
 
 
-def test_orbit_whose_fit_serves_is_not_fitted_again(prepare):
+def test_orbit_whose_fit_serves_is_not_fitted_again(prepared_with):
     fitted = FitSettings(order=4, prior_widths={"sources": 3.0})
-    assert prepare(fitted)[0] is fitted
+    assert prepared_with(fitted)[0] is fitted
 
 
 @pytest.mark.parametrize(
@@ -123,8 +136,8 @@ def test_orbit_whose_fit_serves_is_not_fitted_again(prepare):
     ],
     ids=["lower-order", "other-model", "fewer-measurements"],
 )
-def test_fit_that_cannot_serve_is_replaced(prepare, fitted):
-    assert prepare(fitted)[0] == SETTINGS
+def test_fit_that_cannot_serve_is_replaced(prepared_with, fitted):
+    assert prepared_with(fitted)[0] == SETTINGS
 
 
 @pytest.mark.parametrize(
@@ -138,9 +151,9 @@ def test_fit_that_cannot_serve_is_replaced(prepare, fitted):
     ],
     ids=["its-what-if", "what-if-of-another-orbit", "fit", "another-orbit", "rest"],
 )
-def test_preparation_gives_way_to_all_but_its_what_ifs(prepare, requests, change, is_fitted):
+def test_preparation_gives_way_to_all_but_its_what_ifs(prepared_with, requests, change, is_fitted):
     requests.put({**PREPARED, **change})
-    assert (prepare()[0] is not None) == is_fitted
+    assert (prepared_with()[0] is not None) == is_fitted
 
 
 def test_what_if_of_a_prepared_orbit_needs_no_fit(requests, small_survey):
@@ -149,15 +162,15 @@ def test_what_if_of_a_prepared_orbit_needs_no_fit(requests, small_survey):
     origin = origin_to_dict(SurveyFolder(str(small_survey)))
     request = {**PREPARED, "origin": origin, "settings": settings.to_dict()}
     later = settings.with_(prior_widths={"sources": 3.0})
-    assert _fitter_of(request).what_if(later) is None
-    next(_prepare(request, requests))
-    assert _fitter_of(request).what_if(later).summary["reason"] == FitStatus.WHAT_IF.value
-    solver_process._fitter.cache_clear()
+    assert fitter_of(request).what_if(later) is None
+    next(prepare(request, requests))
+    assert fitter_of(request).what_if(later).summary["reason"] == FitStatus.WHAT_IF.value
+    fitters._fitter.cache_clear()
 
 
 def test_what_is_wrong_with_an_orbit_is_not_said_unasked(monkeypatch, requests):
     def unreadable(request):
         raise InputError("obs.fits: no such file")
 
-    monkeypatch.setattr(solver_process, "_fitter_of", unreadable)
-    assert list(_prepare(PREPARED, requests)) == []
+    monkeypatch.setattr(fitters, "fitter_of", unreadable)
+    assert list(prepare(PREPARED, requests)) == []

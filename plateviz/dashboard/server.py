@@ -32,6 +32,8 @@ from solver.errors import InputError
 
 # Time for a page that has lost its connection to come back to its session.
 _LOST_MILLISECONDS = 60_000
+# Time between two looks for sessions that can be ended.
+_LOOK_MILLISECONDS = 5000
 # A page sends events and a few properties; a selection of 8000 sources takes 60 kB.
 _MESSAGE_BYTES = 2**20
 _HOST = re.compile(r"[a-z0-9]([a-z0-9.-]*[a-z0-9])?(:\d{1,5})?")
@@ -124,6 +126,7 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
         start=False,
         verbose=False,
         unused_session_lifetime_milliseconds=_LOST_MILLISECONDS,
+        check_unused_sessions_milliseconds=_LOOK_MILLISECONDS,
         # A client cannot choose its session, nor have a payload of its own decompressed.
         sign_sessions=True,
         secret_key=secrets.token_bytes(),

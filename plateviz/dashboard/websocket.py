@@ -22,8 +22,9 @@ _PATCHED_DOCUMENTS: Any = bokeh_io_doc._PATCHED_CURDOCS  # noqa: SLF001
 _NO_TOKEN = (ValueError, TypeError, KeyError, AttributeError, AssertionError, RecursionError)
 # A part that is no JSON, or not what it should be, raises one of these, which Bokeh logs.
 _NO_MESSAGE = (ValueError, TypeError, KeyError, AttributeError, RecursionError)
-# Status codes of RFC 6455: what was sent is against the rules of the server.
-_AGAINST_THE_RULES = 1008
+# Status codes of RFC 6455: the browser has left the page, by closing it or loading another one;
+# what was sent is against the rules of the server.
+_LEFT, _AGAINST_THE_RULES = 1001, 1008
 # Messages of a page that the server could not carry out. A page may be changed while it sends one.
 _MOST_ERRORS = 20
 
@@ -67,11 +68,14 @@ class CheckedWebsocket(WSHandler):
         super().open(*arguments, **named)
 
     def on_close(self) -> None:
-        """Count the page as closed."""
+        """Count the page as closed; end its session soon, unless the page may come back to it."""
         limits = self._limits
         if limits is not None and self._is_counted:
             self._is_counted = False
             limits.pages.leave(self._client or "")
+        # A connection that was lost, by a network that failed, has no status code.
+        if self.close_code == _LEFT and self.connection is not None:
+            self.connection.session.request_expiration()
         super().on_close()
 
     async def on_message(self, fragment: str | bytes) -> None:

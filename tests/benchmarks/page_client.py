@@ -23,6 +23,8 @@ _PATIENCE_SECONDS = 20.0
 # An answer is complete when nothing more of it has come for so long.
 _QUIET_SECONDS = 1.0
 _LOOK_SECONDS = 0.02
+# Status code with which a browser closes the websocket of a page that is left.
+_LEFT = 1001
 _MOST_BYTES = 2**28
 _WINDOW = {"width": 1920, "height": 1080, "is_dark": False}
 # What a browser says of a card in a window of that size, screen pixels.
@@ -108,7 +110,7 @@ class PageClient:
         """Close the page."""
         self._is_closing = True
         if self._connection is not None:
-            self._connection.close()
+            self._connection.close(_LEFT)
         if self._listening is not None:
             await asyncio.wait([self._listening], timeout=_PATIENCE_SECONDS)
 

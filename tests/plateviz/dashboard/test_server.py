@@ -285,6 +285,32 @@ def test_pages_that_are_closed_leave_nothing(store, monkeypatch):
     with_server(store, scenario)
 
 
+@pytest.mark.parametrize(("code", "n_kept"), [(1001, 0), (None, 1)], ids=["left", "lost"])
+def test_session_of_a_page_that_is_left_ends_and_that_of_a_lost_one_stays(store, code, n_kept):
+    async def scenario(address, server):
+        page = (await get(f"{address}?view=orbit&orbit=0"))[1]
+        request = HTTPRequest(f"{address.replace('http', 'ws', 1)}ws")
+        protocols = ["bokeh", token_of(page)]
+        connection = await websocket_connect(request, subprotocols=protocols)
+        assert '"ACK"' in await connection.read_message()
+        sessions = server.get_sessions()
+        if code is None:
+            # The message that says that it is closed does not arrive.
+            connection.protocol.stream.close()
+        connection.close(code)
+        while sessions[0].connection_count:
+            await asyncio.sleep(0.02)
+        await server._tornado._cleanup_sessions()
+        assert len(server.get_sessions()) == n_kept
+        if n_kept:
+            again = await websocket_connect(request, subprotocols=protocols)
+            assert '"ACK"' in await again.read_message()
+            assert server.get_sessions() == sessions
+            again.close()
+
+    with_server(store, scenario)
+
+
 def test_page_without_its_last_slash_is_sent_to_its_path(store):
     async def scenario(address, server):
         answer = await AsyncHTTPClient().fetch(

@@ -8,6 +8,7 @@ from typing import Any
 
 import param
 
+from plateviz.dashboard.selected import KINDS
 from plateviz.plots.explored_rows import Columns
 
 # A control shows an empty value as if nothing were chosen.
@@ -46,6 +47,7 @@ class Exploration(param.Parameterized):
     is_log_x = param.Boolean(default=False, doc="whether the lower axis is logarithmic")
     is_log_y = param.Boolean(default=False, doc="whether the left axis is logarithmic")
     has_median = param.Boolean(default=False, doc="whether medians in bins are drawn")
+    selects = param.Selector(objects=[*KINDS], doc="what a drag in the picture selects")
     limits = param.Tuple(default=None, length=2, allow_None=True, doc="limits of the axes, or None")
 
     def __init__(self, tables: list[str], **values: Any) -> None:  # noqa: ANN401 as param
@@ -96,6 +98,8 @@ class Exploration(param.Parameterized):
         switches = [name for name in SWITCHES if getattr(self, name)]
         if switches:
             query["with"] = ",".join(switches)
+        if self.selects != KINDS[0]:
+            query["selects"] = self.selects
         if self.limits is not None:
             query["zoom"] = _text((*self.limits[0], *self.limits[1]))
         return query
@@ -115,7 +119,7 @@ def _text(numbers: tuple[float, ...]) -> str:
 
 
 def _requested(address: Mapping[str, str]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the switches and the limits that an address requests."""
+    """Return the switches, with what is selected, and the limits that an address requests."""
     wanted = address.get("with", "").split(",")
     limits: dict[str, Any] = {}
     between, zoom = (_parsed(address.get(name, ""), n) for name, n in (("between", 2), ("zoom", 4)))
@@ -123,7 +127,10 @@ def _requested(address: Mapping[str, str]) -> tuple[dict[str, Any], dict[str, An
         limits |= {"lowest": between[0], "highest": between[1]}
     if zoom is not None and all(map(math.isfinite, zoom)):
         limits["limits"] = (zoom[:2], zoom[2:])
-    return {name: True for name in SWITCHES if name in wanted}, limits
+    chosen: dict[str, Any] = {name: True for name in SWITCHES if name in wanted}
+    if address.get("selects") in KINDS:
+        chosen["selects"] = address["selects"]
+    return chosen, limits
 
 
 def _parsed(text: str, count: int) -> tuple[float, ...] | None:

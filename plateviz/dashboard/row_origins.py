@@ -13,8 +13,8 @@ from plateviz.tables.explore import EXPLORABLE, ExplorableTable
 _COMMON = (
     "The columns that the controls name, one point per row; above 20,000 rows in the frame, the "
     "number of rows in each cell, or the mean of the column that gives the colour. Along both axes "
-    "the histograms of what is in the frame. A drag selects the sources in a box, which all other "
-    "figures show. The wheel zooms, and the cells become finer."
+    "the histograms of what is in the frame. A drag selects what the controls "
+    "name, which all other figures show. The wheel zooms, and the cells become finer."
 )
 _OF_RUN = (
     f" Only the columns that are drawn are read. Above {MOST_ROWS:,} residuals, those of one "

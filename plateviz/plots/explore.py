@@ -1,5 +1,7 @@
 """Any column of a table against any other, with their histograms along both axes."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -15,7 +17,7 @@ from plateviz.plots.explored_rows import (
 )
 from plateviz.plots.style import CLASS_COLOURS, COLOUR_OF_CLASS, ROW_LIMIT
 from plateviz.tables.explore import ExplorableTable
-from plateviz.tables.labels import id_strings, unit_text
+from plateviz.tables.labels import exposure_labels, id_strings, unit_text
 from plateviz.tables.sources import REFERENCE
 from solver.data.columns import Column
 
@@ -32,7 +34,7 @@ def explored_figure(
     table: ExplorableTable,
     chosen: Columns,
     *,
-    selected: frozenset[int] = frozenset(),
+    selected: frozenset[Any] = frozenset(),
     extent: Extent | None = None,
     width: int = FRAME_WIDTH,
 ) -> Figure:
@@ -42,8 +44,8 @@ def explored_figure(
     ----------
     table : as `tables.explore` makes it
     chosen : the columns; KeyError if the table has none of that name
-    selected : ids of sources that are marked in cells; among points, those of a source are
-        marked where the figure is drawn
+    selected : items of `Columns.selects` that are marked in cells; among points, they are marked
+        where the figure is drawn
     extent : `extent_of` the table and the columns, if it is known
     width : of the frame, screen pixels
     """
@@ -85,14 +87,22 @@ class _Data:
     def __init__(self, table: ExplorableTable, chosen: Columns, rows: np.ndarray) -> None:
         self.table, self.rows = table, rows
         self.frame = pd.DataFrame({"x": self.column(chosen.x), "y": self.column(chosen.y)})
+        kind = table.kind(chosen.selects)
         if table.has_sources:
             sources = table.sources()
             codes = sources.codes[rows]
-            self.frame["id"] = id_strings(pd.Series(sources.ids[codes]))
+            # Rows are selected by the column of this name.
+            self.source = "id" if kind == "sources" else "source"
+            self.frame[self.source] = id_strings(pd.Series(sources.ids[codes]))
             if sources.classes is not None:
                 self.frame["source_class"] = sources.classes[codes]
         for name, words in table.words.items():
             self.frame[name] = words(rows)
+        if kind == "exposures":
+            keys = {name: table.read(name)[rows] for name in ("field_id", "plate_id")}
+            self.frame["exposure"] = exposure_labels(pd.DataFrame(keys))
+        elif kind == "detectors":
+            self.frame["detector_id"] = table.read("detector_id")[rows]
 
     def column(self, name: str) -> np.ndarray:
         return self.table.numbers(name)[self.rows]
@@ -145,10 +155,10 @@ def _histograms(counts: Counts, x: Axis, y: Axis) -> list[Glyphs]:
 
 def _points(data: _Data, chosen: Columns) -> Glyphs:
     table, has_sources = data.frame, data.table.has_sources
-    hover = [("source", "@{id}")] if has_sources else []
+    hover = [("source", f"@{{{data.source}}}")] if has_sources else []
     hover += [(name, f"@{{{name}}}") for name in data.table.words]
     hover += [(chosen.x, "@{x}{0.0000}"), (chosen.y, "@{y}{0.0000}")]
-    keep = [*(["id"] if has_sources else []), *data.table.words]
+    keep = [name for name in table if name not in ("x", "y", "source_class")]
     if chosen.colour:
         values = data.column(chosen.colour)
         table["colour"] = values
@@ -199,23 +209,24 @@ def _selected(
     table: ExplorableTable,
     chosen: Columns,
     axes: tuple[Axis, Axis],
-    selected: frozenset[int],
+    selected: frozenset[Any],
     words: list[str],
 ) -> list[Glyphs]:
-    """Return the rows of selected sources as points over the cells; say it if they are too many."""
-    if not selected or not table.has_sources:
+    """Return the rows of what is selected as points over the cells; say if they are too many."""
+    kind = table.kind(chosen.selects)
+    if not selected or not kind:
         return []
-    limits = (axes[0].limits, axes[1].limits)
-    rows = rows_in_frame(table, chosen, limits, table.sources().among(selected))
+    rows = rows_in_frame(table, chosen, (axes[0].limits, axes[1].limits), selected)
     if len(rows) > ROW_LIMIT:
-        words.append(f"{len(rows):,} of selected sources, too many to be marked")
+        words.append(f"{len(rows):,} of selected {kind}, too many to be marked")
     if not 0 < len(rows) <= ROW_LIMIT:
         return []
-    # Without an `id`: these points show what is selected, and are not selected from.
-    marks = _Data(table, chosen, rows).frame.rename(columns={"id": "source"})
-    label = "selected sources"
+    # Under names that are not selected by: these points show what is selected.
+    names = {"id": "source", "exposure": "in exposure", "detector_id": "on detector"}
+    marks = _Data(table, chosen, rows).frame.rename(columns=names)
+    label = f"selected {kind}"
     colour = CLASS_COLOURS[REFERENCE]  # visible on dark and on light cells
-    hover = [("source", "@{source}")]
+    hover = [(name, f"@{{{name}}}") for name in names.values() if name in marks]
     return [points(marks, "x", "y", name=label, color=colour, size=3.0, hover=hover, label=label)]
 
 

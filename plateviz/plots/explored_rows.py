@@ -4,9 +4,9 @@ A table may have tens of millions of rows. They are looked at a part at a time: 
 stay in the processor's cache, and none is made that is as long as the table.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,7 @@ class Columns:
     is_log_x, is_log_y : whether the axes are logarithmic
     has_median : whether the median of y is drawn in bins of x
     limits : of x and y; None for those of the data
+    selects : what an area selects: "sources", "exposures" or "detectors", if the rows are of them
     """
 
     x: str
@@ -43,6 +44,7 @@ class Columns:
     is_log_y: bool = False
     has_median: bool = False
     limits: tuple[Limits, Limits] | None = None
+    selects: str = "sources"
 
 
 class Extent(NamedTuple):
@@ -111,16 +113,17 @@ def rows_in_frame(
     table: ExplorableTable,
     chosen: Columns,
     limits: tuple[Limits, Limits] | None,
-    among: np.ndarray | None = None,
+    selected: Collection[Any] | None = None,
 ) -> np.ndarray:
     """Return the numbers of the rows that can be drawn.
 
     Parameters
     ----------
     limits : of x and y, between which the rows lie; None for all
-    among : whether each source of the table counts; None for all
+    selected : items of what the columns select, of which the rows are; None for all
     """
-    codes = None if among is None else table.sources().codes
+    items = None if selected is None else table.items(table.kind(chosen.selects))
+    among = None if items is None or selected is None else items.among(selected)
     found = [np.zeros(0, dtype=np.int64)]
     for part in _parts(table, chosen):
         wanted = part.is_drawable
@@ -128,27 +131,27 @@ def rows_in_frame(
             for values, ends in zip((part.x, part.y), limits, strict=True):
                 low, high = sorted(ends)
                 wanted &= (values >= low) & (values <= high)
-        if codes is not None and among is not None:
-            wanted &= among[codes[part.rows]]
+        if items is not None and among is not None:
+            wanted &= among[items.codes[part.rows]]
         found.append(np.flatnonzero(wanted) + part.rows.start)
     return np.concatenate(found)
 
 
-def sources_within(table: ExplorableTable, chosen: Columns, corners: np.ndarray) -> frozenset[int]:
-    """Return the ids of sources with a drawn row inside a polygon.
+def items_within(table: ExplorableTable, chosen: Columns, corners: np.ndarray) -> frozenset[Any]:
+    """Return the sources, exposures or detectors with a drawn row inside a polygon.
 
     Parameters
     ----------
-    table : of rows that have sources
-    chosen : the columns of the polygon's coordinates, and the limits of the rows
+    table : of rows that are of something
+    chosen : the columns of the polygon's coordinates, the limits of the rows, and what is selected
     corners : of the polygon, which closes itself, (n, 2)
     """
-    polygon, sources = Polygon(corners), table.sources()
-    is_found = np.zeros(len(sources.ids), dtype=bool)
+    polygon, items = Polygon(corners), table.items(table.kind(chosen.selects))
+    is_found = np.zeros(len(items.items), dtype=bool)
     for part in _parts(table, chosen):
         is_inside = part.is_drawable & polygon.contains(part.x, part.y)
-        is_found[sources.codes[part.rows][is_inside]] = True
-    return frozenset(sources.ids[is_found].tolist())
+        is_found[items.codes[part.rows][is_inside]] = True
+    return frozenset(items.items[n] for n in np.flatnonzero(is_found))
 
 
 def _parts(table: ExplorableTable, chosen: Columns) -> Iterator[_Part]:

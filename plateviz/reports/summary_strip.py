@@ -10,16 +10,33 @@ STYLE = (files("plateviz.reports") / "summary_strip.css").read_text(encoding="ut
 """The colours of both themes, and the classes of the strip."""
 
 
-def strip(items: Iterable[SummaryItem]) -> str:
-    """Return numbers as a row of tiles, each with its name and its state."""
-    return f"<div class='strip'>{''.join(map(_cell, items))}</div>"
+def strip(items: Iterable[SummaryItem], others: Iterable[SummaryItem] = ()) -> str:
+    """Return numbers as a row of tiles, each with its name and its state, and a line of counts.
+
+    Parameters
+    ----------
+    others : of the solution (A) that is compared with; values that differ stand in the same tile
+    """
+    of_a = {one.label: one for one in others}
+    tiles, counts = [], []
+    for item in items:
+        (counts if item.is_count else tiles).append(_cell(item, of_a.get(item.label)))
+    line = f"<div class='counts'>{''.join(counts)}</div>" if counts else ""
+    return f"<div class='strip'>{''.join(tiles)}</div>{line}"
 
 
-def _cell(item: SummaryItem) -> str:
+def _cell(item: SummaryItem, other: SummaryItem | None) -> str:
     value, bracket, beside = item.value.partition(" (")
     return (
         f"<div class='cell {item.state}' title='{escape(item.hint, quote=True)}'>"
         f"<span class='name'>{escape(item.label)}</span>"
         f"<span class='value'>{escape(value)}"
-        f"<span class='beside'>{escape(bracket + beside)}</span></span></div>"
+        f"<span class='beside'>{escape(bracket + beside)}</span></span>{_other(item, other)}</div>"
     )
+
+
+def _other(item: SummaryItem, other: SummaryItem | None) -> str:
+    if other is None or other.value == item.value:
+        return ""
+    value = other.value.partition(" (")[0]
+    return f"<span class='other {other.state}'>(A) {escape(value)}</span>"

@@ -1,8 +1,8 @@
 """Tables whose columns can be drawn against each other: sources, measurements and exposures."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -46,9 +46,22 @@ class CodedSources(NamedTuple):
     codes: np.ndarray
     classes: np.ndarray | None
 
-    def among(self, selected: Iterable[int]) -> np.ndarray:
-        """Return whether each source of `ids` is selected."""
-        return np.isin(self.ids, np.fromiter(selected, dtype=np.int64))
+
+class CodedItems(NamedTuple):
+    """The source, the exposure or the detector of each row.
+
+    Attributes
+    ----------
+    items : ids of sources or detectors, or (field_id, plate_id) of exposures
+    codes : place in `items` of that of each row
+    """
+
+    items: list[Any]
+    codes: np.ndarray
+
+    def among(self, selected: Collection[Any]) -> np.ndarray:
+        """Return whether each of `items` is selected."""
+        return np.fromiter((one in selected for one in self.items), bool, len(self.items))
 
 
 Words = Callable[[np.ndarray], np.ndarray]
@@ -80,6 +93,34 @@ class ExplorableTable(NamedTuple):
     words: Mapping[str, Words] = MappingProxyType({})
     coded: Callable[[], CodedSources] | None = None
     note: str = ""
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What its rows are of that can be selected: sources, exposures, detectors.
+
+        Exposures and detectors of several orbits are not the same.
+        """
+        is_of_orbit = "orbit_id" not in self.columns
+        has = {
+            "sources": self.has_sources,
+            "exposures": is_of_orbit and {"field_id", "plate_id"} <= set(self.columns),
+            "detectors": is_of_orbit and "detector_id" in self.columns,
+        }
+        return tuple(kind for kind, is_there in has.items() if is_there)
+
+    def kind(self, wanted: str) -> str:
+        """Return what is selected if `wanted` is to be; empty if its rows are of nothing."""
+        return wanted if wanted in self.kinds else next(iter(self.kinds), "")
+
+    def items(self, kind: str) -> CodedItems:
+        """Return the source, exposure or detector of each row; `kind` is one of `kinds`."""
+        if kind == "sources":
+            sources = self.sources()
+            return CodedItems(sources.ids.tolist(), sources.codes)
+        names = ("field_id", "plate_id") if kind == "exposures" else ("detector_id",)
+        codes, items = pd.MultiIndex.from_arrays([self.read(name) for name in names]).factorize()
+        found = items.tolist()
+        return CodedItems(found if kind == "exposures" else [one for (one,) in found], codes)
 
     def numbers(self, name: str) -> np.ndarray:
         """Return a column as floating-point numbers; KeyError if there is none of that name."""

@@ -16,12 +16,22 @@ _UNLIKELY = 2.7e-3
 
 
 class SummaryItem(NamedTuple):
-    """One number: its name, its value as text, its meaning, and its state."""
+    """One number.
+
+    Attributes
+    ----------
+    label : its name
+    value : as text
+    hint : its meaning
+    state : "neutral" if it is not judged
+    is_count : whether it says how large the fit is, not how good
+    """
 
     label: str
     value: str
     hint: str
     state: State
+    is_count: bool = False
 
 
 def summary_strip(result: FitResult) -> list[SummaryItem]:
@@ -165,7 +175,7 @@ def _counts(result: FitResult) -> list[SummaryItem]:
         "n_exposures": ("Exposures", "exposures of the orbit, each with all detectors"),
     }
     items = [
-        SummaryItem(label, f"{_number(result, key):,.0f}", hint, "neutral")
+        SummaryItem(label, f"{_number(result, key):,.0f}", hint, "neutral", is_count=True)
         for key, (label, hint) in names.items()
     ]
     if _number(result, "n_reference") == 0:
@@ -181,6 +191,7 @@ def _iterations(result: FitResult) -> SummaryItem:
         f"{_number(result, 'iterations'):.0f}",
         f"Engine {engine}, distortion order {order}, at most {result.settings.max_iterations}",
         "neutral",
+        is_count=True,
     )
 
 
@@ -188,4 +199,4 @@ def _seconds(result: FitResult) -> SummaryItem:
     seconds: Mapping[str, float] = result.summary["seconds"]  # type: ignore[assignment]
     parts = {name: float(value) for name, value in seconds.items()}
     hint = ", ".join(f"{name} {value:.2f} s" for name, value in parts.items())
-    return SummaryItem("Time", f"{sum(parts.values()):.1f} s", hint, "neutral")
+    return SummaryItem("Time", f"{sum(parts.values()):.1f} s", hint, "neutral", is_count=True)

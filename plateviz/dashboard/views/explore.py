@@ -13,9 +13,10 @@ import panel_material_ui as pmui
 from astropy.table import Table
 
 from plateviz.dashboard.downloads import rows_of
-from plateviz.dashboard.exploration import NONE, SWITCHES
+from plateviz.dashboard.exploration import SWITCHES
 from plateviz.dashboard.latest_answer import PENDING, LatestAnswer, Pending
 from plateviz.dashboard.row_origins import RowsOrigin, TableRequest
+from plateviz.dashboard.selected import KINDS, Selected
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
@@ -29,19 +30,18 @@ from plateviz.plots.explored_rows import (
     Columns,
     Extent,
     extent_of,
+    items_within,
     kept_rows,
     rows_in_frame,
-    sources_within,
 )
 from plateviz.plots.style import ROW_LIMIT
 from plateviz.tables.explore import ExplorableTable
 from solver.errors import InputError
 
-_STEPS, _BETWEEN = 200, "between"
 # Columns that say what a saved row is of, besides the id of its source.
 _KEYS = ("orbit_id", "field_id", "plate_id", "detector_id")
 MOST_SELECTED = 250_000
-"""Sources that an area can select."""
+"""Sources, exposures or detectors that an area can select."""
 _MOST_SAVED = 1_000_000
 
 
@@ -91,7 +91,7 @@ class ExploreView(pn.viewable.Viewer):
         self._origin, self._session, self._wake = origin, session, wake
         self._exploration = origin.exploration
         self._latest: LatestAnswer[_Drawn] = LatestAnswer(origin.executor)
-        self._selecting: LatestAnswer[frozenset[int]] = LatestAnswer(origin.executor)
+        self._selecting: LatestAnswer[frozenset[Any]] = LatestAnswer(origin.executor)
         self._drawn: _Drawn | None = None
         self._table: object = None
         self._extent: tuple[object, Extent] | None = None
@@ -103,6 +103,7 @@ class ExploreView(pn.viewable.Viewer):
             select=selection.select_sources,
             select_area=self._take_area,
             select_exposures=selection.select_exposures,
+            select_detectors=selection.select_detectors,
         )
         self._figure = FigureView(
             _Text(origin.caption, origin.document),
@@ -114,16 +115,18 @@ class ExploreView(pn.viewable.Viewer):
             theme=session.theme,
         )
         self.grid = FigureGrid([self._figure], wake, columns=1)
-        self._limits = pmui.EditableRangeSlider(
-            label=_BETWEEN, start=0.0, end=1.0, size="small", width=260, disabled=True
-        )
-        self._limits.param.watch(self._take_limits, "value_throttled")
+        self._limits = [
+            pmui.FloatInput(label=label, value=None, size="small", width=130, margin=(4, 6))
+            for label in ("at least", "at most")
+        ]
+        for entry in self._limits:
+            entry.param.watch(self._take_limits, "value")
         self._words = markup_pane()
         self._words.visible = False
         self._workspace = workspace(self.grid, self._controls())
         names = list(self._exploration.param.values())
         self._exploration.param.watch(self._change, names)
-        session.selection.param.watch(self._show_selected, "sources")
+        session.selection.param.watch(self._show_selected, [*KINDS])
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the workspace."""
@@ -132,13 +135,15 @@ class ExploreView(pn.viewable.Viewer):
     def _controls(self) -> pmui.FlexBox:
         parameters = self._exploration.param
         select = partial(pmui.Select.from_param, size="small", description="", margin=(4, 6))
+        self._selects = select(parameters.selects, label="A drag selects", width=150, visible=False)
         return pmui.FlexBox(
             select(parameters.table, label="Rows", width=150),
-            select(parameters.y, label="y", width=195),
-            select(parameters.x, label="x", width=195),
-            select(parameters.colour, label="Colour", width=195),
-            select(parameters.only, label="Limit by", width=195),
-            self._limits,
+            select(parameters.y, label="y", width=180),
+            select(parameters.x, label="x", width=180),
+            select(parameters.colour, label="Colour", width=180),
+            self._selects,
+            select(parameters.only, label="Limit by", width=180),
+            *self._limits,
             *(
                 pmui.Checkbox.from_param(
                     parameters[name], label=label, description="", margin=(4, 6)
@@ -170,24 +175,26 @@ class ExploreView(pn.viewable.Viewer):
                 self._exploration.offer(request.columns)
         if not self._select(request):
             return PENDING
-        chosen, selected = self._exploration.columns(), self._session.selection.sources
+        chosen, selected = self._exploration.columns(), self._session.selection.selected
         make = partial(self._make, request, chosen, selected)
         drawn = self._latest.answer((request.key, chosen, selected), make)
         if isinstance(drawn, Pending):
             return drawn
         self._drawn = drawn
-        self._show_limits(drawn)
+        self._show_controls(drawn)
         return drawn.figure
 
-    def _make(self, request: TableRequest, chosen: Columns, selected: frozenset[int]) -> _Drawn:
+    def _make(self, request: TableRequest, chosen: Columns, selected: Selected) -> _Drawn:
         """Make a figure; runs on a thread of its own where that takes a while."""
         table = request.make()
         # Neither a zoom nor another colour changes how many rows there are.
-        key = (request.key, replace(chosen, limits=None, colour="", has_median=False))
+        of_all = replace(chosen, limits=None, colour="", has_median=False, selects="")
+        key = (request.key, of_all)
         known = self._extent
         if known is None or known[0] != key:
             self._extent = known = (key, extent_of(table, chosen))
-        figure = explored_figure(table, chosen, selected=selected, extent=known[1])
+        items = selected.by_kind().get(table.kind(chosen.selects), frozenset())
+        figure = explored_figure(table, chosen, selected=items, extent=known[1])
         return _Drawn(figure, table, chosen, known[1])
 
     def _rows(self) -> dict[str, Table]:
@@ -219,7 +226,7 @@ class ExploreView(pn.viewable.Viewer):
         self._wake()
 
     def _show_selected(self, *_: object) -> None:
-        """Mark the selected sources among cells; points are marked by themselves."""
+        """Mark what is selected among cells; points are marked by themselves."""
         if self._drawn is not None and self._drawn.table.size > ROW_LIMIT:
             self._redraw()
 
@@ -227,17 +234,16 @@ class ExploreView(pn.viewable.Viewer):
         self._exploration.limits = limits
 
     def _take_area(self, corners: np.ndarray) -> None:
-        # A row without a source selects none.
-        if self._drawn is not None and self._drawn.table.has_sources:
+        if self._drawn is not None and self._drawn.table.kinds:
             self._area = corners
             self._redraw()
 
     def _select(self, request: TableRequest) -> bool:
-        """Select the sources in the area that a person has drawn; return whether that is done."""
+        """Select what is in the area that a person has drawn; return whether that is done."""
         area, drawn = self._area, self._drawn
         if area is None or drawn is None:
             return True
-        make = partial(sources_within, drawn.table, drawn.chosen, area)
+        make = partial(items_within, drawn.table, drawn.chosen, area)
         try:
             key = (request.key, drawn.chosen, area.tobytes())
             found = self._selecting.answer(key, make)
@@ -248,16 +254,17 @@ class ExploreView(pn.viewable.Viewer):
         if isinstance(found, Pending):
             return False
         self._area = None
+        kind = drawn.table.kind(drawn.chosen.selects)
         if not found:
             self._say("No row is in that area. What was selected stays selected.")
         elif len(found) > MOST_SELECTED:
             self._say(
-                f"{len(found):,} sources have rows in that area, and at most {MOST_SELECTED:,} can "
+                f"{len(found):,} {kind} have rows in that area, and at most {MOST_SELECTED:,} can "
                 "be selected: draw a smaller one, or limit the rows. What was selected stays."
             )
         else:
             self._say("")
-            self._session.selection.select_sources(found)
+            self._session.selection.param.update(**{kind: found})
         return True
 
     def _say(self, words: str) -> None:
@@ -266,29 +273,24 @@ class ExploreView(pn.viewable.Viewer):
             text = paragraph(words, "caption", self._session.theme) if words else ""
             self._words.param.update(object=text, visible=bool(words))
 
-    def _show_limits(self, drawn: _Drawn) -> None:
-        """Let the slider span the values of the column that limits the rows."""
-        name, chosen = self._exploration.only, drawn.chosen
-        if name == NONE:
-            self._limits.param.update(label=_BETWEEN, disabled=True)
-            return
-        low, high = drawn.extent.only if not math.isnan(drawn.extent.only[0]) else (0.0, 1.0)
-        high = high if high > low else low + 1.0
+    def _show_controls(self, drawn: _Drawn) -> None:
+        """Offer what can be selected, and the limits of the column that limits the rows."""
+        self._selects.visible = len(drawn.table.kinds) > 1
+        is_limited = bool(drawn.chosen.only)
+        limits = (drawn.chosen.lowest, drawn.chosen.highest)
         with self._following():
-            self._limits.param.update(
-                label=f"{name} between",
-                start=low,
-                end=high,
-                step=(high - low) / _STEPS,
-                value=(max(low, chosen.lowest), min(high, chosen.highest)),
-                disabled=False,
-            )
+            for entry, limit, end in zip(self._limits, limits, drawn.extent.only, strict=True):
+                entry.param.update(
+                    visible=is_limited,
+                    value=limit if math.isfinite(limit) else None,
+                    placeholder="" if math.isnan(end) else f"{end:.6g}",
+                )
 
-    def _take_limits(self, event: Any) -> None:  # noqa: ANN401 as param
-        if self._is_following or event.new is None:
+    def _take_limits(self, _: object) -> None:
+        if self._is_following:
             return
-        low, high = event.new  # the ends of the slider are all values: what it shows is rounded
+        lowest, highest = (entry.value for entry in self._limits)
         self._exploration.param.update(
-            lowest=low if low > self._limits.start else -math.inf,
-            highest=high if high < self._limits.end else math.inf,
+            lowest=-math.inf if lowest is None else lowest,
+            highest=math.inf if highest is None else highest,
         )

@@ -96,16 +96,10 @@ class StripView(pn.viewable.Viewer):
         if session.shown is None:
             self._strip.object = ""
             return
-        items = summary_strip(session.shown.result)
-        strips = [strip(items)]
-        if session.other is not None:
-            others = [one for one in summary_strip(session.other.result) if one not in items]
-            strips = [
-                f"<div class='lettered'><b>({letter})</b>{strip(shown)}</div>"
-                for letter, shown in (("B", items), ("A", others))
-            ]
+        others = [] if session.other is None else summary_strip(session.other.result)
+        numbers = strip(summary_strip(session.shown.result), others)
         stale = " stale" if session.stage is Stage.STALE else ""
-        markup = session.units.text("".join(strips))
+        markup = session.units.text(numbers)
         self._strip.object = f"<div class='{session.theme}{stale}'>{markup}</div>"
 
 

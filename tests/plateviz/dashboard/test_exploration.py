@@ -45,7 +45,7 @@ def test_zoom_is_forgotten_with_other_columns_only(exploration):
 )
 def test_address_is_read_back(exploration, between):
     exploration.param.update(y="dec", colour="ra", only="n_obs", is_log_x=True, has_median=True)
-    exploration.param.update(lowest=between[0], highest=between[1])
+    exploration.param.update(lowest=between[0], highest=between[1], selects="detectors")
     exploration.limits = ((1.0, 20.0), (-0.5, 1.5e-3 / 7.0))
     other = Exploration(TABLES)
     other.restore(exploration.address())
@@ -63,7 +63,7 @@ def test_address_is_read_back(exploration, between):
         {"rows": "sources", "zoom": "1~inf~2~3"},
         {"rows": "sources", "zoom": "1~2~3"},
         {"rows": "sources", "zoom": "nan~1e999~3~4"},
-        {"rows": "sources", "with": "limits,table", "between": "a~b"},
+        {"rows": "sources", "with": "limits,table", "between": "a~b", "selects": "limits"},
     ],
 )
 def test_nonsense_in_an_address_is_ignored(nonsense):

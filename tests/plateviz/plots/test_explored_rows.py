@@ -10,8 +10,8 @@ from plateviz.plots.explored_rows import (
     Columns,
     counts_in_frame,
     extent_of,
+    items_within,
     rows_in_frame,
-    sources_within,
 )
 from plateviz.tables.explore import ExplorableTable
 from solver.data.columns import Column
@@ -140,8 +140,7 @@ def test_rows_in_a_frame_are_found_by_number(table):
     limits = ((0.2, 0.8), (0.9, 0.1))
     expected = np.flatnonzero((x >= 0.2) & (x <= 0.8) & (y >= 0.1) & (y <= 0.9))
     assert rows_in_frame(table, Columns("x", "y"), limits).tolist() == expected.tolist()
-    among = table.sources().among(expected[:2].tolist())
-    found = rows_in_frame(table, Columns("x", "y"), limits, among)
+    found = rows_in_frame(table, Columns("x", "y"), limits, expected[:2].tolist())
     assert found.tolist() == expected[:2].tolist()
     assert len(rows_in_frame(table, Columns("x", "y"), None)) == 57
 
@@ -157,9 +156,9 @@ def test_area_has_the_sources_with_a_row_inside():
     # An L, which leaves out its upper right quarter.
     corners = np.array([(0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)], dtype=float)
     chosen = Columns("x", "y")
-    assert sources_within(table, chosen, corners) == {7, 8, 6}
-    assert sources_within(table, chosen, corners[::-1]) == {7, 8, 6}
+    assert items_within(table, chosen, corners) == {7, 8, 6}
+    assert items_within(table, chosen, corners[::-1]) == {7, 8, 6}
     without = Columns("x", "y", only="z", highest=0.5)
-    assert sources_within(table, without, corners) == {7, 6}
-    assert sources_within(table, chosen, corners[:2]) == frozenset()
-    assert sources_within(table, chosen, corners + 20.0) == frozenset()
+    assert items_within(table, without, corners) == {7, 6}
+    assert items_within(table, chosen, corners[:2]) == frozenset()
+    assert items_within(table, chosen, corners + 20.0) == frozenset()

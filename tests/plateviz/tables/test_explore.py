@@ -85,7 +85,7 @@ def test_sources_of_a_table_without_classes_have_none():
     table = ExplorableTable("rows", 3, named, columns.__getitem__, True, False)
     ids, codes, classes = table.sources()
     assert (ids.tolist(), codes.tolist(), classes) == ([5, 7], [1, 0, 1], None)
-    assert table.sources().among([7, 8]).tolist() == [False, True]
+    assert table.items("sources").among({7, 8}).tolist() == [False, True]
 
 
 def test_numbers_of_four_bytes_are_not_copied_into_eight():
@@ -99,3 +99,24 @@ def test_numbers_of_four_bytes_are_not_copied_into_eight():
 def test_exposures_are_named_for_a_hover(fit_result):
     words = EXPLORABLE["exposures"](fit_result).words
     assert words["exposure"](np.array([1])).tolist() == ["field 0, exposure 1"]
+
+
+def test_rows_of_one_orbit_are_of_exposures_and_detectors_too(fit_result):
+    tables = {name: make(fit_result) for name, make in EXPLORABLE.items()}
+    assert tables["measurements"].kinds == ("sources", "exposures", "detectors")
+    assert tables["sources"].kinds == ("sources",)
+    assert tables["exposures"].kinds == ("exposures",)
+    assert tables["exposures"].kind("sources") == "exposures"
+    rows = fit_result.residuals
+    exposures = tables["measurements"].items("exposures")
+    found = [exposures.items[code] for code in exposures.codes]
+    assert found == list(zip(rows["field_id"], rows["plate_id"], strict=True))
+    detectors = tables["measurements"].items("detectors")
+    assert [detectors.items[code] for code in detectors.codes] == rows["detector_id"].tolist()
+
+
+def test_exposures_of_several_orbits_are_not_the_same(fit_result):
+    table = EXPLORABLE["measurements"](fit_result)
+    several = table._replace(columns={**table.columns, "orbit_id": table.columns["nx"]})
+    assert several.kinds == ("sources",)
+    assert several._replace(has_sources=False).kind("sources") == ""

@@ -1,21 +1,26 @@
 """ExploreView over a run: drawn when it is read, areas select, and failures are said in place."""
 
-from types import SimpleNamespace
+import math
+from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from bokeh.events import RangesUpdate, SelectionGeometry
 
 from plateviz.dashboard import row_origins
 from plateviz.dashboard.navigation import Navigation, View
 from plateviz.dashboard.row_origins import OrbitRows, RunRows
+from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views import explore
 from plateviz.dashboard.views.explore import ExploreView
+from plateviz.plots.style import ROW_LIMIT
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN
-from plateviz.tables.explore import ExplorableTable
+from plateviz.tables.explore import ExplorableTable, explorable
+from solver.data.schema import RESIDUALS
 from solver.errors import InputError
 from tests.plateviz.dashboard.test_latest_answer import Executor
 from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
@@ -187,15 +192,61 @@ def test_column_that_cannot_be_read_is_said_and_the_next_one_is_drawn(
     assert title(view) == "residual_x against ny"
 
 
-def test_slider_spans_the_column_that_limits_the_rows(view, executor, navigation):
+def test_rows_are_limited_by_a_column(view, executor, navigation):
     draw(view, executor)
+    low, high = view._limits
+    assert [one.visible for one in (low, high)] == [False, False]
     navigation.survey_exploration.only = "leverage"
     draw(view, executor)
-    assert (view._limits.start, view._limits.end) == (-1.0, 1.0)
-    view._take_limits(SimpleNamespace(new=(0.0, 1.0)))
-    assert navigation.survey_exploration.lowest == 0.0
+    assert low.visible
+    assert [(one.value, one.placeholder) for one in (low, high)] == [(None, "-1"), (None, "1")]
+    low.value = 0.0
+    exploration = navigation.survey_exploration
+    assert (exploration.lowest, exploration.highest) == (0.0, math.inf)
     draw(view, executor)
     assert "15,000 not between the limits of leverage" in view._drawn.figure[0].subtitle
+    navigation.survey_exploration.only = "nx"
+    draw(view, executor)
+    assert low.value is None
+    assert exploration.lowest == -math.inf
+
+
+@pytest.fixture
+def of_orbit(navigation, monkeypatch):
+    """The workspace of an orbit with a measurement of each source on each detector, in cells."""
+    navigation.open_orbit(0)
+    result = navigation.session.shown.result
+    rows = pd.concat([result.residuals] * (ROW_LIMIT // len(result.residuals) + 2))
+    many = replace(result, residuals=rows.reset_index(drop=True))
+    monkeypatch.setattr(
+        row_origins,
+        "EXPLORABLE",
+        {"measurements": lambda _: explorable("measurements", many.residuals, RESIDUALS)},
+    )
+    made = ExploreView(OrbitRows(navigation), navigation.session, lambda *_: None, "No rows.")
+    made.grid._views[0].visibility.param.update(is_near=True, room=[900, 500])
+    return made
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_drag_selects_what_is_chosen(of_orbit, executor, navigation, kind):
+    draw(of_orbit, executor)
+    assert of_orbit._selects.visible
+    navigation.exploration.param.update(x="plate_id", y="detector_id", selects=kind)
+    draw(of_orbit, executor)
+    area(of_orbit, 0.5, 1.5, -0.5, 0.5)
+    draw(of_orbit, executor)
+    rows = navigation.session.shown.result.residuals.query("plate_id == 1 and detector_id == 0")
+    expected = {
+        "sources": frozenset(rows["source_id"].tolist()),
+        "exposures": frozenset(zip(rows["field_id"], rows["plate_id"], strict=True)),
+        "detectors": frozenset([0]),
+    }
+    selected = navigation.session.selection.selected.by_kind()
+    assert selected == {one: expected[one] if one == kind else frozenset() for one in KINDS}
+    (frame,) = of_orbit._drawn.figure
+    assert len(frame[f"selected {kind}"].values("x")) > 0
+    assert navigation.exploration.address().get("selects", "sources") == kind
 
 
 def test_run_that_grows_is_read_again(view, executor, navigation):

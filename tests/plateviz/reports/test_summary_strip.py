@@ -1,0 +1,25 @@
+"""The summary strip as HTML: tiles, the line of counts, and what a solution is compared with."""
+
+from plateviz.reports.summary_strip import strip
+from plateviz.tables.summary import SummaryItem
+
+CHI2 = SummaryItem("χ²", "1.003", "Expected 1.", "good")
+DEVIATION = SummaryItem("α", "0.3 (expected 0.2)", "A 'hint'.", "warn")
+COUNT = SummaryItem("Sources", "12", "Solved for.", "neutral", is_count=True)
+
+
+def test_numbers_are_tiles_and_counts_a_line():
+    html = strip([CHI2, COUNT, DEVIATION])
+    tiles, line = html.split("<div class='counts'>")
+    assert tiles.count("class='cell ") == 2
+    assert "<span class='name'>Sources</span><span class='value'>12" in line
+    assert "A &#x27;hint&#x27;." in tiles
+    assert "counts" not in strip([CHI2])
+
+
+def test_values_that_differ_stand_beside_each_other():
+    others = [CHI2._replace(value="1.5 (<b>)", state="bad"), DEVIATION]
+    html = strip([CHI2, DEVIATION, COUNT], others)
+    assert html.count("(A)") == 1
+    assert "<span class='other bad'>(A) 1.5</span></div>" in html
+    assert "<b>" not in html

@@ -99,6 +99,10 @@ class Pages(pn.viewable.Viewer):
         """Draw the first few figures that are due on the screen."""
         self._figures.draw_due()
 
+    def draw_first(self) -> None:
+        """Draw the first figure on the screen, if its room is known."""
+        self._figures.draw_due(most_new=1)
+
     @property
     def _figures(self) -> FigureGrid:
         """The figures on the screen; at first with the rooms that they had on earlier pages."""

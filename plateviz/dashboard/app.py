@@ -42,8 +42,6 @@ _LOOK = 2000
 # The solver prepares what-ifs once a page has been at rest for so long. Before, the browser draws
 # and a person may step on to the next orbit, for which a fit would take the cores.
 _REST_SECONDS = 3.0
-# Figures that are drawn before the page is shown, if their rooms are known.
-_FIRST_FIGURES = 1
 _SIDEBAR_WIDTH = 300
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
@@ -86,8 +84,7 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     system.is_dark = page.dark_theme
     _set_theme(session, page.dark_theme)
-    for _ in range(_FIRST_FIGURES):
-        pages.draw_due()
+    pages.draw_first()
     system.param.watch(lambda event: page.param.update(dark_theme=event.new), "is_dark")
     if pn.state.curdoc is not None and pn.state.location is not None:
         # Panel reads the location when it is first asked for, and with it writes a path from the

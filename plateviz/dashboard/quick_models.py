@@ -14,6 +14,7 @@ from bokeh.core.has_props import HasProps
 from bokeh.core.property.descriptors import PropertyDescriptor
 from bokeh.model import Model
 from bokeh.model import util as bokeh_models
+from bokeh.settings import settings
 
 # What holds no model and does not change, so that instances may share it as a default.
 _PLAIN = frozenset({type(None), bool, int, float, str, bytes})
@@ -26,6 +27,10 @@ Visitor = Callable[[Model], object]
 
 def make_models_quick() -> None:
     """Let Bokeh in this process look up what it would compute for every model."""
+    # Help for who writes a page: whether each callback takes what it is given, and each new page is
+    # whole.
+    settings.perform_error_diagnostics = False
+    settings.perform_document_validation = False
     names: Any = bokeh_models
     names.visit_immediate_value_references = _visit_models_of
     names.visit_value_and_its_immediate_references = _visit_models_in

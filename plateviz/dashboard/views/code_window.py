@@ -3,12 +3,11 @@
 from html import escape
 
 import panel as pn
-import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.page_code import page_code
 from plateviz.dashboard.views.markup import markup_pane, paragraph, themed
-from plateviz.dashboard.views.window import window
+from plateviz.dashboard.views.window import window, window_button
 from solver.errors import InputError
 
 _TO_COPY = "A click selects the whole text."
@@ -53,17 +52,5 @@ class CodeWindow(pn.viewable.Viewer):
 
 
 def code_button(navigation: Navigation) -> list[pn.viewable.Viewable]:
-    """Return the button that opens the window, and the place of the window, empty until then."""
-    place = pmui.Column(margin=0)
-    made: list[CodeWindow] = []
-
-    def open_window(_: object) -> None:
-        if not made:
-            # A page opens sooner without it.
-            made.append(CodeWindow(navigation))
-            place.append(made[0])
-        made[0].open()
-
-    button = pmui.Button(label="Reproduce", variant="text", size="small")
-    button.on_click(open_window)
-    return [button, place]
+    """Return the button that opens the window, and the place of the window."""
+    return window_button("Reproduce", lambda: CodeWindow(navigation))

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 
 import panel as pn
 import panel_material_ui as pmui
@@ -10,8 +11,9 @@ from plateviz.dashboard.rooms import Room
 from plateviz.dashboard.selected import SelectedIds
 from plateviz.dashboard.views.figure import FigureView, Part
 
-# Figures that are drawn for the first time at once.
-_BATCH = 1
+# Figures that are drawn for the first time at once; after each batch, Bokeh goes through all models
+# of the page.
+_BATCH = 3
 # Time in which the browser lays out a page that has been opened.
 _SETTLING_SECONDS = 10.0
 
@@ -126,14 +128,20 @@ class FigureGrid(pn.viewable.Viewer):
         for view in self._views:
             view.mark_stale(is_stale)
 
-    def draw_due(self) -> None:
+    def draw_due(self, most_new: int = _BATCH) -> None:
         """Let all due figures follow that are drawn, and draw the first few of the others.
 
         A first drawing changes the page, which takes a while. With batches, the page opens at
         once, fills from the top, and remains responsive.
+
+        Parameters
+        ----------
+        most_new : number of figures that are drawn for the first time
         """
         due = [view for view in self._views if view.is_due]
         new = [view for view in due if not view.is_drawn]
-        with pn.io.hold():
-            for view in [view for view in due if view.is_drawn] + new[:_BATCH]:
+        document = pn.state.curdoc
+        # Otherwise Bokeh looks for what is new on the page after each change of a card.
+        with pn.io.hold(), nullcontext() if document is None else document.models.freeze():
+            for view in [view for view in due if view.is_drawn] + new[:most_new]:
                 view.draw()

@@ -14,13 +14,9 @@ from plateviz.dashboard.views.orbit import OrbitPage
 from plateviz.dashboard.views.source import SourcePage
 from plateviz.dashboard.views.stack import Stack
 from plateviz.dashboard.views.survey import SurveyPage
+from plateviz.dashboard.views.to_the_top import ToTheTop
 from plateviz.plots.workspace import title_of
 
-# The views share one scroll bar; each opens at its top.
-_TO_THE_TOP = """
-for (const host of document.querySelectorAll("*"))
-  host.shadowRoot?.querySelector(".main-content")?.scrollTo(0, 0)
-"""
 # In a narrow window the buttons take two lines; none is cut off.
 _SWITCH = {
     "flexWrap": "wrap",
@@ -77,6 +73,7 @@ class Pages(pn.viewable.Viewer):
                 self._view_switch(), self._workspace_switch(), sizing_mode="stretch_width", margin=0
             ),
             NoticeView(navigation.session),
+            ToTheTop(navigation),
             self._stack,
             sizing_mode="stretch_width",
             margin=(0, 12, 8, 12),
@@ -101,6 +98,10 @@ class Pages(pn.viewable.Viewer):
     def draw_due(self) -> None:
         """Draw the first few figures that are due on the screen."""
         self._figures.draw_due()
+
+    def draw_first(self) -> None:
+        """Draw the first figure on the screen, if its room is known."""
+        self._figures.draw_due(most_new=1)
 
     @property
     def _figures(self) -> FigureGrid:
@@ -135,7 +136,6 @@ class Pages(pn.viewable.Viewer):
             sx=_SWITCH,
             styles=_WITHIN_PAGE,
         )
-        switch.jscallback(value=_TO_THE_TOP)
         switch.param.watch(lambda event: navigation.turn_to(event.new), "value")
         navigation.param.watch(lambda event: switch.param.update(value=event.new), "view")
         return switch
@@ -159,7 +159,6 @@ class Pages(pn.viewable.Viewer):
             navigation.turn_to_workspace(event.new)  # type: ignore[attr-defined]
 
         follow()
-        switch.jscallback(value=_TO_THE_TOP)
         switch.param.watch(choose, "value")
         navigation.param.watch(follow, ["view", *WORKSPACES.values()])
         return switch

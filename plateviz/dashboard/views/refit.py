@@ -13,6 +13,7 @@ from plateviz.dashboard.state import default_widths
 from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.fit_controls import TIGHT, controls, width_input
 from plateviz.dashboard.views.solution_window import SolutionWindow
+from plateviz.dashboard.views.window import window_button
 from solver.data.parameter_group import Group
 from solver.data.parameters import OPTIONAL_GROUPS, PARAMETERS
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
@@ -46,8 +47,7 @@ class RefitView(pn.viewable.Viewer):
         )
         self._message = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
-        self._list = SolutionWindow(navigation)
-        self._open_list = pmui.Button(label="All solutions", variant="text", size="small")
+        open_list, list_place = window_button("All solutions", lambda: SolutionWindow(navigation))
         self._reproduce, code_place = code_button(navigation)
         self._column = pmui.Column(
             pmui.Switch.from_param(
@@ -64,9 +64,9 @@ class RefitView(pn.viewable.Viewer):
             self._message,
             self._keep,
             self._solutions,
-            pmui.Row(self._open_list, self._reproduce, margin=0),
+            pmui.Row(open_list, self._reproduce, margin=0),
             code_place,
-            self._list,
+            list_place,
             sizing_mode="stretch_width",
             margin=0,
         )
@@ -82,7 +82,6 @@ class RefitView(pn.viewable.Viewer):
         self._stop.on_click(lambda _: session.cancel())
         self._keep.on_click(lambda _: session.keep())
         self._reset.on_click(self._reset_priors)
-        self._open_list.on_click(lambda _: self._list.open())
         self._solutions.param.watch(self._select, "value")
         session.choices.param.watch(self._show_widths, "prior_widths")
         session.param.watch(self._show_stage, ["stage", "message"])

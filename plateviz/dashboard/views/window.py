@@ -1,8 +1,23 @@
-"""A window over the page."""
+"""A window over the page, and the button that opens it."""
 
+from collections.abc import Callable
+from typing import Protocol
+
+import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.views.figure import Part
+
+
+class HasWindow(Protocol):
+    """A part of the page that is a window."""
+
+    def open(self) -> None:
+        """Open the window."""
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the window."""
+        ...
 
 
 def window(title: str, *contents: Part, width: str) -> pmui.Dialog:
@@ -20,3 +35,22 @@ def window(title: str, *contents: Part, width: str) -> pmui.Dialog:
         close_on_click=True,
         width_option=width,
     )
+
+
+def window_button(label: str, make: Callable[[], HasWindow]) -> list[pn.viewable.Viewable]:
+    """Return the button that opens a window, and the place of the window.
+
+    The window is made when it is first opened: a page opens sooner without it.
+    """
+    place = pmui.Column(margin=0)
+    made: list[HasWindow] = []
+
+    def open_window(_: object) -> None:
+        if not made:
+            made.append(make())
+            place.append(made[0])
+        made[0].open()
+
+    button = pmui.Button(label=label, variant="text", size="small")
+    button.on_click(open_window)
+    return [button, place]

@@ -11,6 +11,7 @@ from bokeh.model import Model, get_class
 from bokeh.model import util as bokeh_models
 from bokeh.models import ColumnDataSource, CumSum, Plot, Scatter, Title
 from bokeh.plotting import figure
+from bokeh.settings import settings
 from bokeh.util.warnings import BokehDeprecationWarning
 
 from plateviz.dashboard import quick_models
@@ -29,7 +30,9 @@ def quick(monkeypatch):
     ):
         monkeypatch.setattr(owner, name, getattr(owner, name))
     monkeypatch.setattr(PropertyDescriptor, "_get_default", quick_models._BOKEH_DEFAULT)
-    return quick_models.make_models_quick
+    yield quick_models.make_models_quick
+    for one in (settings.perform_error_diagnostics, settings.perform_document_validation):
+        one.unset_value()
 
 
 def every_model():

@@ -8,6 +8,7 @@ from typing import Any
 
 import param
 
+from plateviz.dashboard.address_parts import chosen, in_words
 from plateviz.dashboard.selected import KINDS
 from plateviz.plots.explored_rows import Columns
 
@@ -58,8 +59,13 @@ class Exploration(param.Parameterized):
         self._requested: dict[str, str] = {}
         self.param.watch(self._forget, ["table", "x", "y", "only", "is_log_x", "is_log_y"])
 
-    def offer(self, columns: list[str]) -> None:
-        """Limit the choice to the columns of the table; a column that it lacks is replaced."""
+    def offer(self, columns: list[str]) -> list[str]:
+        """Limit the choice to the columns of the table; a column that it lacks is replaced.
+
+        Returns
+        -------
+        What an address has requested in vain, in words.
+        """
         requested, self._requested = self._requested, {}
         first = [name for name in _FIRST[self.table] if name in columns] or columns[:1]
         defaults = {"x": first[0], "y": first[-1], "colour": NONE, "only": NONE}
@@ -70,10 +76,16 @@ class Exploration(param.Parameterized):
             self.param[name].objects = options
             found = wanted[name] if wanted[name] in options else default
             self.param.update(**{name: found})
-        switches, limits = _requested(requested)
+        problems = [
+            f"{name}: expected a column of the {self.table}, found {in_words(requested[name])}"
+            for name in defaults
+            if name in requested and getattr(self, name) != requested[name]
+        ]
+        switches, limits, invalid = _requested(requested)
         self.param.update(**switches)
         # Another kind of axis forgets its limits, so that they are set last.
         self.param.update(**limits)
+        return problems + invalid
 
     def columns(self) -> Columns:
         """Return what is to be drawn."""
@@ -81,11 +93,19 @@ class Exploration(param.Parameterized):
         values |= {name: "" for name in _OPTIONAL if values[name] == NONE}
         return Columns(**values)
 
-    def restore(self, address: Mapping[str, str]) -> None:
-        """Draw what a page's address requests, once its table is there; ignore invalid values."""
-        if address.get("rows") in self.param["table"].objects:
-            self.table = address["rows"]
-            self._requested = dict(address)
+    def restore(self, address: Mapping[str, str]) -> list[str]:
+        """Draw what a page's address requests, once its table is there.
+
+        Returns
+        -------
+        Why the address names no table, in words; `offer` returns what else of it is invalid.
+        """
+        problems: list[str] = []
+        if "rows" in address:
+            table = chosen("rows", address, self.param["table"].objects, None, problems)
+            if table is not None:
+                self.table, self._requested = table, dict(address)
+        return problems
 
     def address(self) -> dict[str, str]:
         """Return what is drawn as the query of the page's address; `restore` reads it back."""
@@ -118,19 +138,34 @@ def _text(numbers: tuple[float, ...]) -> str:
     return "~".join(f"{number!r}" for number in numbers)
 
 
-def _requested(address: Mapping[str, str]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the switches, with what is selected, and the limits that an address requests."""
-    wanted = address.get("with", "").split(",")
+def _requested(
+    address: Mapping[str, str],
+) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
+    """Return switches and limits that an address requests, and what of it is invalid."""
+    wanted = [name for name in address.get("with", "").split(",") if name]
     limits: dict[str, Any] = {}
     between, zoom = (_parsed(address.get(name, ""), n) for name, n in (("between", 2), ("zoom", 4)))
+    if zoom is not None and not all(map(math.isfinite, zoom)):
+        zoom = None
     if between is not None:
         limits |= {"lowest": between[0], "highest": between[1]}
-    if zoom is not None and all(map(math.isfinite, zoom)):
+    if zoom is not None:
         limits["limits"] = (zoom[:2], zoom[2:])
-    chosen: dict[str, Any] = {name: True for name in SWITCHES if name in wanted}
-    if address.get("selects") in KINDS:
-        chosen["selects"] = address["selects"]
-    return chosen, limits
+    invalid = [
+        f"with: expected {', '.join(SWITCHES)}, found {in_words(name)}"
+        for name in wanted
+        if name not in SWITCHES
+    ]
+    for name, found, n in (("between", between, 2), ("zoom", zoom, 4)):
+        if name in address and found is None:
+            text = in_words(address[name])
+            invalid.append(f"{name}: expected {n} numbers with ~ between them, found {text}")
+    switches: dict[str, Any] = {name: True for name in SWITCHES if name in wanted}
+    if (selects := address.get("selects")) in KINDS:
+        switches["selects"] = selects
+    elif selects is not None:
+        invalid.append(f"selects: expected {', '.join(KINDS)}, found {in_words(selects)}")
+    return switches, limits, invalid
 
 
 def _parsed(text: str, count: int) -> tuple[float, ...] | None:

@@ -137,9 +137,10 @@ class Navigation(param.Parameterized):
         session, problems = self.session, []
         session.notice = ""
         is_survey = address.get("view") == View.SURVEY.value
-        (self.survey_exploration if is_survey else self.exploration).restore(address)
-        if address.get("unit") in NAMES.values():
-            session.units.unit = address["unit"]
+        explored = self.survey_exploration if is_survey else self.exploration
+        problems += explored.restore(address)
+        units = session.units
+        units.unit = chosen("unit", address, NAMES.values(), units.unit, problems)
         self.run_name = chosen("run", address, self._runs, self.run_name, problems)
         if "source" in address:
             self.find_source(address["source"])

@@ -172,7 +172,9 @@ class ExploreView(pn.viewable.Viewer):
         if request.key != self._table:
             self._table = request.key
             with self._following():
-                self._exploration.offer(request.columns)
+                problems = self._exploration.offer(request.columns)
+            if problems:
+                self._say(f"Of the address, this was ignored: {'; '.join(problems)}.")
         if not self._select(request):
             return PENDING
         chosen, selected = self._exploration.columns(), self._session.selection.selected

@@ -48,31 +48,44 @@ def test_address_is_read_back(exploration, between):
     exploration.param.update(lowest=between[0], highest=between[1], selects="detectors")
     exploration.limits = ((1.0, 20.0), (-0.5, 1.5e-3 / 7.0))
     other = Exploration(TABLES)
-    other.restore(exploration.address())
-    other.offer(COLUMNS)
+    assert other.restore(exploration.address()) == []
+    assert other.offer(COLUMNS) == []
     assert other.table == "sources"
     assert other.columns() == exploration.columns()
     assert other.address() == exploration.address()
 
 
 @pytest.mark.parametrize(
-    "nonsense",
+    ("nonsense", "told"),
     [
-        {"rows": "nothing", "x": "dec"},
-        {"rows": "sources", "x": "<b>", "y": "", "colour": "../..", "only": "0"},
-        {"rows": "sources", "zoom": "1~inf~2~3"},
-        {"rows": "sources", "zoom": "1~2~3"},
-        {"rows": "sources", "zoom": "nan~1e999~3~4"},
-        {"rows": "sources", "with": "limits,table", "between": "a~b", "selects": "limits"},
+        ({"rows": "nothing", "x": "dec"}, ["rows: expected measurements, sources"]),
+        (
+            {"rows": "sources", "x": "<b>", "y": "", "colour": "../..", "only": "0"},
+            [f"{name}: expected a column of the sources" for name in ("x", "y", "colour", "only")],
+        ),
+        ({"rows": "sources", "zoom": "1~inf~2~3"}, ["zoom: expected 4 numbers"]),
+        ({"rows": "sources", "zoom": "1~2~3"}, ["zoom: expected 4 numbers"]),
+        ({"rows": "sources", "zoom": "nan~1e999~3~4"}, ["zoom: expected 4 numbers"]),
+        (
+            {"rows": "sources", "with": "log x,table", "between": "a~b", "selects": "limits"},
+            [
+                "with: expected is_log_x",
+                "with: expected is_log_x",
+                "between: expected 2 numbers",
+                "selects: expected sources, exposures, detectors",
+            ],
+        ),
     ],
 )
-def test_nonsense_in_an_address_is_ignored(nonsense):
+def test_nonsense_in_an_address_is_ignored_and_told(nonsense, told):
     found, expected = Exploration(TABLES), Exploration(TABLES)
     expected.table = "sources" if nonsense["rows"] == "sources" else TABLES[0]
-    found.restore(nonsense)
+    problems = found.restore(nonsense)
     for one in (found, expected):
-        one.offer(COLUMNS)
+        problems += one.offer(COLUMNS)
     assert found.columns() == expected.columns()
+    assert len(problems) == len(told)
+    assert all(map(str.startswith, problems, told))
 
 
 def test_address_is_empty_before_the_columns_are_known():

@@ -139,6 +139,18 @@ def test_address_opens_what_it_says(fit_result, survey, navigation):
     assert again.exploration.x is None
 
 
+def test_columns_of_an_older_version_are_named_until_others_are_chosen(view, executor, navigation):
+    address = navigation.address() | {"rows": "motions", "x": "n_plates", "colour": "sigma_px"}
+    navigation.begin(address | {"view": "survey", "workspace": "explore"})
+    draw(view, executor)
+    words = view._words.object
+    assert "x: expected a column of the motions, found &#x27;n_plates&#x27;" in words
+    assert "colour: expected a column of the motions" in words
+    assert view._words.visible
+    navigation.survey_exploration.y = "n_orbits"
+    assert not view._words.visible
+
+
 def test_area_of_cells_selects_the_sources_inside(view, executor, navigation):
     draw(view, executor)
     area(view, 0.0, 1.0 / 60)

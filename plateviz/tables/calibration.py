@@ -19,6 +19,7 @@ _TITLES: tuple[tuple[str, Axis], ...] = (
     ("Breathing of the distortion", "breathing"),
     ("Distortion of each field", "field"),
     ("Distortion of each detector", "own"),
+    ("Random walk of the distortion", "walk"),
     ("Motion of the detectors", "motion"),
 )
 

@@ -111,6 +111,13 @@ class ModelSettings:
             is_cause=True,
         ),
     )
+    drift_walk: int = _degree(
+        "Random walk of the distortion",
+        "Let distortion terms change from exposure to exposure, as a random walk,",
+        "drift-walk",
+        "DRIFTWLK",
+        "random walk {}",
+    )
     breathing: int = _degree(
         "Breathing of the distortion",
         "Let distortion terms oscillate with the phase of the satellite's orbit,",

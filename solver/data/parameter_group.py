@@ -13,6 +13,7 @@ Names of axes in array shapes, in all of the solver:
 | breathing | distortion term, cosine or sine of the orbital phase         |
 | field     | distortion term and field after the first                    |
 | own       | distortion term and detector                                 |
+| walk      | distortion term and exposure                                 |
 | motion    | detector and field after the first                           |
 """
 
@@ -21,7 +22,7 @@ from typing import Literal
 
 from solver.units import factor_between
 
-Axis = Literal["src", "exp", "coef", "drift", "breathing", "field", "own", "det", "motion"]
+Axis = Literal["src", "exp", "coef", "drift", "breathing", "field", "own", "walk", "det", "motion"]
 # Axes of the coefficients that all measurements share, in the order of their columns.
 TERM_AXES: tuple[Axis, ...] = ("coef", "drift", "breathing", "field", "own")
 Family = Literal["normal", "gamma", "uniform"]
@@ -93,4 +94,4 @@ class Group:
     @property
     def is_term(self) -> bool:
         """Whether the group's elements are coefficients of distortion terms."""
-        return self.axis in TERM_AXES
+        return self.axis in (*TERM_AXES, "walk")

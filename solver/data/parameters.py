@@ -183,7 +183,7 @@ def _pair(name: str, label: str, symbols: str, rest: tuple, setting: str) -> tup
     rest : axis, unit and width of the prior, which is normal about zero
     """
     axis, unit, width = rest
-    letters = "AB" if axis in TERM_AXES else "xy"
+    letters = "AB" if axis in (*TERM_AXES, "walk") else "xy"
     x, y = (
         Group(
             f"{name}_{direction}",
@@ -219,6 +219,7 @@ OPTIONAL_GROUPS: tuple[Group, ...] = (
         setting="focal_anisotropy",
     ),
     *_pair("drift", "distortion drift", "A_kl,t B_kl,t", ("drift", "um", 1.0), "drift"),
+    *_pair("drift_walk", "distortion walk", "A_kl,m B_kl,m", ("walk", "um", 0.01), "drift_walk"),
     *_pair(
         "breathing", "distortion breathing", "A_kl,φ B_kl,φ", ("breathing", "um", 1.0), "breathing"
     ),

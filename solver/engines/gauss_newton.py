@@ -34,6 +34,9 @@ _REUSE_RATIO = 0.1
 # same reason a small remainder elsewhere becomes a step along these directions that exact ones do
 # not confirm.
 _REUSED_TOLERANCE = 0.1
+# Walking terms let pointings move against them, so that steps shrink more slowly, with exact
+# Jacobians as well. Jacobians less than this many sigmas away are then as good as exact ones.
+_CLOSE_WITH_WALKS = 0.01
 # Fits of more sources than this start from a fit of about this many of them, to a tolerance
 # of this many sigmas, which replaces a step of the full fit at a fraction of its cost.
 _ROUGH_SOURCES = 1000
@@ -155,14 +158,14 @@ def _iterate(
     report(point, float("nan"), "", 0.0)
     if not np.isfinite(point.objective):
         return end(point, None, FitStatus.NOT_FINITE)
-    reduced, limit = eliminate_sources(equations, problem.priors), np.inf
+    reduced, limit, is_close = eliminate_sources(equations, problem.priors), np.inf, False
     while True:
         if reduced is None:
             return end(point, None, FitStatus.SINGULAR)
         step = reduced.solve(*downhill(problem, *point[:3]))
         largest, parameter = largest_step(problem, step, reduced)
         is_doubtful = _REUSED_TOLERANCE < largest / settings.tolerance < 1.0 and limit < np.inf
-        if largest > limit or is_doubtful:
+        if largest > limit or (is_doubtful and not is_close):
             # Freed first, because they are large and reusing memory is faster than allocating it.
             del equations, reduced
             equations = accumulate(problem, point.theta, point.sources)
@@ -177,7 +180,8 @@ def _iterate(
         moved, damping = _descend(problem, point, step)
         if moved is None:
             return end(point, reduced, FitStatus.STUCK)
-        point, limit = moved, min(_REUSE_BELOW, _REUSE_RATIO * largest)
+        is_close = largest < _CLOSE_WITH_WALKS and problem.layout.n_walk > 0
+        point, limit = moved, largest if is_close else min(_REUSE_BELOW, _REUSE_RATIO * largest)
         report(point, largest, parameter, damping)
 
 

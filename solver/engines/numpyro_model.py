@@ -12,10 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 import numpyro
 import numpyro.distributions as dist
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpyro.distributions import constraints
 
 from solver.data.parameters import BY_NAME, SOURCES, Group
+from solver.engines.walk_prior import random_walk
 from solver.linear.chi2 import half_chi2_of_chunks
 from solver.linear.whitening import Coordinates
 from solver.model.forward import AnyArray, Geometry, Index
@@ -35,6 +36,7 @@ class Evidence(eqx.Module):
     width, centre : width and centre of the calibration's priors, per group
     precision : inverse covariance of the sources' priors, mas^-2
     log_norm : logarithm of the likelihood where all residuals are zero
+    in_order : the exposures in order of time
     flat : groups with flat priors
     """
 
@@ -46,6 +48,7 @@ class Evidence(eqx.Module):
     centre: dict[str, Float[AnyArray, " _"]]
     precision: Float[AnyArray, "src 2 2"]
     log_norm: Float[AnyArray, ""]
+    in_order: Int[AnyArray, " exp"]
     layout: VectorLayout = eqx.field(static=True)
     flat: frozenset[str] = eqx.field(static=True)
 
@@ -64,6 +67,7 @@ def evidence_of(problem: Problem) -> Evidence:
         precision=priors.precision,
         log_norm=-np.log(problem.measurements.sigma).sum()
         - np.array(problem.measurements.sigma.size * _HALF_LOG_2PI),
+        in_order=np.argsort(problem.exposures["obstime"].to_numpy(), kind="stable"),
         layout=layout,
         flat=frozenset(name for name, values in width.items() if np.isinf(values).any()),
     )
@@ -104,6 +108,8 @@ def _prior(evidence: Evidence, group: Group) -> dist.Distribution:
     width, centre = evidence.width[group.name], evidence.centre[group.name]
     if group.name in evidence.flat:
         return _improper(len(width))
+    if group.axis == "walk":
+        return random_walk(width, evidence.in_order)
     return _FAMILIES[group.family](width, centre).to_event(1)
 
 

@@ -242,7 +242,9 @@ def _limits(problem: Problem, coordinates: Coordinates, options: SviSettings) ->
     """Return the largest step of every parameter of the guide, in free coordinates."""
     if not options.conditioned:
         return Means(*(np.full(1, np.inf) for _ in Means._fields))
-    longest = 1.0 / np.abs(coordinates.calibration / problem.priors.width[:, None]).max(axis=0)
+    priors = problem.priors
+    independent = priors.walks.independent(np.asarray(coordinates.calibration))
+    longest = 1.0 / np.abs(independent / priors.width[:, None]).max(axis=0)
     unlimited = np.full(1, np.inf)
     return Means(_LARGEST_STEP * longest, unlimited, np.full(1, _LARGEST_SCALE_STEP))
 

@@ -20,7 +20,7 @@ from solver.model.forward import (
     ideal_position,
     image,
 )
-from solver.problem.parameter_vector import local_groups
+from solver.problem.parameter_vector import local_groups, walk_groups
 from solver.problem.problem import Problem
 
 
@@ -156,8 +156,9 @@ def _value_and_gradient(
 
 
 def _non_directing(offsets: Offsets) -> list[str]:
-    """Return the local groups that the directions do not depend on."""
-    return [group.name for group in local_groups(offsets) if group.name not in DIRECTING]
+    """Return the groups of exposures and detectors that the directions do not depend on."""
+    groups = (*local_groups(offsets), *walk_groups(offsets))
+    return [group.name for group in groups if group.name not in DIRECTING]
 
 
 def _by_group(

@@ -17,7 +17,7 @@ from solver.model.forward import AnyArray, Pair
 
 _Slots = Float[AnyArray, "tile slot"]
 # Elements of symmetric 2 x 2 matrices.
-_ELEMENTS = ((0, 0), (0, 1), (1, 1))
+ELEMENTS = ((0, 0), (0, 1), (1, 1))
 # Most terms whose products are compiled one by one; order 9 has 52.
 _MAX_UNROLLED = 52
 
@@ -38,12 +38,30 @@ class SharedCovariances(NamedTuple):
     source_terms: Float[AnyArray, "2 2 coef src"]
 
 
+class WalkCovariances(NamedTuple):
+    """What walking terms add to the covariances of the displacement in each tile.
+
+    Attributes
+    ----------
+    terms : of the displacement's elements, coefficients of the products of a walking term with
+        any term
+    source : between the walking coefficients of x and y and the two offsets of each source
+    """
+
+    terms: Float[AnyArray, "tile 3 walk coef"]
+    source: Float[AnyArray, "tile 2 walk 2 slot"]
+
+
 class TileCovariances(NamedTuple):
-    """Covariances of the local parameters of each tile: of one another, and with the others."""
+    """Covariances of the local parameters of each tile: of one another, and with the others.
+
+    Those with the terms include the walking coefficients at the tile's exposure.
+    """
 
     local: Float[AnyArray, "tile local local"]
     terms: Float[AnyArray, "tile local 2 coef"]
     source: Float[AnyArray, "tile local 2 slot"]
+    walk: WalkCovariances | None
 
 
 class Leverage(NamedTuple):
@@ -74,6 +92,8 @@ def leverage(
     source : source of each slot
     """
     of_displacement = _of_displacement(chunk.prediction.basis, source, shared)
+    if tiles.walk is not None:
+        of_displacement = _with_walk(of_displacement, chunk.prediction.basis, tiles.walk)
     return _projected(chunk, source, shared, _half(chunk, tiles), of_displacement)
 
 
@@ -105,6 +125,29 @@ def _of_many_terms(
     with_source = [
         [jnp.sum(shared.source_terms[i, a][:, source] * basis, axis=0) for a in range(2)]
         for i in range(2)
+    ]
+    return _OfDisplacement(own, with_source)
+
+
+@jax.jit
+def _with_walk(
+    of_displacement: _OfDisplacement, basis: list[_Slots], walk: WalkCovariances
+) -> _OfDisplacement:
+    """Return the covariances of a displacement to which walking terms contribute."""
+    n_tiles, n_elements, n_walk, n_terms = walk.terms.shape
+    by_term = walk.terms.reshape(n_tiles, n_elements * n_walk, n_terms) @ jnp.stack(basis, axis=1)
+    by_term = by_term.reshape(n_tiles, n_elements, n_walk, -1)
+    count = range(n_walk)
+    own = [
+        element + sum(basis[k] * by_term[:, number, k] for k in count)
+        for number, element in enumerate(of_displacement.own)
+    ]
+    with_source = [
+        [
+            element + sum(basis[k] * walk.source[:, i, k, a] for k in count)
+            for a, element in enumerate(elements)
+        ]
+        for i, elements in enumerate(of_displacement.source)
     ]
     return _OfDisplacement(own, with_source)
 
@@ -154,7 +197,7 @@ def _projected(
                 total += covariance * (by[p] * by_source[q] + by[q] * by_source[p])
         return total
 
-    return Leverage(*(element(p, q) for p, q in _ELEMENTS))
+    return Leverage(*(element(p, q) for p, q in ELEMENTS))
 
 
 def _quadratic(by: list[Pair], covariance: list[_Slots], p: int, q: int) -> _Slots:

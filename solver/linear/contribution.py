@@ -72,9 +72,9 @@ def _detectors_contribution(
     kept_share : 1 where other detectors contribute to the rows of an exposure, 0 elsewhere
     """
     owner = np.empty(layout.size, dtype=np.int64)
-    for group in layout.local_groups:
+    for group in (*layout.local_groups, *layout.on("walk")):
         columns = layout.columns(group)
-        count = layout.n_exp if group.axis == "exp" else layout.n_det
+        count = layout.n_exp if group.axis in ("exp", "walk") else layout.n_det
         owner[columns] = np.repeat(np.arange(count), len(columns) // count)
     coefficients = sums.coefficients[detectors].sum(axis=0)
 

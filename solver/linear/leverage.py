@@ -15,9 +15,11 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from solver.linear.chunk_leverage import (
+    ELEMENTS,
     Leverage,
     SharedCovariances,
     TileCovariances,
+    WalkCovariances,
     leverage,
 )
 from solver.linear.covariances import Covariances
@@ -161,17 +163,47 @@ def _tile_covariances(
     terms = covariance.theta[:, layout.coefficients()].reshape(layout.size, 2, layout.n_terms)
     terms = _with_zeros(terms, (layout.size, 2, n_padded), {2: basis})
 
+    def with_source(
+        columns: Int[np.ndarray, "tile k"], source: Int[np.ndarray, "tile slot"]
+    ) -> Float[np.ndarray, "tile k 2 slot"]:
+        rows = cross.shape[-1] * (2 * columns[..., None] + np.arange(2))
+        places = rows[..., None] + position[source][:, None, None, :]
+        return cross.reshape(-1).take(places, mode="clip")
+
     def of_chunk(index: Index) -> TileCovariances:
         own = layout.touched(index.exposure[:, 0], index.detector[:, 0])
-        rows = cross.shape[-1] * (2 * own[..., None] + np.arange(2))
-        places = rows[..., None] + position[index.source][:, None, None, :]
+        of_terms, walk = terms[own], None
+        if layout.n_walk:
+            walked = layout.walked(index.exposure[:, 0])
+            halves = (len(walked), -1, 2, layout.n_walk)
+            of_walk = covariance.theta[own[:, :, None], walked[:, None, :]].reshape(halves)
+            of_terms[..., : layout.n_walk] += of_walk
+            among = covariance.theta[walked[:, :, None], walked[:, None, :]]
+            walk = WalkCovariances(
+                _of_walk(terms[walked], among.reshape(len(walked), 2, layout.n_walk, 2, -1)),
+                with_source(walked, index.source).reshape(len(walked), 2, layout.n_walk, 2, -1),
+            )
         return TileCovariances(
             covariance.theta[own[:, :, None], own[:, None, :]],
-            terms[own],
-            cross.reshape(-1).take(places, mode="clip"),
+            of_terms,
+            with_source(own, index.source),
+            walk,
         )
 
     return of_chunk
+
+
+def _of_walk(
+    with_terms: Float[np.ndarray, "tile two_walk 2 coef"],
+    among: Float[np.ndarray, "tile 2 walk 2 walk"],
+) -> Float[np.ndarray, "tile 3 walk coef"]:
+    """Return `WalkCovariances.terms`, from the covariances of the walking coefficients."""
+    n_tiles, _, n_walk, *_ = among.shape
+    with_terms = with_terms.reshape(n_tiles, 2, n_walk, 2, -1)
+    found = np.stack([with_terms[:, i, :, j] + with_terms[:, j, :, i] for i, j in ELEMENTS], axis=1)
+    for number, (i, j) in enumerate(ELEMENTS):
+        found[:, number, :, :n_walk] += among[:, i, :, j]
+    return found
 
 
 def _basis_places(problem: Problem) -> tuple[Int[np.ndarray, " term"], int]:

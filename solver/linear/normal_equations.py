@@ -20,6 +20,7 @@ from solver.linear.chi2 import Gradient
 from solver.linear.derivative_products import Rows, one_by_one, rows_of
 from solver.linear.linearise import Linearised, linearise, turning
 from solver.linear.tile_sums import TileSums
+from solver.linear.walk_sums import add_cross_walk, add_walks
 from solver.model.forward import Index
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.problem import Problem
@@ -111,7 +112,7 @@ def accumulate(
     source, by_source = np.zeros((n_det, 2, 2, n_src)), np.zeros((n_det, 2, n_src))
     is_known = coefficients is not None
     term_blocks = coefficients if is_known else np.zeros((n_det, 2, n_coef, 2, n_coef))
-    sums = TileSums.empty(index.source.shape, len(layout.local_groups), n_coef)
+    sums = TileSums.empty(index.source.shape, len(layout.local_groups), n_coef, layout.n_walk)
     with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
         pending = helper.submit(lambda: None)
         for i, chunk in enumerate(chunks(problem, theta, sources)):
@@ -127,6 +128,7 @@ def accumulate(
                 source=problem.source_blocks.position[chunk_index.source]
             )
             _add_cross_local(in_order, by_row, layout, cross)
+            add_cross_walk(in_order, sums.shared[:, :, i], sums.basis[i], layout, cross)
         pending.result()
         cross_by_detector = np.empty((n_det, 2 * n_coef, 2, n_src))
         first_half, second_half = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)
@@ -156,6 +158,8 @@ def _sum_in_tiles(
     """Sum the products of chunk `i` over each tile, and add those between distortion terms."""
     sums.sum_local(rows, i)
     sums.sum_mixed(rows, i)
+    if sums.walk.size:
+        sums.sum_walk(rows, i)
     if coefficients is not None:
         _add_coefficients(detector, rows.displacement, sums.basis[i], coefficients)
 
@@ -262,8 +266,10 @@ def _assemble(
     hessian[:, shared, shared] = coefficients.reshape(n_det, 2 * layout.n_terms, 2 * layout.n_terms)
     gradient = _sum_at(first + columns, sums.local[..., -1, local], n_det * size)
     gradient += _sum_at(first + np.arange(size)[shared], sums.mixed[..., -1, :], n_det * size)
-    chi2 = _sum_at(detector, sums.local[..., -1, -1], n_det)
-    return hessian, gradient.reshape(n_det, size), chi2
+    gradient = gradient.reshape(n_det, size)
+    if layout.n_walk:
+        add_walks(index, layout, sums, hessian, gradient)
+    return hessian, gradient, _sum_at(detector, sums.local[..., -1, -1], n_det)
 
 
 def _sum_at(

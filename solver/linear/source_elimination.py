@@ -196,7 +196,7 @@ def eliminate_sources(
     None if the system is singular: the data and the priors leave a direction unconstrained, or
     constrain it so weakly that rounding hides it.
     """
-    prior_hessian = priors.hessian_diagonal(equations.at[0])
+    theta = equations.at[0]
     try:
         source_factor = np.linalg.cholesky(equations.source + priors.precision)
         if before is not None and np.array_equal(before.source_factor, source_factor):
@@ -204,10 +204,10 @@ def eliminate_sources(
         else:
             whitened, of_data = _without_sources(equations, source_factor)
         # NumPy's BLAS, as for the products above, because SciPy's threads would wait for it.
-        factor = np.linalg.cholesky(_with_diagonal(of_data, prior_hessian)).T
+        factor = np.linalg.cholesky(priors.with_hessian(of_data, theta)).T
     except np.linalg.LinAlgError:
         return None
-    hessian = _with_diagonal(equations.theta, prior_hessian)
+    hessian = priors.with_hessian(equations.theta, theta)
     # A squared pivot is what remains of the diagonal after eliminating the other parameters.
     smallest = len(hessian) * np.finfo(float).eps * np.diag(hessian)
     if not (np.diag(factor) ** 2 >= smallest).all():
@@ -244,12 +244,3 @@ def _without_sources(
     for block, (_, product) in zip(blocks, parts, strict=True):
         remaining[np.ix_(block.columns, block.columns)] -= product
     return tuple(matrix for matrix, _ in parts), remaining
-
-
-def _with_diagonal(
-    matrix: Float[np.ndarray, "n n"], added: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, "n n"]:
-    """Return the matrix with `added` on top of its diagonal."""
-    total = matrix.copy()
-    total[np.diag_indices(len(added))] += added
-    return total

@@ -19,15 +19,17 @@ class TileSums:
     mixed : products of these with the derivatives by the distortion coefficients
     basis : distortion terms of each slot
     shared : products of the derivatives by displacement and by source, of each slot
+    walk : products of the derivatives by the first, walking coefficients with those by all
     """
 
     local: Float[np.ndarray, "chunk tile local local"]
     mixed: Float[np.ndarray, "chunk tile local two_coef"]
     basis: Float[np.ndarray, "chunk tile slot coef"]
     shared: Float[np.ndarray, "2 2 chunk tile slot"]
+    walk: Float[np.ndarray, "chunk tile 2 walk 2 coef"]
 
     @classmethod
-    def empty(cls, shape: tuple[int, ...], n_local: int, n_coef: int) -> "TileSums":
+    def empty(cls, shape: tuple[int, ...], n_local: int, n_coef: int, n_walk: int) -> "TileSums":
         """Return uninitialised arrays for a shape (chunk, tile, slot)."""
         tiles, rows = shape[:2], n_local + 1
         return cls(
@@ -35,6 +37,7 @@ class TileSums:
             np.empty((*tiles, rows, 2 * n_coef)),
             np.empty((*shape, n_coef)),
             np.empty((2, 2, *shape)),
+            np.empty((*tiles, 2, n_walk, 2, n_coef)),
         )
 
     def keep_slots(self, chunk: Linearised, rows: Rows, i: int) -> None:
@@ -52,3 +55,12 @@ class TileSums:
         """Fill in `mixed` of chunk `i`, after `keep_slots`."""
         mixed = in_tiles(rows.local, rows.displacement) @ self.basis[i]
         self.mixed[i] = mixed.reshape(self.mixed[i].shape)
+
+    def sum_walk(self, rows: Rows, i: int) -> None:
+        """Fill in `walk` of chunk `i`, after `keep_slots`."""
+        walk, basis = self.walk[i], self.basis[i]
+        walking = basis[..., : walk.shape[2]]
+        weight = one_by_one(rows.displacement, rows.displacement)
+        for j, k in ((0, 0), (0, 1), (1, 1)):
+            weighted = weight[j, k, :, :, None] * walking
+            walk[:, j, :, k] = walk[:, k, :, j] = weighted.swapaxes(1, 2) @ basis

@@ -87,6 +87,8 @@ def _same_causes(old: Problem, new: Problem) -> bool:
     names = [[name for name, _ in problem.layout.optional] for problem in (old, new)]
     if names[0] != names[1] or old.geometry.causes is None or new.geometry.causes is None:
         return names[0] == names[1]
+    if old.layout.n_walk != new.layout.n_walk:
+        return False
     if any(old.elements[axis] != new.elements[axis] for axis in _OPTIONAL_AXES):
         return False
     # The exposures of the new problem are among the old ones.
@@ -153,7 +155,9 @@ def _columns(old: Problem, new: Problem) -> Int[np.ndarray, " calib"]:
     for group in new.layout.groups:
         own = old.layout.columns(group)
         columns[new.layout.columns(group)] = (
-            own[kept] if group.axis == "exp" else own[: len(new.layout.columns(group))]
+            own.reshape(old.layout.n_exp, -1)[kept].ravel()
+            if group.axis in ("exp", "walk")
+            else own[: len(new.layout.columns(group))]
         )
     return columns
 

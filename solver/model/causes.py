@@ -89,6 +89,28 @@ def anisotropic(ideal: Pair, values: Values, exposure: Int[AnyArray, "*#obs"]) -
     return ideal[0] * (1.0 - half), ideal[1] * (1.0 + half)
 
 
+def walked(
+    coefficients: list[Float[Array, ""]],
+    values: Values,
+    direction: str,
+    exposure: Int[AnyArray, "*#obs"],
+    n_exp: int,
+) -> list[Float[Array, "*#obs"]]:
+    """Return the coefficients of the terms at each exposure, the first of which walk.
+
+    Parameters
+    ----------
+    direction : "x" or "y"
+    n_exp : number of exposures, padded
+    """
+    if f"drift_walk_{direction}" not in values:
+        return coefficients
+    walk = values[f"drift_walk_{direction}"].reshape(n_exp, -1)
+    count = walk.shape[1]
+    at_exposure = [c + walk[exposure, k] for k, c in enumerate(coefficients[:count])]
+    return [*at_exposure, *coefficients[count:]]
+
+
 def moved_detector(
     centre: Pair,
     rotation: Float[Array, "*#obs"],

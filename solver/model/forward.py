@@ -18,7 +18,13 @@ from jaxtyping import Array, Float, Int
 
 from solver.data.parameters import OPTIONAL_GROUPS
 from solver.model.aberration import Components, aberrate, lorentz_factor
-from solver.model.causes import Causes, anisotropic, moved_detector, shifted_on_detector
+from solver.model.causes import (
+    Causes,
+    anisotropic,
+    moved_detector,
+    shifted_on_detector,
+    walked,
+)
 from solver.model.detector import to_pixel
 from solver.model.distortion import basis, terms
 from solver.model.projection import displace, focal_axes, project
@@ -63,6 +69,7 @@ class Geometry(eqx.Module):
             "src": len(self.source_frame),
             "exp": len(self.pointing_frame),
             "coef": len(terms(self.order)),
+            "walk": len(self.origin.get("drift_walk_x", ())),
         }
 
     def value(self, offsets: Offsets, name: str) -> Float[Array, " _"]:
@@ -169,7 +176,17 @@ def image(
     values = basis(x / geometry.distortion_scale, y / geometry.distortion_scale, geometry.order)
     if geometry.causes is not None:
         values += geometry.causes.terms(ideal, index.exposure, index.detector)
-    coefficients = [_coefficients(offsets, geometry, direction) for direction in "xy"]
+    optional = geometry.optional(offsets)
+    coefficients = [
+        walked(
+            _coefficients(offsets, geometry, direction),
+            optional,
+            direction,
+            index.exposure,
+            len(geometry.pointing_frame),
+        )
+        for direction in "xy"
+    ]
     focal_x, focal_y = (
         ideal[axis] + (sum(c * b for c, b in zip(terms, values, strict=True)) + shift)
         for axis, (terms, shift) in enumerate(zip(coefficients, displacement, strict=True))
@@ -178,7 +195,6 @@ def image(
     centre_x, centre_y = _pair(offsets, geometry, "detector")
     pitch_x, pitch_y = _pair(offsets, geometry, "pitch")
     rotation = RAD_PER_ARCSEC * geometry.value(offsets, "detector_rotation")
-    optional = geometry.optional(offsets)
     centre, angle = moved_detector(
         (centre_x[n], centre_y[n]), rotation[n], optional, geometry.causes, index.exposure, n
     )

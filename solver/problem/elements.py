@@ -36,17 +36,20 @@ def elements(exposures: pd.DataFrame, instrument: Instrument, settings: FitSetti
     detectors = [str(detector.detector_id) for detector in instrument.detectors]
     later = [str(field) for field in np.unique(exposures["field_id"])[1:]]
     times = [Element(f"t{k}", "t" if k == 1 else f"t^{k}") for k in _degrees(settings)]
+    exposures_called = [
+        Element(f"{field}/{plate}", f"field {field} plate {plate}") for field, plate in plates
+    ]
     phases = [Element("cos", "cos"), Element("sin", "sin")]
     motions = [(d, f) for d in detectors for f in later] if settings.detector_motion else []
     return {
-        "exp": [
-            Element(f"{field}/{plate}", f"field {field} plate {plate}") for field, plate in plates
-        ],
+        "exp": exposures_called,
         "coef": _terms(settings.order),
         "drift": _products(settings.drift, times),
         "breathing": _products(settings.breathing, phases),
         "field": _products(settings.field_distortion, _called("field", later)),
         "own": _products(settings.detector_distortion, _called("detector", detectors)),
+        # Only terms that the distortion has can walk.
+        "walk": _products(min(settings.drift_walk, settings.order), exposures_called),
         "det": _called("detector", detectors),
         "motion": [Element(f"{d}/{f}", f"detector {d} field {f}") for d, f in motions],
     }

@@ -1,6 +1,7 @@
 """VectorLayout: columns of the calibration parameters in the flat vector the engines solve for.
 
-Exposures come first, all groups of one exposure together, then the two directions of the
+Exposures come first, all groups of one exposure together with its walking distortion terms, then
+the two directions of the
 distortion and of its optional terms, then the detectors, all groups of one detector together,
 and last what moves from field to field. The parameters that one measurement depends on therefore
 lie in few contiguous ranges.
@@ -36,6 +37,12 @@ def local_groups(names: Iterable[str]) -> tuple[Group, ...]:
         for group in PARAMETERS
         if group.axis == axis and group.name in known
     )
+
+
+def walk_groups(names: Iterable[str]) -> tuple[Group, ...]:
+    """Return the groups among `names` whose elements are terms at single exposures, x before y."""
+    known = set(names)
+    return tuple(group for group in PARAMETERS if group.axis == "walk" and group.name in known)
 
 
 @dataclass(frozen=True)
@@ -78,10 +85,33 @@ class VectorLayout:
         """Number of terms of one direction: the distortion's and the optional ones."""
         return sum(self._length(group) for group in self._terms(0))
 
+    @cached_property
+    def n_walk(self) -> int:
+        """Number of terms of one direction that walk from exposure to exposure.
+
+        They are the first ones of the distortion.
+        """
+        return sum(self._length(group) for group in self.on("walk")[:1]) // self.n_exp
+
+    @property
+    def lengths(self) -> dict[str, int]:
+        """Numbers of elements of the axes that are padded, but for the sources."""
+        return {"exp": self.n_exp, "coef": self.n_coef, "walk": self.n_exp * self.n_walk}
+
+    @property
+    def walking(self) -> Int[np.ndarray, " two_walk"]:
+        """Which of the terms of both directions walk, first those of x."""
+        return np.r_[: self.n_walk, self.n_terms : self.n_terms + self.n_walk]
+
+    @property
+    def per_exposure(self) -> int:
+        """Number of parameters of one exposure."""
+        return len(self.on("exp")) + 2 * self.n_walk
+
     @property
     def first_coefficient(self) -> int:
         """Column of the first distortion coefficient."""
-        return self.n_exp * len(self.on("exp"))
+        return self.n_exp * self.per_exposure
 
     @property
     def first_detector(self) -> int:
@@ -128,17 +158,26 @@ class VectorLayout:
             axis=-1,
         )
 
+    def walked(self, exposure: Int[np.ndarray, "*n"]) -> Int[np.ndarray, "*n two_walk"]:
+        """Return the columns of the walking terms at exposures, first those of x."""
+        first = self.per_exposure * exposure + len(self.on("exp"))
+        return first[..., None] + np.arange(2 * self.n_walk)
+
     def columns(self, group: Group) -> np.ndarray:
         """Return the columns of one group, in the order of its axis."""
         length = self._length(group)
-        if group.is_term:
-            of_y = group.name.endswith("_y")
+        of_y = group.name.endswith("_y")
+        if group.axis == "walk":
+            own = self.walked(np.arange(self.n_exp))
+            return own[:, of_y * self.n_walk :][:, : self.n_walk].ravel()
+        if group.axis in TERM_AXES:
             before = self._terms(of_y)[: self._terms(of_y).index(group)]
             first = self.first_coefficient + of_y * self.n_terms
             return first + sum(map(self._length, before)) + np.arange(length)
         members = self.on(group.axis)
         first = {"exp": 0, "det": self.first_detector, "motion": self.first_motion}[group.axis]
-        return first + members.index(group) + len(members) * np.arange(length)
+        stride = self.per_exposure if group.axis == "exp" else len(members)
+        return first + members.index(group) + stride * np.arange(length)
 
     def gather(self, values: dict[str, Shaped[np.ndarray, " _"]]) -> Shaped[np.ndarray, " calib"]:
         """Return the flat vector from values per group."""

@@ -12,10 +12,13 @@ from jaxtyping import Bool, Float
 
 from solver.data.parameters import BY_NAME
 from solver.data.settings import FitSettings
+from solver.problem.walks import NO_WALKS, Walks
 
 
 class Priors(NamedTuple):
     """Independent priors of the calibration parameters, and a Gaussian prior per source.
+
+    Of distortion coefficients that walk, mean and steps are independent: see `Walks.independent`.
 
     `centre` is the absolute value at offset zero, used by gamma priors; `width` the standard
     deviation, `inf` where flat; `precision` the inverse covariance of (alpha*, delta),
@@ -26,12 +29,14 @@ class Priors(NamedTuple):
     width: Float[np.ndarray, " calib"]
     is_gamma: Bool[np.ndarray, " calib"]
     precision: Float[np.ndarray, "src 2 2"]
+    walks: Walks = NO_WALKS
 
     def penalty(
         self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
     ) -> float:
         """Return minus twice the logarithm of the prior density, zero at the centres."""
-        normal = np.where(self.is_gamma, 0.0, (theta / self.width) ** 2)
+        independent = self.walks.independent(theta)
+        normal = np.where(self.is_gamma, 0.0, (independent / self.width) ** 2)
         source_penalty = np.einsum("si,sij,sj->", sources, self.precision, sources)
         return float(normal.sum() + self._gamma_penalty(theta) + source_penalty)
 
@@ -48,7 +53,7 @@ class Priors(NamedTuple):
 
     def gradient(self, theta: Float[np.ndarray, " calib"]) -> Float[np.ndarray, " calib"]:
         """Return the derivative of half the penalty with respect to the calibration."""
-        slope = theta / self.width**2
+        slope = self.walks.transposed(self.walks.independent(theta) / self.width**2)
         shape, value = self._gamma(theta)
         slope[self.is_gamma] = 1.0 / self._gamma_scale() - (shape - 1.0) / value
         return slope
@@ -58,11 +63,47 @@ class Priors(NamedTuple):
         return np.einsum("sij,sj->si", self.precision, sources)
 
     def hessian_diagonal(self, theta: Float[np.ndarray, " calib"]) -> Float[np.ndarray, " calib"]:
-        """Return the second derivative of half the penalty with respect to the calibration."""
+        """Return the second derivatives of half the penalty by the independent values."""
         prior_hessian = self.width**-2.0
         shape, value = self._gamma(theta)
         prior_hessian[self.is_gamma] = (shape - 1.0) / value**2
         return prior_hessian
+
+    def with_hessian(
+        self, matrix: Float[np.ndarray, "calib calib"], theta: Float[np.ndarray, " calib"]
+    ) -> Float[np.ndarray, "calib calib"]:
+        """Return a matrix plus the second derivatives of half the penalty by the calibration."""
+        total, added = matrix.copy(), self.hessian_diagonal(theta)
+        of_walks = self.walks.hessian(added)
+        added[self.walks.columns] = 0.0
+        total[np.diag_indices(len(added))] += added
+        for columns, of_walk in zip(self.walks.columns, of_walks, strict=True):
+            total[np.ix_(columns, columns)] += of_walk
+        return total
+
+    def scaled(
+        self, vectors: Float[np.ndarray, "calib k"], theta: Float[np.ndarray, " calib"]
+    ) -> Float[np.ndarray, "calib k"]:
+        """Return vectors in units of the priors' widths, of their independent values."""
+        return self.walks.independent(vectors) * np.sqrt(self.hessian_diagonal(theta))[:, None]
+
+    def shares(
+        self,
+        theta: Float[np.ndarray, " calib"],
+        variance: Float[np.ndarray, " calib"],
+        covariance: Float[np.ndarray, "calib calib"],
+    ) -> Float[np.ndarray, " calib"]:
+        """Return the share of its prior in each parameter; the sum is that of all parameters.
+
+        Parameters
+        ----------
+        variance, covariance : of the posterior; the covariance is used for walks only
+        """
+        diagonal = self.hessian_diagonal(theta)
+        found = diagonal * variance
+        for columns, of_walk in zip(self.walks.columns, self.walks.hessian(diagonal), strict=True):
+            found[columns] = np.einsum("ij,ji->i", of_walk, covariance[np.ix_(columns, columns)])
+        return found
 
     def _gamma_scale(self) -> Float[np.ndarray, " gamma"]:
         return self.width[self.is_gamma] ** 2 / self.centre[self.is_gamma]

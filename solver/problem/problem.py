@@ -30,6 +30,7 @@ from solver.problem.parameter_vector import VectorLayout
 from solver.problem.prior_centres import calibration_centres, catalogue_shift
 from solver.problem.priors import Priors, group_widths
 from solver.problem.source_blocks import SourceBlocks
+from solver.problem.walks import Walks, walks_of
 from solver.units import ARCSEC_PER_DEG, RAD_PER_MAS
 
 # Lower orders are computed with additional coefficients of zero, so that they share a compilation.
@@ -89,7 +90,7 @@ class Problem:
         self, offsets: Mapping[str, Float[np.ndarray, "..."]]
     ) -> tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]]:
         """Return calibration and sources from padded parameters: the inverse of `offsets`."""
-        sizes = {"exp": self.layout.n_exp, "coef": self.layout.n_coef}
+        sizes = self.layout.lengths
         values = {g.name: offsets[g.name][: sizes.get(g.axis)] for g in self.layout.groups}
         return self.layout.gather(values), offsets[SOURCES.name][: self.n_src]
 
@@ -187,20 +188,15 @@ def _build(
     places = propagate(sources, epoch, observer_at(np.array([epoch])).position[0])
     centres = calibration_centres(exposures, instrument, layout, settings, axes)
     frame = _shifted(places.frame, catalogue_shift(settings))
+    causes = causes_of(exposures, sources, instrument, settings)
+    walks = walks_of(layout, exposures["obstime"].to_numpy())
     return Problem(
         order=settings.order,
-        geometry=_geometry(
-            frame,
-            exposures,
-            centres,
-            instrument,
-            settings,
-            causes_of(exposures, sources, instrument, settings),
-        ),
+        geometry=_geometry(frame, exposures, centres, instrument, settings, causes, layout),
         measurements=measurements,
         sources=sources,
         exposures=exposures,
-        priors=_priors(places.covariance, centres, settings, layout),
+        priors=_priors(places.covariance, centres, settings, layout, walks),
         layout=layout,
         epoch=epoch,
         elements=axes,
@@ -247,6 +243,7 @@ def _geometry(
     instrument: Instrument,
     settings: FitSettings,
     causes: Causes | None,
+    layout: VectorLayout,
 ) -> Geometry:
     satellite = exposures[[f"satellite_v{axis}" for axis in "xyz"]].to_numpy()
     observer = observer_at(exposures["obstime"].to_numpy(), satellite)
@@ -254,10 +251,12 @@ def _geometry(
         centres["pointing_ra"] / ARCSEC_PER_DEG, centres["pointing_dec"] / ARCSEC_PER_DEG
     )
     order = max(settings.order, _MIN_COMPUTED_ORDER)
+    n_exp = _rounded_up(len(exposures), 16)
     sizes = {
         "src": _rounded_up(len(source_frame), 1024),
-        "exp": _rounded_up(len(exposures), 16),
+        "exp": n_exp,
         "coef": len(terms(order)),
+        "walk": n_exp * layout.n_walk,
     }
     return Geometry(
         source_frame=pad(source_frame, "src", sizes),
@@ -280,6 +279,7 @@ def _priors(
     centres: dict[str, Float[np.ndarray, " _"]],
     settings: FitSettings,
     layout: VectorLayout,
+    walks: Walks,
 ) -> Priors:
     is_gamma = {
         name: np.full(
@@ -289,9 +289,10 @@ def _priors(
     }
     return Priors(
         centre=layout.gather(centres),
-        width=layout.gather(group_widths(settings, centres)),
+        width=walks.with_widths_of_means(layout.gather(group_widths(settings, centres))),
         is_gamma=layout.gather(is_gamma).astype(bool),
         precision=np.linalg.inv(covariance * settings.width(SOURCES.name) ** 2),
+        walks=walks,
     )
 
 

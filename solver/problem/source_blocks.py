@@ -153,4 +153,5 @@ def _columns_of(
     is_touched = np.ones(layout.size, dtype=bool)
     for group in layout.on("exp"):
         is_touched[layout.columns(group)] = exposures
+    is_touched[layout.walked(np.arange(len(exposures)))] = exposures[:, None]
     return np.flatnonzero(is_touched)

@@ -90,7 +90,8 @@ def effective_parameters(
     source_count = 2 * len(priors.precision) - np.einsum(
         "sij,sji->", priors.precision, covariance.source
     )
-    theta_count = len(prior_hessian) - prior_hessian @ np.diag(covariance.theta)
+    variances = priors.walks.variances(covariance.theta)
+    theta_count = len(prior_hessian) - prior_hessian @ variances
     return float(source_count + theta_count)
 
 
@@ -176,9 +177,7 @@ def error_budget(reduced: ReducedSystem, priors: Priors, covariance: Covariances
     half = conditional @ precision @ (covariance.source - 0.5 * conditional)
     cross_terms, calibration = (
         contribution[covariance.source_blocks.position]
-        for contribution in _quadratic_forms(
-            cross, shared, priors.hessian_diagonal(covariance.at[0])[:, None]
-        )
+        for contribution in _quadratic_forms(cross, shared, priors, covariance.at[0])
     )
     catalogue = half + half.swapaxes(1, 2) + cross_terms
     return ErrorBudget(covariance.source - catalogue - calibration, catalogue, calibration)
@@ -187,20 +186,23 @@ def error_budget(reduced: ReducedSystem, priors: Priors, covariance: Covariances
 def _quadratic_forms(
     cross: Float[np.ndarray, "calib 2 src"],
     shared: Float[np.ndarray, "calib calib"],
-    prior_hessian: Float[np.ndarray, "calib 1"],
+    priors: Priors,
+    theta: Float[np.ndarray, " calib"],
 ) -> tuple[Float[np.ndarray, "src 2 2"], Float[np.ndarray, "src 2 2"]]:
-    """Return C_i' M C_i of each source, for a symmetric matrix and for a diagonal one.
+    """Return C_i' M C_i of each source, for a symmetric matrix and for that of the priors.
 
     Computed for a few sources at a time, to stay in the caches.
     """
     n_calib, _, n_src = cross.shape
+    prior_hessian = priors.hessian_diagonal(theta)[:, None]
     found = np.empty((2, 2, 2, n_src))
     for first in range(0, n_src, _AT_ONCE):
         batch = slice(first, first + _AT_ONCE)
         rows = cross[:, :, batch].reshape(n_calib, -1)
-        left = rows.reshape(n_calib, 2, -1)
-        for kind, product in enumerate((shared @ rows, prior_hessian * rows)):
-            right = product.reshape(left.shape)
+        independent = priors.walks.independent(rows)
+        pairs = (rows, shared @ rows), (independent, prior_hessian * independent)
+        for kind, (values, product) in enumerate(pairs):
+            left, right = (one.reshape(n_calib, 2, -1) for one in (values, product))
             for a, b in ((0, 0), (0, 1), (1, 1)):
                 found[kind, a, b, batch] = np.einsum("ks,ks->s", left[:, a], right[:, b])
     found[:, 1, 0] = found[:, 0, 1]

@@ -71,7 +71,7 @@ def _parameter_table(
     columns = np.concatenate([problem.layout.columns(group) for group in problem.layout.groups])
     moves = weak[columns]
     squares = moves**2 * np.diag(solution.reduced.theta)[columns, None]
-    prior_hessian = problem.priors.hessian_diagonal(solution.reduced.at[0])[columns, None]
+    in_priors = problem.priors.scaled(weak, solution.reduced.at[0])[columns]
     labels = {
         name: pd.Series(np.tile(calibration[name], count), dtype=calibration[name].dtype)
         for name in ("group", "element", "label", "unit")
@@ -80,7 +80,7 @@ def _parameter_table(
         "mode": np.repeat(np.arange(1, count + 1), len(calibration)),
         "move": moves.T.ravel(),
         "share": (squares / squares.sum(axis=0)).T.ravel(),
-        "prior_share": (prior_hessian * moves**2).T.ravel(),
+        "prior_share": (in_priors**2).T.ravel(),
     }
     return pd.DataFrame({**labels, **values})[MODE_PARAMETERS.names]
 

@@ -11,6 +11,7 @@ measurements. Where lambda is close to zero, eigenvectors are arbitrary axes of 
 measurements do not constrain; there the eigenmodes are the axes of simple structure.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ import scipy.linalg as sl
 from jaxtyping import Bool, Float
 
 from solver.linear.source_elimination import ReducedSystem
+from solver.linear.triangular import upper_transposed_times
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.priors import Priors
 from solver.results.simple_structure import joint_axes
@@ -61,11 +63,15 @@ class Eigenmodes(NamedTuple):
 
 
 class _PriorTerms(NamedTuple):
-    """S^-1/2 (matrix) S^-1/2' of the source priors' terms of S, and R^-1 with S = R'R."""
+    """S^-1/2 (matrix) S^-1/2' of the source priors' terms of S, and R^-1 with S = R'R.
+
+    `scaled` returns vectors in units of the calibration's priors.
+    """
 
     references: Float[np.ndarray, "calib calib"]
     sources: Float[np.ndarray, "calib calib"]
     root: Float[np.ndarray, "calib calib"]
+    scaled: Callable[[Float[np.ndarray, "calib k"]], Float[np.ndarray, "calib k"]]
 
 
 def find_eigenmodes(
@@ -84,9 +90,8 @@ def find_eigenmodes(
     reduced : posterior with `priors`
     is_reference : whether each source is a reference source
     """
-    prior_hessian = priors.hessian_diagonal(reduced.at[0])
     prior_terms = _prior_terms(reduced, priors, is_reference)
-    scaled = prior_terms.root * np.sqrt(prior_hessian)[:, None]
+    scaled = prior_terms.scaled(prior_terms.root)
     prior_share, axes = np.linalg.eigh(
         prior_terms.references + prior_terms.sources + scaled.T @ scaled
     )
@@ -96,21 +101,28 @@ def find_eigenmodes(
     information = np.diag(reduced.theta)
     if n_unconstrained:
         axes[:, :n_unconstrained] = _simple_axes(
-            axes[:, :n_unconstrained], prior_terms, prior_hessian, information, layout
+            axes[:, :n_unconstrained], prior_terms, information, layout
         )
-    return _eigenmodes(prior_terms.root @ axes, axes, prior_terms, prior_hessian, information)
+    return _eigenmodes(prior_terms.root @ axes, axes, prior_terms, information)
 
 
 def _prior_terms(
     reduced: ReducedSystem, priors: Priors, is_reference: Bool[np.ndarray, " src"]
 ) -> _PriorTerms:
-    rows, order = reduced.spread(), reduced.source_blocks.order
-    weighted = _weighted(rows, _prior_root(reduced, priors)[order])
-    is_reference = is_reference[order]
-    reference_gram = _gram(weighted[:, :, is_reference])
-    weighted[:, :, is_reference] = 0.0
-    root = sl.solve_triangular(reduced.factor, np.eye(len(rows)))
-    return _PriorTerms(reference_gram, _gram(weighted), root)
+    order = reduced.source_blocks.order
+    weight, is_reference = _prior_root(reduced, priors)[order], is_reference[order]
+    grams = [np.zeros(reduced.factor.shape) for _ in range(2)]
+    for block, matrix in zip(reduced.source_blocks.blocks, reduced.whitened, strict=True):
+        weighted, of_block = _weighted(matrix, weight[block.places]), is_reference[block.places]
+        for gram, members in zip(grams, (of_block, ~of_block), strict=True):
+            gram[np.ix_(block.columns, block.columns)] += _gram(weighted[:, :, members])
+    root = sl.solve_triangular(reduced.factor, np.eye(len(reduced.factor)))
+    references, sources = (
+        upper_transposed_times(root, upper_transposed_times(root, gram).T) for gram in grams
+    )
+    return _PriorTerms(
+        references, sources, root, lambda vectors: priors.scaled(vectors, reduced.at[0])
+    )
 
 
 def _prior_root(reduced: ReducedSystem, priors: Priors) -> Float[np.ndarray, "src 2 2"]:
@@ -142,7 +154,6 @@ def _gram(rows: Float[np.ndarray, "calib 2 _"]) -> Float[np.ndarray, "calib cali
 def _simple_axes(
     axes: Float[np.ndarray, "calib n"],
     prior_terms: _PriorTerms,
-    prior_hessian: Float[np.ndarray, " calib"],
     information: Float[np.ndarray, " calib"],
     layout: VectorLayout,
 ) -> Float[np.ndarray, "calib n"]:
@@ -156,7 +167,7 @@ def _simple_axes(
         [
             axes.T @ prior_terms.references @ axes,
             axes.T @ prior_terms.sources @ axes,
-            *_group_grams(vectors * np.sqrt(prior_hessian)[:, None], layout),
+            *_group_grams(prior_terms.scaled(vectors), layout),
         ]
     )
     group_grams = np.array(_group_grams(vectors * np.sqrt(information)[:, None], layout))
@@ -184,14 +195,14 @@ def _eigenmodes(
     vectors: Float[np.ndarray, "calib calib"],
     axes: Float[np.ndarray, "calib calib"],
     prior_terms: _PriorTerms,
-    prior_hessian: Float[np.ndarray, " calib"],
     information: Float[np.ndarray, " calib"],
 ) -> Eigenmodes:
+    in_priors = prior_terms.scaled(vectors)
     prior_shares = np.stack(
         [
             np.einsum("ik,ik->k", axes, prior_terms.references @ axes),
             np.einsum("ik,ik->k", axes, prior_terms.sources @ axes),
-            prior_hessian @ vectors**2,
+            np.einsum("ik,ik->k", in_priors, in_priors),
         ]
     )
     data_share = np.maximum(1.0 - prior_shares.sum(axis=0), 0.0)

@@ -147,10 +147,10 @@ def calibration_table(solution: SolvedProblem, instrument: Instrument) -> pd.Dat
     marginal = solution.theta_variance
     by_column = {
         "offset": theta,
-        "prior_sigma": priors.width,
+        "prior_sigma": priors.walks.sigmas(priors.width),
         "sigma_conditional": 1.0 / np.sqrt(np.diag(solution.reduced.theta)),
         "sigma_marginal": np.sqrt(marginal),
-        "prior_share": priors.hessian_diagonal(theta) * marginal,
+        "prior_share": priors.shares(theta, marginal, solution.covariance.theta),
     }
     pointing = _pointing(problem, theta)
     of_groups = []

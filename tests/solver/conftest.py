@@ -154,14 +154,13 @@ def dense_jacobian(problem, theta, sources):
 def unpadded(problem):
     """Return the geometry without padded sources and exposures."""
     geometry, n_exp = problem.geometry, problem.layout.n_exp
+    lengths = problem.layout.lengths
     return replace(
         geometry,
         source_frame=geometry.source_frame[: problem.n_src],
         pointing_frame=geometry.pointing_frame[:n_exp],
         origin={
-            group.name: geometry.origin[group.name][:n_exp]
-            if group.axis == "exp"
-            else geometry.origin[group.name]
+            group.name: geometry.origin[group.name][: lengths.get(group.axis)]
             for group in problem.layout.groups
             if group.name in geometry.origin
         },
@@ -197,7 +196,7 @@ def make_dense():
         residual = (problem.measurements.measured - np.asarray(predicted)).ravel() * weight
         n_calib = problem.layout.size
         prior = np.zeros((jacobian.shape[1],) * 2)
-        prior[:n_calib, :n_calib] = np.diag(problem.priors.hessian_diagonal(theta))
+        prior[:n_calib, :n_calib] = problem.priors.with_hessian(np.zeros((n_calib, n_calib)), theta)
         for i, precision in enumerate(problem.priors.precision):
             here = slice(n_calib + 2 * i, n_calib + 2 * i + 2)
             prior[here, here] = precision

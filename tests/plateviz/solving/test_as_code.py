@@ -45,6 +45,7 @@ OF_SURVEYS = [
         focal_anisotropy=True,
         drift=2,
         drift_in_time=3,
+        drift_walk=2,
         breathing=3,
         breathing_period=90.5,
         field_distortion=4,

@@ -26,6 +26,7 @@ EVERY = FitSettings(
     focal_anisotropy=True,
     drift=2,
     drift_in_time=2,
+    drift_walk=3,
     breathing=2,
     field_distortion=2,
     detector_distortion=2,
@@ -72,6 +73,7 @@ def test_groups_have_the_elements_that_the_settings_name(problem):
     assert count["focal_anisotropy"] == 8
     assert count["drift_x"] == count["breathing_y"] == 2 * 3
     assert (count["field_distortion_x"], count["own_distortion_x"]) == (3, 4 * 3)
+    assert count["drift_walk_x"] == 8 * 7
     assert count["detector_turn"] == count["detector_skew"] == count["phase_sine_y"] == 4
     columns = np.concatenate([problem.layout.columns(g) for g in problem.layout.groups])
     assert sorted(columns) == list(range(problem.layout.size))

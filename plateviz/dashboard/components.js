@@ -9,6 +9,8 @@
 // A component of React is drawn first and follows its model a moment later. What the server changed
 // in between, Panel would not show until it changes again; here it is read again then.
 //
+// Columns of texts arrive packed.
+//
 // A table follows its model from when it is drawn.
 
 // The loader of components sends the event a second time.
@@ -66,6 +68,14 @@ document.addEventListener("DOMContentLoaded", () => {
     if (this.is_managed) invalidate_layout.call(this)
     else wait(this, true)
   }
+
+  // Columns of texts, see `packed_texts.py`.
+  const { Deserializer } = Bokeh.require("core/serialization/deserializer")
+  Deserializer.register("plateviz.texts", ({ texts, numbers }, deserializer) => {
+    const words = texts.split("\n")
+    return numbers === undefined
+      ? words : Array.from(deserializer.decode(numbers), number => words[number])
+  })
 
   // A table that is not drawn yet takes what it shows when it is; Panel would change it before.
   const table = Bokeh.Models.get("panel.models.tabulator.DataTabulator").prototype.default_view

@@ -45,6 +45,13 @@ _QUIET_SECONDS = 0.03
 _MOST_SECONDS = 0.3
 
 
+def has_own_scripts(document: Document | None) -> bool:
+    """Return whether the page of a document is one that is sent here, with its scripts."""
+    context = None if document is None else document.session_context
+    # A page that Panel makes elsewhere has no token.
+    return WINDOW in getattr(context, "token_payload", {})
+
+
 class PageHandler(DocHandler):
     """Answers a request of the page without a session."""
 

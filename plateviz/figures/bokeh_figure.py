@@ -23,8 +23,14 @@ class BokehFigure:
     frames : the drawn frames
     """
 
-    def __init__(self, figure: Figure, theme: str) -> None:
-        """Draw `figure` in a theme, "light" or "dark"; ValueError if there is no such theme."""
+    def __init__(self, figure: Figure, theme: str, *, is_packed: bool = False) -> None:
+        """Draw `figure` in a theme, "light" or "dark"; ValueError if there is no such theme.
+
+        Parameters
+        ----------
+        is_packed : whether its texts are for a page whose scripts unpack them, see `PackedTexts`
+        """
+        self._is_packed = is_packed
         self._make(figure)
         self.follow(figure, theme)
 
@@ -68,7 +74,7 @@ class BokehFigure:
             first = self.frames[0] if self.frames else None
             x_range = first.x_range if first and "x" in figure.linked else None
             y_range = first.y_range if first and "y" in figure.linked else None
-            self.frames.append(BokehFrame(frame, x_range, y_range))
+            self.frames.append(BokehFrame(frame, x_range, y_range, is_packed=self._is_packed))
         self.model = models.GridBox(
             children=[
                 (drawn.plot, *divmod(number, figure.columns))

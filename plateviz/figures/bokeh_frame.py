@@ -40,13 +40,17 @@ class BokehFrame:
         frame: Frame,
         x_range: models.Range1d | None = None,
         y_range: models.Range1d | None = None,
+        *,
+        is_packed: bool = False,
     ) -> None:
         """Make the models; `follow` gives them their values.
 
         Parameters
         ----------
         x_range, y_range : limits that the frame shares with another
+        is_packed : as of `BokehGlyphs`
         """
+        self._is_packed = is_packed
         self._logs = (frame.x.is_log, frame.y.is_log)
         self._glyphs: dict[str, BokehGlyphs] = {}
         self._labels: dict[str, list[models.GlyphRenderer]] = {}
@@ -154,7 +158,9 @@ class BokehFrame:
         for glyphs in frame.glyphs:
             drawn = self._glyphs.get(glyphs.name)
             if drawn is None:
-                drawn = self._glyphs[glyphs.name] = self._add(BokehGlyphs(glyphs))
+                drawn = self._glyphs[glyphs.name] = self._add(
+                    BokehGlyphs(glyphs, is_packed=self._is_packed)
+                )
                 if glyphs.reach is not None:
                     self._follow_reach(drawn)
             drawn.follow(glyphs, theme)

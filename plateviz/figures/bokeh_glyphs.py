@@ -10,6 +10,7 @@ from bokeh.core.property.vectorization import Field, Value
 from bokeh.models.glyph import Glyph
 
 from plateviz.figures.figure import HANDLES, By, Glyphs, Look, Ramp
+from plateviz.figures.packed_texts import PackedTexts
 from plateviz.figures.theme import FONT, Theme
 
 _GLYPHS: Mapping[str, Callable[..., Glyph]] = MappingProxyType(
@@ -52,8 +53,14 @@ class BokehGlyphs:
     keys : columns by which rows are selected -> their values in the rows on the screen
     """
 
-    def __init__(self, glyphs: Glyphs) -> None:
-        """Make the models; `follow` gives them their values."""
+    def __init__(self, glyphs: Glyphs, *, is_packed: bool = False) -> None:
+        """Make the models; `follow` gives them their values.
+
+        Parameters
+        ----------
+        is_packed : whether columns of texts are sent as `PackedTexts`
+        """
+        self._is_packed = is_packed
         self.kind = glyphs.kind
         self._models = _models_for(glyphs)
         self.source = models.ColumnDataSource()
@@ -109,6 +116,8 @@ class BokehGlyphs:
 
     def _send(self, columns: dict[str, np.ndarray]) -> None:
         """Replace the columns that differ, which alone are sent to the browser."""
+        if self._is_packed:
+            columns = {name: PackedTexts.of(one) for name, one in columns.items()}
         data = self.source.data
         if data.keys() != columns.keys() or _length(data) != _length(columns):
             self.source.data = columns

@@ -361,6 +361,8 @@ def _columns(part: Any) -> dict[str, Any]:  # noqa: ANN401 from the server
 def _rows_with_id(model: Mapping[str, Any]) -> int:
     """Return the number of rows of a table of sources; 0 for other tables."""
     ids = _columns(model.get("data")).get("id")
+    if isinstance(ids, dict) and "texts" in ids:
+        return int(ids["numbers"]["shape"][0]) if "numbers" in ids else len(ids["texts"].split())
     if isinstance(ids, dict) and "shape" in ids:
         return int(ids["shape"][0])
     plain = _plain(ids)

@@ -9,6 +9,7 @@ import panel_material_ui as pmui
 from bokeh.events import Event, RangesUpdate, Reset
 
 from plateviz.dashboard.latest_answer import Pending
+from plateviz.dashboard.page_request import has_own_scripts
 from plateviz.dashboard.selected import NO_IDS, SelectedIds
 from plateviz.dashboard.views.card_tools import CardTools
 from plateviz.dashboard.views.figure_text import FigureText
@@ -207,7 +208,8 @@ class FigureView(pn.viewable.Viewer):
     def _show(self, figure: Figure) -> None:
         figure = self._resized(figure)
         if self._drawn is None:
-            self._drawn = BokehFigure(figure, self._theme)
+            is_packed = has_own_scripts(pn.state.curdoc)
+            self._drawn = BokehFigure(figure, self._theme, is_packed=is_packed)
         else:
             self._drawn.follow(figure, self._theme)
         if self._pane is None or self._pane.object is not self._drawn.model:

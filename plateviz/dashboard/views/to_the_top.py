@@ -17,10 +17,12 @@ class ToTheTop(pn.custom.JSComponent):
 
     _esm = """
     export function render({ model }) {
-      model.on("shown", () => {
+      const scroll = () => {
         for (const host of document.querySelectorAll("*"))
           host.shadowRoot?.querySelector(".main-content")?.scrollTo(0, 0)
-      })
+      }
+      // With the next picture: before, the browser would lay the page out for it.
+      model.on("shown", () => requestAnimationFrame(scroll))
     }
     """
 

@@ -19,6 +19,7 @@ from solver.engines.run_engine import Resumption, run_engine
 from solver.engines.warm_starts import WarmStart, likely, nearest
 from solver.engines.what_if import linearised, solve_what_if
 from solver.errors import FitError, InputError
+from solver.linear.contribution import compiling
 from solver.linear.covariances import Covariances
 from solver.problem.noise import Noise
 from solver.problem.problem import Problem, orders_held, rebuilt
@@ -90,6 +91,7 @@ class OrbitFitter:
         self._last_fit: _LastFit | None = None
         self._starts: list[WarmStart] = []
         self._attempted: list[FitSettings] = []
+        self._compiling: Iterator[None] = iter(())
         self._stopped: tuple[FitSettings, object] | None = None
 
     def fit(
@@ -132,6 +134,7 @@ class OrbitFitter:
             )
             self._starts = [WarmStart(settings, problem, estimate.mode)]
             self._attempted = [settings]
+            self._compiling = compiling(estimate.mode.equations, problem)
         result = _with_noise(_with_outliers(result, outliers), noise)
         return _with_orders(result, orders, time.perf_counter() - fitted)
 
@@ -197,7 +200,8 @@ class OrbitFitter:
         """Precompute warm starts for the what-if solutions that are likely to come next.
 
         These are lower orders (`solver.engines.warm_starts.likely`); with a warm start they
-        take no longer than a change of priors.
+        take no longer than a change of priors. What those with fewer measurements need is
+        compiled.
 
         Parameters
         ----------
@@ -219,6 +223,9 @@ class OrbitFitter:
                 self._attempted.append(settings)
                 self._starts += self._warm_start(last, settings)
                 yield
+        # Not `yield from`, with which it would end with this.
+        for _ in self._compiling:
+            yield
 
     def _warm_start(self, last: _LastFit, settings: FitSettings) -> list[WarmStart]:
         """Return a warm start for `settings`, in a list; an empty list if there is no solution."""

@@ -1,5 +1,7 @@
 """The footprint: sources and fields on the sky (paper, figure "footprint")."""
 
+from itertools import cycle
+
 import numpy as np
 import pandas as pd
 
@@ -83,12 +85,12 @@ def _outlines(fields: pd.DataFrame) -> list[Glyphs]:
 
     A line is too thin for a finger: what is tapped is a wide one, which is not seen.
     """
-    outlines, dashes, ids = [], [], []
-    for number, (_, field) in enumerate(fields.groupby("field_id")):
-        for detector_id, detector in field.groupby("detector_id"):
-            ids.append(detector_id)
-            outlines.append(detector[["x_arcmin", "y_arcmin"]].to_numpy(dtype=float))
-            dashes.append(_DASHES[number % len(_DASHES)])
+    corners = fields[["x_arcmin", "y_arcmin"]].to_numpy(dtype=float)
+    dash = dict(zip(sorted(fields["field_id"].unique()), cycle(_DASHES), strict=False))
+    groups = sorted(fields.groupby(["field_id", "detector_id"]).indices.items())
+    outlines = [corners[rows] for _, rows in groups]
+    dashes = [dash[field] for (field, _), _ in groups]
+    ids = [detector_id for (_, detector_id), _ in groups]
     lines = paths(outlines, name="outlines", color="line", width=1.2, dashes=dashes)
     handles = paths(outlines, name=HANDLES, color=_UNSEEN, width=_FINGER)
     return [of_detectors(one, ids) for one in (lines, handles)]

@@ -79,11 +79,11 @@ def _observed(result: FitResult, exposure: int) -> pd.DataFrame:
     ----------
     exposure : its row in `result.exposures`
     """
-    here = np.flatnonzero(result.exposure_index == exposure)
-    rows = result.residuals.iloc[here][["source_id", "ideal_x", "ideal_y"]]
-    sources = result.sources
-    found = np.searchsorted(sources["source_id"].to_numpy(), rows["source_id"].to_numpy())
-    return rows.assign(**{name: sources[name].to_numpy()[found] for name in ("ra", "dec")})
+    here, sources = np.flatnonzero(result.exposure_index == exposure), result.sources
+    # Column by column: rows of the whole table would be copied.
+    rows = {n: result.residuals[n].to_numpy()[here] for n in ("source_id", "ideal_x", "ideal_y")}
+    found = np.searchsorted(sources["source_id"].to_numpy(), rows["source_id"])
+    return pd.DataFrame(rows | {n: sources[n].to_numpy()[found] for n in ("ra", "dec")})
 
 
 def _outline(

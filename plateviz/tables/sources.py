@@ -173,9 +173,10 @@ def _sigma_single_mas(result: FitResult, instrument: Instrument) -> float:
     # x and y are pooled, because the mounting angles and the roll differ: the square-root law
     # takes one uncertainty per measurement for both coordinates.
     residuals = result.residuals
-    detectors = {d.detector_id: d for d in instrument.detectors}
-    pitch_x = residuals["detector_id"].map({i: d.pitch_x_um for i, d in detectors.items()})
-    pitch_y = residuals["detector_id"].map({i: d.pitch_y_um for i, d in detectors.items()})
-    sigma_um = np.concatenate([residuals["sx"] * pitch_x, residuals["sy"] * pitch_y])
+    pitch = np.array([(d.pitch_x_um, d.pitch_y_um) for d in instrument.detectors])
+    number = instrument.index_of(residuals["detector_id"].to_numpy())
+    sigma_um = np.concatenate(
+        [residuals[name].to_numpy() * pitch[number, i] for i, name in enumerate(("sx", "sy"))]
+    )
     single = float(np.median(sigma_um)) if len(sigma_um) else float("nan")
     return single / instrument.focal_length_um / RAD_PER_MAS

@@ -103,8 +103,9 @@ class FitResult:
         )
         keys = field * (int(plate.max(initial=0)) + 1) + plate
         known, rows = np.split(keys, [len(self.exposures)])
-        order = np.argsort(known)
-        return order[np.searchsorted(known[order], rows)]
+        place = np.empty(int(keys.max(initial=0)) + 1, dtype=np.intp)
+        place[known] = np.arange(len(known))
+        return place[rows]
 
     def groups_on(self, axis: Axis) -> tuple[Group, ...]:
         """Return the parameter groups of the fit with one value per element of `axis`."""

@@ -4,7 +4,7 @@ Normal equations are sums over the measurements, so removing measurements subtra
 contribution. It is already summed for whole detectors; other subsets are linearised again.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,9 @@ from solver.linear.chi2 import Gradient
 from solver.linear.normal_equations import DetectorSums, NormalEquations, accumulate
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.problem import Problem, of_rows
+
+# One source in so many: enough for more than `tiles.FEW_TILES`, few measurements in each.
+_APART = 50
 
 
 class Contribution(NamedTuple):
@@ -56,6 +59,26 @@ def contribution_of(
         removed_equations.source,
         remaining_cross,
     )
+
+
+def compiling(equations: NormalEquations, problem: Problem) -> Iterator[None]:
+    """Compile what `contribution_of` needs for few measurements, before anybody waits for it.
+
+    Tiles of few measurements have other shapes than those of an orbit, and JAX compiles once for
+    each: for a source, for sources that lie in many tiles, and for an exposure.
+
+    Yields
+    ------
+    None after each shape, whose compilation takes seconds.
+    """
+    index = problem.measurements.index
+    for removed in (
+        index.source == index.source[0],
+        index.source % _APART == 0,
+        index.exposure == index.exposure[0],
+    ):
+        contribution_of(equations, problem, removed)
+        yield
 
 
 def _detectors_contribution(

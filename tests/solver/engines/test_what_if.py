@@ -10,6 +10,7 @@ from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines import what_if
 from solver.fit import OrbitFitter, fit_orbit
+from solver.linear import normal_equations
 from solver.linear.normal_equations import accumulate
 from solver.linear.update import update_equations
 from solver.problem.problem import build_problem
@@ -163,6 +164,32 @@ def test_interrupted_precomputation_resumes_and_runs_once(orbit):
     rest = len(list(prepared.precompute(6)))
     assert rest > 0
     assert list(prepared.precompute(6)) == []
+
+
+def test_what_ifs_with_fewer_measurements_have_nothing_to_compile(sample_orbit, monkeypatch):
+    """JAX compiles once for each shape of the chunks."""
+    fitter, shapes = OrbitFitter(sample_orbit), set()
+    fitter.fit(FitSettings(order=2))
+    linearise = normal_equations.linearise
+
+    def noting(*arguments):
+        shapes.add(arguments[-1].shape)
+        return linearise(*arguments)
+
+    monkeypatch.setattr(normal_equations, "linearise", noting)
+    list(fitter.precompute(2))
+    compiled = shapes.copy()
+    shapes.clear()
+    ids = np.unique(sample_orbit.measurements["source_id"]).tolist()
+    for excluded in (
+        {"sources": frozenset(ids[:1])},
+        {"sources": frozenset(ids[::20])},
+        {"exposures": frozenset([first(sample_orbit, "field_id", "plate_id")])},
+    ):
+        settings = FitSettings(order=2, exclusions=Exclusions(**excluded))
+        assert fitter.what_if(settings) is not None
+    assert len(shapes) > 1
+    assert shapes <= compiled
 
 
 def test_lower_order_without_a_shifted_term_is_not_precomputed(orbit):

@@ -5,14 +5,12 @@ is whole if it did not change between two looks and has the end of a Parquet fil
 orbit's measurements except to compute their SHA-256, and that once for each time they are written.
 """
 
-import hashlib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-import pandas as pd
-
+from plateviz.runs.fitted_exposures import FittedExposures, digest_of
 from plateviz.runs.fitted_orbit import read_provenance
 from plateviz.runs.run import Run
 from solver.data.schema import ENVIRONMENT
@@ -84,6 +82,11 @@ class Arrivals:
         Parameters
         ----------
         run : contains the orbits that are fitted
+
+        Raises
+        ------
+        InputError
+            If the record of their exposures is damaged.
         """
         self._run, self._survey = run, run.survey
         self._listed: dict[str, str] = {}
@@ -93,9 +96,10 @@ class Arrivals:
         self._digests: dict[Path, tuple[_State | None, str]] = {}
         self._exposures: dict[int, str] = {}
         self._exposures_read: object = None
-        self._first_exposures: dict[int, str] = {}
-        # Of fitted orbits: the SHA-256 that was fitted, and the state at the first look.
-        self._fitted: dict[int, tuple[str, _State | None]] = {}
+        self._fitted_exposures = FittedExposures(run.directory)
+        # Of fitted orbits: the SHA-256 of the files that were fitted, and the state of the
+        # measurements at the first look.
+        self._fitted: dict[int, tuple[Mapping[str, str], _State | None]] = {}
         self._tried: dict[int, _Signature] = {}
 
     def look(self) -> Look:
@@ -116,6 +120,8 @@ class Arrivals:
             # An orbit may be being added.
             return Look([], [Remark("waiting", None, f"{error}")], is_settled=False)
         fitted = set(self._run.complete_orbits())
+        # One that another process has fitted is compared with what it is at the first look.
+        self._record(one for one in fitted if self._fitted_exposures.of(one) is None)
         files = {one: measurement_path(self._survey, one) for one in orbits if one not in fitted}
         self._before, self._states = self._states, {p: _state_of(p) for p in files.values()}
         ready, remarks = [], self._misnamed()
@@ -132,7 +138,9 @@ class Arrivals:
 
     def try_orbits(self, orbits: Iterable[int]) -> None:
         """Record that orbits are fitted as they are; one is ready again once it has changed."""
+        orbits = list(orbits)
         self._tried |= {orbit: self._signature(orbit) for orbit in orbits}
+        self._record(orbits)
 
     def is_as_tried(self, orbit: int) -> bool:
         """Return whether the files of an orbit are those that it was tried with."""
@@ -151,11 +159,8 @@ class Arrivals:
         # A survey may begin without exposures.
         if state != self._exposures_read and state != (None, None):
             table = read_survey_table(path, ENVIRONMENT)
-            self._exposures = {
-                int(one): _digest_of(rows) for one, rows in table.groupby("orbit_id")
-            }
+            self._exposures = {int(one): digest_of(rows) for one, rows in table.groupby("orbit_id")}
             self._exposures_read = state
-            self._first_exposures = {**self._exposures, **self._first_exposures}
         return survey_orbits(self._survey)
 
     def _unfit(self, orbit: int) -> Remark | None:
@@ -193,15 +198,14 @@ class Arrivals:
         name = _name_of(path)
         state = _state_of(path)
         if orbit not in self._fitted:
-            inputs = read_provenance(self._run.orbit_directory(orbit))
-            self._fitted[orbit] = inputs.get(name, ""), state
-        digest, first = self._fitted[orbit]
+            self._fitted[orbit] = read_provenance(self._run.orbit_directory(orbit)), state
+        inputs, first = self._fitted[orbit]
         is_known = state == first and name in self._listed
         if state is None:
             found = f"{name} is gone"
-        elif digest != (self._listed[name] if is_known else self._digest(path)):
+        elif inputs.get(name) != (self._listed[name] if is_known else self._digest(path)):
             found = f"{name} is another file"
-        elif self._exposures.get(orbit) != self._first_exposures.get(orbit):
+        elif self._has_other_exposures(orbit, inputs):
             found = f"its exposures in {EXPOSURES} are others"
         else:
             return None
@@ -211,6 +215,18 @@ class Arrivals:
             f"{found} since it was fitted; the run keeps its solution, and another --run NAME fits "
             "it as it is now",
         )
+
+    def _has_other_exposures(self, orbit: int, inputs: Mapping[str, str]) -> bool:
+        """Return whether an orbit's exposures differ from those that were fitted."""
+        path = self._survey / EXPOSURES
+        if path.is_file() and inputs.get(EXPOSURES) == self._digest(path):
+            return False
+        return self._exposures.get(orbit) != self._fitted_exposures.of(orbit)
+
+    def _record(self, orbits: Iterable[int]) -> None:
+        """Record the exposures of orbits as those that are fitted."""
+        there = self._exposures
+        self._fitted_exposures.record({one: there[one] for one in orbits if one in there})
 
     def _misnamed(self) -> list[Remark]:
         folder = self._survey / MEASUREMENTS
@@ -250,8 +266,3 @@ def _state_of(path: Path) -> _State | None:
 
 def _name_of(path: Path) -> str:
     return f"{MEASUREMENTS}/{path.name}"
-
-
-def _digest_of(rows: pd.DataFrame) -> str:
-    values = pd.util.hash_pandas_object(rows, index=False).to_numpy()
-    return hashlib.sha256(values.tobytes()).hexdigest()

@@ -1,5 +1,7 @@
 """Kept solutions: copied whole under a name that is free, and read back; notes beside them."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 
 import plateviz
@@ -86,6 +88,26 @@ def test_second_of_two_people_is_told_and_loses_nothing(tmp_path):
         write_note(path, "theirs", before.version)
     assert read_note(path).text == "mine" == refused.value.note.text
     assert write_note(path, "mine and theirs", refused.value.note.version).text == "mine and theirs"
+
+
+def test_three_people_at_once_lose_nothing(tmp_path):
+    path = tmp_path / "note.txt"
+
+    def write_lines(person):
+        for number in range(20):
+            note = read_note(path)
+            while True:
+                try:
+                    write_note(path, f"{note.text}\n{person}{number}", note.version)
+                except NoteChangedError as error:
+                    note = error.note
+                else:
+                    break
+
+    with ThreadPoolExecutor(3) as threads:
+        list(threads.map(write_lines, "abc"))
+    lines = read_note(path).text.split()
+    assert sorted(lines) == sorted(f"{person}{number}" for person in "abc" for number in range(20))
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,14 @@
 
 import json
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
 
 from plateviz.runs import dask_workers, fit_survey, watch
+from plateviz.runs.fitted_exposures import FittedExposures
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.run import Run
 from plateviz.runs.watch import Ends, Watch
@@ -23,7 +25,7 @@ from solver.io.survey import (
     read_survey_table,
     write_survey_table,
 )
-from solver.io.survey_manifest import MANIFEST
+from solver.io.survey_manifest import MANIFEST, survey_changes
 from tests.solver.growing_survey import GrowingSurvey
 
 ONCE = Ends(at_once=True)
@@ -114,6 +116,27 @@ def test_orbits_are_fitted_as_they_arrive_and_a_restart_goes_on(growing, watched
     run = Run(growing.directory, "watched")
     assert run.complete_orbits() == [0, 1, 2]
     assert (run.grows, run.is_complete) == (True, False)
+
+
+@pytest.mark.usefixtures("fits")
+def test_three_writers_at_once_add_their_orbits_and_one_orbit_once(growing, watched):
+    refused = []
+
+    def write(orbit):
+        try:
+            growing.append(orbit)
+        except InputError as error:
+            refused.append(str(error))
+
+    def write_at_once():
+        with ThreadPoolExecutor(3) as writers:
+            list(writers.map(write, (1, 2, 2)))
+
+    said = watched(write_at_once)
+    assert kinds(said) == [("fitted", 0), ("fitted", 1), ("fitted", 2)]
+    assert len(refused) == 1
+    assert "that the survey does not have, found 2" in refused[0]
+    assert survey_changes(growing.directory) == []
 
 
 @pytest.mark.usefixtures("fits")
@@ -218,17 +241,52 @@ def test_changed_orbit_is_named_and_keeps_its_solution(growing, watched):
     assert {p: p.stat().st_mtime_ns for p in run.directory.glob("orbit=*/*")} == before
 
 
-@pytest.mark.usefixtures("fits")
-def test_exposures_that_change_are_named(growing, watched):
-    def change():
-        path = growing.directory / EXPOSURES
-        table = read_survey_table(path, ENVIRONMENT)
-        write_survey_table(table.assign(ra_est=table["ra_est"] + 1e-6), ENVIRONMENT, path)
-        growing.write_manifest()
+def change_exposures(growing, orbit):
+    path = growing.directory / EXPOSURES
+    table = read_survey_table(path, ENVIRONMENT)
+    table.loc[table["orbit_id"] == orbit, "ra_est"] += 1e-6
+    write_survey_table(table, ENVIRONMENT, path)
+    growing.write_manifest()
 
-    said = watched(change, nothing)
+
+@pytest.mark.usefixtures("fits")
+def test_exposures_that_change_are_named_once_by_each_watch(growing, watched):
+    said = watched(lambda: change_exposures(growing, 0), nothing)
     assert kinds(said) == [("fitted", 0), ("changed", 0)]
     assert "its exposures in exposures.parquet are others" in message(said, "changed")
+    said = watched(lambda: growing.append(1), nothing)
+    assert kinds(said) == [("changed", 0), ("fitted", 1)]
+
+
+@pytest.mark.usefixtures("fits")
+def test_exposures_that_change_between_two_watches_are_named(growing, watched):
+    watched(lambda: growing.append(1))
+    # Those of other orbits are no change of these.
+    growing.append(2)
+    assert kinds(watched(ends=ONCE)) == [("fitted", 2)]
+    change_exposures(growing, 1)
+    assert kinds(watched(ends=ONCE)) == [("changed", 1)]
+
+
+@pytest.mark.usefixtures("fits")
+def test_exposures_that_were_written_after_the_look_and_before_the_fit_are_no_change(
+    growing, watched, monkeypatch
+):
+    record = FittedExposures.record
+
+    def change_then(self, digests):
+        record(self, dict.fromkeys(digests, "of the look"))
+
+    monkeypatch.setattr(FittedExposures, "record", change_then)
+    assert kinds(watched(nothing)) == [("fitted", 0)]
+
+
+@pytest.mark.usefixtures("fits")
+def test_damaged_record_of_exposures_is_named(growing, watched):
+    watched(ends=ONCE)
+    (Run(growing.directory, "watched").directory / "exposures.json").write_text("[]")
+    with pytest.raises(InputError, match=r"exposures.json: expected digests of exposures"):
+        watched(ends=ONCE)
 
 
 @pytest.mark.usefixtures("fits")

@@ -12,6 +12,7 @@ from plateviz.runs.run import DEFAULT_RUN
 from solver.errors import InputError
 
 if TYPE_CHECKING:
+    from plateviz.reports.more_figures import MoreFigures
     from plateviz.reports.report import Facts, Report
     from plateviz.runs.kept_solutions import KeptSolution
     from solver.data.result import FitResult
@@ -27,6 +28,15 @@ class ReportRequest(NamedTuple):
     run: str
     other: str | None
     instrument: Path | None
+    both: tuple[str, ...] = ()
+    explore: tuple[str, ...] = ()
+
+    @property
+    def more(self) -> "MoreFigures":
+        """The figures besides those of every report."""
+        from plateviz.reports.more_figures import MoreFigures
+
+        return MoreFigures(self.both, self.explore)
 
 
 def report(
@@ -57,6 +67,21 @@ def report(
         Path | None,
         typer.Option(help="Instrument (TOML file) of a result file; the mini-mock's by default."),
     ] = None,
+    both: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Also draw this figure of both solutions, such as residual-map; may be repeated.",
+            metavar="FIGURE",
+        ),
+    ] = None,
+    explore: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Also draw a column against another, as the address of the Explore workspace "
+            "says it: 'rows=measurements&x=focal_x&y=residual_x'; may be repeated.",
+            metavar="COLUMNS",
+        ),
+    ] = None,
     pdf: Annotated[
         bool, typer.Option("--pdf", help="Also print the report to PDF with Chromium.")
     ] = False,
@@ -75,7 +100,8 @@ def report(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Write a report: one HTML file that needs no network."""
-    request = ReportRequest(path, orbit, source, survey, run, other, instrument)
+    more = tuple(both or ()), tuple(explore or ())
+    request = ReportRequest(path, orbit, source, survey, run, other, instrument, *more)
     if pages:
         _write_pages(request, output, pdf, workers)
     else:
@@ -84,7 +110,8 @@ def report(
 
 def _write_pages(request: ReportRequest, folder: Path, pdf: bool, workers: int | None) -> None:
     of_one_page = (request.orbit, request.source, request.other, request.instrument)
-    if pdf or any(option is not None for option in of_one_page):
+    has_more = bool(request.both or request.explore)
+    if pdf or has_more or any(option is not None for option in of_one_page):
         raise InputError(
             "--pages: expected no option but --run and --workers, found an option of a single page"
         )
@@ -145,6 +172,10 @@ def _compose(request: ReportRequest) -> "Report":
         raise InputError(
             "--other: expected with --orbit or a result of `plateviz fit` only, found neither"
         )
+    if request.both and request.other is None:
+        raise InputError("--both: expected with --other, found no solution to compare with")
+    if request.explore and request.source is not None:
+        raise InputError("--explore: expected with an orbit or a survey, found --source")
     from plateviz.reports.survey import source_report, survey_orbit_report, survey_report
     from plateviz.runs.queries import open_run
 
@@ -152,8 +183,9 @@ def _compose(request: ReportRequest) -> "Report":
     if request.source is not None:
         return source_report(run, request.source, facts)
     if request.orbit is None:
-        return survey_report(run, facts)
-    return survey_orbit_report(run, request.orbit, facts, _other_solution(request, request.orbit))
+        return survey_report(run, facts, request.more)
+    other = _other_solution(request, request.orbit)
+    return survey_orbit_report(run, request.orbit, facts, other, more=request.more)
 
 
 def _compose_from_file(request: ReportRequest) -> "Report":
@@ -171,7 +203,7 @@ def _compose_from_file(request: ReportRequest) -> "Report":
     result = read_result(request.path)
     other = read_result(Path(request.other)) if request.other else None
     facts = {**_facts(), SOLVED: read_versions(request.path)}
-    return orbit_report(result, focal_plane, facts, other)
+    return orbit_report(result, focal_plane, facts, other, more=request.more)
 
 
 def _compose_from_kept(request: ReportRequest, kept: "KeptSolution") -> "Report":
@@ -187,8 +219,9 @@ def _compose_from_kept(request: ReportRequest, kept: "KeptSolution") -> "Report"
 
     focal_plane = read_instrument(request.instrument) if request.instrument else instrument_of(kept)
     other = read_result(Path(request.other)) if request.other else None
+    simulation = simulation_of_kept(kept)
     return orbit_report(
-        kept.read(), focal_plane, _facts(), other, simulation=simulation_of_kept(kept)
+        kept.read(), focal_plane, _facts(), other, simulation=simulation, more=request.more
     )
 
 

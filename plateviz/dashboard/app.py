@@ -42,7 +42,9 @@ _LOOK = 2000
 # The solver prepares what-ifs once a page has been at rest for so long. Before, the browser draws
 # and a person may step on to the next orbit, for which a fit would take the cores.
 _REST_SECONDS = 3.0
-_SIDEBAR_WIDTH = 300
+_SIDEBAR_WIDTH = 264
+# The bar has one line of words, and its height is missing below.
+_LOW_BAR = {"styleOverrides": {"root": {"minHeight": "48px !important"}}}
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
 
@@ -103,7 +105,7 @@ def empty_page(store: SolutionStore, **contents: list[Part]) -> pmui.Page:
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
         sidebar_width=_SIDEBAR_WIDTH,
-        theme_config={"typography": {"fontSize": 13}},
+        theme_config={"typography": {"fontSize": 13}, "components": {"MuiToolbar": _LOW_BAR}},
         **contents,
     )
     # The page would show whether the server is busy, for which the server would keep it for ever.

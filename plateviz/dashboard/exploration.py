@@ -1,7 +1,6 @@
 """Exploration: what the Explore workspace draws against what, in one browser session."""
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
@@ -11,6 +10,7 @@ import param
 from plateviz.dashboard.address_parts import chosen, in_words
 from plateviz.dashboard.selected import KINDS
 from plateviz.plots.explored_rows import Columns
+from plateviz.plots.explored_text import SWITCHES, numbers_in, parts_of
 
 # A control shows an empty value as if nothing were chosen.
 NONE = "none"
@@ -26,10 +26,6 @@ _FIRST: Mapping[str, tuple[str, str]] = {
     "motions": ("n_orbits", "sigma_parallax"),
     "orbits": ("epoch", "chi2_per_dof"),
 }
-_NUMBER = r"-?(?:\d+(?:\.\d*)?(?:e[+-]?\d+)?|inf)"
-_NUMBERS = re.compile(rf"{_NUMBER}(?:~{_NUMBER})*")
-SWITCHES: Mapping[str, str] = {"is_log_x": "log x", "is_log_y": "log y", "has_median": "median"}
-"""Names of the switches, and what they are called on the page."""
 
 
 class Exploration(param.Parameterized):
@@ -111,18 +107,7 @@ class Exploration(param.Parameterized):
         """Return what is drawn as the query of the page's address; `restore` reads it back."""
         if self.x is None:
             return {}
-        query = {"rows": self.table, "x": self.x, "y": self.y}
-        query |= {name: getattr(self, name) for name in _OPTIONAL if getattr(self, name) != NONE}
-        if self.only != NONE and (self.lowest, self.highest) != _ALL:
-            query["between"] = _text((self.lowest, self.highest))
-        switches = [name for name in SWITCHES if getattr(self, name)]
-        if switches:
-            query["with"] = ",".join(switches)
-        if self.selects != KINDS[0]:
-            query["selects"] = self.selects
-        if self.limits is not None:
-            query["zoom"] = _text((*self.limits[0], *self.limits[1]))
-        return query
+        return parts_of(self.table, self.columns())
 
     def _forget(self, *events: param.parameterized.Event) -> None:
         """Forget limits that were of other columns."""
@@ -133,18 +118,15 @@ class Exploration(param.Parameterized):
         self.param.update(**values)
 
 
-def _text(numbers: tuple[float, ...]) -> str:
-    # Every digit: who opens the address must see the same rows.
-    return "~".join(f"{number!r}" for number in numbers)
-
-
 def _requested(
     address: Mapping[str, str],
 ) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
     """Return switches and limits that an address requests, and what of it is invalid."""
     wanted = [name for name in address.get("with", "").split(",") if name]
     limits: dict[str, Any] = {}
-    between, zoom = (_parsed(address.get(name, ""), n) for name, n in (("between", 2), ("zoom", 4)))
+    between, zoom = (
+        numbers_in(address.get(name, ""), n) for name, n in (("between", 2), ("zoom", 4))
+    )
     if zoom is not None and not all(map(math.isfinite, zoom)):
         zoom = None
     if between is not None:
@@ -166,10 +148,3 @@ def _requested(
     elif selects is not None:
         invalid.append(f"selects: expected {', '.join(KINDS)}, found {in_words(selects)}")
     return switches, limits, invalid
-
-
-def _parsed(text: str, count: int) -> tuple[float, ...] | None:
-    if not _NUMBERS.fullmatch(text):
-        return None
-    numbers = tuple(map(float, text.split("~")))
-    return numbers if len(numbers) == count else None

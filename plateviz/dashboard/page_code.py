@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from plateviz.dashboard.exploration import Exploration
 from plateviz.dashboard.navigation import Navigation, View
 from plateviz.dashboard.orbit_figures import chosen_of, figures_of
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
 from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.explored_text import text_of
 from plateviz.plots.gallery import source_figures, survey_figures
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace, title_of
 from plateviz.runs.queries import SurveyRun
@@ -17,6 +19,7 @@ from plateviz.solving.as_code import (
     FigureCall,
     as_command,
     as_python,
+    explored_as_python,
     figures_as_python,
     report_command,
     report_of_run,
@@ -24,9 +27,7 @@ from plateviz.solving.as_code import (
 from solver.errors import InputError
 
 _OTHER = f"{NAME}-other"
-_EXPLORED = (OrbitWorkspace.EXPLORE, SurveyWorkspace.EXPLORE)
 _OF_WHAT_IF = "It is a what-if; a fit agrees with it to a thousandth of each uncertainty."
-_OF_EXPLORE = "The figure of Explore is drawn again by the address of this page, or by Save view."
 _OF_OTHER_ORBIT = "The report does not compare with another orbit; the Python does."
 
 
@@ -77,21 +78,29 @@ def _of_solution(navigation: Navigation) -> PageCode:
     figures = [one for one in figures_of(session, workspace) if one.has_data(chosen)]
     is_compared = workspace is OrbitWorkspace.ORDERS and session.other is not None
     other = session.other if is_compared else None
-    calls = [
+    calls: list[FigureCall] = [
         (one.name, _keywords(session, chosen if one.follows_shown else None)) for one in figures
     ]
+    more = _explored(navigation.exploration) if workspace is OrbitWorkspace.EXPLORE else []
+    if other is not None:
+        name = session.figure_of_both
+        calls.insert(0, (name, {"both": True, **_keywords(session, chosen)}))
+        more = ["--both", name] if other.orbit == shown.orbit else []
     origin = session.store.origin
     commands = [as_command(origin, shown.orbit, shown.settings)]
     compared = other is not None and other.orbit == shown.orbit
     if other is not None and compared:
         commands.append(as_command(origin, other.orbit, other.settings, _OTHER))
-    commands.append(report_command(origin, shown.orbit, _OTHER if compared else None))
+    commands.append(report_command(origin, shown.orbit, _OTHER if compared else None, more))
     python = [as_python(origin, shown.orbit, shown.settings)]
     if other is not None:
         second = as_python(origin, other.orbit, other.settings, "other").removeprefix(PREAMBLE)
         python += [second, "solution = solution.compared_with(other)"]
-    python.append(figures_as_python("solution", calls))
-    words = [_about(navigation, f"the solution ({shown.settings.describe()})", figures)]
+    if workspace is OrbitWorkspace.EXPLORE:
+        python.append(_explored_as_python(navigation.exploration, "solution", session))
+    else:
+        python.append(figures_as_python("solution", calls))
+    words = [_about(navigation, f"the solution ({shown.settings.describe()})")]
     words += [_OF_WHAT_IF] if _is_step(shown, other) else []
     words += [_OF_OTHER_ORBIT] if other is not None and not compared else []
     return PageCode(" ".join(words), "\n".join(commands), "\n".join(filter(None, python)))
@@ -108,16 +117,36 @@ def _of_run(
     calls: list[FigureCall] = [(one, _keywords(navigation.session, None)) for one in names]
     survey = str(run.survey)
     opened = f"{PREAMBLE}{variable} = plateviz.open({survey!r}, run={run.name!r}){call}"
-    python = "\n".join(filter(None, [opened, figures_as_python(variable, calls)]))
-    about = _about(navigation, f"what is shown of run {run.name}", names)
+    figures = figures_as_python(variable, calls)
+    if navigation.workspace is SurveyWorkspace.EXPLORE:
+        exploration = navigation.survey_exploration
+        options = (*options, *_explored(exploration))
+        figures = _explored_as_python(exploration, variable, navigation.session)
+    python = "\n".join(filter(None, [opened, figures]))
+    about = _about(navigation, f"what is shown of run {run.name}")
     return PageCode(about, report_of_run(survey, run.name, *options), python)
 
 
-def _about(navigation: Navigation, what: str, figures: Sequence[object]) -> str:
+def _explored(exploration: Exploration) -> list[str]:
+    """Return the options of a report that draws what Explore draws; none before it does."""
+    if exploration.x is None:
+        return []
+    return ["--explore", text_of(exploration.table, exploration.columns())]
+
+
+def _explored_as_python(exploration: Exploration, variable: str, session: Session) -> str:
+    if exploration.x is None:
+        return ""
+    columns = exploration.columns()
+    return explored_as_python(variable, exploration.table, columns, session.theme)
+
+
+def _about(navigation: Navigation, what: str) -> str:
     title = title_of(navigation.workspace)
-    drawn = f" and the figures of {title}, each in its own unit" if figures else ""
-    about = f"These make {what} on the screen again{drawn}. The report has all figures."
-    return f"{about} {_OF_EXPLORE}" if navigation.workspace in _EXPLORED else about
+    return (
+        f"These make {what} on the screen again and the figures of {title}, each in its own unit. "
+        "The report has all figures."
+    )
 
 
 def _is_step(shown: Solution, other: Solution | None) -> bool:

@@ -26,6 +26,7 @@ class Session(RequestState):
 
     shown = param.ClassSelector(class_=Solution, default=None, allow_None=True)
     other = param.ClassSelector(class_=Solution, default=None, allow_None=True)
+    figure_of_both = param.String(default="residual-map", doc="name of what is drawn of both")
     solutions = param.List(default=[], item_type=Solution)
     theme = param.Selector(default="light", objects=["light", "dark"])
 

@@ -3,7 +3,7 @@
 The plots are imported on first use, since Bokeh takes seconds to import.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from os import PathLike
@@ -14,11 +14,13 @@ import pandas as pd
 from astropy.table import QTable
 
 from plateviz.notebook.card import card, summary_line
+from plateviz.notebook.exploring import Explores
 from plateviz.notebook.figures import FigureSpec, HasFigures, NotebookFigure, figure_collection
 from plateviz.notebook.keywords import takes_settings
 from plateviz.notebook.lazy_collection import LazyCollection, unknown_name
 from plateviz.notebook.report import path_of, write_report
 from plateviz.notebook.table import OpenTable, result_tables
+from plateviz.tables.explore import EXPLORABLE, ExplorableTable
 from plateviz.tables.summary import summary_strip
 from plateviz.tables.verdict import Verdict, orbit_verdict
 from solver.data.instrument import Instrument
@@ -42,7 +44,7 @@ class WhatIfs(Protocol):
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class OpenSolution(HasFigures):
+class OpenSolution(HasFigures, Explores):
     """A fitted orbit.
 
     Attributes
@@ -133,6 +135,7 @@ class OpenSolution(HasFigures):
         *,
         exposures: Iterable[tuple[int, int]] | None = None,
         detector: int | None = None,
+        both: bool = False,
         theme: str = "light",
     ) -> NotebookFigure:
         """Return a figure that displays itself.
@@ -143,14 +146,15 @@ class OpenSolution(HasFigures):
         exposures : (field, plate) of the exposures to show, in figures with a selection of
             exposures; all by default
         detector : detector to show, in figures with a selection of detectors; all by default
+        both : whether to draw it of the solution compared with (A) and of this one (B)
         theme : "light" or "dark"
 
         Raises
         ------
         InputError
-            If there is no such figure, exposure or detector.
+            If there is no such figure, exposure, detector or solution to compare with.
         """
-        return self._figures_of(self._chosen(exposures, detector), theme)[name]
+        return self._figures_of(self._chosen(exposures, detector), theme, both)[name]
 
     def compared_with(self, other: "OpenSolution") -> "OpenSolution":
         """Return this solution with another to compare with, for the figure `comparison`.
@@ -227,11 +231,22 @@ class OpenSolution(HasFigures):
     def _figures(self, theme: str) -> LazyCollection[NotebookFigure]:
         return self._figures_of(self._chosen(None, None), theme)
 
-    def _figures_of(self, chosen: "Chosen", theme: str) -> LazyCollection[NotebookFigure]:
+    def _figures_of(
+        self, chosen: "Chosen", theme: str, both: bool = False
+    ) -> LazyCollection[NotebookFigure]:
+        from plateviz.plots.both_solutions import comparable_figures, of_both
         from plateviz.plots.gallery import diagnostics
 
-        found = [one for one in diagnostics() if one.has_data(chosen)]
-        return figure_collection([_spec(one, chosen) for one in found], theme)
+        if both and self.other is None:
+            raise InputError("both: expected a solution to compare with, found none")
+        known = map(of_both, comparable_figures()) if both else diagnostics()
+        return figure_collection([_spec(d, chosen) for d in known if d.has_data(chosen)], theme)
+
+    def _explorable_rows(self) -> Collection[str]:
+        return EXPLORABLE
+
+    def _explorable(self, rows: str) -> ExplorableTable:
+        return EXPLORABLE[rows](self.result)
 
     def _chosen(
         self, exposures: Iterable[tuple[int, int]] | None, detector: int | None
@@ -272,9 +287,8 @@ def _frame(table: OpenTable) -> pd.DataFrame:
     return table.frame.copy(deep=False)
 
 
-def _spec(diagnostic: "Diagnostic", chosen: "Chosen") -> FigureSpec:
-    plot = partial(diagnostic.plot, chosen)
-    return FigureSpec(diagnostic.name, diagnostic.title, diagnostic.caption, plot)
+def _spec(figure: "Diagnostic", chosen: "Chosen") -> FigureSpec:
+    return FigureSpec(figure.name, figure.title, figure.caption, partial(figure.plot, chosen))
 
 
 def _pairs(exposures: object) -> list[tuple[int, int]]:

@@ -1,5 +1,6 @@
 """OpenSurvey: a survey directory, with its orbits, the runs that fitted them, and its sources."""
 
+from collections.abc import Collection
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -10,6 +11,7 @@ from astropy.table import QTable
 
 from plateviz.notebook.card import card, summary_line
 from plateviz.notebook.dashboard import Dashboard
+from plateviz.notebook.exploring import Explores
 from plateviz.notebook.figures import FigureSpec, HasFigures, NotebookFigure, figure_collection
 from plateviz.notebook.keywords import settings_with, takes_settings
 from plateviz.notebook.lazy_collection import LazyCollection, unknown_name
@@ -18,11 +20,14 @@ from plateviz.notebook.orbit import OpenOrbit
 from plateviz.notebook.report import write_report
 from plateviz.notebook.source import OpenSource
 from plateviz.notebook.table import OpenTable
+from plateviz.runs.column_cache import ColumnCache
+from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
 from plateviz.runs.run import DEFAULT_RUN
 from plateviz.solving.job import Job
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import SummaryItem, run_strip, source_list
+from plateviz.tables.explore import ExplorableTable
 from plateviz.tables.verdict import Verdict, run_verdict
 from solver.data.columns import Table
 from solver.data.schema import CATALOGUE, TRUTH
@@ -35,7 +40,7 @@ if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
 
 
-class OpenSurvey(HasSolver, HasFigures):
+class OpenSurvey(HasSolver, HasFigures, Explores):
     """A survey directory, with one of its runs.
 
     Attributes
@@ -58,6 +63,7 @@ class OpenSurvey(HasSolver, HasFigures):
         """
         super().__init__(LazySolver(SurveyFolder(str(directory))))
         self.directory = directory
+        self._columns = ColumnCache()
         self._numbers = self._solver.origin.orbits()
         self.run_name = (
             open_run(directory, run).name if run is not None else self._default_run_name()
@@ -246,6 +252,12 @@ class OpenSurvey(HasSolver, HasFigures):
             for one in survey_figures()
         ]
         return figure_collection(figures, theme)
+
+    def _explorable_rows(self) -> Collection[str]:
+        return COLUMNS_OF_RUN
+
+    def _explorable(self, rows: str) -> ExplorableTable:
+        return explorable_of_run(self._run(), rows, self._columns)
 
     def _report(self, facts: "Facts") -> "Report":
         from plateviz.reports.survey import survey_report

@@ -31,6 +31,16 @@ def comparable_figures() -> tuple[Diagnostic, ...]:
     return tuple(one for one in diagnostics() if one.workspace is not OrbitWorkspace.ORDERS)
 
 
+def of_both(diagnostic: Diagnostic) -> Diagnostic:
+    """Return a figure that is drawn of both solutions."""
+    return replace(
+        diagnostic,
+        title=f"{_TITLE}: {diagnostic.title}",
+        plot=lambda chosen: figure_of_both(diagnostic, chosen),
+        is_wide=True,
+    )
+
+
 def figure_of_both(diagnostic: Diagnostic, chosen: Chosen) -> Figure:
     """Draw a figure of the solution that is compared with (A), and of the solution (B).
 

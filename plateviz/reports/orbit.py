@@ -8,6 +8,7 @@ import pandas as pd
 
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
+from plateviz.reports.more_figures import NO_MORE, MoreFigures, more_of_orbit
 from plateviz.reports.report import Facts, Report, ReportFigure, plain
 from plateviz.tables import calibration_tables, exposure_chi2, outlier_list, summary_strip
 from plateviz.tables.labels import dates
@@ -28,6 +29,7 @@ def orbit_report(
     other: FitResult | None = None,
     has_choices: bool = True,
     simulation: SurveySettings | None = None,
+    more: MoreFigures = NO_MORE,
 ) -> Report:
     """Return the report of one orbit.
 
@@ -40,6 +42,12 @@ def orbit_report(
     has_choices : whether figures that depend on a selection are also drawn for each detector and
         for single exposures
     simulation : settings with which the orbit was simulated; None where they are not known
+    more : figures after those of every report
+
+    Raises
+    ------
+    InputError
+        If one of `more` cannot be drawn.
     """
     date = dates(pd.Series([result.summary["epoch_mjd"]])).iloc[0]
     exposures = _exposures(result.exposures)
@@ -53,7 +61,10 @@ def orbit_report(
         subtitle=f"Plate Analysis of one orbit, mean epoch {date} (TCB)",
         verdict=orbit_verdict(result),
         items=summary_strip(result),
-        figures=[_figure(d, whole, has_choices) for d in diagnostics() if d.has_data(whole)],
+        figures=[
+            *(_figure(d, whole, has_choices) for d in diagnostics() if d.has_data(whole)),
+            *more_of_orbit(more, whole),
+        ],
         tables=tables,
         facts={
             **facts,

@@ -4,6 +4,7 @@ from functools import partial
 
 from plateviz.plots.gallery import source_figures, survey_figures
 from plateviz.plots.survey_figure import SourceFigure, SurveyFigure
+from plateviz.reports.more_figures import NO_MORE, MoreFigures, more_of_run
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.report import SOLVED, Facts, Report, ReportFigure, plain
 from plateviz.runs.load_tables import survey_tables
@@ -26,17 +27,19 @@ from solver.errors import InputError
 from solver.io.survey import section
 
 
-def survey_report(run: SurveyRun, facts: Facts) -> Report:
+def survey_report(run: SurveyRun, facts: Facts, more: MoreFigures = NO_MORE) -> Report:
     """Return the report of a run of a survey.
 
     Parameters
     ----------
     facts : provenance of the report
+    more : figures after those of every report
 
     Raises
     ------
     InputError
-        If orbits of the run are missing; those that failed are reported.
+        If orbits of the run are missing, or one of `more` cannot be drawn; orbits that failed are
+        reported.
     """
     tables = survey_tables(run)
     orbits, motions = tables.orbits, tables.motions
@@ -51,7 +54,7 @@ def survey_report(run: SurveyRun, facts: Facts) -> Report:
         subtitle=f"Run {run.name} of {len(orbits):,} orbits",
         verdict=run_verdict(orbits, motions),
         items=run_strip(orbits, motions),
-        figures=[_figure(figure, tables) for figure in survey_figures()],
+        figures=[*(_figure(one, tables) for one in survey_figures()), *more_of_run(more, run)],
         tables={"Orbits": in_words(orbit_list(orbits), ORBITS_OF_RUN)},
         facts={**facts, **_of_run(run)},
     )
@@ -63,18 +66,20 @@ def survey_orbit_report(
     facts: Facts,
     other: FitResult | None = None,
     has_choices: bool = True,
+    more: MoreFigures = NO_MORE,
 ) -> Report:
     """Return the report of one orbit of a run, fitted or failed.
 
     Parameters
     ----------
     other : solution to compare with
-    has_choices : as of `orbit_report`
+    has_choices, more : as of `orbit_report`
 
     Raises
     ------
     InputError
-        If the survey has no such orbit, or the run has not fitted it.
+        If the survey has no such orbit, the run has not fitted it, or one of `more` cannot be
+        drawn.
     """
     folder = SurveyFolder(str(run.survey))
     if orbit not in folder.orbits():
@@ -84,9 +89,8 @@ def survey_orbit_report(
     if message is not None:
         return failed_orbit_report(folder.read(orbit), message, facts)
     result, instrument = run.result(orbit), folder.read_instrument()
-    return orbit_report(
-        result, instrument, facts, other, has_choices, simulation=folder.read_simulation()
-    )
+    simulation = folder.read_simulation()
+    return orbit_report(result, instrument, facts, other, has_choices, simulation, more)
 
 
 def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:

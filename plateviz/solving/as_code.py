@@ -1,7 +1,9 @@
 """A solution and its figures as code: the command line and the Python that make them again."""
 
+import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from plateviz.solving.origin import OrbitFiles, Origin, SurveyFolder
 from solver.data.engine_settings import ENGINE_OPTIONS, engine_options
@@ -9,6 +11,9 @@ from solver.data.setting_kinds import Setting
 from solver.data.setting_words import options_of
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import LeftOut, Texts
+
+if TYPE_CHECKING:
+    from plateviz.plots.explored_rows import Columns
 
 NAME = "reproduced"
 """Name of the run, or of the result file, that the command writes."""
@@ -41,13 +46,16 @@ def as_command(origin: Origin, orbit: int | None, settings: FitSettings, name: s
     return _in_lines(words, _options(settings, "fit"))
 
 
-def report_command(origin: Origin, orbit: int | None, other: str | None = None) -> str:
+def report_command(
+    origin: Origin, orbit: int | None, other: str | None = None, more: Sequence[str] = ()
+) -> str:
     """Return the command line that draws the figures of what `as_command` has made.
 
     Parameters
     ----------
     orbit : as of `as_command`
     other : name of a second solution that it has made, to compare with; None for none
+    more : further options and their values
     """
     if isinstance(origin, SurveyFolder):
         made = [origin.directory, "--run", NAME, "--orbit", str(orbit)]
@@ -56,7 +64,7 @@ def report_command(origin: Origin, orbit: int | None, other: str | None = None) 
         camera = [] if origin.instrument is None else ["--instrument", origin.instrument]
         made = [f"{NAME}.fits", *camera]
         compared = [] if other is None else ["--other", f"{other}.fits"]
-    return shlex.join(["plateviz", "report", *made, *compared, "-o", f"{NAME}.html"])
+    return shlex.join(["plateviz", "report", *made, *compared, *more, "-o", f"{NAME}.html"])
 
 
 def report_of_run(survey: str, run: str, *options: str) -> str:
@@ -86,6 +94,24 @@ def as_python(
     } | engine_options(settings.svi, settings.nuts)
     arguments = ", ".join(f"{keyword}={value!r}" for keyword, value in changes.items())
     return f"{PREAMBLE}{name} = {opened}.fit({arguments})"
+
+
+def explored_as_python(variable: str, rows: str, chosen: "Columns", theme: str) -> str:
+    """Return Python that draws what *Explore* draws of a solution or a run."""
+    arguments = [repr(one) for one in (rows, chosen.x, chosen.y)]
+    between = tuple(one if math.isfinite(one) else None for one in (chosen.lowest, chosen.highest))
+    keywords = {
+        "colour": chosen.colour,
+        "only": chosen.only,
+        "between": between if chosen.only and between != (None, None) else None,
+        "log_x": chosen.is_log_x,
+        "log_y": chosen.is_log_y,
+        "median": chosen.has_median,
+        "zoom": chosen.limits,
+        "theme": "" if theme == "light" else theme,
+    }
+    arguments += [f"{name}={value!r}" for name, value in keywords.items() if value]
+    return f"figures = [\n    {variable}.explore({', '.join(arguments)}),\n]"
 
 
 def figures_as_python(variable: str, figures: Sequence[FigureCall]) -> str:

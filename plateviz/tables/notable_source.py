@@ -29,8 +29,8 @@ class NotableSource(NamedTuple):
         """What is notable about it, in one line."""
         parallax = f"{self.parallax:+.2f}".replace("-", "−")
         return (
-            f"differs from its catalogue by {self.proper_motion:.2f} mas/yr in proper motion and "
-            f"{parallax} mas in parallax, from {self.n_orbits:,} orbits"
+            f"{self.proper_motion:.2f} mas/yr and {parallax} mas parallax off its catalogue, in "
+            f"{self.n_orbits:,} orbits"
         )
 
 

@@ -166,11 +166,11 @@ def parse_exclusions(texts: Iterable[str]) -> Exclusions:
         match = _EXCLUSION.fullmatch(text.strip())
         if match is None:
             raise InputError(
-                "exclusion: expected source=ID, detector=ID or exposure=FIELD/PLATE, "
-                f"found {text!r}"
+                "what to leave out: expected source=ID, exposure=FIELD/PLATE or detector=ID, such "
+                f"as source=12 or exposure=0/3, found {text!r}"
             )
         if any(abs(int(number)) > _LARGEST_ID for number in match.group(2, 4, 5) if number):
-            raise InputError(f"exclusion: expected an id of 64 bits, found {text!r}")
+            raise InputError(f"what to leave out: expected an id of 64 bits, found {text!r}")
         if match[3]:
             exposures.add((int(match[4]), int(match[5])))
         else:

@@ -1,9 +1,12 @@
 """Take a screenshot of every workspace of the dashboard, in both themes and three sizes.
 
-    python tests/benchmarks/screenshots.py DIR OUTPUT [--source ID]
+    python tests/benchmarks/screenshots.py DIR OUTPUT [--source ID | --readme]
 
 DIR is a survey with a run, such as `plateviz simulate DIR && plateviz survey DIR` make. OUTPUT gets
-one PNG each, such as `orbit-sky-dark-1366x768.png`, and is made if it is not there.
+one PNG each, such as `orbit-sky-dark-1366x768.png`, and is made if it is not there. With --readme
+it gets the picture of README.md only, `orbit-page.png`, whose survey has a defect:
+
+    plateviz simulate DIR --orbits 2 --stars 40000 --defect distortion-drift=0.3um --magnitudes
 """
 
 import argparse
@@ -11,6 +14,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import Page
 
 # Import this checkout, whatever the working directory.
@@ -23,12 +27,16 @@ from tests.benchmarks.machine import write
 _SIZES = ((1920, 1080), (1366, 768), (768, 1024))
 # Time for all figures of a workspace to be drawn.
 _DRAWN_MS = 4000
+_README_SIZE = {"width": 1600, "height": 1000}
 
 
 def main() -> None:
     arguments = parse_arguments()
     arguments.output.mkdir(parents=True, exist_ok=True)
     with served(arguments.survey) as address, chromium() as open_page:
+        if arguments.readme:
+            take_readme(open_page(), address, arguments.output / "orbit-page.png")
+            return
         for width, height in _SIZES:
             for name, query in queries(arguments.source):
                 page = open_page()
@@ -62,11 +70,21 @@ def take(page: Page, path: Path, theme: str) -> None:
     write(str(path))
 
 
+def take_readme(page: Page, address: str, path: Path) -> None:
+    """Write the picture of README.md: a solution with a flaw, its cause and the remedy."""
+    page.set_viewport_size(_README_SIZE)
+    page.goto(f"{address}?view=orbit&workspace=verdict&orbit=0")
+    page.get_by_role("button", name="Try it").wait_for(timeout=60_000)
+    take(page, path, "light")
+    Image.open(path).convert("RGB").quantize().save(path, optimize=True)
+
+
 def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Take a screenshot of every workspace.")
     parser.add_argument("survey", type=Path, metavar="DIR", help="a survey with a run")
     parser.add_argument("output", type=Path, metavar="OUTPUT", help="directory of the screenshots")
     parser.add_argument("--source", metavar="ID", help="source whose page is shown, too")
+    parser.add_argument("--readme", action="store_true", help="take the picture of README.md only")
     return parser.parse_args()
 
 

@@ -22,7 +22,9 @@ class CodeWindow(pn.viewable.Viewer):
         self._navigation, self._session = navigation, navigation.session
         self._text = markup_pane()
         self._window = window("Reproduce", self._text, width="md")
-        self._session.param.watch(self._follow, ["shown", "other", "theme"])
+        self._session.param.watch(self._follow, ["shown", "other", "figure_of_both", "theme"])
+        for one in (navigation.exploration, navigation.survey_exploration):
+            one.param.watch(self._follow, list(one.param.values()))
         navigation.param.watch(self._follow, ["view", "run_name", "found", *WORKSPACES.values()])
 
     def __panel__(self) -> pn.viewable.Viewable:

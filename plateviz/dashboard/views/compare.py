@@ -41,10 +41,11 @@ class CompareView(pn.viewable.Viewer):
             margin=(12, 10, 5, 10),
             **wide,
         )
-        figures = {one.title: one for one in comparable_figures()}
-        self._figure = pmui.Select(
-            label="Figure of both", options=figures, value=figures["Residual map"], **wide
-        )
+        self._figures = {one.name: one for one in comparable_figures()}
+        figures = {one.title: name for name, one in self._figures.items()}
+        chosen = self._session.figure_of_both
+        self._figure = pmui.Select(label="Figure of both", options=figures, value=chosen, **wide)
+        self._figure.link(self._session, value="figure_of_both")
         self._figure.param.watch(lambda _: change_figure(), "value")
         self._table = markup_pane()
         self._message = ""
@@ -69,7 +70,7 @@ class CompareView(pn.viewable.Viewer):
     @property
     def figure(self) -> Diagnostic:
         """The figure that is drawn of both solutions."""
-        return self._figure.value
+        return self._figures[self._session.figure_of_both]
 
     def _offer(self, *_: object) -> None:
         entries = [*self._list.entries(), *self._list.other_orbits()]

@@ -13,7 +13,6 @@ import panel_material_ui as pmui
 from astropy.table import Table
 
 from plateviz.dashboard.downloads import rows_of
-from plateviz.dashboard.exploration import SWITCHES
 from plateviz.dashboard.latest_answer import PENDING, LatestAnswer, Pending
 from plateviz.dashboard.row_origins import RowsOrigin, TableRequest
 from plateviz.dashboard.selected import KINDS, Selected
@@ -34,6 +33,7 @@ from plateviz.plots.explored_rows import (
     kept_rows,
     rows_in_frame,
 )
+from plateviz.plots.explored_text import SWITCHES
 from plateviz.plots.style import ROW_LIMIT
 from plateviz.tables.explore import ExplorableTable
 from solver.errors import InputError

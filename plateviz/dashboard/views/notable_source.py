@@ -6,7 +6,12 @@ import panel_material_ui as pmui
 from plateviz.dashboard.navigation import Navigation
 from plateviz.tables.notable_source import notable_source
 
-_STYLE = {"textTransform": "none", "textAlign": "left", "fontSize": "14px"}
+_STYLE = {
+    "textTransform": "none",
+    "textAlign": "left",
+    "fontSize": "13px",
+    "letterSpacing": "normal",
+}
 
 
 class NotableSourceLink(pn.viewable.Viewer):
@@ -36,4 +41,4 @@ class NotableSourceLink(pn.viewable.Viewer):
         if found is not None:
             self._source_id = str(found.source_id)
             text = self._navigation.session.units.text(found.text)
-            self._button.label = f"Most significant motion: source {found.source_id} {text}"
+            self._button.label = f"Most significant motion: source {found.source_id}, {text}"

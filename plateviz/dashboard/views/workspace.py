@@ -8,7 +8,7 @@ from plateviz.dashboard.views.figure import Part
 from plateviz.dashboard.views.figure_grid import FigureGrid
 
 # Screen pixels above a workspace: the page's bar, the switches, the verdict.
-_ABOVE = 170
+_ABOVE = 154
 
 
 def workspace(grid: FigureGrid, *above: Part, below: Sequence[Part] = ()) -> pmui.FlexBox:

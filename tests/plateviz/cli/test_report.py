@@ -47,9 +47,12 @@ def test_two_results_are_compared(run, fit_result, tmp_path):
     for name in ("a", "b"):
         write_result(fit_result, tmp_path / f"{name}.fits")
     arguments = ["--other", tmp_path / "b.fits", "-o", tmp_path / "r.html"]
-    code, _, _ = run("report", tmp_path / "a.fits", *arguments)
+    more = ["--both", "residual-map", "--explore", "rows=sources&x=ra&y=dec"]
+    code, _, _ = run("report", tmp_path / "a.fits", *arguments, *more)
     assert code == 0
-    assert 'id="figure-comparison"' in (tmp_path / "r.html").read_text(encoding="utf-8")
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    for name in ("comparison", "both-residual-map", "explore-0"):
+        assert f'id="figure-{name}"' in page
 
 
 @pytest.mark.parametrize(
@@ -57,13 +60,17 @@ def test_two_results_are_compared(run, fit_result, tmp_path):
     [
         (["--orbit", "9"], "expected an orbit 9, found none of that number"),
         (["--orbit", "2"], "expected a complete fitted orbit, found no COMPLETE file"),
+        (["--orbit", "0", "--both", "residual-map"], "--both: expected with --other"),
+        (["--source", "5", "--explore", "rows=orbits"], "--explore: expected with an orbit or"),
+        (["--orbit", "0", "--explore", "rows=stars&x=ra&y=dec"], "found 'stars'"),
+        (["--orbit", "0", "--explore", "rows=sources&x=ra&y=flux"], "found 'flux'"),
+        (["--pages", "--explore", "rows=sources&x=ra&y=dec"], "--pages: expected no option but"),
         (["--orbit", "0", "--survey"], "expected one of --orbit, --source and --survey"),
         (["--run", "other"], "expected a run 'other', found default"),
         (["--survey"], "found 1 of 3 orbits missing"),
         (["--other", "b"], "--other: expected with --orbit"),
         (["--orbit", "0", "--instrument", "i.toml"], "--instrument: expected with a result of"),
     ],
-    ids=["no-orbit", "missing", "several", "no-run", "incomplete", "other-of-survey", "instrument"],
 )
 def test_invalid_options_give_one_message_and_no_file(run, run_dir, tmp_path, options, message):
     code, _, err = run("report", run_dir, *options, "-o", tmp_path / "r.html")

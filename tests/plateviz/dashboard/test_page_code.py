@@ -1,6 +1,7 @@
 """The code of what is on the screen: run, it draws the figures of the page with their numbers."""
 
 import shlex
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +13,13 @@ from plateviz.dashboard.orbit_figures import chosen_of, figures_of
 from plateviz.dashboard.page_code import page_code
 from plateviz.notebook.keywords import settings_with
 from plateviz.notebook.solution import OpenSolution
+from plateviz.plots.both_solutions import comparable_figures, figure_of_both
+from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.explore import explored_figure
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
+from plateviz.reports.more_figures import MoreFigures, more_of_orbit
+from plateviz.runs.explorable import COLUMNS_OF_RUN
+from plateviz.tables.explore import EXPLORABLE
 from solver.data.instrument import MINI_MOCK
 from solver.data.settings import FitSettings
 from solver.errors import InputError
@@ -92,18 +99,57 @@ def test_compared_solution_is_made_too(solved, make_fit_result):
     (comparison,) = [
         one for one in figures_of(session, OrbitWorkspace.ORDERS) if one.name == "comparison"
     ]
-    require_same(figures["comparison"]._plot(), comparison.plot(chosen_of(session)))
+    chosen = chosen_of(session)
+    require_same(figures["comparison"]._plot(), comparison.plot(chosen))
+    both = {one.name: one for one in comparable_figures()}[session.figure_of_both]
+    require_same(figures[both.name]._plot(), figure_of_both(both, chosen))
     assert "It is a what-if" in code.about
     made, other, report = code.command.replace("\\\n", "").splitlines()
     assert "--run reproduced --orbits 0   --order 3" in made
     assert other.startswith("plateviz survey sky --run reproduced-other --orbits 0")
     assert shlex.split(report)[2:8] == ["sky", "--run", "reproduced", "--orbit", "0", "--other"]
+    assert shlex.split(report)[9:11] == ["--both", "residual-map"]
     # A comparison with another orbit is no report of one orbit.
     session.other = fitted._replace(orbit=1)
     code = page_code(solved)
     assert "--other" not in code.command
+    assert "--both" not in code.command
     assert "other = plateviz.open('sky').orbit(1).fit()" in code.python
     assert "another orbit" in code.about
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"only": "n_obs", "lowest": 12.0, "has_median": True, "colour": "leverage"},
+        {"x": "standardised", "is_log_x": True, "limits": ((0.1, 2.5), (-0.5, 1e-3 / 7.0))},
+    ],
+)
+def test_explore_is_drawn_again(solved, changes):
+    solved.turn_to_workspace(OrbitWorkspace.EXPLORE)
+    assert page_code(solved).python.endswith(".fit()")
+    result = solved.session.shown.result
+    table = EXPLORABLE["measurements"](result)
+    solved.exploration.offer(list(table.columns))
+    solved.exploration.param.update(**changes)
+    solved.exploration.param.update(selects="exposures")
+    solved.session.theme = "dark"
+    code = page_code(solved)
+    expected = explored_figure(table, solved.exploration.columns())
+    drawn = drawn_by(code)["explore"]
+    assert drawn._theme == "dark"
+    by_python = drawn._plot()
+    assert (by_python[0].x, by_python[0].y) == (expected[0].x, expected[0].y)
+    report = shlex.split(code.command.splitlines()[-1])
+    texts = [report[report.index("--explore") + 1]]
+    chosen = Chosen(result, MINI_MOCK)
+    (figure,) = more_of_orbit(MoreFigures(explored=texts), chosen)
+    in_report = figure.choices["All"]()
+    require_same(in_report, by_python)
+    # What a drag selects is of the page only.
+    same = replace(solved.exploration.columns(), selects="sources")
+    require_same(by_python, explored_figure(table, same))
 
 
 def test_view_of_a_run_reads_the_run(navigation, survey):
@@ -115,9 +161,12 @@ def test_view_of_a_run_reads_the_run(navigation, survey):
     )
     assert "survey.figure('orbit-health')" in code.python
     navigation.turn_to_workspace(SurveyWorkspace.EXPLORE)
+    assert "figures" not in page_code(navigation).python
+    navigation.survey_exploration.offer(list(COLUMNS_OF_RUN["residuals"]))
     code = page_code(navigation)
-    assert "figure" not in code.python
-    assert "the address of this page" in code.about
+    assert "\n    survey.explore('residuals', 'focal_x', 'residual_x'),\n" in code.python
+    wanted = "'rows=residuals&x=focal_x&y=residual_x'"
+    assert f"--survey --explore {wanted} -o REPORT.html" in code.command
     source = int(survey.history["source_id"].iloc[0])
     navigation.open_source(str(source))
     code = page_code(navigation)

@@ -71,7 +71,7 @@ def test_steps_and_seed_are_settings_of_the_engines():
         ({"priors": {"distortion_x": "1 kg"}}, "prior of distortion_x: .* found 'kg'"),
         ({"priors": {"distortion_x": -1}}, "positive prior width"),
         ({"centres": {"detector_x[2]": "far"}}, "centre of a prior: expected .*found"),
-        ({"exclude": "detector 2"}, "exclusion: expected source=ID"),
+        ({"exclude": "detector 2"}, "what to leave out: expected source=ID"),
         ({"exclude": 2}, "exclude: expected texts such as 'detector=2', found 2"),
         ({"steps": 2.5}, "svi steps to be 1 or more, found 2.5"),
         ({"seed": -1}, "svi seed to be 0 or more"),

@@ -126,6 +126,39 @@ def test_solution_with_another_has_the_comparison_figure(solution, make_fit_resu
     assert "compared with order 5" in repr(both)
 
 
+def test_figure_is_drawn_of_both_solutions(solution, make_fit_result, instrument):
+    with pytest.raises(InputError, match="both: expected a solution to compare with"):
+        solution.figure("residual-map", both=True)
+    other = OpenSolution(make_fit_result(2)[0], instrument, "other", "plateviz.open('other')")
+    drawn = solution.compared_with(other).figure("residual-map", both=True, detector=1)._plot()
+    assert [frame.title[:3] for frame in drawn] == ["(A)", "(B)"]
+    alone = [one.figure("residual-map", detector=1)._plot()[0] for one in (other, solution)]
+    for frame, expected in zip(drawn, alone, strict=True):
+        np.testing.assert_array_equal(frame["tails"].values("x"), expected["tails"].values("x"))
+
+
+def test_any_column_is_drawn_against_any_other(solution):
+    drawn = solution.explore("sources", "n_obs", "sigma_ra_marginal", only="dof", between=(9, None))
+    assert repr(drawn) == "figure 'explore': sigma_ra_marginal against n_obs"
+    sources = solution.result.sources.query("dof >= 9")
+    marks = drawn._plot()[0]["rows by class"]
+    assert sorted(marks.values("x")) == sorted(sources["n_obs"])
+
+
+@pytest.mark.parametrize(
+    ("rows", "x", "options", "message"),
+    [
+        ("stars", "ra", {}, "rows out of measurements, sources, exposures, found 'stars'"),
+        ("sources", "flux", {}, "a column of the sources out of .*, found 'flux'"),
+        ("sources", "ra", {"only": "flux"}, "found 'flux'"),
+        ("sources", "ra", {"theme": "blue"}, "theme: expected one of light, dark"),
+    ],
+)
+def test_what_is_not_there_is_not_explored(solution, rows, x, options, message):
+    with pytest.raises(InputError, match=message):
+        solution.explore(rows, x, "dec", **options)
+
+
 @pytest.mark.usefixtures("few_figures")
 def test_report_states_the_call_and_the_verdict(solution, tmp_path):
     path = solution.report(tmp_path / "r.html")

@@ -15,12 +15,22 @@ import plateviz
 from plateviz.cli.options import fit_settings, takes_settings
 from plateviz.notebook.keywords import settings_with
 from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.explore import explored_figure
+from plateviz.plots.explored_rows import Columns
+from plateviz.plots.explored_text import text_of
 from plateviz.plots.gallery import diagnostics
 from plateviz.reports.summary_strip import strip
 from plateviz.runs.queries import open_run
-from plateviz.solving.as_code import as_command, as_python, figures_as_python, report_command
+from plateviz.solving.as_code import (
+    as_command,
+    as_python,
+    explored_as_python,
+    figures_as_python,
+    report_command,
+)
 from plateviz.solving.origin import OrbitFiles, SurveyFolder
 from plateviz.tables import summary_strip
+from plateviz.tables.explore import EXPLORABLE
 from solver.data.engine_settings import engine_settings
 from solver.data.exclusions import Exclusions
 from solver.data.instrument import MINI_MOCK
@@ -171,6 +181,9 @@ def test_command_and_python_make_the_same_numbers(small_survey, tmp_path, run, m
     namespace = {}
     drawn = figures_as_python("solution", [("residual-map", {"exposures": [(0, 3)]})])
     exec(f"{as_python(origin, 1, settings)}\n{drawn}", namespace)
+    explored = Columns("n_obs", "sigma_ra_marginal", only="dof", lowest=20.0, has_median=True)
+    more = explored_as_python("solution", "sources", explored, "dark")
+    exec(more.replace("figures", "more"), namespace)
     by_python = namespace["solution"].sources
     for name in ("ra", "dec"):
         # Degrees; the number of threads of the linear algebra changes the last digit.
@@ -184,8 +197,13 @@ def test_command_and_python_make_the_same_numbers(small_survey, tmp_path, run, m
             np.testing.assert_allclose(found[name], values, rtol=1e-6, atol=1e-6)
         else:
             np.testing.assert_array_equal(found[name], values)
+    (frame,) = explored_figure(EXPLORABLE["sources"](by_command), explored)
+    marks = namespace["more"][0]._plot()[0]["rows by class"]
+    np.testing.assert_allclose(marks.values("y"), frame["rows by class"].values("y"), rtol=1e-6)
     monkeypatch.chdir(tmp_path)
-    assert run(*words_of(report_command(origin, 1))[1:])[0] == 0
+    more = ["--explore", text_of("sources", explored)]
+    assert run(*words_of(report_command(origin, 1, more=more))[1:])[0] == 0
     page = (tmp_path / "reproduced.html").read_text(encoding="utf-8")
     assert "<title>Orbit 1 " in page
+    assert 'id="figure-explore-0"' in page
     assert strip(summary_strip(by_command)) in page

@@ -22,7 +22,7 @@ def test_notable_source_is_the_most_significant_not_the_fastest():
     found = notable_source(MOTIONS)
     assert (found.source_id, found.n_orbits) == (12, 40)
     assert found.proper_motion == np.hypot(0.3, 0.4)
-    assert "0.50 mas/yr in proper motion and −0.90 mas in parallax, from 40 orbits" in found.text
+    assert found.text == "0.50 mas/yr and −0.90 mas parallax off its catalogue, in 40 orbits"
 
 
 def test_run_without_fitted_motions_has_no_notable_source():

@@ -61,7 +61,7 @@ def test_exclusions_are_parsed():
     "text", ["", "source", "source=x", "exposure=3", "plate=1/2", "source=1.5"]
 )
 def test_invalid_exclusion_raises(text):
-    with pytest.raises(InputError, match="expected source=ID, detector=ID or exposure=FIELD/PLATE"):
+    with pytest.raises(InputError, match="source=ID, exposure=FIELD/PLATE or detector=ID"):
         parse_exclusions([text])
 
 

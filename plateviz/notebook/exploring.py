@@ -1,0 +1,85 @@
+"""Explores: any column of the tables of a solution or a run against any other, as a figure."""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Collection
+from functools import partial
+from typing import TYPE_CHECKING
+
+from plateviz.notebook.figures import FigureSpec, NotebookFigure, figure_collection
+
+if TYPE_CHECKING:
+    from plateviz.tables.explore import ExplorableTable
+
+Range = tuple[float | None, float | None]
+"""Least and largest value; None for no limit."""
+
+
+class Explores(ABC):
+    """An object whose rows can be drawn, any column against any other."""
+
+    def explore(
+        self,
+        rows: str,
+        x: str,
+        y: str,
+        *,
+        colour: str = "",
+        only: str = "",
+        between: Range = (None, None),
+        log_x: bool = False,
+        log_y: bool = False,
+        median: bool = False,
+        zoom: tuple[tuple[float, float], tuple[float, float]] | None = None,
+        theme: str = "light",
+    ) -> NotebookFigure:
+        """Return the figure that *Explore* draws on the dashboard.
+
+        Parameters
+        ----------
+        rows : what a row is, such as "measurements" of a solution or "residuals" of a run
+        x, y : names of columns
+        colour : column that decides the colour; the class of the source or the number by default
+        only : column whose values `between` two limits are drawn; all by default
+        log_x, log_y : whether the axes are logarithmic
+        median : whether medians of y in bins of x are drawn
+        zoom : limits of x and of y; those of the data by default
+        theme : "light" or "dark"
+
+        Raises
+        ------
+        InputError
+            If there are no such rows, columns or theme, or files of the run cannot be read.
+        """
+        from plateviz.plots.explore import explored_figure
+        from plateviz.plots.explored_rows import Columns
+        from plateviz.plots.explored_text import require_columns, require_rows
+
+        require_rows(rows, self._explorable_rows())
+        lowest, highest = between
+        chosen = Columns(
+            x,
+            y,
+            colour,
+            only,
+            -math.inf if lowest is None else lowest,
+            math.inf if highest is None else highest,
+            log_x,
+            log_y,
+            median,
+            zoom,
+        )
+        table = self._explorable(rows)
+        require_columns(chosen, rows, table.columns)
+        plot = partial(explored_figure, table, chosen)
+        caption = f"A row is one of the {rows}; with many rows in the frame, their number in cells."
+        spec = FigureSpec("explore", f"{y} against {x}", caption, plot)
+        return figure_collection([spec], theme)["explore"]
+
+    @abstractmethod
+    def _explorable_rows(self) -> Collection[str]:
+        """Return what a row can be."""
+
+    @abstractmethod
+    def _explorable(self, rows: str) -> "ExplorableTable":
+        """Return the table of some rows."""

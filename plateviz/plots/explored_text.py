@@ -1,0 +1,113 @@
+"""What *Explore* draws as text, the same in an address, on the command line and in Python."""
+
+import math
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from urllib.parse import parse_qsl, urlencode
+
+from plateviz.plots.explored_rows import Columns
+from solver.errors import InputError
+
+SWITCHES: Mapping[str, str] = MappingProxyType(
+    {"is_log_x": "log x", "is_log_y": "log y", "has_median": "median"}
+)
+"""Names of the switches, and what they are called on the page."""
+_NUMBER = r"-?(?:\d+(?:\.\d*)?(?:e[+-]?\d+)?|inf)"
+_NUMBERS = re.compile(rf"{_NUMBER}(?:~{_NUMBER})*")
+_KEYS = ("rows", "x", "y", "colour", "only", "between", "with", "selects", "zoom")
+
+
+def parts_of(rows: str, chosen: Columns) -> dict[str, str]:
+    """Return what is drawn as parts of an address.
+
+    Parameters
+    ----------
+    rows : what a row is, such as "measurements"
+    """
+    parts = {"rows": rows, "x": chosen.x, "y": chosen.y}
+    parts |= {name: getattr(chosen, name) for name in ("colour", "only") if getattr(chosen, name)}
+    if chosen.only and (chosen.lowest, chosen.highest) != (-math.inf, math.inf):
+        parts["between"] = _joined((chosen.lowest, chosen.highest))
+    switches = [name for name in SWITCHES if getattr(chosen, name)]
+    if switches:
+        parts["with"] = ",".join(switches)
+    if chosen.selects != Columns.selects:
+        parts["selects"] = chosen.selects
+    if chosen.limits is not None:
+        parts["zoom"] = _joined((*chosen.limits[0], *chosen.limits[1]))
+    return parts
+
+
+def text_of(rows: str, chosen: Columns) -> str:
+    """Return what is drawn as one text, "rows=measurements&x=focal_x&y=residual_x"."""
+    return urlencode(parts_of(rows, replace(chosen, selects=Columns.selects)), safe="~,")
+
+
+def parse_explored(text: str) -> tuple[str, Columns]:
+    """Return what a row is and what is drawn, from `text_of` or the same part of an address.
+
+    Raises
+    ------
+    InputError
+        If a part is missing, unknown or invalid. Whether there are such rows and columns is
+        not known here.
+    """
+    parts = dict(parse_qsl(text, keep_blank_values=True))
+    unknown = sorted(set(parts) - set(_KEYS))
+    if unknown or not {"rows", "x", "y"} <= set(parts):
+        raise InputError(
+            "explore: expected parts such as rows=measurements&x=focal_x&y=residual_x out of "
+            f"{', '.join(_KEYS)}, found {text[:80]!r}"
+        )
+    chosen = Columns(parts["x"], parts["y"], parts.get("colour", ""), parts.get("only", ""))
+    wanted = list(filter(None, parts.get("with", "").split(",")))
+    if not set(wanted) <= set(SWITCHES):
+        raise InputError(f"explore: with: expected {', '.join(SWITCHES)}, found {parts['with']!r}")
+    chosen = replace(chosen, **{name: True for name in wanted})
+    if "between" in parts:
+        lowest, highest = _required("between", parts["between"], 2)
+        chosen = replace(chosen, lowest=lowest, highest=highest)
+    if "zoom" in parts:
+        ends = _required("zoom", parts["zoom"], 4)
+        chosen = replace(chosen, limits=(ends[:2], ends[2:]))
+    return parts["rows"], chosen
+
+
+def require_columns(chosen: Columns, rows: str, names: Collection[str]) -> None:
+    """Raise `InputError` if a column that is drawn is not among those of the rows."""
+    for name in filter(None, (chosen.x, chosen.y, chosen.colour, chosen.only)):
+        if name not in names:
+            raise InputError(
+                f"explore: expected a column of the {rows} out of {', '.join(names)}, "
+                f"found {name!r}"
+            )
+
+
+def require_rows(rows: str, known: Collection[str]) -> None:
+    """Raise `InputError` if there are no such rows."""
+    if rows not in known:
+        raise InputError(f"explore: expected rows out of {', '.join(known)}, found {rows!r}")
+
+
+def numbers_in(text: str, count: int) -> tuple[float, ...] | None:
+    """Return the numbers of a part of an address; None if they are not numbers or not so many."""
+    if not _NUMBERS.fullmatch(text):
+        return None
+    numbers = tuple(map(float, text.split("~")))
+    return numbers if len(numbers) == count else None
+
+
+def _required(name: str, text: str, count: int) -> tuple[float, ...]:
+    numbers = numbers_in(text, count)
+    if numbers is None or (count > 2 and not all(map(math.isfinite, numbers))):
+        raise InputError(
+            f"explore: {name}: expected {count} numbers with ~ between, found {text!r}"
+        )
+    return numbers
+
+
+def _joined(numbers: tuple[float, ...]) -> str:
+    # Every digit: who reads it must see the same rows.
+    return "~".join(f"{number!r}" for number in numbers)

@@ -1,0 +1,86 @@
+"""Figures that a report has on request: of both solutions that it compares, and of *Explore*."""
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+from plateviz.plots.both_solutions import comparable_figures, of_both
+from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.explore import explored_figure
+from plateviz.plots.explored_text import parse_explored, require_columns, require_rows
+from plateviz.reports.report import ReportFigure
+from plateviz.runs.column_cache import ColumnCache
+from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
+from plateviz.runs.queries import SurveyRun
+from plateviz.tables.explore import EXPLORABLE, ExplorableTable
+from solver.errors import InputError
+
+
+class MoreFigures(NamedTuple):
+    """Figures besides those that every report has.
+
+    Attributes
+    ----------
+    both : names of figures that are drawn of both solutions
+    explored : as from `plateviz.plots.explored_text.text_of`
+    """
+
+    both: Sequence[str] = ()
+    explored: Sequence[str] = ()
+
+
+NO_MORE = MoreFigures()
+
+
+def more_of_orbit(more: MoreFigures, chosen: Chosen) -> list[ReportFigure]:
+    """Return the figures of a solution; InputError if one cannot be drawn."""
+
+    def table(rows: str) -> ExplorableTable:
+        return EXPLORABLE[rows](chosen.result)
+
+    return [*_of_both(more.both, chosen), *_explored(more.explored, EXPLORABLE, table)]
+
+
+def more_of_run(more: MoreFigures, run: SurveyRun) -> list[ReportFigure]:
+    """Return the figures of a run; InputError if one cannot be drawn."""
+    columns = ColumnCache()
+    return _explored(
+        more.explored, COLUMNS_OF_RUN, lambda rows: explorable_of_run(run, rows, columns)
+    )
+
+
+def _of_both(names: Sequence[str], chosen: Chosen) -> list[ReportFigure]:
+    known = {one.name: one for one in comparable_figures()}
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise InputError(f"both: expected a figure out of {', '.join(known)}, found {unknown[0]!r}")
+    if names and chosen.other is None:
+        raise InputError("both: expected a solution to compare with, found none")
+    figures = [of_both(known[name]) for name in names]
+    return [
+        ReportFigure(
+            f"both-{one.name}", one.title, one.caption, {"All": partial(one.plot, chosen)}, True
+        )
+        for one in figures
+    ]
+
+
+def _explored(
+    texts: Sequence[str], known: Iterable[str], table_of: Callable[[str], ExplorableTable]
+) -> list[ReportFigure]:
+    figures, names = [], tuple(known)
+    for number, text in enumerate(texts):
+        rows, chosen = parse_explored(text)
+        require_rows(rows, names)
+        table = table_of(rows)
+        require_columns(chosen, rows, table.columns)
+        figures.append(
+            ReportFigure(
+                f"explore-{number}",
+                f"{chosen.y} against {chosen.x}",
+                f"A row is one of the {rows}; with many rows in the frame, their number in cells.",
+                {"All": partial(explored_figure, table, chosen)},
+                is_wide=True,
+            )
+        )
+    return figures

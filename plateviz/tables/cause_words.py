@@ -1,38 +1,22 @@
 """What is said of each kind of cause: its name, the evidence, and what to do."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
-from plateviz.tables.labels import id_strings
-from solver.data.result import FitResult
-from solver.results.diagnosis.causes import Causes, Found
-from solver.results.diagnosis.table import Diagnosis
+from plateviz.tables.cause_case import Case, Said
+from plateviz.tables.data_cause_words import (
+    said_of_noise,
+    said_of_noise_of,
+    said_of_outliers,
+    said_of_reference,
+    said_of_references,
+    said_of_swapped,
+)
 
 _NM_PER_UM = 1000.0
 _ORDINALS = {2: "second", 3: "third"}
 _MOST_NAMED, _HIGHEST_ORDER = 8, 9
-
-
-class Case(NamedTuple):
-    """A cause that was found, and the solution that it was found in."""
-
-    found: Found
-    causes: Causes
-    diagnosis: Diagnosis
-    result: FitResult
-
-
-class Said(NamedTuple):
-    """What is said of a cause; see `Cause`."""
-
-    name: str
-    title: str
-    words: str
-    action: str
-    options: tuple[str, ...] = ()
 
 
 def said_of(case: Case) -> Said:
@@ -112,8 +96,8 @@ def _moves(name: str, verb: str) -> Callable[[Case], Said]:
             f"{detector} {verb} during the orbit",
             f"Its residuals change with time, against those of the others: {_size(case)}; "
             f"{_fall(case)}.",
-            "leave the detector out, or solve the exposures before and after apart",
-            (f"--exclude {detector.replace(' ', '=')}",),
+            "let the detectors move from field to field in the fit",
+            ("--detector-motion",),
         )
 
     return said
@@ -137,41 +121,6 @@ def _along(name: str, title: str, words: str, action: str, option: str) -> Calla
         return Said(f"{name}-{axis}", title.format(axis), evidence, action, (option,))
 
     return said
-
-
-def _noise(case: Case) -> Said:
-    factor = float(np.sqrt(case.found.test.statistic))
-    is_larger = factor > 1.0
-    return Said(
-        "noise",
-        f"the noise is {'larger' if is_larger else 'smaller'} than stated",
-        f"It is {factor:.3f} times the stated uncertainties, in all exposures and sources alike.",
-        f"let the fit estimate the noise, or multiply sx and sy by {factor:.3f}",
-        ("--noise-scale",),
-    )
-
-
-def _noise_of(name: str, words: str, action: str, *options: str) -> Callable[[Case], Said]:
-    def said(case: Case) -> Said:
-        test = case.found.test
-        evidence = (
-            f"χ² scatters by more than chance: {test.statistic:.3g}, expected "
-            f"{test.expected:.3g} ± {test.scatter:.2g}."
-        )
-        return Said(name, words, evidence, action, options)
-
-    return said
-
-
-def _outliers(case: Case) -> Said:
-    return Said(
-        "outliers",
-        "some measurements are outliers",
-        f"{int(case.found.size):,} residuals are beyond six sigma; chance makes "
-        f"{case.found.test.expected:.1g}.",
-        "let the fit find and leave them out",
-        ("--robust",),
-    )
 
 
 def _of_each(
@@ -200,32 +149,6 @@ def _swing(case: Case) -> Said:
     )
 
 
-def _references(case: Case) -> Said:
-    # The deviations are in units of the prior's sigmas, which the fit may have widened already.
-    factor = max(case.found.size, 1.1) * case.result.settings.width("sources")
-    return Said(
-        "reference-errors",
-        "the reference stars are further from the catalogue than it states",
-        f"Typical deviations are {case.found.size:.2f} times what its uncertainties allow.",
-        "widen the prior of the reference stars",
-        (f"--prior sources={factor:.2f}",),
-    )
-
-
-def _reference(case: Case) -> Said:
-    ids = id_strings(pd.Series(case.found.items, dtype=np.int64))
-    some = len(ids) > 1
-    named = ", ".join(ids[:_MOST_NAMED])
-    return Said(
-        "wrong-references",
-        f"{len(ids)} reference star{'s are' if some else ' is'} not where the catalogue has "
-        f"{'them' if some else 'it'}",
-        f"Without its own catalogue position each is far from it, as binaries are: {named}.",
-        f"leave {'these stars' if some else 'this star'} out",
-        tuple(f"--exclude source={one}" for one in ids),
-    )
-
-
 _WORDS: dict[str, Callable[[Case], Said]] = {
     "drift": _changes(
         "distortion-drifts",
@@ -236,8 +159,8 @@ _WORDS: dict[str, Callable[[Case], Said]] = {
     ),
     "bend": _changes(
         "distortion-oscillates",
-        "the distortion changes to and fro, as with the phase of the orbit about the Earth",
-        "follow a curve in time",
+        "the distortion changes with the phase of the orbit about the Earth",
+        "oscillate with that period",
         "breathe",
         "--breathing",
     ),
@@ -262,30 +185,31 @@ _WORDS: dict[str, Callable[[Case], Said]] = {
         "include the shift in the fit, or correct the measured positions",
         "--charge-transfer",
     ),
-    "noise": _noise,
-    "exposures": _noise_of(
+    "noise": said_of_noise,
+    "exposures": said_of_noise_of(
         "noise-of-exposures",
         "the noise differs between exposures",
         "let the fit estimate the noise of each exposure, or leave out the worst",
         "--noise-by-exposure",
     ),
-    "magnitudes": _noise_of(
+    "magnitudes": said_of_noise_of(
         "noise-of-magnitudes",
         "the noise depends on magnitude otherwise than stated",
         "let the fit estimate how the noise depends on magnitude",
         "--noise-by-magnitude",
     ),
-    "detectors": _noise_of(
+    "detectors": said_of_noise_of(
         "noise-of-detectors",
         "the noise differs between detectors",
         "state the uncertainties sx and sy of each detector",
     ),
-    "sources": _noise_of(
+    "sources": said_of_noise_of(
         "sources",
         "some sources scatter by more than their noise",
         "look at the sources that scatter most; they may be double or wrongly identified",
     ),
-    "outliers": _outliers,
+    "outliers": said_of_outliers,
+    "swapped": said_of_swapped,
     "stretch": _of_each(
         "anisotropy",
         "focal lengths along x and y differ",
@@ -295,6 +219,6 @@ _WORDS: dict[str, Callable[[Case], Said]] = {
     "shear": _of_each("shear", "the axes of the focal plane are not at right angles"),
     "quadratic": _of_each("distortion-of-exposures", "the distortion changes between exposures"),
     "swing": _swing,
-    "references": _references,
-    "reference": _reference,
+    "references": said_of_references,
+    "reference": said_of_reference,
 }

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plateviz.tables.cause_words import Case, said_of
+from plateviz.tables.cause_case import Case
+from plateviz.tables.cause_words import said_of
 from plateviz.tables.remedy import remedied
 from solver.data.result import FitResult
 from solver.results.diagnosis.causes import Causes
@@ -19,7 +20,7 @@ _WILD_CHI2 = 30.0
 # Uncertainties wrong by more than this share of chi2.
 _LARGE_CHI2 = 0.2
 # Outliers of so many of the sources, and so many of the exposures, are not few.
-_LARGE_PARTS = {"outliers": 0.02, "swing": 0.1}
+_LARGE_PARTS = {"outliers": 0.02, "swapped": 0.02, "swing": 0.1}
 # Rms deviation of the reference stars over its expected value, beyond which the frame is wrong.
 _LARGE_DEVIATION = 1.2
 
@@ -61,12 +62,17 @@ class Cause(NamedTuple):
 def causes_in_words(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> list[Cause]:
     """Return the causes of a solution's flaws in words, the most likely first."""
     if not result.summary["converged"]:
-        return [_stuck(result, diagnosis)]
+        return [_stuck(result, diagnosis, causes)]
     return [_in_words(Case(one, causes, diagnosis, result)) for one in causes.found]
 
 
-def _stuck(result: FitResult, diagnosis: Diagnosis) -> Cause:
+def _stuck(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> Cause:
     """Return what keeps a fit from converging: patterns about a wrong point say nothing."""
+    spoils = "It spoils everything: these numbers are those of the last iteration."
+    swapped = [one for one in causes.found if one.test.subject == "swapped"]
+    if swapped and not result.settings.robust:
+        cause = _in_words(Case(swapped[0], causes, diagnosis, result))
+        return cause._replace(spoils=spoils, is_large=True)
     far, total = int(diagnosis.rows.is_far.sum()), diagnosis.rows.n
     noise = diagnosis.tests[0]
     is_wild = noise.statistic > _WILD_CHI2 and not result.settings.robust
@@ -86,7 +92,6 @@ def _stuck(result: FitResult, diagnosis: Diagnosis) -> Cause:
         title = "the fit came to no solution"
         action = "check the start values, and allow more iterations"
         options = ()
-    spoils = "It spoils everything: these numbers are those of the last iteration."
     name = "wild-measurements" if is_wild else "not-converged"
     return Cause(name, title, words, float(noise.sigma), spoils, action, options, True)
 
@@ -113,6 +118,7 @@ def _harm(case: Case) -> tuple[str, bool]:
     found, subject = case.found, case.found.test.subject
     of_parts = {
         "outliers": len(case.result.sources),
+        "swapped": len(case.result.sources),
         "swing": len(case.result.exposures),
         "reference": len(case.diagnosis.references.chi2),
     }
@@ -134,7 +140,7 @@ def _harm(case: Case) -> tuple[str, bool]:
             return spoils, _references_off(case.result)
         if subject == "swing":
             spoils = "It spoils the positions of the sources in these exposures."
-        if subject == "outliers":
+        if subject in ("outliers", "swapped"):
             spoils = f"It spoils the positions of up to {count:,} sources."
         return spoils, count > _LARGE_PARTS[subject] * of_parts[subject]
     if subject == "references":

@@ -103,16 +103,21 @@ def mean_square(seed: int, defects: tuple[str, ...]) -> float:
     FitError
         If the fit has no solution.
     """
+    result = fit_orbit(sparse_orbit(seed, defects))
+    if not result.summary["converged"]:
+        raise FitError(f"no solution: {result.summary['reason']}")
+    return float(np.mean(pulls(result.sources, result.true_places) ** 2))
+
+
+def sparse_orbit(seed: int, defects: tuple[str, ...] = ()) -> OrbitData:
+    """Return the orbit of a survey whose number is the last two digits of the seed."""
     settings = replace(SETTINGS, seed=seed, defects=defects)
     truth = truth_catalogue(settings)
     catalogue, _ = defective_catalogue(reference_catalogue(truth, settings), truth, settings)
     orbit = measure_orbit(seed % settings.orbits, truth, settings)
     measured = truth["source_id"].isin(orbit.measurements["source_id"])
     tables = (table[measured].reset_index(drop=True) for table in (catalogue, truth))
-    result = fit_orbit(OrbitData(orbit.measurements, orbit.exposures, *tables))
-    if not result.summary["converged"]:
-        raise FitError(f"no solution: {result.summary['reason']}")
-    return float(np.mean(pulls(result.sources, result.true_places) ** 2))
+    return OrbitData(orbit.measurements, orbit.exposures, *tables)
 
 
 def pulls(sources: pd.DataFrame, true_places: pd.DataFrame | None) -> np.ndarray:

@@ -19,6 +19,7 @@ def run_trials(
     trial: Callable[[int], Record],
     executor: Executor | None = None,
     after: Callable[[int, Record], None] = lambda *_: None,
+    version: str | None = None,
 ) -> list[Record]:
     """Run the trials that a file has no record of, and return the records of all, by number.
 
@@ -28,9 +29,10 @@ def run_trials(
     trial : given its number, returns what is recorded
     executor : runs the trials; this process by default
     after : called with the number and the record of each trial that ran
+    version : of what is tried; trials of another one are run again
     """
     wanted = list(numbers)
-    records = read_records(path)
+    records = read_records(path, version)
     missing = [number for number in wanted if number not in records]
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", encoding="utf-8") as lines:
@@ -39,7 +41,8 @@ def run_trials(
 
         def keep(number: int, record: Record) -> None:
             records[number] = record
-            lines.write(json.dumps({"trial": number, **record}) + "\n")
+            marked = {} if version is None else {"version": version}
+            lines.write(json.dumps({"trial": number, **marked, **record}) + "\n")
             lines.flush()
             os.fsync(lines.fileno())
             after(number, record)
@@ -54,13 +57,18 @@ def run_trials(
     return [records[number] for number in sorted(wanted)]
 
 
-def read_records(path: Path) -> dict[int, Record]:
-    """Return the records in a file by number; the last line may be one that was cut off."""
+def read_records(path: Path, version: str | None = None) -> dict[int, Record]:
+    """Return the records in a file by number, of one version; a line that was cut off is not one.
+
+    Without a version, records are taken whatever theirs is.
+    """
     records = {}
     for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else []:
         try:
             record = json.loads(line)
         except json.JSONDecodeError:
+            continue
+        if version is not None and record.pop("version", None) != version:
             continue
         records[int(record.pop("trial"))] = record
     return records

@@ -15,6 +15,7 @@ from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.defects.defect import Case
 from solver.simulate.measure import measure_orbit
 from tests.campaigns.defects import SETTINGS, pulls
+from tests.campaigns.true_causes import deviations, true_terms, truth_of
 
 pytestmark = pytest.mark.full
 
@@ -47,47 +48,10 @@ def pull_of(result):
     return float(np.sqrt(np.mean(pulls(result.sources, result.true_places) ** 2)))
 
 
-def deviations(result, group, truth):
-    """Return the deviations of a group from the truth in marginal sigmas."""
-    rows = result.calibration[result.calibration["group"] == group]
-    return (rows["offset"].to_numpy() - truth) / rows["sigma_marginal"].to_numpy()
-
-
-def true_terms(name, amplitude, degree):
-    """Return the coefficients of a defect of the distortion, x and y in rows, um."""
-    # The same numbers as the simulator's, which are those of the survey.
-    case = Case(name, amplitude, replace(SETTINGS, seed=SEED))
-    found = case.survey_rng().standard_normal((degree + 1, 2))
-    return (amplitude * found / np.linalg.norm(found)).T
-
-
-def truth_of(name, amplitude, exposures):
-    """Return group -> true values of a defect."""
-    if name == "focal-anisotropy":
-        case = Case(name, 1e-6 * amplitude, replace(SETTINGS, seed=SEED))
-        return {
-            "focal_anisotropy": 1e6
-            * case.amplitude
-            * case.orbit_rng().standard_normal(len(exposures))
-        }
-    if name == "distortion-drift":
-        # From -1/2 to 1/2 over the orbit; the polynomial of first degree goes from -1 to 1.
-        x, y = 0.5 * true_terms(name, amplitude, 2)
-        return {"drift_x": x, "drift_y": y}
-    if name == "distortion-step":
-        # Degree two does not change, nor does the second of the four fields.
-        still = np.zeros(3)
-        x, y = (
-            np.concatenate([np.zeros(7), *[np.r_[still, cubic]] * 2])
-            for cubic in true_terms(name, amplitude, 3)
-        )
-        return {"field_distortion_x": x, "field_distortion_y": y}
-    if name == "charge-transfer":
-        return {"charge_transfer_x": 0.0, "charge_transfer_y": amplitude}
-    if name == "pixel-phase":
-        one = dict.fromkeys(("phase_sine_x", "phase_sine_y"), amplitude)
-        return one | dict.fromkeys(("phase_cosine_x", "phase_cosine_y"), 0.0)
-    return {}
+def case_of(name, text):
+    """Return a defect of the orbit, with the amplitude as a number in its unit."""
+    amplitude = float(re.match(r"[\d.]+", text)[0])
+    return Case(name, amplitude, replace(SETTINGS, seed=SEED))
 
 
 @pytest.mark.parametrize("name", CAUSES)
@@ -100,8 +64,7 @@ def test_modelled_cause_is_recovered(name):
     assert result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.015)
     # The rms of some 2,600 pulls is uncertain by 0.014.
     assert pull_of(result) == pytest.approx(1.0, abs=0.03)
-    amplitude = float(re.match(r"[\d.]+", text)[0])
-    for group, truth in truth_of(name, amplitude, data.exposures).items():
+    for group, truth in truth_of(case_of(name, text), data.exposures).items():
         found = deviations(result, group, truth)
         assert np.abs(found).max() < 4.0, group
         assert np.sqrt(np.mean(found**2)) < 2.0, group
@@ -110,7 +73,7 @@ def test_modelled_cause_is_recovered(name):
 def test_phase_of_the_breathing_is_recovered():
     text, modelled = CAUSES["distortion-orbital"]
     result = fit_orbit(orbit(f"distortion-orbital={text}"), settings=FitSettings(**modelled))
-    terms = true_terms("distortion-orbital", float(text.rstrip("um")), 2)
+    terms = true_terms(case_of("distortion-orbital", text), 2)
     rows = result.calibration.set_index("group")["offset"]
     found = np.stack([rows["breathing_x"], rows["breathing_y"]]).reshape(2, 2, 3)
     amplitude = np.hypot(found[:, 0], found[:, 1])

@@ -11,35 +11,39 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtri
 
+from solver.results.diagnosis import gains
+from solver.results.diagnosis.patterns import Family
 from solver.results.diagnosis.projection import Projection
 from solver.results.diagnosis.rate import sigmas
 from solver.results.diagnosis.scatter import Scatter, scatter_tests
 from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test, pattern_test
 
-# What each parameter of a pattern has to explain: the simpler of two explanations is taken.
-_PER_PARAMETER = 4.0
 _MOST_PATTERNS = 4
 # A pattern after the first one is named if it explains this share of what the first one does.
 _LEAST_SHARE = 0.1
 # Patterns that name no cause: they are taken only where no other explains as much.
 _WITHOUT_CAUSE = ("cells", "map")
+# Courses in time of the same terms: of these only the one that explains most is named.
+_COURSES = ("drift", "bend", "step", "velocity")
+_VELOCITY_DEGREE = 2
 # Those whose tests follow one another.
-_PATTERNS = (
-    "drift",
-    "bend",
-    "step",
-    "velocity",
-    "order",
-    "shift",
-    "turn",
-    "phase",
-    "magnitude",
-    *_WITHOUT_CAUSE,
-)
+_PATTERNS = (*_COURSES, "order", "shift", "turn", "phase", "magnitude", *_WITHOUT_CAUSE)
 # The positions of the sources carry these into all exposures.
-_MAKES_PATTERNS = ("swing", "outliers", "stretch", "shear", "quadratic", "references", "reference")
+_MAKES_PATTERNS = (
+    "swing",
+    "outliers",
+    "swapped",
+    "stretch",
+    "shear",
+    "quadratic",
+    "references",
+    "reference",
+)
+_OF_EXPOSURES = ("stretch", "shear", "quadratic")
 # A cause of another kind is named beside the first one from this share of its sigmas.
 _OF_ITS_OWN = 0.5
+# Outliers are wrong identifications if these have this share of their chi2.
+_OF_OUTLIERS = 0.5
 _REFERENCE_LIMIT = 0.01
 # Median of a chi2 with two degrees of freedom, and how much larger it is if all stars are wrong.
 _MEDIAN_CHI2, _ALL_WRONG = 1.3863, 3.0
@@ -51,11 +55,13 @@ class Found(NamedTuple):
     Attributes
     ----------
     test : the test that says so, after the causes before it
+    gain : how much more likely the cause makes the residuals (`solver.results.diagnosis.gains`)
     items : indices of exposures, or ids of sources, that it is about; may be empty
     size : rms displacement, um, or another amplitude of the cause
     """
 
     test: Test
+    gain: float
     items: tuple[int, ...] = ()
     size: float = float("nan")
 
@@ -76,13 +82,13 @@ class Causes(NamedTuple):
 def find_causes(diagnosis: Diagnosis) -> Causes:
     """Return the causes that explain the tests of a solution."""
     patterns, explained = _patterns(diagnosis)
+    of_exposures, of_each = _of_exposures(diagnosis, explained)
     scatter = scatter_tests(
-        diagnosis.rows, diagnosis.magnitude, explained, without=diagnosis.swinging
+        diagnosis.rows, diagnosis.magnitude, explained + of_each, without=diagnosis.swinging
     )
-    found = [*_swinging(diagnosis), *patterns, *_of_exposures(diagnosis, patterns)]
-    found += _of_scatter(diagnosis, scatter, found)
-    found += _of_references(diagnosis)
-    found.sort(key=lambda one: one.test.log_chance)
+    found = [*_swinging(diagnosis), *patterns, *of_exposures, *_of_outliers(diagnosis)]
+    found += [*_of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
+    found.sort(key=lambda one: -one.gain)
     return Causes(tuple(_of_their_own(found)), scatter[0])
 
 
@@ -100,6 +106,7 @@ def _of_their_own(found: list[Found]) -> list[Found]:
         one
         for one in found[1:]
         if one.test.sigma > _OF_ITS_OWN * leads.sigma
+        and one.gain > _LEAST_SHARE * first[0].gain
         and not (one.test.subject in _PATTERNS and leads.subject in _MAKES_PATTERNS)
         or (one.test.subject in _PATTERNS and leads.subject in _PATTERNS)
     ]
@@ -113,80 +120,95 @@ def _limit(diagnosis: Diagnosis) -> float:
 def _patterns(diagnosis: Diagnosis) -> tuple[list[Found], float]:
     """Return the patterns that the residuals have, and how much of chi2 they explain."""
     projection: Projection = diagnosis.projection
+    families, scale = list(diagnosis.patterns.families), diagnosis.scale
     found: list[Found] = []
     explained, limit = 0.0, _limit(diagnosis)
     while len(found) < _MOST_PATTERNS:
-        tests = [
-            (family, pattern_test(projection, family, diagnosis.scale))
-            for family in diagnosis.patterns.families
-        ]
+        tests = [(family, pattern_test(projection, family, scale)) for family in families]
         tests = [one for one in tests if one[1].log_chance < limit]
         named = [one for one in tests if one[1].subject not in _WITHOUT_CAUSE]
         if not (named or tests) or (found and not named):
             break
-        family, test = max(named or tests, key=lambda one: _gain(one[1]))
-        gain = diagnosis.scale * test.statistic
-        if found and gain < _LEAST_SHARE * explained:
+        gained = [(gains.of_pattern(projection, *one, scale), *one) for one in named or tests]
+        gain, family, test = max(gained, key=lambda one: one[0])
+        fall = scale * test.statistic
+        if found and fall < _LEAST_SHARE * explained:
             break
-        found.append(Found(test, size=test.size_um))
-        explained += gain - test.expected
+        found.append(Found(test, gain, size=test.size_um))
+        explained += fall - test.expected
         projection = projection.without(family)
+        families = [one for one in families if not _are_alternatives(one, family)]
     return found, explained
 
 
-def _gain(test: Test) -> float:
-    return test.statistic - _PER_PARAMETER * test.expected
+def _are_alternatives(one: Family, other: Family) -> bool:
+    """Return whether two families are courses in time of the same terms, or the same."""
+    if one.subject not in _COURSES or other.subject not in _COURSES:
+        return one is other
+    degrees = [f.what[0] if f.what else _VELOCITY_DEGREE for f in (one, other)]
+    return degrees[0] == degrees[1]
 
 
 def _swinging(diagnosis: Diagnosis) -> list[Found]:
     test = next(one for one in diagnosis.tests if one.subject == "swing")
     if not len(diagnosis.swinging):
         return []
-    return [Found(test, tuple(int(one) for one in diagnosis.swinging))]
+    items = tuple(int(one) for one in diagnosis.swinging)
+    return [Found(test, gains.of_swings(diagnosis), items)]
 
 
-def _of_exposures(diagnosis: Diagnosis, patterns: list[Found]) -> list[Found]:
-    """Return the cause that each exposure has a pattern of its own, the one that explains most."""
-    subjects = ("stretch", "shear", "quadratic")
-    tests = [one for one in diagnosis.tests if one.subject in subjects]
-    best = max(tests, key=_excess)
-    explained = max((one.test.statistic for one in patterns), default=0.0)
-    if best.log_chance > _limit(diagnosis) or _excess(best) < explained:
+def _of_exposures(diagnosis: Diagnosis, explained: float) -> tuple[list[Found], float]:
+    """Return the cause that each exposure has a pattern of its own, and what it explains of chi2.
+
+    It is the pattern that explains most, beyond what those of all exposures explain already.
+    """
+    tests = [one for one in diagnosis.tests if one.subject in _OF_EXPOSURES]
+    gained = [(*gains.of_each_exposure(diagnosis, one.subject), one) for one in tests]
+    gain, of_each, best = max(gained, key=lambda one: one[0])
+    if best.log_chance > _limit(diagnosis) or best.statistic - best.expected < explained:
+        return [], 0.0
+    return [Found(best, gain)], of_each - explained
+
+
+def _of_outliers(diagnosis: Diagnosis) -> list[Found]:
+    """Return outliers as a cause, or the wrong identifications that make most of them."""
+    limit, tests = _limit(diagnosis), {one.subject: one for one in diagnosis.tests}
+    rows, pairs = diagnosis.rows, diagnosis.swapped
+    gain = gains.of_outliers(rows)
+    far = float(np.square(rows.whitened[rows.is_far]).sum())
+    if tests["swapped"].log_chance < limit and pairs.chi2 > _OF_OUTLIERS * far:
+        return [Found(tests["swapped"], gain, pairs.items, float(len(pairs.items)))]
+    if tests["outliers"].log_chance > limit:
         return []
-    return [Found(best)]
+    return [Found(tests["outliers"], gain, size=float(rows.is_far.sum()))]
 
 
-def _excess(test: Test) -> float:
-    return test.statistic - test.expected
-
-
-def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter], found: list[Found]) -> list[Found]:
-    """Return the causes that change the size of the residuals."""
-    limit = _limit(diagnosis)
-    by_name = {one.name: one for one in scatter}
+def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
+    """Return the cause that changes the size of the residuals, after what patterns explain."""
+    limit, noise = _limit(diagnosis), scatter[0]
     tests = {one.subject: one for one in diagnosis.tests}
-    strongest = max((one.test.sigma for one in found), default=0.0)
-    causes = []
-    if by_name["outliers"].log_chance < limit:
-        causes.append(Found(tests["outliers"], size=by_name["outliers"].value))
-    groups = [tests[name] for name in ("exposures", "magnitudes", "detectors") if name in tests]
-    # Another cause also changes these, but by less than it shows itself.
-    groups = [one for one in groups if one.log_chance < limit and one.sigma > strongest]
-    if groups:
-        # One whose noise differs most; it also changes chi2 as a whole.
-        test, noise = min(groups, key=lambda one: one.log_chance), tests["noise"]
-        return [*causes, Found(test._replace(log_chance=min(test.log_chance, noise.log_chance)))]
-    noise, strongest = by_name["noise"], min((one.test.log_chance for one in found), default=0.0)
-    if noise.log_chance < min(limit, strongest):
-        sigma = sigmas(noise.log_chance)
-        test = tests["noise"]._replace(
-            statistic=noise.value, log_chance=noise.log_chance, sigma=sigma
+    found = []
+    for one in scatter:
+        test = tests.get(one.name)
+        # What the fit adjusts itself has no significance.
+        if test is None or test.sigma == 0.0 or one.log_chance > limit:
+            continue
+        test = test._replace(
+            statistic=one.value, log_chance=one.log_chance, sigma=sigmas(one.log_chance)
         )
-        causes.append(Found(test, size=float(np.sqrt(noise.value) - 1.0)))
-    sources = tests["sources"]
-    if sources.log_chance < limit and not (causes or found):
-        causes.append(Found(sources))
-    return causes
+        if one.name == "noise":
+            gain = gains.of_scale(one.value, one.freedom)
+            found.append(Found(test, gain, size=float(np.sqrt(one.value) - 1.0)))
+        elif one.name == "magnitudes":
+            found.append(Found(test, gains.of_slope(noise, one)))
+        elif one.name in ("exposures", "detectors", "sources"):
+            found.append(Found(test, gains.of_groups(noise, one)))
+    if not found:
+        return []
+    best = max(found, key=lambda one: one.gain)
+    # The noise as a whole changes, too.
+    chance = min(best.test.log_chance, noise.log_chance)
+    return [best._replace(test=best.test._replace(log_chance=chance, sigma=sigmas(chance)))]
 
 
 def _of_references(diagnosis: Diagnosis) -> list[Found]:
@@ -203,7 +225,9 @@ def _of_references(diagnosis: Diagnosis) -> list[Found]:
     typical = max(float(np.median(chi2)) / _MEDIAN_CHI2, 1.0)
     far = chi2 / typical > chdtri(2.0, -np.expm1(np.log1p(-_REFERENCE_LIMIT) / len(chi2)))
     if not far.any() or typical > _ALL_WRONG:
-        return [Found(worst._replace(subject="references"), size=float(np.sqrt(typical)))]
+        gain = gains.of_scale(typical, 2.0 * len(chi2))
+        return [Found(worst._replace(subject="references"), gain, size=float(np.sqrt(typical)))]
     order = np.argsort(-chi2[far])
     named = tuple(int(one) for one in ids[far][order])
-    return [Found(worst._replace(subject="reference"), named, float(far.sum()))]
+    gain = float(np.sum(chi2[far] - 2.0 * gains.PER_PARAMETER))
+    return [Found(worst._replace(subject="reference"), gain, named, float(far.sum()))]

@@ -24,12 +24,14 @@ class ExposureChi2(NamedTuple):
     shear : axes that are not at right angles, one
     quadratic : quadratic distortion, six
     swing : pointing that changes while the detectors are read, `4 WAVES`
+    scale : chi2 of the exposure per degree of freedom, by which the others are divided
     """
 
     stretch: np.ndarray
     shear: np.ndarray
     quadratic: np.ndarray
     swing: np.ndarray
+    scale: np.ndarray
 
 
 def exposure_chi2(camera: Camera, rows: Rows) -> ExposureChi2:
@@ -54,6 +56,7 @@ def exposure_chi2(camera: Camera, rows: Rows) -> ExposureChi2:
         _gain(gram, along, base, shear) / typical,
         _gain(gram, along, linear, quadratic) / typical,
         _gain(gram, along, smooth, swing) / typical,
+        typical,
     )
 
 

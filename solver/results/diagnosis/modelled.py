@@ -55,7 +55,6 @@ def _of_terms(
     """Yield the columns of terms of the distortion that drift, breathe, or are of a part."""
     settings, at = result.settings, camera.scale * rows.at
     field = np.unique(result.exposures["field_id"].to_numpy(), return_inverse=True)[1]
-    angle = camera.minutes * 2.0 * np.pi / settings.breathing_period
     later, detectors = np.arange(1, field.max() + 1), np.arange(len(camera.turn))
     in_time = legendre.legvander(2.0 * camera.time, settings.drift_in_time)[:, 1:].T
     own = at - camera.centre[rows.detector]
@@ -65,7 +64,7 @@ def _of_terms(
         (
             "breathing",
             settings.breathing,
-            np.array([np.cos(angle), np.sin(angle)])[:, rows.exposure],
+            np.array([np.cos(camera.phase), np.sin(camera.phase)])[:, rows.exposure],
             rows.at,
         ),
         (

@@ -18,8 +18,9 @@ VARIABLE, ABOVE = (2, 3), 2
 _MOST_STEPS = 3
 # Cells along each side of a detector.
 CELLS = 3
-# Constant, linear, quadratic and cubic in time; the ones of a distortion that changes.
-N_SMOOTH, CHANGES = 4, (1, 2)
+# Constant, linear, quadratic and cubic in time; cosine and sine of the orbital phase; then steps.
+N_POWERS, N_SMOOTH = 4, 6
+LINEAR, COSINE, SINE = 1, 4, 5
 # Quadratic terms (x^2, xy, y^2; of each x, y) of the aberration by a velocity along x and along y:
 # with a the position, v a^2 / 2 - (v a) a, where x^2 is (2 P2 + 1) / 3.
 _ABERRATION = np.array(
@@ -61,7 +62,7 @@ class Patterns:
     camera : instrument and exposures
     degrees : of the terms; `VARIABLE`, and the ones above the fitted order
     times : functions of the time, shape (times, exposures): constant, linear, quadratic, cubic,
-        and a step at the change from each field to the next
+        cosine and sine of the orbital phase, and a step at changes from a field to the next
     families : the causes that are looked for
     """
 
@@ -162,11 +163,11 @@ class Patterns:
         """Yield the spatial function and the time of each column but those of the cells."""
         for i, (k, j) in enumerate(self._terms):
             changes = k + j in VARIABLE
-            times = [*CHANGES, *range(N_SMOOTH, len(self.times))] if changes else []
+            times = [LINEAR, COSINE, SINE, *range(N_SMOOTH, len(self.times))] if changes else []
             times += [0] if k + j > order else []
             yield from ((2 * i + axis, time) for axis in (0, 1) for time in times)
         first, n_det = 2 * len(self._terms), len(self.camera.turn)
-        yield from ((first + i, time) for i in range(3 * n_det) for time in range(1, N_SMOOTH))
+        yield from ((first + i, time) for i in range(3 * n_det) for time in range(1, N_POWERS))
         first += 3 * n_det
         yield from ((first + i, 0) for i in range(8 if self.has_magnitude else 4))
 
@@ -206,20 +207,20 @@ def families(patterns: Patterns, order: int) -> list[Family]:
     """Return the causes that are looked for, each with its patterns."""
     found = []
     for n in VARIABLE:
-        linear, curved = (patterns.of_degree(n, time) for time in CHANGES)
+        linear, cosine, sine = (patterns.of_degree(n, time) for time in (LINEAR, COSINE, SINE))
         found.append(Family("distortion against time", "drift", linear, what=(n,)))
-        both = np.concatenate([linear, curved])
-        found.append(Family("distortion against time, curved", "bend", both, what=(n,)))
+        both = np.concatenate([cosine, sine])
+        found.append(Family("distortion against orbital phase", "bend", both, what=(n,)))
         for i in range(patterns.n_steps):
             step = patterns.of_degree(n, N_SMOOTH + i)
             found.append(Family("distortion between fields", "step", step, what=(n, i)))
-    velocity = np.concatenate([patterns.of_degree(2, time) for time in CHANGES])
+    velocity = np.concatenate([patterns.of_degree(2, time) for time in (COSINE, SINE)])
     weights = np.kron(np.eye(2), _ABERRATION)
     found.append(Family("differential aberration", "velocity", velocity, weights))
     above = [patterns.of_degree(n, 0) for n in range(order + 1, order + 1 + ABOVE)]
     found.append(Family("distortion above the order", "order", np.concatenate(above)))
     for d in range(len(patterns.camera.turn)):
-        moves = np.stack([patterns.of_detector(d, time) for time in range(1, N_SMOOTH)])
+        moves = np.stack([patterns.of_detector(d, time) for time in range(1, N_POWERS)])
         found.append(Family("shift of a detector", "shift", moves[:, :2].ravel(), what=(d,)))
         found.append(Family("turn of a detector", "turn", moves[:, 2], what=(d,)))
         found.append(Family("map of a detector", "cells", patterns.of_cells(d), what=(d,)))
@@ -235,12 +236,13 @@ def families(patterns: Patterns, order: int) -> list[Family]:
 
 def _times(camera: Camera) -> np.ndarray:
     """Return the functions of the time, shape (times, exposures)."""
-    smooth = legendre.legvander(2.0 * camera.time, N_SMOOTH - 1).T
+    smooth = legendre.legvander(2.0 * camera.time, N_POWERS - 1).T
     # The linear one grows by one from the first exposure to the last.
     smooth[1] *= 0.5
     last = int(camera.field.max(initial=0))
     changes = np.unique(np.linspace(1, last, min(last, _MOST_STEPS)).round())
-    return np.concatenate([smooth, (camera.field >= changes[:, None]) - 0.5])
+    phase = np.array([np.cos(camera.phase), np.sin(camera.phase)])
+    return np.concatenate([smooth, phase, (camera.field >= changes[:, None]) - 0.5])
 
 
 def legendre_at(along: np.ndarray, degree: int) -> list[np.ndarray]:

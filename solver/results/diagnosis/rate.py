@@ -1,7 +1,7 @@
 """Probabilities of a statistic by chance, in sigmas, and the rate of false discoveries."""
 
 import numpy as np
-from scipy.special import chdtrc, gammaln, log_ndtr, ndtri_exp
+from scipy.special import chdtrc, gammainc, gammaln, log_ndtr, ndtri_exp
 
 # Larger chi2 are no more certain, and may be infinite.
 _LARGEST = 1e9
@@ -35,6 +35,17 @@ def log_chance_normal(z: float, *, sides: int = 2) -> float:
     if sides == 2:
         return float(min(np.log(2.0) + log_ndtr(-abs(z)), 0.0))
     return float(log_ndtr(-z))
+
+
+def log_chance_poisson(count: int, expected: float) -> float:
+    """Return the logarithm of the probability that chance makes as many as `count`, or more."""
+    if count <= 0:
+        return 0.0
+    chance = float(gammainc(count, expected))
+    if chance > 0.0:
+        return float(np.log(chance))
+    # The first term of the sum, far in the tail.
+    return float(count * np.log(max(expected, 1e-300)) - expected - gammaln(count + 1.0))
 
 
 def sigmas(log_probability: float) -> float:

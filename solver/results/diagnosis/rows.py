@@ -72,7 +72,7 @@ class Camera(NamedTuple):
     scale : unit of the distortion's coordinates, um
     roll : position angle of each exposure, from that of the first, rad
     time : of each exposure, from -0.5 for the first to 0.5 for the last
-    minutes : the same in minutes
+    phase : of the satellite's orbit about the Earth, zero in the middle of the exposures, rad
     field : number of the field of each exposure, from 0, in order of time
     um_per_mas : on the focal plane
     """
@@ -84,7 +84,7 @@ class Camera(NamedTuple):
     scale: float
     roll: np.ndarray
     time: np.ndarray
-    minutes: np.ndarray
+    phase: np.ndarray
     field: np.ndarray
     um_per_mas: float
 
@@ -168,6 +168,7 @@ def _camera(
     span = max(float(np.ptp(days)), 1e-12)
     start = exposures.groupby("field_id")["obstime"].transform("min")
     roll = np.radians(fitted["position_angle"].to_numpy())
+    period = result.settings.breathing_period / _MINUTES_PER_DAY
     return Camera(
         turn,
         pitch,
@@ -176,7 +177,7 @@ def _camera(
         scale,
         roll - roll[0],
         (days - days.min()) / span - 0.5,
-        _MINUTES_PER_DAY * (days - 0.5 * (days.min() + days.max())),
+        2.0 * np.pi * (days - 0.5 * (days.min() + days.max())) / period,
         np.unique(start.to_numpy(), return_inverse=True)[1],
         float(fitted["focal_length"].mean()) * RAD_PER_MAS,
     )

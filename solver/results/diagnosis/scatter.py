@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammainc
 
-from solver.results.diagnosis.rate import log_chance, log_chance_normal
+from solver.results.diagnosis.rate import log_chance, log_chance_normal, log_chance_poisson
 from solver.results.diagnosis.rows import Rows
 
 # Chance of a good residual beyond `rows.FAR` on either axis.
@@ -22,6 +21,7 @@ class Scatter(NamedTuple):
     name : of the test
     value, expected, scatter : of the statistic, the last two for a good solution
     log_chance : logarithm of the probability of a value as far as this by chance
+    freedom : number of degrees of freedom
     """
 
     name: str
@@ -29,6 +29,7 @@ class Scatter(NamedTuple):
     expected: float
     scatter: float
     log_chance: float
+    freedom: float = 1.0
 
 
 def scatter_tests(
@@ -38,7 +39,7 @@ def scatter_tests(
 
     Parameters
     ----------
-    magnitude : of each source; NaN where unknown
+    magnitude : of each source; NaN where unknown, or where chi2 is not only that of noise
     explained : chi2 that other causes explain
     without : indices of exposures to leave out
     """
@@ -50,18 +51,18 @@ def scatter_tests(
     scale = max(total / freedom, 1e-300)
     whole = float(_normalised(np.array([total]), np.array([freedom]))[0])
     spread = float(np.sqrt(2.0 / freedom))
+    # Groups are compared with each other: what is explained is in all of them.
+    typical = max(float(chi2.sum()) / freedom, 1e-300)
     found = [
-        Scatter("noise", scale, 1.0, spread, log_chance_normal(whole)),
-        _dispersion("exposures", rows.exposure, chi2 / scale, dof),
-        _dispersion("sources", rows.source, chi2 / scale, dof),
-        _dispersion("detectors", rows.detector, chi2 / scale, dof),
+        Scatter("noise", scale, 1.0, spread, log_chance_normal(whole), freedom),
+        _dispersion("exposures", rows.exposure, chi2 / typical, dof),
+        _dispersion("sources", rows.source, chi2 / typical, dof),
+        _dispersion("detectors", rows.detector, chi2 / typical, dof),
     ]
-    slope = _slope(rows.source, magnitude, chi2 / scale, dof)
+    slope = _slope(rows.source, magnitude, chi2 / typical, dof)
     count, expected = int(rows.is_far.sum()), _FAR_BY_CHANCE * rows.n
-    # Poisson: the chance of as many or more.
-    chance = float(gammainc(count, expected)) if count else 1.0
-    log_far = np.log(chance) if chance > 0.0 else count * np.log(expected / count) + count
-    far = Scatter("outliers", count, expected, float(np.sqrt(expected)), float(log_far))
+    chance = log_chance_poisson(count, expected)
+    far = Scatter("outliers", count, expected, float(np.sqrt(expected)), chance)
     return [*found, *([slope] if slope else []), far]
 
 
@@ -80,7 +81,7 @@ def _dispersion(name: str, group: np.ndarray, chi2: np.ndarray, dof: np.ndarray)
     squares = float(np.sum(z**2))
     log_p = log_chance(squares, freedom) if freedom else 0.0
     value = squares / freedom if freedom else 1.0
-    return Scatter(name, value, 1.0, float(np.sqrt(2.0 / max(freedom, 1.0))), log_p)
+    return Scatter(name, value, 1.0, float(np.sqrt(2.0 / max(freedom, 1.0))), log_p, freedom)
 
 
 def _slope(

@@ -19,6 +19,7 @@ from solver.results.diagnosis.references import (
 )
 from solver.results.diagnosis.rows import Camera, Rows, camera_rows
 from solver.results.diagnosis.scatter import scatter_tests
+from solver.results.diagnosis.swapped import Swapped, swapped
 
 # If all is well, the probability that any test is a discovery: a solution to be used with care,
 # and one that is not to be trusted.
@@ -64,11 +65,13 @@ class Diagnosis(NamedTuple):
     ----------
     tests : the table
     camera, rows, patterns, projection : see there; the rows of exposures that swing are zero
-    magnitude : of each source, NaN where unknown
+    magnitude : of each source, NaN where unknown, and for reference stars, whose chi2 depends on
+        the errors of the catalogue
     scale : chi2 per degree of freedom without outliers and exposures that swing, at least 1
     exposures : chi2 of patterns of each exposure
     swinging : indices of the exposures whose pointing changed while they were read
     references : chi2 of each reference star
+    swapped : measurements with each other's identification
     """
 
     tests: tuple[Test, ...]
@@ -81,6 +84,7 @@ class Diagnosis(NamedTuple):
     exposures: ExposureChi2
     swinging: np.ndarray
     references: ReferenceChi2
+    swapped: Swapped
 
     def found(self, rate: float) -> tuple[Test, ...]:
         """Return the tests that are discoveries at a rate of false alarms over all tests."""
@@ -97,16 +101,18 @@ def diagnose(result: FitResult) -> Diagnosis:
     camera, rows = camera_rows(result)
     magnitude = source_magnitudes(result)
     exposures = exposure_chi2(camera, rows)
-    swings, swinging = _swings(exposures)
-    scatter = scatter_tests(rows, magnitude, without=swinging)
+    swings, swinging = _swings(exposures, camera.field)
+    of_others = np.where(result.sources["is_reference"].to_numpy(bool), np.nan, magnitude)
+    scatter = scatter_tests(rows, of_others, without=swinging)
     scale = max(scatter[0].value, 1.0)
     still = np.isin(rows.exposure, swinging, invert=True)
     rows = rows._replace(residual=rows.residual * still[:, None])
     patterns = Patterns(camera, int(result.summary["order"]), magnitude)
     projection = project(result, camera, rows, patterns)
-    references = reference_chi2(result.sources)
+    references, pairs = reference_chi2(result.sources), swapped(result)
     tests = [
-        *(Test(one.name, one.name, (), *one[1:], sigmas(one.log_chance)) for one in scatter),
+        *(Test(one.name, one.name, (), *one[1:5], sigmas(one.log_chance)) for one in scatter),
+        _of_pairs(pairs),
         *(pattern_test(projection, family, scale) for family in patterns.families),
         *_of_exposures(exposures, swinging),
         swings,
@@ -123,11 +129,12 @@ def diagnose(result: FitResult) -> Diagnosis:
         rows,
         patterns,
         projection,
-        magnitude,
+        of_others,
         scale,
         exposures,
         swinging,
         references,
+        pairs,
     )
 
 
@@ -178,17 +185,35 @@ def _of_exposures(found: ExposureChi2, swinging: np.ndarray) -> list[Test]:
     return tests
 
 
-def _swings(found: ExposureChi2) -> tuple[Test, np.ndarray]:
+def _of_pairs(found: Swapped) -> Test:
+    """Return the test of the identifications."""
+    count, scatter = float(len(found.rows) // 2), float(np.sqrt(found.expected))
+    numbers = count, found.expected, scatter, found.log_chance, sigmas(found.log_chance)
+    return Test("measurements in each other's place", "swapped", (), *numbers)
+
+
+def _swings(found: ExposureChi2, field: np.ndarray) -> tuple[Test, np.ndarray]:
     """Return the test of the largest swing of an exposure, and which exposures swing."""
     dof, n = 4.0 * WAVES, len(found.swing)
     chances = np.array([of_many(log_chance(one, dof), n) for one in found.swing])
-    swinging = np.flatnonzero(chances < _OF_EXPOSURES)
+    is_own = found.swing * found.scale > _induced(found.swing * found.scale, field)
+    swinging = np.flatnonzero((chances < _OF_EXPOSURES) & is_own)
     if len(swinging) > _MOST_SWINGING * n:
         swinging = swinging[:0]
     largest, chance = float(found.swing.max(initial=0.0)), float(chances.min(initial=0.0))
     typical, scatter = float(chdtri(dof, 0.5 / n)), float(np.sqrt(2.0 * dof))
     name = "pointing while an exposure is read"
     return Test(name, "swing", (), largest, typical, scatter, chance, sigmas(chance)), swinging
+
+
+def _induced(swing: np.ndarray, field: np.ndarray) -> np.ndarray:
+    """Return the largest chi2 of a swing that the other exposures of the field may bring about.
+
+    The positions of the sources, each a mean over the exposures, carry it.
+    """
+    root, count = np.sqrt(swing), np.bincount(field)
+    others = np.bincount(field, root)[field] - root
+    return np.square(others / count[field])
 
 
 def _of_references(result: FitResult, found: ReferenceChi2) -> list[Test]:

@@ -1,0 +1,26 @@
+"""A cause to be put into words, and what is said of it."""
+
+from typing import NamedTuple
+
+from solver.data.result import FitResult
+from solver.results.diagnosis.causes import Causes, Found
+from solver.results.diagnosis.table import Diagnosis
+
+
+class Case(NamedTuple):
+    """A cause that was found, and the solution that it was found in."""
+
+    found: Found
+    causes: Causes
+    diagnosis: Diagnosis
+    result: FitResult
+
+
+class Said(NamedTuple):
+    """What is said of a cause; see `Cause`."""
+
+    name: str
+    title: str
+    words: str
+    action: str
+    options: tuple[str, ...] = ()

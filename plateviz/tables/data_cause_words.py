@@ -1,0 +1,93 @@
+"""What is said of causes in the data: their noise, wrong measurements, and reference stars."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.cause_case import Case, Said
+from plateviz.tables.labels import id_strings
+
+_MOST_NAMED = 8
+
+
+def said_of_noise(case: Case) -> Said:
+    """Return what is said of noise that is the same in all measurements."""
+    factor = float(np.sqrt(case.found.test.statistic))
+    is_larger = factor > 1.0
+    return Said(
+        "noise",
+        f"the noise is {'larger' if is_larger else 'smaller'} than stated",
+        f"It is {factor:.3f} times the stated uncertainties, in all exposures and sources alike.",
+        f"let the fit estimate the noise, or multiply sx and sy by {factor:.3f}",
+        ("--noise-scale",),
+    )
+
+
+def said_of_noise_of(name: str, words: str, action: str, *options: str) -> Callable[[Case], Said]:
+    """Return the function that says that the noise of groups differs."""
+
+    def said(case: Case) -> Said:
+        test = case.found.test
+        evidence = (
+            f"χ² scatters by more than chance: {test.statistic:.3g}, expected "
+            f"{test.expected:.3g} ± {test.scatter:.2g}."
+        )
+        return Said(name, words, evidence, action, options)
+
+    return said
+
+
+def said_of_outliers(case: Case) -> Said:
+    """Return what is said of outliers."""
+    return Said(
+        "outliers",
+        "some measurements are outliers",
+        f"{int(case.found.size):,} residuals are beyond six sigma; chance makes "
+        f"{case.found.test.expected:.1g}.",
+        "let the fit find and leave them out",
+        ("--robust",),
+    )
+
+
+def said_of_swapped(case: Case) -> Said:
+    """Return what is said of measurements with each other's identification."""
+    ids = id_strings(pd.Series(case.found.items, dtype=np.int64))
+    pairs = int(case.found.test.statistic)
+    return Said(
+        "swapped",
+        "measurements have each other's identification",
+        f"In {pairs:,} pair{'s' if pairs > 1 else ''}, each is where the other should be; chance "
+        f"makes {case.found.test.expected:.1g}. The sources: "
+        f"{', '.join(ids[:_MOST_NAMED])}{', ...' if len(ids) > _MOST_NAMED else ''}.",
+        "let the fit find, list and leave them out",
+        ("--robust",),
+    )
+
+
+def said_of_references(case: Case) -> Said:
+    """Return what is said of reference stars whose errors are larger than stated."""
+    # The deviations are in units of the prior's sigmas, which the fit may have widened already.
+    factor = max(case.found.size, 1.1) * case.result.settings.width("sources")
+    return Said(
+        "reference-errors",
+        "the reference stars are further from the catalogue than it states",
+        f"Typical deviations are {case.found.size:.2f} times what its uncertainties allow.",
+        "widen the prior of the reference stars",
+        (f"--prior sources={factor:.2f}",),
+    )
+
+
+def said_of_reference(case: Case) -> Said:
+    """Return what is said of single reference stars that are wrong."""
+    ids = id_strings(pd.Series(case.found.items, dtype=np.int64))
+    some = len(ids) > 1
+    named = ", ".join(ids[:_MOST_NAMED])
+    return Said(
+        "wrong-references",
+        f"{len(ids)} reference star{'s are' if some else ' is'} not where the catalogue has "
+        f"{'them' if some else 'it'}",
+        f"Without its own catalogue position each is far from it, as binaries are: {named}.",
+        f"leave {'these stars' if some else 'this star'} out",
+        tuple(f"--exclude source={one}" for one in ids),
+    )

@@ -1,0 +1,67 @@
+"""Test of the identifications: measurements that are where each other should be."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from solver.data.result import FitResult
+from solver.results.diagnosis.rate import log_chance_poisson
+from solver.results.diagnosis.rows import FAR
+
+# Of its own residual: how near one has to be to where the other should be. The positions of
+# both stars are off, too, by the share that one wrong measurement has in them.
+_NEAR = 0.25
+
+
+class Swapped(NamedTuple):
+    """Pairs of measurements with each other's identification.
+
+    Attributes
+    ----------
+    rows : of the residual table, those of a pair one after the other
+    items : ids of their sources
+    expected : number of pairs by chance
+    log_chance : logarithm of the probability of as many by chance
+    chi2 : sum over the rows
+    """
+
+    rows: np.ndarray
+    items: tuple[int, ...]
+    expected: float
+    log_chance: float
+    chi2: float
+
+
+def swapped(result: FitResult) -> Swapped:
+    """Return the measurements far off that are where another one far off should be, and it there.
+
+    It holds in a solution that such measurements keep from converging, as long as most stars are
+    near their places.
+    """
+    table = result.residuals
+    residual = table[["residual_x", "residual_y"]].to_numpy(dtype=float)
+    at = table[["nx", "ny"]].to_numpy(dtype=float)
+    chi2 = np.square(residual / table[["sx", "sy"]].to_numpy(dtype=float)).sum(axis=1)
+    chosen = np.flatnonzero(chi2 > FAR**2)
+    distance = np.hypot(*residual.T)
+    area = float(np.prod(np.ptp(at, axis=0)))
+    share = np.pi * (_NEAR * distance) ** 2 / max(area, 1e-300)
+    pairs, expected = [], 0.0
+    keys = [result.exposure_index[chosen], table["detector_id"].to_numpy()[chosen]]
+    for group in pd.Series(chosen).groupby(keys).indices.values():
+        rows = chosen[group]
+        if len(rows) < 2:
+            continue
+        measured, model = at[rows], at[rows] - residual[rows]
+        apart = np.hypot(*(measured[:, None] - model[None]).transpose(2, 0, 1))
+        is_there = apart < _NEAR * np.minimum(distance[rows][:, None], distance[rows][None])
+        np.fill_diagonal(is_there, False)
+        a, b = np.nonzero(np.triu(is_there & is_there.T))
+        pairs += [np.stack([rows[a], rows[b]], axis=1).ravel()]
+        # Each is there by chance.
+        expected += 0.5 * float(np.minimum(share[rows], 1.0).sum()) ** 2
+    found = np.concatenate([np.empty(0, dtype=np.int64), *pairs])
+    chance = log_chance_poisson(len(found) // 2, expected)
+    sources = tuple(np.unique(table["source_id"].to_numpy()[found]).tolist())
+    return Swapped(found, sources, expected, chance, float(chi2[np.unique(found)].sum()))

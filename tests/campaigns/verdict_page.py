@@ -1,0 +1,152 @@
+"""The page of the documents on the measured verdict, from the records of its campaign."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from solver.simulate.defects.table import BY_NAME
+from tests.campaigns.trials import Record
+from tests.campaigns.verdict_cases import CASES, FACTORS, DefectCase, trial_of
+from tests.campaigns.verdict_chart import draw
+
+BEGIN, END = "<!-- verdicts:begin -->", "<!-- verdicts:end -->"
+_NO_CAUSE, _GOOD = "no cause", "good"
+# Records of a defect: those at each factor, and those with the cause modelled.
+_Records = Mapping[float | str, list[Record]]
+_MODELLED = "modelled"
+
+
+def write_page(folder: Path, records: Mapping[int, Record]) -> None:
+    """Write the tables into the page of a folder, and its figure beside it."""
+    page = folder / "verdicts.md"
+    page.write_text(with_tables(page.read_text("utf-8"), records), "utf-8")
+    (folder / "verdicts.svg").write_text(figure(records), "utf-8")
+
+
+def with_tables(text: str, records: Mapping[int, Record]) -> str:
+    """Return the text of the page with the tables of the records."""
+    before, _, rest = text.partition(BEGIN)
+    after = rest.partition(END)[2]
+    return f"{before}{BEGIN}\n{tables(records)}\n{END}{after}"
+
+
+def figure(records: Mapping[int, Record]) -> str:
+    """Return the chart of what is seen and what is named, as SVG."""
+    of_cases = _by_case(records)
+    panels = {
+        case.name: {
+            "seen": [(f, _share(_seen(of_case[f]))) for f in FACTORS if of_case[f]],
+            "named rightly": [(f, _share(_named(case, of_case[f]))) for f in FACTORS if of_case[f]],
+        }
+        for case, of_case in of_cases.items()
+    }
+    return draw(panels, FACTORS)
+
+
+def tables(records: Mapping[int, Record]) -> str:
+    """Return all tables of the page."""
+    of_cases, clean = _by_case(records), _clean(records)
+    states = Counter(one["state"] for one in clean)
+    total = len(clean)
+    lines = [
+        f"The figures rest on {len(records):,} trials, {total} of them clean orbits.\n",
+        "Clean orbits:\n",
+        "| orbits | good | with care | not to be trusted |",
+        "|---:|---:|---:|---:|",
+        f"| {total} | {_of(states[_GOOD], total)} | {_of(states['warn'], total)} "
+        f"| {_of(states['bad'], total)} |\n",
+        "Seen, and named rightly, of the orbits at each factor of the amplitude:\n",
+        _row("defect", "amplitude", *(f"× {factor:g}" for factor in FACTORS)),
+        "|---|---:|" + "---:|" * len(FACTORS),
+        *(_seen_row(case, of_case) for case, of_case in of_cases.items()),
+        "\nThe first cause that is named at the amplitude itself (× 1), and the rms pull there:\n",
+        _row("defect", "pull", "first cause, orbits"),
+        "|---|---:|---|",
+        *(_named_row(case, of_case[1.0]) for case, of_case in of_cases.items() if of_case[1.0]),
+        "\nWith the cause modelled, at five times the amplitude:\n",
+        _row(
+            "defect",
+            "fit with",
+            "orbits",
+            "trusted",
+            "rms pull",
+            "new parameters, deviation over sigma",
+        ),
+        "|---|---|---:|---:|---:|---:|",
+        *(
+            _modelled_row(case, of_case[_MODELLED])
+            for case, of_case in of_cases.items()
+            if of_case[_MODELLED]
+        ),
+    ]
+    return "\n".join(lines)
+
+
+def _by_case(records: Mapping[int, Record]) -> dict[DefectCase, _Records]:
+    found: dict[str, dict[float | str, list[Record]]] = {
+        case.name: {key: [] for key in (*FACTORS, _MODELLED)} for case in CASES
+    }
+    for number, record in sorted(records.items()):
+        trial = trial_of(number)
+        if trial.case:
+            key = _MODELLED if trial.is_modelled else trial.factor
+            found[trial.case.name][key].append(record)
+    return {case: found[case.name] for case in CASES}
+
+
+def _clean(records: Mapping[int, Record]) -> list[Record]:
+    return [record for number, record in records.items() if trial_of(number).case is None]
+
+
+def _seen(records: Iterable[Record]) -> list[bool]:
+    return [record["state"] != _GOOD for record in records]
+
+
+def _named(case: DefectCase, records: Iterable[Record]) -> list[bool]:
+    return [bool(record["causes"]) and record["causes"][0] in case.causes for record in records]
+
+
+def _seen_row(case: DefectCase, of_case: _Records) -> str:
+    cells = [
+        f"{sum(_seen(rows))}, {sum(_named(case, rows))} of {len(rows)}" if rows else "-"
+        for rows in (of_case[factor] for factor in FACTORS)
+    ]
+    amplitude = f"{case.amplitude:g} {BY_NAME[case.name].unit}".rstrip()
+    return _row(f"`{case.name}`", amplitude, *cells)
+
+
+def _named_row(case: DefectCase, records: Sequence[Record]) -> str:
+    first = Counter(one["causes"][0] if one["causes"] else _NO_CAUSE for one in records)
+    named = ", ".join(f"{name} {count}" for name, count in first.most_common())
+    return _row(f"`{case.name}`", _pull(records), named)
+
+
+def _modelled_row(case: DefectCase, records: Sequence[Record]) -> str:
+    options = ", ".join(f"`{name}={value}`" for name, value in case.modelled.items())
+    trusted = _of(len(records) - sum(_seen(records)), len(records))
+    squares = [(one["deviation"], one["parameters"]) for one in records if "deviation" in one]
+    deviation = "-"
+    if squares:
+        values, counts = np.array(squares).T
+        deviation = f"{np.sqrt(np.average(values**2, weights=counts)):.2f}"
+    return _row(f"`{case.name}`", options, str(len(records)), trusted, _pull(records), deviation)
+
+
+def _pull(records: Sequence[Record]) -> str:
+    """Return the rms pull over the orbits that have one."""
+    pulls = [record["pull"] for record in records if record.get("converged")]
+    return f"{np.sqrt(np.mean(np.square(pulls))):.3f}" if pulls else "-"
+
+
+def _of(count: int, total: int) -> str:
+    return f"{count} of {total}"
+
+
+def _share(flags: Sequence[bool]) -> float:
+    return sum(flags) / max(len(flags), 1)
+
+
+def _row(*cells: str) -> str:
+    return f"| {' | '.join(cells)} |"

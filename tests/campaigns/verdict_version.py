@@ -1,0 +1,27 @@
+"""Version of the verdict: records of trials under different rules must not be mixed."""
+
+import ast
+import hashlib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+# What decides on the state of a solution, and on the first cause.
+_PARTS = ("solver/results/diagnosis/*.py", "plateviz/tables/causes.py")
+
+
+def verdict_version() -> str:
+    """Return a digest of the code of the verdict, the same for other words and comments."""
+    paths = sorted(path for part in _PARTS for path in ROOT.glob(part))
+    digest = hashlib.sha256()
+    for path in paths:
+        digest.update(code_of(path.read_text(encoding="utf-8")).encode())
+    return digest.hexdigest()[:12]
+
+
+def code_of(source: str) -> str:
+    """Return a text of the code alone: without comments, docstrings and other sentences."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
+            node.value = " "
+    return ast.dump(tree)

@@ -1,0 +1,112 @@
+"""Measure the verdict: its false alarms, and from which size on it sees and names each defect.
+
+    python tests/campaigns/verdicts.py [--trials N] [--records FILE] [--write assets/docs]
+
+Sparse orbits of some 1,300 sources are simulated without and with each defect that one orbit can
+show, at five amplitudes, and fitted with the default settings; and at the largest with its cause
+modelled. Each trial takes about two seconds of a core, all of them three hours. Trials are recorded
+with the version of the verdict; a stopped campaign goes on, and runs those of other versions again.
+"""
+
+import argparse
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+# Import this checkout, whatever the working directory.
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+# Imported before NumPy, as in the program, because it sets how long idle BLAS threads spin.
+import solver  # noqa: F401, I001
+
+import numpy as np
+
+from plateviz.tables.verdict import orbit_verdict
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings
+from solver.errors import FitError, InputError
+from solver.fit import fit_orbit
+from solver.simulate.defects.defect import Case
+from tests.benchmarks.machine import write
+from tests.campaigns.defects import SETTINGS, pulls, sparse_orbit
+from tests.campaigns.trials import Record, read_records, run_trials
+from tests.campaigns.true_causes import deviations, truth_of
+from tests.campaigns.verdict_cases import Trial, numbers, trial_of
+from tests.campaigns.verdict_page import write_page
+from tests.campaigns.verdict_version import verdict_version
+
+
+def main() -> int:
+    arguments = parse_arguments()
+    version = verdict_version()
+    chosen = numbers()[: arguments.trials]
+    run_trials(arguments.records, chosen, trial, after=report, version=version)
+    if arguments.write:
+        write_page(arguments.write, read_records(arguments.records, version))
+    return 0
+
+
+def trial(number: int) -> Record:
+    """Return the verdict of a trial, and the rms pull of the sources with many measurements."""
+    wanted, start = trial_of(number), time.process_time()
+    case = wanted.case
+    defects = (case.text(wanted.factor),) if case else ()
+    settings = FitSettings(**case.modelled) if case and wanted.is_modelled else FitSettings()
+    try:
+        result = fit_orbit(sparse_orbit(wanted.orbit, defects), settings=settings)
+    except (FitError, InputError) as error:
+        return {"state": "none", "causes": [], "failed": str(error)}
+    verdict = orbit_verdict(result)
+    found = pulls(result.sources, result.true_places)
+    record = {
+        "state": verdict.state,
+        "causes": [cause.name for cause in verdict.causes],
+        "sigma": round(float(verdict.causes[0].significance), 1) if verdict.causes else 0.0,
+        "converged": bool(result.summary["converged"]),
+        "pull": round(float(np.sqrt(np.mean(found**2))), 4),
+        "sources": len(result.sources),
+    }
+    if wanted.is_modelled:
+        record |= of_truth(wanted, result)
+    return {**record, "seconds": round(time.process_time() - start, 2)}
+
+
+def of_truth(wanted: Trial, result: FitResult) -> dict[str, float | int]:
+    """Return the rms deviation of the new parameters from the truth, sigmas, and their number."""
+    case = wanted.case
+    if case is None:
+        return {}
+    of_survey = replace(SETTINGS, seed=wanted.orbit)
+    orbit_id = wanted.orbit % SETTINGS.orbits
+    truth = truth_of(
+        Case(case.name, wanted.factor * case.amplitude, of_survey, orbit_id), result.exposures
+    )
+    if not truth:
+        return {}
+    found = [np.ravel(deviations(result, group, values)) for group, values in truth.items()]
+    together = np.concatenate(found)
+    return {
+        "deviation": round(float(np.sqrt(np.mean(together**2))), 3),
+        "parameters": together.size,
+    }
+
+
+def report(number: int, record: Record) -> None:
+    """Print one line about a trial."""
+    wanted = trial_of(number)
+    what = f"{wanted.case.text(wanted.factor)}" if wanted.case else "clean"
+    words = " modelled" if wanted.is_modelled else ""
+    write(f"{number}: {what}{words}: {record}")
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--trials", type=int, help="the first so many, all by default")
+    parser.add_argument("--records", type=Path, default=Path("verdicts.jsonl"))
+    parser.add_argument("--write", type=Path, help="folder of verdicts.md and its figure")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

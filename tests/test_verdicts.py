@@ -1,0 +1,99 @@
+"""The campaign of the verdict: its schedule, its version, and the page that it writes."""
+
+from collections import Counter
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from tests.campaigns.trials import read_records, run_trials
+from tests.campaigns.verdict_cases import CASES, CLEAN, FACTORS, ORBITS, numbers, trial_of
+from tests.campaigns.verdict_page import BEGIN, END, figure, tables, with_tables
+from tests.campaigns.verdict_version import code_of, verdict_version
+
+DOCUMENTS = Path(__file__).resolve().parent.parent / "assets" / "docs"
+
+
+def test_every_trial_is_scheduled_once():
+    trials = [trial_of(number) for number in numbers()]
+    assert len(set(numbers())) == len(trials)
+    cells = Counter(
+        (one.case.name, one.factor, one.is_modelled) for one in trials if one.case is not None
+    )
+    assert set(cells.values()) == {ORBITS}
+    modelled = sum(bool(case.modelled) for case in CASES)
+    assert len(cells) == len(CASES) * len(FACTORS) + modelled
+    assert sum(one.case is None for one in trials) == CLEAN
+
+
+def test_first_trials_hold_all_defects_alike():
+    first = [trial_of(number) for number in numbers()[:200]]
+    counts = Counter(one.case.name for one in first if one.case and not one.is_modelled)
+    assert set(counts) == {case.name for case in CASES}
+    assert max(counts.values()) - min(counts.values()) <= 4
+
+
+def test_version_is_that_of_the_code_and_not_of_its_words():
+    source = 'def f():\n    """Say so."""\n    return 1  # one\n'
+    assert code_of(source) == code_of(source.replace("Say so.", "Say it.").replace("# one", ""))
+    assert code_of(source) != code_of(source.replace("return 1", "return 2"))
+    assert verdict_version() == verdict_version()
+
+
+def test_trials_of_another_version_are_run_again(tmp_path):
+    path, ran = tmp_path / "trials.jsonl", []
+
+    def trial(number):
+        ran.append(number)
+        return {"state": "good"}
+
+    run_trials(path, range(2), trial, version="a")
+    run_trials(path, range(2), trial, version="a")
+    assert ran == [0, 1]
+    run_trials(path, range(2), trial, version="b")
+    assert ran == [0, 1, 0, 1]
+    assert set(read_records(path, "a")) == set(read_records(path, "b")) == {0, 1}
+    assert read_records(path, "c") == {}
+
+
+@pytest.fixture
+def records():
+    """Orbits of the first defect at one amplitude, the second of which is named wrongly."""
+    good = {"state": "good", "causes": [], "pull": 1.0, "converged": True}
+    right = {"state": "bad", "causes": list(CASES[0].causes), "pull": 1.1, "converged": True}
+    wrong = {"state": "warn", "causes": ["noise"], "pull": 1.1, "converged": True}
+    at_one = 1000 * (1 + FACTORS.index(1.0))
+    modelled = 1000 * (1 + len(FACTORS))
+    with_truth = good | {"deviation": 2.0, "parameters": 6}
+    return {0: good, 1: wrong, at_one: right, at_one + 1: wrong, modelled: with_truth}
+
+
+def test_page_has_the_shares_of_the_records(records):
+    text = tables(records)
+    assert "rest on 5 trials, 2 of them clean orbits" in text
+    assert "| 2 | 1 of 2 | 1 of 2 | 0 of 2 |" in text
+    assert f"| `{CASES[0].name}` | 0.085 um | - | - | 2, 1 of 2 | - | - |" in text
+    assert f"| `{CASES[0].name}` | 1.100 | {CASES[0].causes[0]} 1, noise 1 |" in text
+    assert f"| `{CASES[0].name}` | `drift=2` | 1 | 1 of 1 | 1.000 | 2.00 |" in text
+    page = f"before {BEGIN} old {END} after"
+    assert with_tables(page, records) == f"before {BEGIN}\n{text}\n{END} after"
+
+
+def test_figure_has_a_point_for_each_share(records):
+    root = ET.fromstring(figure(records))
+    circles = list(root.iter("{http://www.w3.org/2000/svg}circle"))
+    # Two of the legend, and of the one amplitude the share seen and the share named.
+    assert len(circles) == 4
+    seen, named = (float(circle.get("cy")) for circle in circles[2:])
+    assert named > seen
+
+
+def test_page_shows_the_records_of_its_file():
+    path = DOCUMENTS / "verdicts.jsonl"
+    versions = [line for line in path.read_text("utf-8").splitlines() if line]
+    last = versions[-1].partition('"version": "')[2].partition('"')[0]
+    records = read_records(path, last)
+    assert records
+    text = (DOCUMENTS / "verdicts.md").read_text("utf-8")
+    assert with_tables(text, records) == text
+    assert figure(records) == (DOCUMENTS / "verdicts.svg").read_text("utf-8")

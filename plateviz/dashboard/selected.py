@@ -4,6 +4,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -91,15 +92,16 @@ class Selected:
         """Return what a fit does not use as a selection."""
         return Selected(exclusions.sources, exclusions.exposures, exclusions.detectors)
 
+    @cached_property
     def ids(self) -> SelectedIds:
-        """Return the columns of figures, and the texts in them, that are selected."""
+        """Columns of figures, and the texts in them, that are selected; all figures share them."""
         texts = {
             "id": map(str, self.sources),
             "exposure": (exposure_label(*pair) for pair in self.exposures),
             "detector_id": map(str, self.detectors),
         }
         found = {column: frozenset(ids) for column, ids in texts.items()}
-        return {column: ids for column, ids in found.items() if ids}
+        return MappingProxyType({column: ids for column, ids in found.items() if ids})
 
     def chosen(self, rows: pd.DataFrame) -> np.ndarray:
         """Return whether each row is of a selected source, exposure or detector, shape (n,).

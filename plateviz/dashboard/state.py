@@ -49,7 +49,7 @@ class Selection(param.Parameterized):
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
         """Start without options."""
         super().__init__(**values)
-        self._requested: dict[str, Any] = {}
+        self._requested, self._selected = dict[str, Any](), Selected()
 
     def offer_orbits(self, orbits: Iterable[int | None]) -> None:
         """Let `orbits` be what can be selected; the first one is, at first."""
@@ -156,8 +156,10 @@ class Selection(param.Parameterized):
 
     @property
     def selected(self) -> Selected:
-        """The selected sources, exposures and detectors."""
-        return Selected(self.sources, self.exposures, self.detectors)
+        """The selected sources, exposures and detectors; the same object until it changes."""
+        now = Selected(self.sources, self.exposures, self.detectors)
+        self._selected = self._selected if now == self._selected else now
+        return self._selected
 
     def select(self, selected: Selected) -> None:
         """Select sources, exposures and detectors in place of those selected before."""
@@ -178,7 +180,7 @@ class Selection(param.Parameterized):
     @property
     def ids(self) -> SelectedIds:
         """The selected sources, exposures and detectors as the marks of figures name them."""
-        return self.selected.ids()
+        return self.selected.ids
 
     @property
     def name_of_selected(self) -> str | None:

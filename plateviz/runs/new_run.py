@@ -77,7 +77,7 @@ def _content(survey: Path, settings: FitSettings, grows: bool) -> dict[str, obje
 
 
 def _check_same(path: Path, run: Run, wanted: Mapping[str, object]) -> None:
-    found = read_header(run.directory, RUN_FILE)
+    found = read_header(run.directory, RUN_FILE, "run")
     different = [
         f"{title} ({name})"
         for title in wanted

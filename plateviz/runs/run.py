@@ -108,7 +108,7 @@ class Run:
     @property
     def grows(self) -> bool:
         """Whether orbits may be added to the survey while the run is fitted."""
-        return read_header(self.directory, RUN_FILE).get(GROWS) is True
+        return read_header(self.directory, RUN_FILE, "run").get(GROWS) is True
 
     @property
     def is_complete(self) -> bool:
@@ -160,7 +160,7 @@ class Run:
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""
         self.require_unchanged(RUN_FILE)
-        return read_header(self.directory, RUN_FILE)
+        return read_header(self.directory, RUN_FILE, "run")
 
     def require_unchanged(self, name: str, check: Check = require_unchanged) -> None:
         """Refuse a file that belongs to no orbit, and is not as it was written; InputError."""

@@ -138,12 +138,13 @@ def write_manifest(directory: Path, content: Mapping[str, object]) -> None:
         path.write_text(f"{manifest_of(directory, names)}{header}  {HEADER}\n", encoding="utf-8")
 
 
-def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
-    """Return the content of a survey's header.
+def read_header(directory: Path, name: str = HEADER, of: str = "survey") -> dict[str, object]:
+    """Return the content of a header, such as a survey's.
 
     Parameters
     ----------
     name : file name; differs for an unfinished survey
+    of : what the directory is
 
     Raises
     ------
@@ -156,12 +157,10 @@ def read_header(directory: Path, name: str = HEADER) -> dict[str, object]:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
-        raise InputError(
-            f"{directory}: expected a survey with a file {name}, found none"
-        ) from error
+        raise InputError(f"{directory}: expected a {of} with a file {name}, found none") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: expected the header of a survey, found: {error}") from error
-    content = parse_toml(text, path, "the header of a survey")
+        raise InputError(f"{path}: expected the header of a {of}, found: {error}") from error
+    content = parse_toml(text, path, f"the header of a {of}")
     if content.get("format") != FORMAT:
         raise InputError(
             f"{path}: expected format = {FORMAT}, found {content.get('format', 'no format')!r}"

@@ -9,7 +9,7 @@ _WHAT_TO_DO = "Change the settings on the left and press Fit, or choose another 
 def missing_text(session: Session) -> str:
     """Return why there is no solution yet, and what to do about it."""
     if session.stage is Stage.FAILED:
-        return f"There is no solution. {session.message} {_WHAT_TO_DO}"
+        return f"There is no solution. {_sentence(session.message)} {_WHAT_TO_DO}"
     return "The first solution is being computed."
 
 
@@ -21,5 +21,9 @@ def outdated_text(session: Session) -> str:
         so_far = f": {session.message}" if session.message else ""
         return f"Another solution is being computed{so_far}. This is still the last one."
     if session.stage is Stage.FAILED:
-        return f"The last request has no solution, and this one stays. {session.message}"
+        return f"The last request has no solution, and this one stays. {_sentence(session.message)}"
     return ""
+
+
+def _sentence(message: str) -> str:
+    return message if not message or message.endswith((".", "!", "?")) else f"{message}."

@@ -9,11 +9,13 @@ from bokeh.document import Document
 from panel.io.state import set_curdoc
 
 from plateviz.dashboard.navigation import View
+from plateviz.dashboard.saved_view import view_text
 from plateviz.dashboard.selected import NOTHING, Selected
 from plateviz.dashboard.selected_tables import selected_tables
 from plateviz.dashboard.table_sender import TableSender
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.selection_bar import SelectionBar, is_read_here, words
+from plateviz.dashboard.views.selection_list import SelectionList
 from solver.errors import InputError
 
 SOURCES = Selected(frozenset(range(132)))
@@ -75,6 +77,27 @@ def test_all_measurements_of_what_is_selected_are_saved(navigation, session, fit
     assert len(tables["measurements"]) == expected.sum()
     assert tables["sources"]["source_id"].tolist() == [source]
     assert tables["exposures"]["plate_id"].tolist() == [1]
+
+
+def test_250_000_sources_are_selected_listed_and_refused_where_they_are_too_many(
+    navigation, session, fit_result
+):
+    bar, listed = SelectionBar(navigation), SelectionList(navigation)
+    measured = fit_result.sources["source_id"].tolist()
+    others = 250_000 - len(measured)
+    session.selection.select_sources(frozenset([*measured, *range(10**17, 10**17 + others)]))
+    assert bar._words.object == f"250,000 sources selected, {len(measured)} sources in this orbit"
+    # Every figure shares the names of what is selected.
+    assert session.selection.ids is session.selection.ids
+    assert navigation.address()["sources"] == "many"
+    listed.open()
+    assert len(listed._tables["sources"]._table.value) == len(measured)
+    assert len(selected_tables(navigation)["sources"]) == len(measured)
+    with pytest.raises(InputError, match="250,000 are selected: save these as a table"):
+        view_text(navigation)
+    bar._actions.leave_out()
+    assert session.choices.settings().exclusions.sources == frozenset(measured)
+    assert session.selection.sources >= frozenset(measured)
 
 
 def test_rows_of_the_calibration_tables_select_and_are_selected(session, fit_result):

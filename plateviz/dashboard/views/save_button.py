@@ -156,6 +156,7 @@ class SaveButton(pn.custom.JSComponent):
     _stylesheets = [
         """
         :host(.save-in-corner) { position: absolute; top: 2px; right: 54px; z-index: 3; }
+        :host(.save-in-bar) { align-self: center; }
         .save { --text: #1f2933; --muted: #52606d; --line: #d5dbe1; --tile: #ffffff;
                 position: relative; }
         .save.dark { --text: #e6eaee; --muted: #a5b0bb; --line: #39424c; --tile: #1c222a; }

@@ -22,11 +22,11 @@ from solver.linear.leverage import residuals
 from solver.problem.noise import Noise
 from solver.problem.problem import Problem
 
-_MAX_ROUNDS = 8
+_MAX_ROUNDS = 12
 # A step that is this fraction of its uncertainty ends the search.
 _TOLERANCE = 0.05
-# Largest step of the logarithm of a variance.
-_MAX_STEP = 1.0
+# Largest scoring step of the logarithm of a variance, and so many to one fit.
+_MAX_STEP, _MAX_SCORING = 1.0, 20
 # Width of the prior of the logarithm of the references' variance, about the stated one. The data of
 # one orbit may hardly say anything about it, and would then make it vanish.
 _REFERENCE_WIDTH = 1.0
@@ -50,13 +50,15 @@ def estimate_noise(
     """
     names, design = _predictors(problem, settings)
     by_row, by_reference = np.zeros(len(names)), 0.0
-    mode, rounds, largest = None, 0, np.inf
-    while largest >= _TOLERANCE and rounds < _MAX_ROUNDS:
+    mode, rounds, largest, is_solution = None, 0, np.inf, False
+    while not (is_solution and largest < _TOLERANCE) and rounds < _MAX_ROUNDS:
         rounds += 1
         scaled = _scaled(problem, np.exp(0.5 * design @ by_row), np.exp(0.5 * by_reference))
         mode = find_mode(scaled, settings, progress, start=mode)
-        if mode.reduced is None or not mode.status.is_solution:
+        if mode.reduced is None:
             return None
+        # Wrong uncertainties may be what keeps a fit from its solution.
+        is_solution = mode.status.is_solution
         covariance = covariances(mode.reduced)
         step, sigma = _step_of_rows(scaled, mode, covariance, design)
         reference_step, reference_sigma = _step_of_references(
@@ -66,6 +68,8 @@ def estimate_noise(
             reference_step, reference_sigma = 0.0, np.inf
         by_row, by_reference = by_row + step, by_reference + reference_step
         largest = np.max(np.abs(step) / sigma, initial=abs(reference_step) / reference_sigma)
+    if not is_solution:
+        return None
     # Half of the logarithm of the variance.
     log_factor, sigmas = (
         {name: 0.5 * float(value) for name, value in zip(names, values, strict=True)}
@@ -128,13 +132,23 @@ def _step_of_rows(
     covariance: Covariances,
     design: Float[np.ndarray, "obs predictor"],
 ) -> tuple[Float[np.ndarray, " predictor"], Float[np.ndarray, " predictor"]]:
-    """Return a scoring step of the logarithms of the variances, and their uncertainties."""
+    """Return the step of the logarithms of the variances, and their uncertainties.
+
+    The step is to the largest likelihood of the residuals as they are: variances that are wrong by
+    orders of magnitude take a scoring step each, but no fit each.
+    """
     found = residuals(problem, mode.theta, mode.sources, covariance)
     squares, expected = (found.whitened**2).sum(axis=1), 2.0 - found.trace
     information = design.T @ (expected[:, None] * design)
-    step = np.linalg.solve(information, design.T @ (squares - expected))
-    sigma = np.sqrt(2.0 * np.diag(np.linalg.inv(information)))
-    return np.clip(step, -_MAX_STEP, _MAX_STEP), sigma
+    inverse = np.linalg.inv(information)
+    sigma, total = np.sqrt(2.0 * np.diag(inverse)), np.zeros(design.shape[1])
+    for _ in range(_MAX_SCORING if len(total) else 0):
+        remaining = squares * np.exp(-design @ total) - expected
+        step = np.clip(inverse @ (design.T @ remaining), -_MAX_STEP, _MAX_STEP)
+        total += step
+        if np.max(np.abs(step) / sigma) < _TOLERANCE:
+            break
+    return total, sigma
 
 
 def _step_of_references(

@@ -137,17 +137,21 @@ def _subset(rows: Rows, camera: Camera, n_sources: int) -> tuple[Rows, float]:
     """Return a part of the rows that stands for all, and how many of its sources one stands for.
 
     A source stays at one place of the focal plane while a field is exposed. So few exposures of
-    each field have nearly all that the data say, if they are given the weight of all. What
-    counts are the sources: of these, as many are taken as there is time for.
+    each field have nearly all that the data say, if each is given the weight of those about it:
+    the ones of most weight, since the noise may differ between exposures. What counts are the
+    sources: of these, as many are taken as there is time for.
     """
-    taken = np.zeros(len(camera.time), dtype=bool)
-    each = max(int(_MOST_ROWS / max(rows.n, 1) * len(taken) / (camera.field.max() + 1)), 0)
+    each = max(int(_MOST_ROWS / max(rows.n, 1) * len(camera.time) / (camera.field.max() + 1)), 0)
+    of_exposure = np.bincount(rows.exposure, rows.weight, len(camera.time))
+    factor = np.zeros(len(camera.time))
     for field in np.unique(camera.field):
         of_field = np.flatnonzero(camera.field == field)
         count = min(max(each, _LEAST_EXPOSURES), len(of_field))
-        taken[of_field[((np.arange(count) + 0.5) / count * len(of_field)).astype(np.int64)]] = True
-    some = rows.of(np.flatnonzero(taken[rows.exposure]))
-    some = some._replace(weight=some.weight * (rows.weight.sum() / some.weight.sum()))
+        for group in np.array_split(of_field, count):
+            heaviest = group[np.argmax(of_exposure[group])]
+            factor[heaviest] = of_exposure[group].sum() / max(of_exposure[heaviest], 1e-300)
+    some = rows.of(np.flatnonzero(factor[rows.exposure] > 0.0))
+    some = some._replace(weight=some.weight * factor[some.exposure])
     if some.n <= _MOST_ROWS:
         return some, 1.0
     order = np.random.default_rng(0).permutation(n_sources)

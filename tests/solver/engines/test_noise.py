@@ -54,6 +54,20 @@ def test_noise_of_each_exposure_is_recovered(small_orbit):
         assert np.log(factor / expected) == pytest.approx(0.0, abs=4.0 * sigma)
 
 
+def test_noise_that_differs_by_orders_of_magnitude_is_recovered(small_orbit):
+    data = small_orbit.data
+    plates = data.measurements["plate_id"].to_numpy()
+    true = np.where(plates == 0, 20.0, np.where(plates == 1, 0.1, 1.0))
+    result = fit_orbit(
+        understated(data, true), small_orbit.instrument, FitSettings(noise_by_exposure=True)
+    )
+    for exposure in data.exposures.itertuples():
+        name = f"exposure {exposure.field_id}/{exposure.plate_id}"
+        factor, sigma = factor_of(result, name)
+        expected = {0: 20.0, 1: 0.1}.get(exposure.plate_id, 1.0)
+        assert np.log(factor / expected) == pytest.approx(0.0, abs=4.0 * sigma)
+
+
 def test_noise_by_magnitude_is_recovered(small_orbit):
     data = small_orbit.data
     magnitude = np.random.default_rng(0).uniform(10.0, 19.0, len(data.catalogue))

@@ -20,10 +20,11 @@ from plateviz.notebook.source import OpenSource
 from plateviz.notebook.table import OpenTable
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
 from plateviz.runs.run import DEFAULT_RUN
+from plateviz.runs.run_tests import read_run_verdict
 from plateviz.solving.job import Job
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import SummaryItem, run_strip, source_list
-from plateviz.tables.verdict import Verdict, run_verdict
+from plateviz.tables.verdict import Verdict
 from solver.data.columns import Table
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.data.settings import FitSettings
@@ -177,7 +178,7 @@ class OpenSurvey(HasSolver, HasFigures):
     @property
     def verdict(self) -> Verdict:
         """Whether to trust the run."""
-        return run_verdict(self.orbits, self.motions)
+        return read_run_verdict(self._run())
 
     def dashboard(self, *, port: int = 0, height: int = 900) -> Dashboard:
         """Return the dashboard, for display in a frame of a cell or as the page of `panel serve`.

@@ -21,9 +21,11 @@ from solver.engines.what_if import linearised, solve_what_if
 from solver.errors import FitError, InputError
 from solver.linear.contribution import compiling
 from solver.linear.covariances import Covariances
+from solver.linear.source_elimination import ReducedSystem
 from solver.problem.noise import Noise
 from solver.problem.problem import Problem, orders_held, rebuilt
 from solver.problem.problem_cache import ProblemCache
+from solver.results.catalogue_response import sky_statistics
 from solver.results.orbit_result import PartialResult, partial_result
 from solver.results.orders import compare_orders
 from solver.results.source_history import history_table
@@ -191,10 +193,28 @@ class OrbitFitter:
         FitError
             If the last fit has no solution.
         """
+        last, reduced = self._solved(result)
+        return history_table(last.problem, reduced, last.covariance, result)
+
+    def sky_statistics(self, result: FitResult) -> dict[str, pd.DataFrame]:
+        """Return what the last fit, whose result this is, says about errors of the catalogue.
+
+        The tables are those of `solver.results.catalogue_response.sky_statistics`.
+
+        Raises
+        ------
+        FitError
+            If the last fit has no solution.
+        """
+        last, reduced = self._solved(result)
+        return sky_statistics(last.problem, reduced, result)
+
+    def _solved(self, result: FitResult) -> tuple[_LastFit, ReducedSystem]:
         last = self._last_fit
-        if last is None or last.settings != result.settings or last.mode.reduced is None:
+        reduced = None if last is None else last.mode.reduced
+        if last is None or last.settings != result.settings or reduced is None:
             raise FitError(f"orbit {self._orbit_id}: {result.summary['reason']}")
-        return history_table(last.problem, last.mode.reduced, last.covariance, result)
+        return last, reduced
 
     def precompute(self, order: int) -> Iterator[None]:
         """Precompute warm starts for the what-if solutions that are likely to come next.

@@ -7,6 +7,7 @@ import typer
 
 from plateviz.cli.output import print_json
 from plateviz.solving.survey_progress import fit_and_report, require_all, require_trust
+from plateviz.tables.verdict import as_plain
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 
@@ -52,13 +53,19 @@ def run_survey(
     FitError
         If orbits failed.
     DistrustError
-        If solutions should not be trusted, unless the request accepts that.
+        If the run, or solutions of its orbits, should not be trusted, unless the request accepts
+        that.
     """
     if workers is not None and scheduler is not None:
         raise InputError(
             "--workers: expected none with --scheduler, which has its own workers, found both"
         )
     report = fit_and_report(survey, name, settings, orbits, workers, scheduler, repair)
+    # Imported here, because it takes a while, and a mistake in the request should be told at once.
+    from plateviz.runs.queries import SurveyRun
+    from plateviz.runs.run_tests import read_run_verdict
+
+    verdict = read_run_verdict(SurveyRun(report.run))
     if as_json:
         print_json(
             {
@@ -69,6 +76,7 @@ def run_survey(
                 "failed": {str(orbit): reason for orbit, reason in report.failed.items()},
                 "distrusted": {str(orbit): why for orbit, why in report.distrusted.items()},
                 "seconds": report.seconds,
+                "verdict": as_plain(verdict),
             }
         )
     else:
@@ -78,6 +86,10 @@ def run_survey(
         typer.echo(
             f"{report.run.directory}: {counts}, in {report.seconds:.1f} s; the run is {state}"
         )
+        typer.echo(verdict.headline)
+        if verdict.state != "good":
+            for sentence in [*verdict.reasons, *verdict.notable]:
+                typer.echo(f"  {sentence}")
     require_all(report)
     if not accept:
-        require_trust(report)
+        require_trust(report, verdict)

@@ -24,11 +24,12 @@ from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
 from plateviz.runs.run import DEFAULT_RUN
+from plateviz.runs.run_tests import read_run_verdict
 from plateviz.solving.job import Job
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import SummaryItem, run_strip, source_list
 from plateviz.tables.explore import ExplorableTable
-from plateviz.tables.verdict import Verdict, run_verdict
+from plateviz.tables.verdict import Verdict
 from solver.data.columns import Table
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.data.settings import FitSettings
@@ -183,7 +184,7 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
     @property
     def verdict(self) -> Verdict:
         """Whether to trust the run."""
-        return run_verdict(self.orbits, self.motions)
+        return read_run_verdict(self._run())
 
     def dashboard(self, *, port: int = 0, height: int = 900) -> Dashboard:
         """Return the dashboard, for display in a frame of a cell or as the page of `panel serve`.

@@ -20,8 +20,9 @@ from plateviz.tables import (
 )
 from plateviz.tables.headings import MOTION, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in_words
 from plateviz.tables.run_health import MISSING
+from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
-from plateviz.tables.verdict import run_verdict, source_verdict
+from plateviz.tables.verdict import source_verdict
 from solver.data.result import FitResult
 from solver.errors import InputError
 from solver.io.survey import section
@@ -52,7 +53,7 @@ def survey_report(run: SurveyRun, facts: Facts, more: MoreFigures = NO_MORE) -> 
     return Report(
         title=f"Survey {run.survey.resolve().name}",
         subtitle=f"Run {run.name} of {len(orbits):,} orbits",
-        verdict=run_verdict(orbits, motions),
+        verdict=run_verdict(orbits, motions, tables.tests),
         items=run_strip(orbits, motions),
         figures=[*(_figure(one, tables) for one in survey_figures()), *more_of_run(more, run)],
         tables={"Orbits": in_words(orbit_list(orbits), ORBITS_OF_RUN)},

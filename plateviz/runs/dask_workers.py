@@ -67,7 +67,8 @@ def _fit(run: Run, orbit: int) -> None:
     instrument = read_survey_instrument(run.survey)
     fitter = OrbitFitter(read_survey_orbit(run.survey, orbit), instrument)
     result = with_verdict(fitter.fit(run.settings()))
-    run.keep(orbit, result, fitter.history(result))
+    tables = {"history": fitter.history(result), **fitter.sky_statistics(result)}
+    run.keep(orbit, result, tables)
 
 
 @contextmanager

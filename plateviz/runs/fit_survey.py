@@ -17,6 +17,7 @@ from pyarrow import parquet
 
 from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
 from plateviz.runs.fitted_orbit import read_summary
+from plateviz.runs.gathered_tests import write_test_tables
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import gather_history
 from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run
@@ -144,7 +145,7 @@ def fit_missing(
                     if outcome.message:
                         failed[outcome.orbit] = outcome.message
                     progress(Progress(done, len(missing), outcome))
-        _gather(run)
+        gather(run)
         if closes:
             close_run(run)
     except DiskError as error:
@@ -199,13 +200,14 @@ def close_run(run: Run) -> None:
         run.mark_complete()
 
 
-def _gather(run: Run) -> None:
+def gather(run: Run) -> None:
     """Write the tables over all orbits, unless they are there."""
     complete = run.complete_orbits()
     if run.is_complete or not complete or run.gathered_orbits() == complete:
         return
     run.begin_gathering()
     _write_tables(run)
+    write_test_tables(run)
     run.mark_gathered(complete)
 
 

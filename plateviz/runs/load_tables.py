@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run_tests import read_run_tests
 from plateviz.tables.survey_tables import SurveyTables
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.errors import InputError
@@ -32,6 +33,7 @@ def survey_tables(run: SurveyRun) -> SurveyTables:
     return SurveyTables(
         orbits=run.orbits(),
         motions=run.motions(),
+        tests=read_run_tests(run),
         catalogue=read_survey_table(run.survey / REFERENCE, CATALOGUE),
         truth=_truth(run.survey),
         errors_by_count=run.errors_by_count(),

@@ -132,6 +132,13 @@ class SurveyRun:
             return None
         return self._table(ERRORS_FILE, ERRORS_BY_COUNT.names)
 
+    def test_table(self, name: str) -> pd.DataFrame | None:
+        """Return one of the tables from which the run is tested; None if it has none."""
+        if not self.is_gathered or not (self.directory / name).is_file():
+            self._run.require_unchanged(name)
+            return None
+        return self._table(name)
+
     def history(self, source_id: int) -> pd.DataFrame:
         """Return `survey_schema.HISTORY` of one source by epoch; no rows if it is unknown."""
         if not self._has_history:

@@ -4,7 +4,7 @@
     runs/NAME/orbit=0000/                 one fitted orbit (`plateviz.runs.fitted_orbit`)
     runs/NAME/failed/orbit=0000.json      why an orbit has no solution
     runs/NAME/history.parquet             all orbits sorted by source (`plateviz.runs.queries`)
-    runs/NAME/motions.parquet, ...        tables computed from it
+    runs/NAME/motions.parquet, ...        tables computed from it and from the orbits
     runs/NAME/gathered.json               the orbits in these tables, and the tables' SHA-256;
                                           removed before they are written, and written after them
     runs/NAME/COMPLETE                    written last, when every orbit of the survey is fitted: a
@@ -33,6 +33,7 @@ from plateviz.runs.fitted_orbit import (
     write_fitted_orbit,
 )
 from solver.data.result import FitResult
+from solver.data.run_schema import RUN_TABLES
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
@@ -56,7 +57,9 @@ HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE = (
     "motions.parquet",
     "errors_by_count.parquet",
 )
-_TABLES = (HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE)
+# Those from which the run is tested.
+TEST_FILES = tuple(f"{table.name}.parquet" for table in RUN_TABLES)
+_TABLES = (HISTORY_FILE, MOTIONS_FILE, ERRORS_FILE, *TEST_FILES)
 _REMEDY = "`plateviz survey` with --repair writes the run's tables again"
 _HEADER_REMEDY = "restore it from a copy, or fit the survey with another --run"
 _ORBIT = re.compile(r"orbit=(\d{4,})")
@@ -193,9 +196,9 @@ class Run:
             remove_fitted_orbit(self.orbit_directory(orbit))
         return damaged
 
-    def keep(self, orbit: int, result: FitResult, history: pd.DataFrame) -> None:
-        """Write a fitted orbit with its part of the history, and remove a recorded failure."""
-        write_fitted_orbit(self.orbit_directory(orbit), result, {"history": history})
+    def keep(self, orbit: int, result: FitResult, tables: Mapping[str, pd.DataFrame]) -> None:
+        """Write a fitted orbit with its history and other tables; remove a recorded failure."""
+        write_fitted_orbit(self.orbit_directory(orbit), result, tables)
         self._failure_path(orbit).unlink(missing_ok=True)
 
     def keep_failure(self, orbit: int, message: str) -> None:

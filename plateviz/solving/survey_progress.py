@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from plateviz.cache import keep_compilations
 from plateviz.solving.progress import reporting
+from plateviz.tables.verdict import Verdict
 from solver.data.settings import FitSettings
 from solver.errors import DistrustError, FitError
 
@@ -61,8 +62,8 @@ def require_all(report: "Report") -> None:
         raise FitError(_failure_message(report.failed))
 
 
-def require_trust(report: "Report") -> None:
-    """Raise `DistrustError` with the orbits whose solutions should not be trusted, if any."""
+def require_trust(report: "Report", verdict: Verdict) -> None:
+    """Raise `DistrustError` if the run, or the solutions of some orbits, should not be trusted."""
     orbits = list(map(str, report.distrusted))
     if orbits:
         listed = ", ".join(orbits[:_MAX_LISTED])
@@ -72,6 +73,11 @@ def require_trust(report: "Report") -> None:
             f"the solutions of {counted} should not be trusted as they are: {listed}; they are "
             f"written. `plateviz report {quote(str(report.run.survey))} --run {report.run.name} "
             f"--orbit {orbits[0]}` says why, and --accept ends with exit code 0"
+        )
+    if verdict.state == "bad":
+        raise DistrustError(
+            f"{verdict.headline} It is written. `plateviz report {quote(str(report.run.survey))} "
+            f"--run {report.run.name}` says why, and --accept ends with exit code 0"
         )
 
 

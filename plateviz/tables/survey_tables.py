@@ -1,10 +1,11 @@
 """SurveyTables and SourceTables: input tables of the figures of a run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import pandas as pd
 
+from plateviz.tables.run_diagnosis import RunTests, no_tests
 from plateviz.tables.source_track import source_curves, source_track
 
 
@@ -21,6 +22,7 @@ class SurveyTables:
     errors_by_count : `survey_schema.ERRORS_BY_COUNT`, or None without artificial sources
     area : Galactic longitudes and latitudes between which the fields lie, deg, or None
     target : Galactic longitude and latitude, deg, or None
+    tests : tables from which the run is tested
     """
 
     orbits: pd.DataFrame
@@ -30,6 +32,7 @@ class SurveyTables:
     errors_by_count: pd.DataFrame | None = None
     area: tuple[tuple[float, float], tuple[float, float]] | None = None
     target: tuple[float, float] | None = None
+    tests: RunTests = field(default_factory=no_tests)
 
 
 @dataclass(frozen=True)

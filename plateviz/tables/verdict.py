@@ -9,7 +9,6 @@ from scipy.special import chdtrc
 
 from plateviz.tables.causes import Cause, causes_in_words
 from plateviz.tables.notable_in_orbit import notable_sentences
-from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
 from plateviz.tables.tests_in_words import TestInWords, tests_in_words
@@ -21,7 +20,7 @@ from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Diagnosis, Test,
 _NAME = "verdict"
 # Tail probabilities of a single chi2: three and four sigmas of a normal, one-sided.
 _UNLIKELY, _FAR_OFF = 1.35e-3, 3.2e-5
-_MOST_NAMED, _MOST_ORBITS = 3, 20
+_MOST_NAMED = 3
 _UNSEEN = (
     "No test of one orbit shows smooth errors of the reference catalogue: those that shift, turn "
     "or stretch the field, or are quadratic in it, are taken for pointing and distortion and move "
@@ -59,13 +58,17 @@ class Verdict(NamedTuple):
 
 def with_verdict(result: FitResult) -> FitResult:
     """Return a result whose summary has the verdict on it, for the files and the command line."""
-    verdict = _judge(result)
-    plain = {
+    plain = as_plain(_judge(result))
+    return replace(result, summary={**result.summary, _NAME: plain})
+
+
+def as_plain(verdict: Verdict) -> dict[str, object]:
+    """Return a verdict as text, numbers, lists and dicts, for JSON."""
+    return {
         **verdict._asdict(),
         "causes": [one._asdict() for one in verdict.causes],
         "tests": [one._asdict() for one in verdict.tests],
     }
-    return replace(result, summary={**result.summary, _NAME: plain})
 
 
 def is_judged(result: FitResult) -> bool:
@@ -141,63 +144,6 @@ def _tested(diagnosis: Diagnosis, found: Sequence[Test]) -> str:
 def _judged(items: list[SummaryItem]) -> list[SummaryItem]:
     """Return the judged numbers without the first, convergence, which `_converged` describes."""
     return [item for item in items[1:] if item.state != "neutral"]
-
-
-def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame) -> Verdict:
-    """Return the verdict on a run, by the same rules as `run_strip` and `orbit_states`.
-
-    Parameters
-    ----------
-    orbits : `survey_schema.RUN_ORBITS`
-    motions : `survey_schema.MOTIONS`, no rows until the orbits are gathered
-    """
-    items = run_strip(orbits, motions)
-    of_orbits = orbit_states(orbits).drop(columns="status")
-    bad = orbits[(of_orbits == "bad").any(axis=1) & (orbits["status"] == COMPLETE)]
-    state = worst([*(item.state for item in items), "bad" if len(bad) else "good"])
-    headline = {
-        "good": "The orbits of this run can be trusted.",
-        "warn": "The orbits of this run can be used with care.",
-        "bad": "Some orbits of this run should not be trusted as they are.",
-    }[state]
-    reasons = [*_fitted(orbits), *_motions(motions)]
-    failed = orbits[orbits["status"] == FAILED]
-    notable = [
-        f"Orbit {row.orbit_id} has no solution: {row.message}" for row in failed.itertuples()
-    ]
-    if len(bad):
-        notable.append(f"Numbers far from their expected values: {_named(bad['orbit_id'])}.")
-    return Verdict(state, headline, reasons, notable)
-
-
-def _named(orbits: pd.Series) -> str:
-    numbers = ", ".join(map(str, orbits.head(_MOST_ORBITS)))
-    if len(orbits) > _MOST_ORBITS:
-        return f"{len(orbits):,} orbits, among them {numbers}"
-    return f"{'orbit' if len(orbits) == 1 else 'orbits'} {numbers}"
-
-
-def _fitted(orbits: pd.DataFrame) -> list[str]:
-    fitted = orbits[orbits["status"] == COMPLETE]
-    if fitted.empty:
-        return ["No orbit has a solution."]
-    chi2, converged = fitted["chi2_per_dof"], int((fitted["converged"] == 1).sum())
-    return [
-        f"{len(fitted):,} of {len(orbits):,} orbits have a solution; {converged:,} of these "
-        "converged.",
-        f"χ² per degree of freedom has a median of {chi2.median():.3f} and ranges from "
-        f"{chi2.min():.3f} to {chi2.max():.3f} over the orbits; expected 1.",
-    ]
-
-
-def _motions(motions: pd.DataFrame) -> list[str]:
-    if motions.empty:
-        return ["No motions are fitted yet; this is done after the last orbit."]
-    fitted = int(motions["fit_pmra"].notna().sum())
-    return [
-        f"{fitted:,} of {len(motions):,} sources were measured in enough orbits to fit position, "
-        "parallax and proper motion."
-    ]
 
 
 def source_verdict(history: pd.DataFrame, motion: pd.Series | None) -> Verdict:

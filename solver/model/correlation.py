@@ -23,7 +23,7 @@ def correlation_matrices(catalogue: pd.DataFrame) -> Float[np.ndarray, "src 5 5"
     return matrices
 
 
-def square_roots(matrices: Float[np.ndarray, "src 5 5"]) -> Float[np.ndarray, "src 5 5"]:
+def square_roots(matrices: Float[np.ndarray, "src n n"]) -> Float[np.ndarray, "src n n"]:
     """Return the symmetric square root of each correlation or covariance matrix.
 
     Unlike a Cholesky factor it does not depend on the order of the parameters. Negative

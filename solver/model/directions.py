@@ -67,3 +67,21 @@ def unproject(
     c, s = np.cos(position_angle), np.sin(position_angle)
     axes = np.array([(-c, s), (s, c)]) @ frame[1:]
     return frame[0] + ideal_um / focal_length @ axes
+
+
+def mean_direction(
+    ra_deg: Float[np.ndarray, " n"], dec_deg: Float[np.ndarray, " n"]
+) -> tuple[float, float]:
+    """Return right ascension and declination of the mean of some directions, deg."""
+    x, y, z = tangent_frame(ra_deg, dec_deg)[:, 0].mean(axis=0)
+    ra, dec = np.degrees([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))]).tolist()
+    return ra % 360.0, dec
+
+
+def places_about(
+    centre: tuple[float, float], ra_deg: Float[np.ndarray, " n"], dec_deg: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 2"]:
+    """Return the places of directions in the plane tangent at `centre`, deg to East and North."""
+    axes = tangent_frame(np.array([centre[0]]), np.array([centre[1]]))[0]
+    along, east, north = (tangent_frame(ra_deg, dec_deg)[:, 0] @ axes.T).T
+    return np.degrees(np.stack([east, north], axis=1) / along[:, None])

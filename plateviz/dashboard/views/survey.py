@@ -39,10 +39,12 @@ from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.reports.summary_strip import strip
 from plateviz.runs.load_tables import survey_tables
+from plateviz.runs.run_tests import read_run_tests
 from plateviz.tables import orbit_list, orbit_states, run_strip
 from plateviz.tables.headings import ORBITS_OF_RUN
+from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.survey_tables import SurveyTables
-from plateviz.tables.verdict import run_verdict
+from plateviz.tables.verdict import Verdict
 from solver.data.survey_schema import MOTIONS, RUN_ORBITS
 from solver.errors import InputError
 
@@ -67,6 +69,7 @@ class SurveyPage(pn.viewable.Viewer):
         self._grids: dict[SurveyWorkspace, FigureGrid] = {}
         self._tables: SurveyTables | None = None
         self._orbits = self._motions = pd.DataFrame()
+        self._verdict: Verdict | None = None
         self._failure = ""
         self._head, self._strip = markup_pane(), markup_pane()
         self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=8)
@@ -160,7 +163,9 @@ class SurveyPage(pn.viewable.Viewer):
         self._failure = ""
         if run is not None:
             try:
-                self._orbits, self._motions = run.orbits(), run.motions()
+                orbits, motions, tests = run.orbits(), run.motions(), read_run_tests(run)
+                self._orbits, self._motions = orbits, motions
+                self._verdict = run_verdict(orbits, motions, tests)
             except InputError as error:
                 self._failure = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
         self._show()
@@ -183,10 +188,10 @@ class SurveyPage(pn.viewable.Viewer):
             grid.change(theme)
 
     def _show_head(self, *_: object) -> None:
-        if self._navigation.run is None:
+        if self._navigation.run is None or self._verdict is None:
             return
         title = titled("Run", self._navigation.run_name)
-        verdict = self._session.units.text(judged(run_verdict(self._orbits, self._motions)))
+        verdict = self._session.units.text(judged(self._verdict))
         head = f"<div class='head'>{verdict}{title}</div>"
         if self._failure:
             head += paragraph(self._failure, "outdated", self._session.theme)

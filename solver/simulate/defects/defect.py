@@ -154,3 +154,8 @@ def elapsed(attitude: pd.DataFrame) -> Float[np.ndarray, " exp"]:
     """Return the time of each exposure as a fraction, 0 for the first and 1 for the last."""
     time = attitude["obstime"].to_numpy()
     return (time - time.min()) / max(float(np.ptp(time)), 1e-9)
+
+
+def survey_time(case: Case) -> float:
+    """Return the number of the orbit as a fraction: 0 for the survey's first, 1 for its last."""
+    return case.orbit_id / max(case.settings.orbits - 1, 1)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from solver.simulate.defects.defect import Case, elapsed
+from solver.simulate.defects.defect import Case, elapsed, survey_time
 
 # Period of a circular orbit 600 km above the Earth, the paper's section "Discussion".
 ORBITAL_PERIOD_S = 5_801.0
@@ -52,6 +52,11 @@ def stepping(case: Case, attitude: pd.DataFrame) -> AddedTerms:
     return _added(case, _CUBIC, later.astype(float))
 
 
+def changing_with_orbits(case: Case, attitude: pd.DataFrame) -> AddedTerms:
+    """Return quadratic terms that change linearly from orbit to orbit; zero in mid-survey."""
+    return _added(case, _QUADRATIC, np.full(len(attitude), survey_time(case) - 0.5))
+
+
 def of_higher_order(case: Case, attitude: pd.DataFrame) -> AddedTerms:
     """Return constant terms of degree 6 and 7, above the fit's default order."""
     return _added(case, _ABOVE_FIFTH, np.ones(len(attitude)))
@@ -62,6 +67,7 @@ ADDED_TERMS: Mapping[str, Callable[[Case, pd.DataFrame], AddedTerms]] = MappingP
         "distortion-drift": drifting,
         "distortion-orbital": oscillating,
         "distortion-step": stepping,
+        "distortion-trend": changing_with_orbits,
         "distortion-order": of_higher_order,
     }
 )

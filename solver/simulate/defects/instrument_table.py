@@ -47,6 +47,34 @@ INSTRUMENT_DEFECTS = (
         high=1e3,
     ),
     Defect(
+        name="distortion-trend",
+        label="distortion that changes from orbit to orbit",
+        unit="um",
+        example="50nm",
+        does="The quadratic terms change linearly with the number of the orbit, and are constant "
+        "within each. Amplitude: change of the six coefficients from the first orbit of the survey "
+        "to the last, root of the sum of squares.",
+        stands_for="ageing of the optics, outgassing; each orbit alone is without flaw",
+        reference="Anderson 2007, ACS ISR 2007-08 (drift of the distortion of HST's ACS)",
+        stage=Stage.FOCAL_PLANE,
+        apply=optics.distortion_trend,
+        high=1e3,
+    ),
+    Defect(
+        name="focal-trend",
+        label="focal length that changes from orbit to orbit",
+        unit="ppm",
+        example="3000ppm",
+        does="The focal length changes linearly with the number of the orbit, beside its scatter, "
+        "1e-3 between orbits. Amplitude: change from the first orbit of the survey to the last.",
+        stands_for="ageing and cooling of the telescope; each orbit alone is without flaw",
+        reference="Lallo et al. 2006, Proc. SPIE 6270, 62701N (focus of HST over years)",
+        stage=Stage.FOCAL_PLANE,
+        apply=optics.focal_trend,
+        low=-1e4,
+        high=1e4,
+    ),
+    Defect(
         name="distortion-order",
         label="distortion of higher order than fitted",
         unit="um",

@@ -4,9 +4,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import legendre
 
-from solver.simulate.defects.defect import Case, Rows
+from solver.simulate.defects.defect import Case, Rows, survey_time
 from solver.simulate.defects.distortion_terms import (
     AddedTerms,
+    changing_with_orbits,
     drifting,
     of_higher_order,
     oscillating,
@@ -33,6 +34,16 @@ def distortion_orbital(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
 def distortion_step(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     """Change the cubic terms between the two halves of the fields."""
     return _distorted(rows, stepping(case, rows.attitude))
+
+
+def distortion_trend(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+    """Change the quadratic terms from orbit to orbit; zero in the middle of the survey."""
+    return _distorted(rows, changing_with_orbits(case, rows.attitude))
+
+
+def focal_trend(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+    """Change the focal length from orbit to orbit; zero in the middle of the survey."""
+    return case.amplitude * (survey_time(case) - 0.5) * rows.ideal
 
 
 def distortion_order(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:

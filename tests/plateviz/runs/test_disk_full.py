@@ -60,7 +60,7 @@ def test_full_disk_stops_the_survey_with_one_message(survey_folder, fit_as, fit_
         tried.append(orbit)
         if len(tried) == 2:
             fit_as(fails)
-        run.keep(orbit, fit_result, fit_result.sources)
+        run.keep(orbit, fit_result, {"history": fit_result.sources})
 
     def fails(run, orbit):
         tried.append(orbit)
@@ -68,7 +68,7 @@ def test_full_disk_stops_the_survey_with_one_message(survey_folder, fit_as, fit_
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(fitted_orbit, "flush", full)
-            run.keep(orbit, fit_result, fit_result.sources)
+            run.keep(orbit, fit_result, {"history": fit_result.sources})
 
     def full(_):
         raise FULL
@@ -86,7 +86,7 @@ def test_full_disk_stops_the_survey_with_one_message(survey_folder, fit_as, fit_
     assert len(run.complete_orbits()) == 2
     assert run.failures() == {}
     tried.clear()
-    fit_as(lambda run, orbit: run.keep(orbit, fit_result, fit_result.sources))
+    fit_as(lambda run, orbit: run.keep(orbit, fit_result, {"history": fit_result.sources}))
     report = fit_survey.fit_survey(survey_folder, "full", SETTINGS, workers=1)
     assert (len(report.fitted), len(report.kept)) == (1, 2)
 
@@ -163,7 +163,7 @@ def test_second_repair_at_once_is_refused(survey_folder):
 
 @pytest.mark.usefixtures("in_threads")
 def test_clock_that_went_back_changes_nothing(survey_folder, fit_as, fit_result):
-    fit_as(lambda run, orbit: run.keep(orbit, fit_result, fit_result.sources))
+    fit_as(lambda run, orbit: run.keep(orbit, fit_result, {"history": fit_result.sources}))
     fit_survey.fit_survey(survey_folder, "clock", SETTINGS, [0, 1], workers=1)
     run = Run(survey_folder, "clock")
     future = time.time() + 10 * 365 * 86400

@@ -17,7 +17,9 @@ from plateviz.runs.fit_survey import fit_survey
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
 from plateviz.runs.run import Run
+from plateviz.runs.run_tests import read_run_tests, read_run_verdict
 from plateviz.solving.reproduction import reproduced
+from solver.data.run_schema import RUN_TABLES
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from solver.errors import InputError
@@ -161,6 +163,23 @@ def test_errors_by_count_are_of_the_artificial_sources(run):
     errors = run.errors_by_count()
     assert list(errors.columns) == ERRORS_BY_COUNT.names
     assert errors["n_orbits"].iloc[0] == 1
+
+
+def test_run_is_tested_from_its_own_tables(run):
+    tests = read_run_tests(run)
+    for table, frame in zip(RUN_TABLES, tests, strict=True):
+        assert list(frame) == table.names
+    assert set(tests.calibrations["orbit_id"]) == {0, 1, 2}
+    assert set(tests.orbit_causes["orbit_id"]) == {0, 1, 2}
+    stored = run.result(1).summary["verdict"]["tests"]
+    of_orbit = tests.orbit_tests[tests.orbit_tests["orbit_id"] == 1]
+    assert list(of_orbit["name"]) == [test["name"] for test in stored]
+    assert list(of_orbit["sigma"]) == [test["sigma"] for test in stored]
+    # Three orbits are too few to look for smooth errors of the catalogue.
+    assert tests.zonal.empty
+    verdict = read_run_verdict(run)
+    assert verdict.state in ("good", "warn")
+    assert any("takes eight orbits" in sentence for sentence in verdict.reasons)
 
 
 def test_statistics_of_classes_agree_with_their_sources(run):

@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.special import chdtri
 
@@ -13,7 +12,6 @@ from plateviz.tables.outliers import swapped
 from plateviz.tables.verdict import (
     is_judged,
     orbit_verdict,
-    run_verdict,
     source_verdict,
     with_verdict,
     worst,
@@ -139,30 +137,6 @@ def test_exposure_and_source_that_stand_out_are_named(fit_result):
     plate = exposures.loc[3, ["field_id", "plate_id"]].astype(int).tolist()
     assert any("field {}, exposure {}".format(*plate) in sentence for sentence in notable)
     assert any(str(sources.loc[5, "source_id"]) in sentence for sentence in notable)
-
-
-def test_run_names_its_failed_orbits(survey):
-    verdict = run_verdict(survey.orbits, survey.motions)
-    assert verdict.state == "bad"
-    failed = [sentence for sentence in verdict.notable if "has no solution" in sentence]
-    assert [sentence.split()[1] for sentence in failed] == ["11", "12"]
-
-
-@pytest.mark.parametrize(
-    ("n_bad", "text"),
-    [(1, "values: orbit 0."), (2, "values: orbits 0, 1."), (30, "30 orbits, among them 0, 1,")],
-)
-def test_orbits_far_off_are_named(survey, n_bad, text):
-    orbits = pd.concat([survey.orbits[survey.orbits["status"] == "complete"].head(1)] * 40)
-    orbits = orbits.assign(orbit_id=range(40)).reset_index(drop=True)
-    orbits.loc[orbits["orbit_id"] < n_bad, "chi2_per_dof"] = 9.0
-    verdict = run_verdict(orbits, survey.motions)
-    assert any(text in sentence for sentence in verdict.notable)
-
-
-def test_run_without_fitted_orbits_is_reported(survey):
-    none = survey.orbits.assign(status="missing")
-    assert "No orbit has a solution." in run_verdict(none, survey.motions.iloc[:0]).reasons
 
 
 def test_sources_within_chance_are_not_reported(fit_result):

@@ -7,7 +7,8 @@ from numpy.polynomial.legendre import legval2d
 
 from solver.data.instrument import MINI_MOCK
 from solver.simulate.defects.defect import Case, Rows
-from solver.simulate.defects.optics import pointing_jitter
+from solver.simulate.defects.distortion_terms import changing_with_orbits
+from solver.simulate.defects.optics import focal_trend, pointing_jitter
 from tests.solver.simulate.defects.conftest import ORBIT, SETTINGS, on_focal_plane, places
 
 
@@ -37,6 +38,31 @@ def test_drift_changes_the_quadratic_terms_by_its_amplitude(compare, measure):
     found, left = coefficients(rows, (2,), seconds / seconds.max() - 0.5)
     assert np.linalg.norm(found) == pytest.approx(0.1, rel=1e-4)
     assert np.abs(left).max() < 1e-5
+
+
+def test_trend_of_the_distortion_is_that_between_the_first_and_the_last_orbit(measure):
+    attitude = measure().attitude
+    first, middle, last = (
+        changing_with_orbits(Case("distortion-trend", 0.05, SETTINGS, orbit), attitude)
+        for orbit in (0, ORBIT, SETTINGS.orbits - 1)
+    )
+    assert {sum(pair) for pair in first.degrees} == {2}
+    assert np.linalg.norm(last.coefficients) == pytest.approx(0.05)
+    assert np.ptp(last.change) == 0.0
+    assert [one.change[0] for one in (first, middle, last)] == [-0.5, 0.0, 0.5]
+
+
+def test_trend_of_the_focal_length_is_that_between_the_first_and_the_last_orbit(measure):
+    attitude = measure().attitude
+    ideal = np.array([[1000.0, -2000.0]])
+    one, nothing = np.zeros(1, dtype=int), np.zeros((1, 2))
+    rows = Rows(one, one, ideal, nothing, np.zeros(1), attitude, MINI_MOCK)
+    moved = [
+        focal_trend(Case("focal-trend", 1e-3, SETTINGS, orbit), rows)
+        for orbit in (0, SETTINGS.orbits - 1)
+    ]
+    np.testing.assert_allclose(moved[1] - moved[0], 1e-3 * ideal)
+    np.testing.assert_allclose(moved[1], -moved[0])
 
 
 def test_orbital_distortion_has_amplitude_and_period(compare, measure):

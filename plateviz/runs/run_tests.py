@@ -1,0 +1,31 @@
+"""Reading of the tables from which a run is tested, and of its verdict."""
+
+import pandas as pd
+
+from plateviz.runs.queries import SurveyRun
+from plateviz.tables.run_diagnosis import RunTests
+from plateviz.tables.run_verdict import run_verdict
+from plateviz.tables.verdict import Verdict
+from solver.data.columns import Table
+from solver.data.run_schema import RUN_TABLES
+
+
+def read_run_tests(run: SurveyRun) -> RunTests:
+    """Return the tables of the tests of a run; no rows until it is gathered, or in old runs.
+
+    Raises
+    ------
+    InputError
+        If a table is damaged.
+    """
+    return RunTests(*(_read(run, table) for table in RUN_TABLES))
+
+
+def read_run_verdict(run: SurveyRun) -> Verdict:
+    """Return the verdict on a run; raises as `read_run_tests`."""
+    return run_verdict(run.orbits(), run.motions(), read_run_tests(run))
+
+
+def _read(run: SurveyRun, table: Table) -> pd.DataFrame:
+    found = run.test_table(f"{table.name}.parquet")
+    return pd.DataFrame(columns=table.names) if found is None else found

@@ -1,0 +1,226 @@
+"""The causes of a run's flaws in words: what, how certain, what it spoils, what to do."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.causes import Cause
+from plateviz.tables.labels import id_strings, unit_text
+from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests
+from solver.results.diagnosis.table import CARE_RATE, Test
+
+# A cause after the first one is named if it has this share of its sigmas: it may be a result of it.
+_OF_ITS_OWN = 0.5
+# A cause that orbits name counts from this share of them; chance makes some, each another.
+_LEAST_SHARE, _LEAST_ORBITS = 0.1, 2
+# Zonal errors larger than this share of the positions' uncertainty make it wrong by a tenth.
+_LARGE_SHARE = 0.5
+_MOST_NAMED = 8
+_MIN_ORBITS_OF_SOURCE = 4
+# Tests of what orbits find, which say less than the causes that orbits name.
+_OF_ORBITS = ("together", "care", "bad")
+
+
+class Case(NamedTuple):
+    """A test that finds something, and the run in which it does."""
+
+    test: Test
+    diagnosis: RunDiagnosis
+    tables: RunTests
+    motions: pd.DataFrame
+
+
+def run_causes(diagnosis: RunDiagnosis, tables: RunTests, motions: pd.DataFrame) -> list[Cause]:
+    """Return the causes of what the tests of a run find, the most likely first.
+
+    Parameters
+    ----------
+    motions : `survey_schema.MOTIONS`, no rows until the orbits are gathered
+    tables : of the same run
+    """
+    causes = [*_of_orbits(diagnosis, tables)]
+    is_explained = bool(causes)
+    for test in diagnosis.found(CARE_RATE):
+        words = _WORDS.get(test.subject)
+        # What orbits name themselves is also found in all of them together.
+        if words is not None and not (test.subject in _OF_ORBITS and is_explained):
+            causes.append(words(Case(test, diagnosis, tables, motions)))
+    causes.sort(key=lambda cause: -cause.significance)
+    return _of_their_own(causes)
+
+
+def _of_their_own(causes: list[Cause]) -> list[Cause]:
+    """Return one cause of each name, without those that the first one may have brought about."""
+    unique = {cause.name: cause for cause in reversed(causes)}
+    ordered = [cause for cause in causes if unique[cause.name] is cause]
+    least = _OF_ITS_OWN * ordered[0].significance if ordered else 0.0
+    return [cause for cause in ordered if cause.significance >= least]
+
+
+def _of_orbits(diagnosis: RunDiagnosis, tables: RunTests) -> list[Cause]:
+    """Return the causes that more of the orbits name than chance would make."""
+    found = {test.subject for test in diagnosis.found(CARE_RATE)}
+    named = tables.orbit_causes[tables.orbit_causes["name"] != ""]
+    if not found & {"care", "bad", "together"} or named.empty:
+        return []
+    total = len(diagnosis.states)
+    least = max(_LEAST_ORBITS, _LEAST_SHARE * total)
+    return [
+        _repeated(rows, total, diagnosis)
+        for _, rows in named.groupby("name", sort=False)
+        if len(rows) >= least
+    ]
+
+
+def _repeated(rows: pd.DataFrame, total: int, diagnosis: RunDiagnosis) -> Cause:
+    """Return a cause that many orbits name; significances of independent orbits add in squares."""
+    worst = rows.loc[rows["significance"].idxmax()]
+    significance = float(np.sqrt(np.square(rows["significance"]).sum()))
+    orbits = ", ".join(map(str, rows["orbit_id"].head(_MOST_NAMED)))
+    more = " and more" if len(rows) > _MOST_NAMED else ""
+    n_bad = int((diagnosis.states.loc[rows["orbit_id"]] == "bad").sum())
+    words = (
+        f"{len(rows):,} of {total:,} orbits name it ({orbits}{more}), with up to "
+        f"{worst['significance']:.0f} sigma; {n_bad:,} of these should not be trusted."
+    )
+    return Cause(
+        str(worst["name"]),
+        f"in many orbits, {worst['title']}",
+        words,
+        significance,
+        f"In orbit {worst['orbit_id']}, where it is most certain: {worst['spoils']}",
+        str(worst["action"]),
+        tuple(str(worst["options"]).splitlines()),
+        bool(rows["is_large"].mean() > 0.5),
+    )
+
+
+def _zonal(case: Case) -> Cause:
+    row = case.tables.zonal.iloc[0]
+    rms = float(row["rms"])
+    typical = _typical_sigma(case.motions)
+    words = (
+        "The reference stars of neighbouring places deviate together, and the frames of the "
+        "orbits and their distortion follow as they would the catalogue, not the focal plane: "
+        f"χ² {case.test.statistic:.1f}, expected {case.test.expected:.0f} ± "
+        f"{case.test.scatter:.1f}. The field has an rms of about {rms:.2g} mas along each axis."
+    )
+    return Cause(
+        "zonal-errors",
+        "the reference catalogue has smooth errors, which neighbouring stars share",
+        words,
+        float(case.test.sigma),
+        f"It spoils all positions, by about {rms:.2g} mas, which more orbits do not reduce; the "
+        f"motions fitted to all orbits have a typical uncertainty of {typical:.2g} mas.",
+        "state larger errors of the reference stars, or use another catalogue",
+        (f"--prior sources={max(_widened(case, rms), 1.1):.2f}",),
+        rms > _LARGE_SHARE * typical,
+    )
+
+
+def _typical_sigma(motions: pd.DataFrame) -> float:
+    """Return the median uncertainty of the fitted positions, mas; NaN without motions."""
+    if motions.empty:
+        return float("nan")
+    many = ~motions["is_reference"] & (motions["n_orbits"] >= _MIN_ORBITS_OF_SOURCE)
+    return float(np.nanmedian(motions.loc[many, ["sigma_ra", "sigma_dec"]]))
+
+
+def _widened(case: Case, rms: float) -> float:
+    """Return the factor on the errors of the reference stars that has room for the field."""
+    rows = case.motions[case.motions["is_reference"]]
+    stated = float(np.nanmedian(rows[["sigma_catalogue_ra", "sigma_catalogue_dec"]]))
+    return float(np.hypot(1.0, rms / stated)) if stated > 0.0 else 1.1
+
+
+def _against_time(case: Case) -> Cause:
+    trend = case.diagnosis.trends[case.test.name]
+    kind, group = case.test.subject, case.test.name.partition(" of ")[2]
+    unit = unit_text(trend.unit)
+    change = f"{abs(trend.change):.3g} {unit}".rstrip()
+    orbits = case.tables.calibrations["orbit_id"].unique()
+    how = {
+        "trend": f"It changes by {change} from the first orbit to the last",
+        "jump": f"It changes by {change} at orbit {orbits[trend.at]}",
+        "season": f"It differs by {change} between position angles",
+    }[kind]
+    title = {
+        "trend": "changes steadily from orbit to orbit",
+        "jump": "jumps between two orbits",
+        "season": "changes with the season",
+    }[kind]
+    return Cause(
+        f"calibration-{kind}",
+        f"the calibration {title}: {group}",
+        f"Most significant is {trend.label}. {how}, by more than it scatters.",
+        float(case.test.sigma),
+        "It spoils no position: each orbit has a calibration of its own. One calibration for all "
+        "orbits would be wrong by as much, and the test for smooth errors of the catalogue takes "
+        "a trend, but no jump and no season, for the instrument's.",
+        "keep a calibration for each orbit, and look for the cause in the instrument",
+        (),
+        False,
+    )
+
+
+def _together(case: Case) -> Cause:
+    name = case.test.name.partition(": ")[2]
+    return Cause(
+        "weak-in-each-orbit",
+        f"all orbits together show what none shows alone: {name}",
+        f"The chances of this test in all orbits multiply to χ² {case.test.statistic:.0f}, "
+        f"expected {case.test.expected:.0f} ± {case.test.scatter:.0f}.",
+        float(case.test.sigma),
+        "It spoils each orbit by less than its noise, and their mean perhaps by more.",
+        "look at this test in the verdicts of the orbits, and model its cause",
+        (),
+        False,
+    )
+
+
+def _share(case: Case) -> Cause:
+    test = case.test
+    what = "should not be trusted" if test.subject == "bad" else "have flaws"
+    return Cause(
+        "many-flawed-orbits",
+        f"more orbits {what} than chance explains",
+        f"{test.statistic:.0f} of {len(case.diagnosis.states):,} orbits, expected "
+        f"{test.expected:.1f} ± {test.scatter:.1f}, without a cause that they share.",
+        float(test.sigma),
+        "It spoils these orbits, and by their weight the means over all.",
+        "read the verdicts of these orbits",
+        (),
+        test.subject == "bad",
+    )
+
+
+def _scatter(case: Case) -> Cause:
+    is_reference = "reference" in case.test.name
+    name = id_strings(pd.Series(case.test.what, dtype=np.int64)).iloc[0]
+    kind = "reference star" if is_reference else "source"
+    return Cause(
+        f"{kind.split()[0]}-scatters",
+        f"{kind} {name} does not move as a single star",
+        f"Its positions scatter about its motion by χ² {case.test.statistic:.0f}, expected "
+        f"{case.test.expected:.0f}; no other source scatters as much.",
+        float(case.test.sigma),
+        "It spoils this source's motion"
+        + (", and pulls the frames of the orbits." if is_reference else "."),
+        "look at its time series; it may be double, or wrongly identified",
+        (f"--exclude source={name}",) if is_reference else (),
+        False,
+    )
+
+
+_WORDS: dict[str, Callable[[Case], Cause]] = {
+    "zonal": _zonal,
+    "trend": _against_time,
+    "jump": _against_time,
+    "season": _against_time,
+    "together": _together,
+    "care": _share,
+    "bad": _share,
+    "scatter": _scatter,
+}

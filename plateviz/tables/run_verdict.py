@@ -1,0 +1,143 @@
+"""The verdict on a run as text: whether to trust it, and why."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.run_causes import run_causes
+from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests, diagnose_run
+from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
+from plateviz.tables.tests_in_words import TestInWords
+from plateviz.tables.verdict import Verdict, worst
+from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Test
+
+_MOST_NAMED, _MOST_ORBITS = 3, 20
+_HEADLINES = {
+    "good": "This run can be trusted.",
+    "warn": "This run can be used with care.",
+    "bad": "This run should not be trusted as it is.",
+}
+
+
+def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -> Verdict:
+    """Return the verdict on a run, by its tests and by the rules of `run_strip`.
+
+    All tests together alarm in `CARE_RATE` of good runs. The run should not be trusted if the
+    alarm is also one of `BAD_RATE`, and a cause spoils much; or if orbits failed or are far off.
+
+    Parameters
+    ----------
+    orbits : `survey_schema.RUN_ORBITS`
+    motions : `survey_schema.MOTIONS`, no rows until the orbits are gathered
+    tables : of the tests, no rows until then
+    """
+    diagnosis = diagnose_run(motions, tables)
+    found, certain = diagnosis.found(CARE_RATE), diagnosis.found(BAD_RATE)
+    causes = run_causes(diagnosis, tables, motions) if found else []
+    by_tests = "warn" if found else "good"
+    if certain and any(cause.is_large for cause in causes):
+        by_tests = "bad"
+    of_orbits = orbit_states(orbits).drop(columns="status")
+    is_off = (of_orbits == "bad").any(axis=1) & (orbits["status"] == COMPLETE)
+    far = orbits[is_off]
+    states = [by_tests, *(item.state for item in run_strip(orbits, motions))]
+    state = worst([*states, "bad" if len(far) else "good"])  # type: ignore[list-item]
+    headline = _HEADLINES[state]
+    if causes:
+        headline = f"{headline[:-1]}: {causes[0].title}."
+    reasons = [*(cause.sentence() for cause in causes), *_tested(diagnosis, found, tables)]
+    reasons += [*_fitted(orbits), *_motions(motions), *_sensitivity(tables.zonal)]
+    faults = [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
+    notable = _failed(orbits)
+    if len(far):
+        notable.append(f"Numbers far from their expected values: {_named(far['orbit_id'])}.")
+    if len(distrusted := diagnosis.states[diagnosis.states == "bad"]):
+        notable.append(f"Solutions not to be trusted: {_named(pd.Series(distrusted.index))}.")
+    tests = _in_words(diagnosis, found)
+    return Verdict(state, headline, reasons, notable, faults, causes, tests)
+
+
+def _tested(diagnosis: RunDiagnosis, found: Sequence[Test], tables: RunTests) -> list[str]:
+    total = len(diagnosis.tests)
+    if tables.orbit_causes.empty:
+        return [
+            "The run has not been tested as a whole: it is not gathered yet, or an older version "
+            "made it."
+        ]
+    chance = f"in {100 * CARE_RATE:.0f} % of good runs any of them would"
+    if not found:
+        return [
+            f"None of {total} tests of the run finds anything that chance does not explain; "
+            f"{chance}."
+        ]
+    named = ", ".join(one.name for one in found[:_MOST_NAMED])
+    return [
+        f"{len(found)} of {total} tests of the run find what chance does not explain, among "
+        f"them: {named}; {chance}."
+    ]
+
+
+def _in_words(diagnosis: RunDiagnosis, found: Sequence[Test]) -> list[TestInWords]:
+    names = {test.name for test in found}
+    return [
+        TestInWords(
+            test.name,
+            float(test.statistic),
+            float(test.expected),
+            float(test.scatter),
+            float(test.sigma),
+            None,
+            test.name in names,
+        )
+        for test in diagnosis.tests
+    ]
+
+
+def _failed(orbits: pd.DataFrame) -> list[str]:
+    failed = orbits[orbits["status"] == FAILED]
+    return [f"Orbit {row.orbit_id} has no solution: {row.message}" for row in failed.itertuples()]
+
+
+def _named(orbits: pd.Series) -> str:
+    numbers = ", ".join(map(str, orbits.head(_MOST_ORBITS)))
+    if len(orbits) > _MOST_ORBITS:
+        return f"{len(orbits):,} orbits, among them {numbers}"
+    return f"{'orbit' if len(orbits) == 1 else 'orbits'} {numbers}"
+
+
+def _fitted(orbits: pd.DataFrame) -> list[str]:
+    fitted = orbits[orbits["status"] == COMPLETE]
+    if fitted.empty:
+        return ["No orbit has a solution."]
+    chi2, converged = fitted["chi2_per_dof"], int((fitted["converged"] == 1).sum())
+    return [
+        f"{len(fitted):,} of {len(orbits):,} orbits have a solution; {converged:,} of these "
+        "converged.",
+        f"χ² per degree of freedom has a median of {chi2.median():.3f} and ranges from "
+        f"{chi2.min():.3f} to {chi2.max():.3f} over the orbits; expected 1.",
+    ]
+
+
+def _motions(motions: pd.DataFrame) -> list[str]:
+    if motions.empty:
+        return ["No motions are fitted yet; this is done after the last orbit."]
+    fitted = int(motions["fit_pmra"].notna().sum())
+    return [
+        f"{fitted:,} of {len(motions):,} sources were measured in enough orbits to fit position, "
+        "parallax and proper motion."
+    ]
+
+
+def _sensitivity(zonal: pd.DataFrame) -> list[str]:
+    """Return how small smooth errors of the catalogue are seen."""
+    if zonal.empty or not np.isfinite(zonal["typical"].iloc[0]):
+        return [
+            "Smooth errors of the catalogue were not looked for: that takes eight orbits, fitted "
+            "by this version."
+        ]
+    return [
+        f"Smooth errors of the catalogue would be seen in half of such runs if their rms were "
+        f"{zonal['typical'].iloc[0]:.2g} mas along each axis; smaller ones spoil the positions "
+        "unseen."
+    ]

@@ -1,0 +1,226 @@
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from plateviz.tables.run_diagnosis import RunTests, diagnose_run, no_tests
+from plateviz.tables.run_verdict import run_verdict
+from plateviz.tables.verdict import as_plain
+from solver.data.run_schema import FIELD_DEGREES, ORBIT_CAUSES, ZONAL_FIELD
+
+N_ORBITS = 40
+GOOD = {"state": "good", "name": "", "title": "", "significance": 0.0, "spoils": "", "action": ""}
+DRIFTS = {
+    "state": "bad",
+    "name": "distortion-drifts",
+    "title": "the distortion drifts",
+    "significance": 6.0,
+    "spoils": "It spoils the positions, by up to 0.3 mas rms.",
+    "action": "let the distortion drift in the fit",
+}
+
+
+def causes(n_drifting=0):
+    rows = [
+        {
+            **(DRIFTS if orbit < n_drifting else GOOD),
+            "orbit_id": orbit,
+            "options": "--drift 2" if orbit < n_drifting else "",
+            "is_large": orbit < n_drifting,
+        }
+        for orbit in range(N_ORBITS)
+    ]
+    return pd.DataFrame(rows)[ORBIT_CAUSES.names]
+
+
+def orbit_tests(shift=0.0, seed=1):
+    """Chances of five tests in all orbits, of which one is more significant by `shift`."""
+    random = np.random.default_rng(seed)
+    sigma = np.abs(random.standard_normal((N_ORBITS, 5)) + [shift, 0, 0, 0, 0])
+    names = ["noise", "exposures", "sources", "shift of a detector, 1", "reference stars, all, α"]
+    return pd.DataFrame(
+        {
+            "orbit_id": np.repeat(np.arange(N_ORBITS), 5),
+            "name": names * N_ORBITS,
+            "sigma": sigma.ravel(),
+        }
+    )
+
+
+def calibrations(slope=0.0):
+    random = np.random.default_rng(2)
+    orbits = np.arange(N_ORBITS)
+    values = random.standard_normal((N_ORBITS, 3)) + slope * orbits[:, None] * [0.0, 1.0, 0.0]
+    table = pd.DataFrame(
+        {
+            "orbit_id": np.repeat(orbits, 3),
+            "epoch": np.repeat(61_800.0 + 10.0 * orbits, 3),
+            "position_angle": np.repeat(np.where(orbits % 10 < 5, 58.0, 238.0), 3),
+            "label": ["A 2 0", "A 1 1", "A 0 2"] * N_ORBITS,
+            "value": values.ravel(),
+        }
+    )
+    return table.assign(group="distortion, degree 2", unit="um")
+
+
+def zonal(chi2):
+    """A field of 12 tested directions."""
+    degrees = np.array(FIELD_DEGREES * 2)
+    columns = {"axis": ["ra"] * 10 + ["dec"] * 10, "coefficient": 0.1}
+    columns |= {"degree_ra": degrees[:, 0], "degree_dec": degrees[:, 1]}
+    columns |= {f"scatter_{number:02d}": 0.01 for number in range(20)}
+    columns |= {"centre_ra": 266.0, "centre_dec": -29.0, "half_ra": 0.5, "half_dec": 0.5}
+    columns |= {"chi2": chi2, "dof": 12.0, "rms": 0.4, "typical": 0.15}
+    return pd.DataFrame(columns)[ZONAL_FIELD.names]
+
+
+def tables(**changes):
+    whole = {
+        "calibrations": calibrations(),
+        "orbit_tests": orbit_tests(),
+        "orbit_causes": causes(),
+        "zonal": zonal(11.0),
+    }
+    return RunTests(**whole | changes)
+
+
+@pytest.fixture(scope="module")
+def good(survey):
+    """A run of which all orbits are fitted, and its motions, which scatter as they should."""
+    complete = survey.orbits[survey.orbits["status"] == "complete"].head(N_ORBITS)
+    motions = survey.motions.copy()
+    motions["chi2"] = motions["dof"].astype(float)
+    return complete.assign(orbit_id=range(N_ORBITS)), motions
+
+
+def judged(good, **changes):
+    return run_verdict(*good, tables(**changes))
+
+
+def test_good_run_is_trusted_with_all_its_tests(good):
+    verdict = judged(good)
+    assert (verdict.state, verdict.headline) == ("good", "This run can be trusted.")
+    assert not verdict.causes
+    # Two shares, five tests of the orbits, trend and jump, smooth errors, two kinds of source.
+    assert len(verdict.tests) == 12
+    assert not any(test.is_found for test in verdict.tests)
+    assert any("0.15 mas along each axis" in sentence for sentence in verdict.reasons)
+
+
+def test_smooth_errors_of_the_catalogue_are_named_with_what_they_spoil(good):
+    verdict = judged(good, zonal=zonal(80.0))
+    assert verdict.state == "bad"
+    (cause,) = verdict.causes
+    assert (cause.name, cause.is_large) == ("zonal-errors", True)
+    assert verdict.headline.endswith(f"{cause.title}.")
+    assert "about 0.4 mas" in cause.spoils
+    name, value = cause.options[0].removeprefix("--prior ").split("=")
+    assert name == "sources"
+    assert float(value) > 1.0
+
+
+def test_cause_that_many_orbits_name_is_that_of_the_run(good):
+    verdict = judged(good, orbit_causes=causes(30), orbit_tests=orbit_tests(5.0))
+    assert verdict.state == "bad"
+    assert [cause.name for cause in verdict.causes] == ["distortion-drifts"]
+    cause = verdict.causes[0]
+    assert cause.title == "in many orbits, the distortion drifts"
+    assert cause.options == ("--drift 2",)
+    assert "30 of 40 orbits" in cause.words
+    assert cause.significance == pytest.approx(6.0 * np.sqrt(30))
+
+
+def test_single_bad_orbit_is_named_but_no_flaw_of_the_run(good):
+    verdict = judged(good, orbit_causes=causes(1))
+    assert verdict.state == "good"
+    assert "Solutions not to be trusted: orbit 0." in verdict.notable
+
+
+def test_weak_flaw_of_all_orbits_is_seen_in_all_together(good):
+    verdict = judged(good, orbit_tests=orbit_tests(1.0))
+    assert verdict.state == "warn"
+    (cause,) = verdict.causes
+    assert cause.name == "weak-in-each-orbit"
+    assert cause.title.endswith(": noise")
+
+
+def test_trend_of_the_calibration_needs_care_and_spoils_no_position(good):
+    verdict = judged(good, calibrations=calibrations(0.2))
+    assert verdict.state == "warn"
+    assert verdict.causes[0].name == "calibration-trend"
+    assert "A 1 1" in verdict.causes[0].words
+    assert "no position" in verdict.causes[0].spoils
+
+
+def test_source_that_scatters_is_named(good):
+    orbits, motions = good
+    motions = motions.copy()
+    row = motions.index[(motions["dof"] > 20) & ~motions["is_reference"]][0]
+    motions.loc[row, "chi2"] = 20.0 * motions.loc[row, "dof"]
+    verdict = run_verdict(orbits, motions, tables())
+    assert verdict.causes[0].name == "source-scatters"
+    assert str(motions.loc[row, "source_id"]) in verdict.causes[0].title
+
+
+def test_weaker_cause_that_the_first_may_bring_about_is_not_named(good):
+    verdict = judged(
+        good,
+        zonal=zonal(41.0),
+        orbit_causes=causes(40),
+        orbit_tests=orbit_tests(5.0),
+    )
+    assert [cause.name for cause in verdict.causes] == ["distortion-drifts"]
+    assert sum(test.is_found for test in verdict.tests) > 2
+
+
+def test_tests_of_reference_stars_are_not_multiplied(good):
+    """All orbits have the same stars, whose errors all of them find."""
+    shared = orbit_tests()
+    shared.loc[shared["name"] == "reference stars, all, α", "sigma"] = 2.0
+    diagnosis = diagnose_run(good[1], tables(orbit_tests=shared))
+    found = {test.name: test.sigma for test in diagnosis.tests}
+    assert found["all orbits: reference stars, all, α"] < 0.5
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_good_orbits_together_are_within_chance(good, seed):
+    diagnosis = diagnose_run(good[1], tables(orbit_tests=orbit_tests(seed=100 + seed)))
+    assert not diagnosis.found(0.002)
+
+
+def test_run_that_was_not_tested_says_so(good):
+    verdict = run_verdict(*good, no_tests())
+    assert any("not been tested as a whole" in sentence for sentence in verdict.reasons)
+    assert any("not looked for" in sentence for sentence in verdict.reasons)
+
+
+def test_verdict_is_plain_for_json(good):
+    plain = json.loads(json.dumps(as_plain(judged(good, zonal=zonal(80.0)))))
+    assert plain["causes"][0]["name"] == "zonal-errors"
+    assert {"state", "headline", "causes", "tests", "reasons"} <= set(plain)
+
+
+def test_run_names_its_failed_orbits(survey):
+    verdict = run_verdict(survey.orbits, survey.motions, no_tests())
+    assert verdict.state == "bad"
+    failed = [sentence for sentence in verdict.notable if "has no solution" in sentence]
+    assert [sentence.split()[1] for sentence in failed] == ["11", "12"]
+
+
+@pytest.mark.parametrize(
+    ("n_bad", "text"),
+    [(1, "values: orbit 0."), (2, "values: orbits 0, 1."), (30, "30 orbits, among them 0, 1,")],
+)
+def test_orbits_far_off_are_named(survey, n_bad, text):
+    orbits = pd.concat([survey.orbits[survey.orbits["status"] == "complete"].head(1)] * 40)
+    orbits = orbits.assign(orbit_id=range(40)).reset_index(drop=True)
+    orbits.loc[orbits["orbit_id"] < n_bad, "chi2_per_dof"] = 9.0
+    verdict = run_verdict(orbits, survey.motions, no_tests())
+    assert any(text in sentence for sentence in verdict.notable)
+
+
+def test_run_without_fitted_orbits_is_reported(survey):
+    none = survey.orbits.assign(status="missing")
+    verdict = run_verdict(none, survey.motions.iloc[:0], no_tests())
+    assert "No orbit has a solution." in verdict.reasons

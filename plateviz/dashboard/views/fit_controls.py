@@ -4,6 +4,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.state import CONTROLS, FitChoices
+from plateviz.dashboard.views.at_once import taken_at_once
 from solver.data.parameter_group import Group
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import SETTINGS
@@ -22,12 +23,14 @@ def controls(
     ----------
     is_cause : whether the settings add causes to the model
     """
-    return {
+    found = {
         name: _control(choices, name)
         for kind in kinds
         for name, one in CONTROLS.items()
         if isinstance(one, kind) and one.is_cause == is_cause
     }
+    taken_at_once(*found.values())
+    return found
 
 
 def width_input(choices: FitChoices, group: Group) -> pmui.TextInput:
@@ -45,6 +48,7 @@ def width_input(choices: FitChoices, group: Group) -> pmui.TextInput:
         choices.prior_widths = {**widths, group.name: event.new}  # type: ignore[attr-defined]
 
     entry.param.watch(take, "value")
+    taken_at_once(entry)
     return entry
 
 

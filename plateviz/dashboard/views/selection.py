@@ -6,6 +6,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.views.at_once import taken_at_once
 
 
 class SelectionView(pn.viewable.Viewer):
@@ -25,9 +26,7 @@ class SelectionView(pn.viewable.Viewer):
             description="",
             sizing_mode="stretch_width",
         )
-        for control in (field, plates, detector):
-            # Panel waits 50 ms for further changes; a hand on the slider sends some ten a second.
-            control._debounce = 0  # type: ignore[misc]
+        taken_at_once(field, plates, detector)
         self._column = pmui.Column(field, plates, detector, sizing_mode="stretch_width", margin=0)
         self._column.insert(0, _orbit_control(navigation, **wide))
 

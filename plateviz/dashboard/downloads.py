@@ -5,6 +5,7 @@ import re
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
@@ -13,6 +14,7 @@ import numpy as np
 import pandas as pd
 from astropy.table import Column, Table
 
+from plateviz.solving.turns import Turns
 from plateviz.tables.explore import ExplorableTable
 from solver.data import columns
 from solver.errors import InputError
@@ -47,9 +49,15 @@ class Later(NamedTuple):
     Attributes
     ----------
     make : does it
+    turns : of all pages of the server, if one is done at a time
     """
 
     make: Callable[[Progress], Download | Done]
+    turns: Turns | None = None
+
+    def turn(self, wait: Callable[[int], object]) -> AbstractContextManager[None]:
+        """Return the context to make it in; `wait` is called as by `Turns.turn`."""
+        return nullcontext() if self.turns is None else self.turns.turn(wait)
 
 
 def as_file(tables: Mapping[str, Table], stem: str, suffix: str) -> Download:

@@ -16,11 +16,12 @@ from plateviz.reports.survey import source_report, survey_report
 from plateviz.runs.queries import SurveyRun
 from plateviz.solving.as_code import as_command, report_of_run
 from plateviz.solving.solution_store import SolutionStore
+from plateviz.solving.turns import Turns
 from solver.errors import InputError
 
 
 def page_report(navigation: Navigation) -> Later:
-    """Return the report of the view on the screen as it is now; it is made on a thread.
+    """Return the report of the view on the screen as it is now; a thread makes it in its turn.
 
     Raises
     ------
@@ -29,15 +30,15 @@ def page_report(navigation: Navigation) -> Later:
     """
     if navigation.view is View.ORBIT:
         return _of_solution(navigation.session)
-    run = navigation.run
+    run, turns = navigation.run, navigation.session.store.reports
     if run is None:
         raise InputError(navigation.why_no_run.rstrip("."))
     if navigation.view is View.SURVEY:
-        return _later(f"run-{run.name}", partial(_survey, run))
+        return _later(f"run-{run.name}", partial(_survey, run), turns)
     found = navigation.found
     if found is None:
         raise InputError("no source is shown yet; choose one first")
-    return _later(f"source-{found.source_id}", partial(_source, run, found))
+    return _later(f"source-{found.source_id}", partial(_source, run, found), turns)
 
 
 def _of_solution(session: Session) -> Later:
@@ -49,15 +50,16 @@ def _of_solution(session: Session) -> Later:
     if other is not None:
         facts["Report"]["Compared with solution"] = other.label
     make = partial(_solution, shown, other, session.store, facts)
-    return _later(session.selection.subject() + ("-what-if" if shown.is_what_if else ""), make)
+    stem = session.selection.subject() + ("-what-if" if shown.is_what_if else "")
+    return _later(stem, make, session.store.reports)
 
 
-def _later(stem: str, compose: Callable[[], Report]) -> Later:
+def _later(stem: str, compose: Callable[[], Report], turns: Turns) -> Later:
     def make(progress: Progress) -> Download:
         page = page_of(compose(), progress)
         return Download(file_name(f"{stem}-report", ".html"), page.encode())
 
-    return Later(make)
+    return Later(make, turns)
 
 
 def _solution(

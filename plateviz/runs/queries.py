@@ -145,6 +145,9 @@ class SurveyRun:
             return pd.DataFrame(columns=HISTORY.names)
         rows = col("source_id") == int(source_id)
         parts = [read_frame(Path(file), HISTORY.names, rows) for file in self.history_files()]
+        if not parts:
+            # There were some before.
+            raise InputError(f"{self.directory}: expected fitted orbits, found none any more")
         found = pd.concat(parts, ignore_index=True)
         return found.sort_values("epoch", ignore_index=True, kind="stable")
 

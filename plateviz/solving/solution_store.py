@@ -24,6 +24,7 @@ from plateviz.solving.judge import Judge
 from plateviz.solving.made_solutions import MadeSolution, MadeSolutions
 from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
 from plateviz.solving.solver_pool import Solver
+from plateviz.solving.turns import Turns
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.data.settings import ENGINES, FitSettings
@@ -49,6 +50,7 @@ class SolutionStore:
     columns : the columns of runs that were read last
     background : runs what takes a while, for all sessions
     judge : of the solutions that are shown
+    reports : turns of those who make a report
     """
 
     def __init__(self, origin: Origin, solver: Solver) -> None:
@@ -74,6 +76,7 @@ class SolutionStore:
         self.columns = ColumnCache()
         self.background = ThreadPoolExecutor(_READERS, thread_name_prefix="reader")
         self.judge = Judge(self.background)
+        self.reports = Turns()
 
     @property
     def title(self) -> str:

@@ -223,10 +223,15 @@ class SaveButton(pn.custom.JSComponent):
         def progress(done: int, total: int) -> None:
             send({"text": f"Being {self.done} \u2026 {done} of {total}", "more": True})
 
+        def wait(place: int) -> None:
+            before = "the one" if place == 1 else f"the {place}"
+            send({"text": f"Waiting for {before} of other pages before it \u2026", "more": True})
+
         could_not = f"It could not be {self.done}"
         message: dict[str, object] = {"text": f"{could_not}; the server's log says why."}
         try:
-            made = later.make(progress)
+            with later.turn(wait):
+                made = later.make(progress)
             message = made._asdict()
         except InputError as error:
             message = {"text": f"{could_not}: {error}."}

@@ -42,6 +42,13 @@ def test_report_of_a_solution_has_its_settings_and_its_command(navigation, fit_r
     assert "order 5" in page
 
 
+def test_reports_of_all_pages_are_made_in_turn(navigation):
+    turns = navigation.session.store.reports
+    for view in (View.ORBIT, View.SURVEY):
+        navigation.turn_to(view)
+        assert page_report(navigation).turns is turns
+
+
 def test_report_of_a_what_if_is_named_and_compared(navigation):
     session = navigation.session
     fitted = session.shown

@@ -19,6 +19,7 @@ from plateviz.dashboard.state import (
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.solving.job import Job
 from plateviz.solving.made_solutions import MadeSolutions
+from plateviz.solving.turns import Turns
 from solver.data.instrument import MINI_MOCK
 from solver.data.settings import SETTINGS, FitSettings
 from solver.errors import InputError
@@ -37,7 +38,7 @@ class FakeStore:
         self.requested, self.prepared, self.cancelled, self.abandoned = [], [], [], []
         self.left = []
         self.judge = SimpleNamespace(has_judged=lambda _: True)
-        self.is_shared = False
+        self.is_shared, self.reports = False, Turns()
         self.made, self.kept = MadeSolutions(), KeptSolutions(Path("nowhere"))
         self.selections = SimpleNamespace(all=dict, keep=lambda *_: None, forget=lambda *_: None)
 

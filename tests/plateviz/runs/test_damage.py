@@ -139,6 +139,15 @@ def test_page_of_the_history_is_checked_where_the_file_is_not(survey):
             assert found.equals(expected)
 
 
+def test_history_of_a_run_that_is_gone_is_refused_in_words(survey):
+    run = SurveyRun(Run(survey, "default"))
+    source = run.motions()["source_id"].iloc[0]
+    assert len(run.history(source)) > 0
+    shutil.rmtree(run.directory)
+    with pytest.raises(InputError, match="default: expected fitted orbits, found none any more"):
+        run.history(source)
+
+
 @pytest.mark.parametrize(
     "name", ["orbit=0001/sources.parquet", "orbit=0001/COMPLETE", "history.parquet", "COMPLETE"]
 )

@@ -9,6 +9,7 @@ import pytest
 
 from plateviz.dashboard.downloads import Download, Later
 from plateviz.dashboard.views.save_button import Picture, SaveButton
+from plateviz.solving.turns import Turns
 from solver.errors import InputError
 
 
@@ -82,6 +83,19 @@ def test_file_that_takes_long_is_made_on_a_thread_and_one_at_a_time(sent, monkey
     until(lambda: not button._is_making)
     button._handle_msg("HTML")
     until(lambda: len(sent) == 5)
+
+
+def test_file_that_waits_for_those_of_other_pages_says_its_place(sent, monkeypatch):
+    monkeypatch.setattr(type(pn.state), "curdoc", Page())
+    turns = Turns()
+    choices = {"HTML": lambda: Later(lambda _: Download("a.html", b"x"), turns)}
+    buttons = [SaveButton("A report", choices) for _ in range(2)]
+    with turns.turn(pytest.fail):
+        for button, words in zip(buttons, ("the one", "the 2"), strict=True):
+            button._handle_msg("HTML")
+            text = f"Waiting for {words} of other pages before it …"
+            until(lambda told={"text": text, "more": True}: told in sent)
+    until(lambda: sent.count({"name": "a.html", "content": b"x"}) == 2)
 
 
 def test_file_that_cannot_be_made_is_told(sent, monkeypatch):

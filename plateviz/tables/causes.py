@@ -8,7 +8,7 @@ from plateviz.tables.cause_case import Case
 from plateviz.tables.cause_words import said_of
 from plateviz.tables.remedy import remedied
 from solver.data.result import FitResult
-from solver.results.diagnosis.causes import Causes
+from solver.results.diagnosis.causes import Causes, wrong_identifications
 from solver.results.diagnosis.table import Diagnosis
 
 # Sources with fewer measurements do not say how good a solution is.
@@ -69,7 +69,7 @@ def causes_in_words(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> 
 def _stuck(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> Cause:
     """Return what keeps a fit from converging: patterns about a wrong point say nothing."""
     spoils = "It spoils everything: these numbers are those of the last iteration."
-    swapped = [one for one in causes.found if one.test.subject == "swapped"]
+    swapped = wrong_identifications(diagnosis)
     if swapped and not result.settings.robust:
         cause = _in_words(Case(swapped[0], causes, diagnosis, result))
         return cause._replace(spoils=spoils, is_large=True)

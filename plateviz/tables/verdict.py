@@ -12,6 +12,7 @@ from plateviz.tables.notable_in_orbit import notable_sentences
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
 from plateviz.tables.tests_in_words import TestInWords, tests_in_words
+from plateviz.tables.unseen import unseen_sentences
 from solver.data.result import FitResult
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Diagnosis, Test, diagnose
@@ -21,11 +22,6 @@ _NAME = "verdict"
 # Tail probabilities of a single chi2: three and four sigmas of a normal, one-sided.
 _UNLIKELY, _FAR_OFF = 1.35e-3, 3.2e-5
 _MOST_NAMED = 3
-_UNSEEN = (
-    "No test of one orbit shows smooth errors of the reference catalogue: those that shift, turn "
-    "or stretch the field, or are quadratic in it, are taken for pointing and distortion and move "
-    "the positions by as much as they are large. Only orbits at other position angles show them."
-)
 _HEADLINES: dict[State, str] = {
     "good": "This solution can be trusted.",
     "warn": "This solution can be used with care.",
@@ -120,7 +116,7 @@ def _judge(result: FitResult) -> Verdict:
     items = summary_strip(result)
     reasons = [_converged(result), *(cause.sentence() for cause in causes)]
     reasons += [_tested(diagnosis, found), *map(_sentence, _judged(items))]
-    reasons += [_common_error(result), _UNSEEN]
+    reasons += [_common_error(result), *unseen_sentences(result)]
     faults = [] if converged else [_converged(result)]
     faults += [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
     if found and not causes:

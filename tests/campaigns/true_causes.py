@@ -39,8 +39,8 @@ def truth_of(case: Case, exposures: pd.DataFrame) -> dict[str, np.ndarray | floa
     if case.name == "charge-transfer":
         return {"charge_transfer_x": 0.0, "charge_transfer_y": case.amplitude}
     if case.name == "pixel-phase":
-        one = dict.fromkeys(("phase_sine_x", "phase_sine_y"), case.amplitude)
-        return one | dict.fromkeys(("phase_cosine_x", "phase_cosine_y"), 0.0)
+        sines = {f"phase_sine_{axis}": case.amplitude for axis in "xy"}
+        return {**sines, **{f"phase_cosine_{axis}": 0.0 for axis in "xy"}}
     return {}
 
 

@@ -101,7 +101,7 @@ def report(number: int, record: Record) -> None:
 
 
 def parse_arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description="Measure the verdict.")
     parser.add_argument("--trials", type=int, help="the first so many, all by default")
     parser.add_argument("--records", type=Path, default=Path("verdicts.jsonl"))
     parser.add_argument("--write", type=Path, help="folder of verdicts.md and its figure")

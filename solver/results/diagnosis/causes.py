@@ -170,17 +170,26 @@ def _of_exposures(diagnosis: Diagnosis, explained: float) -> tuple[list[Found], 
     return [Found(best, gain)], of_each - explained
 
 
+def wrong_identifications(diagnosis: Diagnosis) -> list[Found]:
+    """Return measurements with each other's identification as a cause, if there are any."""
+    pairs = diagnosis.swapped
+    if pairs.log_chance > _limit(diagnosis):
+        return []
+    test = next(one for one in diagnosis.tests if one.subject == "swapped")
+    gain = gains.of_outliers(diagnosis.rows)
+    return [Found(test, gain, pairs.items, float(len(pairs.items)))]
+
+
 def _of_outliers(diagnosis: Diagnosis) -> list[Found]:
     """Return outliers as a cause, or the wrong identifications that make most of them."""
-    limit, tests = _limit(diagnosis), {one.subject: one for one in diagnosis.tests}
-    rows, pairs = diagnosis.rows, diagnosis.swapped
-    gain = gains.of_outliers(rows)
+    rows, swapped = diagnosis.rows, wrong_identifications(diagnosis)
     far = float(np.square(rows.whitened[rows.is_far]).sum())
-    if tests["swapped"].log_chance < limit and pairs.chi2 > _OF_OUTLIERS * far:
-        return [Found(tests["swapped"], gain, pairs.items, float(len(pairs.items)))]
-    if tests["outliers"].log_chance > limit:
+    if swapped and diagnosis.swapped.chi2 > _OF_OUTLIERS * far:
+        return swapped
+    test = next(one for one in diagnosis.tests if one.subject == "outliers")
+    if test.log_chance > _limit(diagnosis):
         return []
-    return [Found(tests["outliers"], gain, size=float(rows.is_far.sum()))]
+    return [Found(test, gains.of_outliers(rows), size=float(rows.is_far.sum()))]
 
 
 def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:

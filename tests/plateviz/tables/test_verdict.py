@@ -80,6 +80,25 @@ def test_fit_that_does_not_converge_says_what_helps(fit_result):
     assert [cause.name for cause in orbit_verdict(robust).causes] == ["not-converged"]
 
 
+def test_swapped_measurements_are_listed_where_they_prevent_a_solution(fit_result):
+    residuals = fit_result.residuals.copy()
+    at, residual = ["nx", "ny"], ["residual_x", "residual_y"]
+    model = residuals[at].to_numpy() - residuals[residual].to_numpy()
+    # The nearest neighbour of a measurement in its exposure, as in a wrong cross-match.
+    key = ["field_id", "plate_id", "detector_id"]
+    same = np.flatnonzero((residuals[key] == residuals.loc[0, key]).all(axis=1))
+    first, second = same[np.argsort(np.hypot(*(model[same] - model[0]).T))[:2]]
+    for one, other in ((first, second), (second, first)):
+        residuals.loc[one, at] = model[other]
+        residuals.loc[one, residual] = model[other] - model[one]
+    stuck = replace(with_summary(fit_result, converged=False, reason="stuck"), residuals=residuals)
+    [cause] = orbit_verdict(stuck).causes
+    assert cause.name == "swapped"
+    assert cause.options == ("--robust",)
+    assert "In 1 pair, each is where the other should be" in cause.words
+    assert str(residuals.loc[first, "source_id"]) in cause.words
+
+
 def test_outliers_with_each_others_identification_are_counted(fit_result):
     rows = fit_result.residuals.head(4).assign(field_id=0, plate_id=0, detector_id=0)
     at, places = rows[["model_x", "model_y"]].to_numpy(), [1, 0, 2, 3]

@@ -143,6 +143,7 @@ def test_cause_is_named(defect, subject):
     [
         ("detector-turn=5arcsec", "turn"),
         ("outliers=0.3%", "outliers"),
+        ("swapped=0.2%", "swapped"),
         ("distortion-orbital=0.3um", "bend"),
         ("distortion-step=0.2um", "step"),
         ("distortion-order=0.2um", "order"),
@@ -198,3 +199,23 @@ def test_wrong_reference_star_is_named(clean):
     found = find_causes(diagnose(replace(clean, sources=sources))).found
     assert found[0].test.subject == "reference"
     assert found[0].items == (int(sources.loc[wrong, "source_id"]),)
+
+
+def test_measurements_in_each_others_place_are_found(clean):
+    residuals = clean.residuals.copy()
+    model = residuals[["nx", "ny"]].to_numpy() - residuals[["residual_x", "residual_y"]].to_numpy()
+    # The nearest neighbour of a measurement in its exposure, as in a wrong cross-match.
+    key = ["field_id", "plate_id", "detector_id"]
+    same = np.flatnonzero((residuals[key] == residuals.loc[0, key]).all(axis=1))
+    first, second = same[np.argsort(np.hypot(*(model[same] - model[0]).T))[:2]]
+    for one, other in ((first, second), (second, first)):
+        residuals.loc[one, ["nx", "ny"]] = model[other] + 0.01
+        residuals.loc[one, ["residual_x", "residual_y"]] = model[other] + 0.01 - model[one]
+    # One that is far off, and not where another should be.
+    residuals.loc[second + 200, "residual_x"] += 5.0
+    diagnosis = diagnose(replace(clean, residuals=residuals))
+    assert sorted(diagnosis.swapped.rows) == sorted([first, second])
+    cause = find_causes(diagnosis).found[0]
+    assert cause.test.subject == "swapped"
+    assert set(cause.items) == set(residuals.loc[[first, second], "source_id"])
+    assert not len(diagnose(clean).swapped.rows)

@@ -1,0 +1,67 @@
+"""What no test of one orbit can see, and how large it could be."""
+
+import numpy as np
+
+from solver.data.result import FitResult
+from solver.units import RAD_PER_MAS
+
+# Sigmas beyond which the deviation of the reference stars is a discovery among all tests.
+_NOTICED = 3.0
+
+
+def unseen_sentences(result: FitResult) -> list[str]:
+    """Return sentences on the errors of the reference catalogue that a solution cannot show."""
+    sentences = [
+        "No test of one orbit shows smooth errors of the reference catalogue. Those that shift, "
+        "turn or stretch the field are taken for pointing, and move all positions by as much as "
+        "they are large."
+    ]
+    quadratic = quadratic_mas(result)
+    if np.isfinite(quadratic):
+        sentences.append(
+            "Those that are quadratic in the field are taken for distortion: they could be as "
+            f"large as all of the fitted quadratic distortion, {quadratic:.2g} mas rms. Only "
+            "orbits at other position angles tell them apart."
+        )
+    factor = reference_factor(result)
+    if np.isfinite(factor):
+        sentences.append(
+            f"The errors of all reference stars could be {factor:.1f} times as large as stated "
+            "before they are noticed: the catalogue decides their positions, not the measurements."
+        )
+    return sentences
+
+
+def quadratic_mas(result: FitResult) -> float:
+    """Return the rms displacement by the fitted quadratic terms, mas; NaN if there are none.
+
+    A common shift is left out, which the pointing takes up.
+    """
+    terms = result.values_on("coef", "offset").head(3)
+    scale = float(result.summary.get("distortion_scale_um", np.nan))
+    if len(terms) < 3 or not scale > 0.0:
+        return float("nan")
+    x, y = (result.residuals[["focal_x", "focal_y"]].to_numpy(dtype=float) / scale).T
+    values = np.stack([1.5 * x**2, x * y, 1.5 * y**2])
+    displacement = terms[["distortion_x", "distortion_y"]].to_numpy().T @ values
+    variance = float(displacement.var(axis=1).sum())
+    focal_length = float(result.values_on("exp")["focal_length"].mean())
+    return float(np.sqrt(variance)) / (focal_length * RAD_PER_MAS)
+
+
+def reference_factor(result: FitResult) -> float:
+    """Return the factor on the errors of the reference stars that a solution would just show.
+
+    With the stated covariance P and that of the measurements M, the deviation of an estimate from
+    the catalogue has the variance (f^2 P + M) / (P + M) times the expected one, whose square is the
+    share P / (P + M). NaN if there are no reference stars that the measurements determine.
+    """
+    factors = []
+    for axis in ("ra", "dec"):
+        expected = float(result.summary[f"expected_normalised_deviation_{axis}"])
+        name = f"normalised_deviation_dof_{axis}"
+        freedom = float(result.summary.get(name, result.summary["n_reference"]))
+        if expected > 0.0 and freedom > 0.0:
+            noticed = (1.0 + _NOTICED / np.sqrt(2.0 * freedom)) ** 2 - 1.0
+            factors.append(np.sqrt(1.0 + noticed / expected**2))
+    return float(np.mean(factors)) if factors else float("nan")

@@ -1,0 +1,58 @@
+"""What no test of one orbit can see: how large it could be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from plateviz.tables.unseen import quadratic_mas, reference_factor, unseen_sentences
+from plateviz.tables.verdict import orbit_verdict
+
+
+def with_summary(result, **values):
+    return replace(result, summary={**result.summary, **values})
+
+
+def test_quadratic_terms_are_the_limit_of_quadratic_errors(fit_result):
+    result = with_summary(fit_result, distortion_scale_um=21_000.0)
+    calibration = result.calibration.copy()
+    is_term = calibration["group"].isin(["distortion_x", "distortion_y"])
+    calibration.loc[is_term, "offset"] = 0.0
+    none = replace(result, calibration=calibration)
+    assert quadratic_mas(none) == 0.0
+    # A term that is the product of both coordinates, along x alone.
+    calibration = calibration.copy()
+    chosen = (calibration["group"] == "distortion_x") & (calibration["element"] == 1)
+    calibration.loc[chosen, "offset"] = 2.0
+    found = quadratic_mas(replace(result, calibration=calibration))
+    x, y = result.residuals[["focal_x", "focal_y"]].to_numpy().T / 21_000.0
+    focal_length = result.values_on("exp")["focal_length"].mean()
+    expected = 2.0 * np.std(x * y) / focal_length * np.degrees(1.0) * 3.6e6
+    assert found == pytest.approx(expected)
+    assert f"{found:.2g} mas rms" in " ".join(
+        unseen_sentences(replace(result, calibration=calibration))
+    )
+
+
+def test_result_of_an_older_version_has_no_limit(fit_result):
+    summary = {k: v for k, v in fit_result.summary.items() if k != "distortion_scale_um"}
+    assert np.isnan(quadratic_mas(replace(fit_result, summary=summary)))
+
+
+def test_references_that_the_data_do_not_determine_may_be_far_off(fit_result):
+    def factor(expected, freedom):
+        values = {f"expected_normalised_deviation_{one}": expected for one in ("ra", "dec")}
+        values |= {f"normalised_deviation_dof_{one}": freedom for one in ("ra", "dec")}
+        return reference_factor(with_summary(fit_result, **values))
+
+    # Three sigma of the scatter are 30 %.
+    assert factor(1.0, 50.0) == pytest.approx(1.3)
+    assert factor(0.3, 50.0) == pytest.approx(np.sqrt(1.0 + 0.69 / 0.09))
+    assert factor(1.0, 5000.0) < factor(1.0, 50.0)
+    assert np.isnan(factor(0.0, 50.0))
+
+
+def test_verdict_says_what_it_cannot_see(fit_result):
+    reasons = orbit_verdict(fit_result).reasons
+    assert any("smooth errors of the reference catalogue" in sentence for sentence in reasons)
+    assert any("times as large as stated before they are noticed" in one for one in reasons)

@@ -204,6 +204,13 @@ class ModelSettings:
         "NOISEMAG",
         "noise by magnitude",
     )
+    noise_floor: bool = _switch(
+        "Floor of the noise",
+        "Estimate a floor that is added in quadrature to the uncertainties of all measurements.",
+        "noise-floor",
+        "NOISEFLR",
+        "noise floor",
+    )
     reference_scale: bool = _switch(
         "Scale of the reference errors",
         "Estimate one factor on the catalogue's uncertainties of all reference stars.",

@@ -178,7 +178,7 @@ class FitSettings(ModelSettings):
     def has_noise_model(self) -> bool:
         """Whether uncertainties are estimated with the parameters."""
         by_row = self.noise_scale or self.noise_by_exposure or self.noise_by_magnitude
-        return by_row or self.reference_scale
+        return by_row or self.noise_floor or self.reference_scale
 
     @property
     def step_tolerance(self) -> float:

@@ -1,10 +1,11 @@
 """Noise model: by how much the errors differ from those stated, by restricted likelihood.
 
 The logarithm of the variance of a measurement is that of its stated variance plus a linear
-predictor: of its exposure, its star's magnitude, or neither. That of the reference stars'
-catalogue errors has one addition for all. Where the restricted likelihood is largest, the squared
-residuals that go with each parameter sum to their expectation, which leverage lowers; scoring
-steps get there in a few fits.
+predictor: of its exposure, its star's magnitude, or neither. A floor may be added in quadrature
+(`solver.engines.variance_model`). The logarithm of the reference stars' catalogue variance has one
+addition for all. Where the restricted likelihood is largest, the squared residuals that go with
+each parameter sum to their expectation, which leverage lowers; scoring steps get there in a few
+fits.
 """
 
 from collections.abc import Callable
@@ -16,17 +17,18 @@ from jaxtyping import Float
 
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, find_mode
+from solver.engines.variance_model import VarianceModel
 from solver.errors import InputError
 from solver.linear.covariances import Covariances, covariances
 from solver.linear.leverage import residuals
 from solver.problem.noise import Noise
 from solver.problem.problem import Problem
 
-_MAX_ROUNDS = 12
+_MAX_ROUNDS = 20
 # A step that is this fraction of its uncertainty ends the search.
 _TOLERANCE = 0.05
-# Largest scoring step of the logarithm of a variance, and so many to one fit.
-_MAX_STEP, _MAX_SCORING = 1.0, 20
+# Largest step of the logarithm of the references' variance.
+_MAX_STEP = 1.0
 # Width of the prior of the logarithm of the references' variance, about the stated one. The data of
 # one orbit may hardly say anything about it, and would then make it vanish.
 _REFERENCE_WIDTH = 1.0
@@ -48,19 +50,20 @@ def estimate_noise(
     InputError
         If the noise is to depend on magnitudes and there are none.
     """
-    names, design = _predictors(problem, settings)
-    by_row, by_reference = np.zeros(len(names)), 0.0
+    model, by_reference = _variance_model(problem, settings), 0.0
+    by_row, sigma = model.start(), model.start()
     mode, rounds, largest, is_solution = None, 0, np.inf, False
     while not (is_solution and largest < _TOLERANCE) and rounds < _MAX_ROUNDS:
         rounds += 1
-        scaled = _scaled(problem, np.exp(0.5 * design @ by_row), np.exp(0.5 * by_reference))
+        scaled = _scaled(problem, model.sigma(by_row), np.exp(0.5 * by_reference))
         mode = find_mode(scaled, settings, progress, start=mode)
         if mode.reduced is None:
             return None
         # Wrong uncertainties may be what keeps a fit from its solution.
         is_solution = mode.status.is_solution
         covariance = covariances(mode.reduced)
-        step, sigma = _step_of_rows(scaled, mode, covariance, design)
+        found = residuals(scaled, mode.theta, mode.sources, covariance)
+        step, sigma = model.step(by_row, found)
         reference_step, reference_sigma = _step_of_references(
             scaled, mode, covariance, by_reference
         )
@@ -72,7 +75,7 @@ def estimate_noise(
         return None
     # Half of the logarithm of the variance.
     log_factor, sigmas = (
-        {name: 0.5 * float(value) for name, value in zip(names, values, strict=True)}
+        {name: 0.5 * float(value) for name, value in zip(model.names, values, strict=False)}
         for values in (by_row, sigma)
     )
     if settings.reference_scale:
@@ -83,14 +86,15 @@ def estimate_noise(
         "log_factor": log_factor,
         "sigma": sigmas,
     }
-    factor = pd.Series(np.exp(0.5 * design @ by_row), index=problem.measurements.label)
-    return Noise(factor, float(np.exp(0.5 * by_reference)), entry)
+    if model.has_floor:
+        entry["floor_pix"] = model.floor(by_row)
+        entry["floor_sigma_pix"] = model.floor_sigma(by_row, sigma)
+    factor = pd.Series(model.factor(by_row), index=problem.measurements.label)
+    return Noise(factor, model.floor(by_row), float(np.exp(0.5 * by_reference)), entry)
 
 
-def _predictors(
-    problem: Problem, settings: FitSettings
-) -> tuple[list[str], Float[np.ndarray, "obs predictor"]]:
-    """Return the names of the predictors, and their values at each measurement."""
+def _variance_model(problem: Problem, settings: FitSettings) -> VarianceModel:
+    """Return the model of the variances that the settings ask for."""
     index, n_obs = problem.measurements.index, problem.n_obs
     names: list[str] = []
     columns: list[np.ndarray] = [np.empty((n_obs, 0))]
@@ -105,7 +109,8 @@ def _predictors(
         centred = magnitude - np.nanmean(magnitude)
         names.append("per magnitude")
         columns.append(np.nan_to_num(centred)[:, None])
-    return names, np.concatenate(columns, axis=1)
+    stated, design = problem.measurements.sigma, np.concatenate(columns, axis=1)
+    return VarianceModel(names, design, stated, settings.noise_floor)
 
 
 def _magnitude(problem: Problem) -> Float[np.ndarray, " src"]:
@@ -114,9 +119,8 @@ def _magnitude(problem: Problem) -> Float[np.ndarray, " src"]:
     raise InputError("noise by magnitude: expected a column magnitude in the catalogue, found none")
 
 
-def _scaled(problem: Problem, factor: Float[np.ndarray, " obs"], reference: float) -> Problem:
+def _scaled(problem: Problem, sigma: Float[np.ndarray, "obs 2"], reference: float) -> Problem:
     """Return the problem with other uncertainties of the measurements and reference stars."""
-    sigma = problem.measurements.sigma * factor[:, None]
     is_reference = problem.sources["is_reference"].to_numpy(bool)
     precision = problem.priors.precision / np.where(is_reference, reference**2, 1.0)[:, None, None]
     return replace(
@@ -124,31 +128,6 @@ def _scaled(problem: Problem, factor: Float[np.ndarray, " obs"], reference: floa
         measurements=replace(problem.measurements, sigma=sigma),
         priors=problem.priors._replace(precision=precision),
     )
-
-
-def _step_of_rows(
-    problem: Problem,
-    mode: Mode,
-    covariance: Covariances,
-    design: Float[np.ndarray, "obs predictor"],
-) -> tuple[Float[np.ndarray, " predictor"], Float[np.ndarray, " predictor"]]:
-    """Return the step of the logarithms of the variances, and their uncertainties.
-
-    The step is to the largest likelihood of the residuals as they are: variances that are wrong by
-    orders of magnitude take a scoring step each, but no fit each.
-    """
-    found = residuals(problem, mode.theta, mode.sources, covariance)
-    squares, expected = (found.whitened**2).sum(axis=1), 2.0 - found.trace
-    information = design.T @ (expected[:, None] * design)
-    inverse = np.linalg.inv(information)
-    sigma, total = np.sqrt(2.0 * np.diag(inverse)), np.zeros(design.shape[1])
-    for _ in range(_MAX_SCORING if len(total) else 0):
-        remaining = squares * np.exp(-design @ total) - expected
-        step = np.clip(inverse @ (design.T @ remaining), -_MAX_STEP, _MAX_STEP)
-        total += step
-        if np.max(np.abs(step) / sigma) < _TOLERANCE:
-            break
-    return total, sigma
 
 
 def _step_of_references(

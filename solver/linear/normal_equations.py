@@ -128,7 +128,7 @@ def accumulate(
                 source=problem.source_blocks.position[chunk_index.source]
             )
             _add_cross_local(in_order, by_row, layout, cross)
-            add_cross_walk(in_order, sums.shared[:, :, i], sums.basis[i], layout, cross)
+            add_cross_walk(in_order, sums.shared[:, :, i], chunk.prediction.basis, layout, cross)
         pending.result()
         cross_by_detector = np.empty((n_det, 2 * n_coef, 2, n_src))
         first_half, second_half = slice(n_det // 2 + 1), slice(n_det // 2 + 1, n_det)

@@ -54,7 +54,7 @@ def add_walks(
 def add_cross_walk(
     index: Index,
     shared: Float[np.ndarray, "2 2 tile slot"],
-    basis: Float[np.ndarray, "tile slot coef"],
+    basis: list[Float[np.ndarray, "tile slot"]],
     layout: VectorLayout,
     cross: Float[np.ndarray, "calib 2 src"],
 ) -> None:
@@ -70,7 +70,7 @@ def add_cross_walk(
         direction, term = divmod(number, layout.n_walk)
         for a in range(2):
             place = (2 * walked[..., number] + a) * n_src + index.source
-            values = shared[direction, a] * basis[..., term]
+            values = shared[direction, a] * basis[term]
             np.add.at(flat, place.ravel(), values.ravel())
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from solver.data.orbit import OrbitData
@@ -16,11 +17,13 @@ class Noise(NamedTuple):
     Attributes
     ----------
     factor : by the label of a measurement, its uncertainty over the stated one
+    floor : added in quadrature to the uncertainties of all measurements, pixel
     reference : uncertainties of the reference stars in the catalogue over the stated ones
     entry : the estimates, for the summary of a result
     """
 
     factor: pd.Series
+    floor: float
     reference: float
     entry: dict[str, object]
 
@@ -29,7 +32,7 @@ class Noise(NamedTuple):
         measurements, catalogue = data.measurements.copy(), data.catalogue.copy()
         factor = self.factor.reindex(measurements.index, fill_value=1.0).to_numpy()
         for name in ("sx", "sy"):
-            measurements[name] = measurements[name] * factor
+            measurements[name] = np.hypot(measurements[name] * factor, self.floor)
         chosen = catalogue["is_reference"].to_numpy(bool)
         for name in _CATALOGUE_ERRORS:
             catalogue.loc[chosen, name] = catalogue.loc[chosen, name] * self.reference

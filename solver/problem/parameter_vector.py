@@ -165,6 +165,13 @@ class VectorLayout:
 
     def columns(self, group: Group) -> np.ndarray:
         """Return the columns of one group, in the order of its axis."""
+        return self._columns[group.name]
+
+    @cached_property
+    def _columns(self) -> dict[str, np.ndarray]:
+        return {group.name: self._columns_of(group) for group in self.groups}
+
+    def _columns_of(self, group: Group) -> np.ndarray:
         length = self._length(group)
         of_y = group.name.endswith("_y")
         if group.axis == "walk":

@@ -64,10 +64,10 @@ OF_SURVEYS = [
         charge_transfer=True,
         magnitude_shift=True,
         pixel_phase=True,
-        noise_scale=True,
+        noise_floor=True,
         reference_scale=True,
     ),
-    FitSettings(noise_by_exposure=True, noise_by_magnitude=True),
+    FitSettings(noise_by_exposure=True, noise_by_magnitude=True, noise_scale=True),
 ]
 OF_FILES = [
     FitSettings(compare_orders=True),

@@ -104,3 +104,54 @@ def test_scale_of_the_reference_errors_is_recovered():
 def test_noise_by_magnitude_needs_magnitudes(small_orbit):
     with pytest.raises(InputError, match="expected a column magnitude in the catalogue"):
         fit_orbit(small_orbit.data, small_orbit.instrument, FitSettings(noise_by_magnitude=True))
+
+
+def floored(data, floor, stated):
+    """Return the tables with smaller stated uncertainties, and noise of these and a floor."""
+    rows, rng = data.measurements, np.random.default_rng(0)
+    before = rows["sx"].to_numpy()
+    assert (np.hypot(stated, floor) >= before).all()
+    missing = np.sqrt(stated**2 + floor**2 - before**2)
+    noise = missing * rng.standard_normal((2, len(rows)))
+    return replace(
+        data,
+        measurements=rows.assign(
+            sx=stated, sy=stated, nx=rows["nx"] + noise[0], ny=rows["ny"] + noise[1]
+        ),
+    )
+
+
+@pytest.mark.parametrize("scale", [False, True], ids=["alone", "with-scale"])
+def test_floor_of_the_noise_is_recovered(small_orbit, scale):
+    data, floor = small_orbit.data, 0.02
+    stated = np.random.default_rng(1).uniform(0.005, 0.05, len(data.measurements))
+    data = floored(data, floor, stated)
+    settings = FitSettings(noise_floor=True, noise_scale=scale)
+    result = fit_orbit(data, small_orbit.instrument, settings)
+    noise = result.summary["noise"]
+    assert noise["converged"]
+    assert noise["floor_pix"] == pytest.approx(floor, abs=4.0 * noise["floor_sigma_pix"])
+    assert noise["floor_sigma_pix"] < 0.1 * floor
+    assert result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.15)
+    if scale:
+        factor, sigma = factor_of(result, "all")
+        assert np.log(factor) == pytest.approx(0.0, abs=4.0 * sigma)
+    else:
+        expected = np.hypot(stated, noise["floor_pix"])
+        np.testing.assert_allclose(result.residuals["sx"], expected)
+
+
+def test_no_floor_is_found_where_there_is_none(small_orbit):
+    noise = fit_orbit(
+        small_orbit.data, small_orbit.instrument, FitSettings(noise_floor=True)
+    ).summary["noise"]
+    assert noise["converged"]
+    assert noise["floor_pix"] < 3.0 * noise["floor_sigma_pix"]
+    assert 0.0 < noise["floor_sigma_pix"] < 0.5 * small_orbit.data.measurements["sx"].iloc[0]
+
+
+def test_a_floor_and_a_factor_of_equal_uncertainties_are_refused(small_orbit):
+    data, settings = small_orbit.data, FitSettings(noise_floor=True, noise_scale=True)
+    equal = replace(data, measurements=data.measurements.assign(sx=0.01, sy=0.01))
+    with pytest.raises(InputError, match="a floor does what a factor does"):
+        fit_orbit(equal, small_orbit.instrument, settings)

@@ -60,6 +60,12 @@ class Surveys:
             _make_noisy(measurement_path(directory, orbit), 0.01 * orbit, random)
         return _fitted(directory, "default", FitSettings())
 
+    @cached_property
+    def trending(self) -> SurveyRun:
+        """The same survey with a distortion that changes from orbit to orbit."""
+        settings = replace(_SKY, defects=("distortion-trend=0.3um",))
+        return _fitted(self._simulated("trending", settings), "default", FitSettings())
+
     def counted(self, settings: SurveySettings) -> SurveyTables:
         """Return a survey with the numbers of orbits of its sources, without a fit."""
         directory = self._simulated("counted", settings)
@@ -137,5 +143,6 @@ SURVEYS: Mapping[str, SurveyPair] = {
     "error-by-count": _RUNS,
     "reference-scatter": _RUNS,
     "motion-pulls": _RUNS,
+    "calibration-trends": (_RUNS[0], lambda s: survey_tables(s.trending)),
 }
 SOURCES: Mapping[str, SourcePair] = {"sky-track": _SOURCES, "time-series": _SOURCES}

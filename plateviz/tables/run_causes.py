@@ -20,7 +20,7 @@ _LARGE_SHARE = 0.5
 _MOST_NAMED = 8
 _MIN_ORBITS_OF_SOURCE = 4
 # Tests of what orbits find, which say less than the causes that orbits name.
-_OF_ORBITS = ("together", "care", "bad")
+_OF_ORBITS = ("together", "care", "bad", "orbit")
 
 
 class Case(NamedTuple):
@@ -196,6 +196,23 @@ def _share(case: Case) -> Cause:
     )
 
 
+def _orbit(case: Case) -> Cause:
+    (orbit,) = case.test.what
+    rows = case.tables.orbit_tests
+    worst = rows[rows["orbit_id"] == orbit].nlargest(1, "sigma")["name"].iloc[0]
+    return Cause(
+        "flawed-orbit",
+        f"orbit {orbit} has a flaw",
+        f"Its test “{worst}” is the furthest off in the whole run, {case.test.statistic:.1f} "
+        f"sigma, expected {case.test.expected:.1f}.",
+        float(case.test.sigma),
+        "It spoils this orbit, and by its weight the means over all.",
+        f"read the verdict of orbit {orbit}, and fit it anew or leave it out",
+        (),
+        False,
+    )
+
+
 def _scatter(case: Case) -> Cause:
     is_reference = "reference" in case.test.name
     name = id_strings(pd.Series(case.test.what, dtype=np.int64)).iloc[0]
@@ -222,5 +239,6 @@ _WORDS: dict[str, Callable[[Case], Cause]] = {
     "together": _together,
     "care": _share,
     "bad": _share,
+    "orbit": _orbit,
     "scatter": _scatter,
 }

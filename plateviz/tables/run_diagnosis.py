@@ -75,6 +75,7 @@ def diagnose_run(motions: pd.DataFrame, tables: RunTests) -> RunDiagnosis:
     tests = [
         *_shares(states),
         *_together(tables.orbit_tests),
+        *_furthest_orbit(tables.orbit_tests),
         *(trend.test for trend in trends),
         *_zonal(tables.zonal),
         *_sources(motions),
@@ -131,6 +132,18 @@ def _together(orbit_tests: pd.DataFrame) -> list[Test]:
             )
         )
     return tests
+
+
+def _furthest_orbit(orbit_tests: pd.DataFrame) -> list[Test]:
+    """Return the test of the most significant one of all tests of all orbits."""
+    if orbit_tests["orbit_id"].nunique() < _LEAST_ORBITS:
+        return []
+    worst = orbit_tests.loc[orbit_tests["sigma"].idxmax()]
+    sigma, count = float(worst["sigma"]), len(orbit_tests)
+    chance = of_many(log_chance_normal(sigma), count)
+    expected = sigmas(float(np.log(0.5 / count)))
+    orbit, name = (int(worst["orbit_id"]),), "orbit that is furthest off"
+    return [Test(name, "orbit", orbit, sigma, expected, 0.4, chance, sigmas(chance))]
 
 
 def _zonal(zonal: pd.DataFrame) -> list[Test]:

@@ -48,9 +48,10 @@ RIGHT = {
     "zonal-errors=0.3mas": ("zonal-errors",),
     "zonal-errors=0.5mas": ("zonal-errors",),
     "zonal-errors=1mas": ("zonal-errors",),
-    "distortion-trend=10nm": ("calibration-trend",),
     "distortion-trend=30nm": ("calibration-trend",),
+    "distortion-trend=100nm": ("calibration-trend",),
     "focal-trend=3000ppm": ("calibration-trend",),
+    "focal-trend=6000ppm": ("calibration-trend",),
     "distortion-drift=30nm": ("distortion-drifts", "weak-in-each-orbit"),
     "distortion-orbital=30nm": ("distortion-oscillates", "weak-in-each-orbit"),
     "distortion-step=30nm": ("distortion-steps", "weak-in-each-orbit"),
@@ -147,7 +148,7 @@ def table(trials: Sequence[Trial], folder: Path) -> str:
 
 
 def parse_arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--clean", type=int, default=20, help="runs without a defect")
     parser.add_argument("--repeats", type=int, default=2, help="runs of each defect")
     parser.add_argument("--only", nargs="*", help="defects as NAME=AMPLITUDE; all by default")

@@ -9,9 +9,11 @@ import pytest
 
 from plateviz import plots, tables
 from plateviz.figures.bokeh_figure import BokehFigure
+from plateviz.tables.calibration_trends import calibration_trends
 from solver.simulate.settings import SurveySettings
 from solver.simulate.true_calibration import true_calibration
 from tests.plateviz.linear_stars import N_STARS, LinearStars
+from tests.plateviz.run_tables import calibrations
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +131,10 @@ def survey_drawings(survey, errors_by_count):
             tables.reference_scatter(survey.motions),
         ),
         "motion_pulls": (plots.plot_motion_pulls, tables.motion_pulls(survey.motions)),
+        "calibration_trends": (
+            plots.plot_calibration_trends,
+            calibration_trends(calibrations(0.2)),
+        ),
         "orbit_health": (plots.plot_orbit_health, tables.orbit_health(survey.orbits)),
         "sky_track": (plots.plot_sky_track, tables.sky_track(*survey.source("reference"))),
         "time_series": (plots.plot_time_series, tables.time_series(*survey.source("reference"))),

@@ -42,7 +42,7 @@ def fit_as(monkeypatch, fit_result):
 
     def replace(fit):
         monkeypatch.setattr(dask_workers, "_fit", fit)
-        monkeypatch.setattr(fit_survey, "_gather", lambda _: None)
+        monkeypatch.setattr(fit_survey, "gather", lambda _: None)
         monkeypatch.setattr(fit_survey, "close_run", lambda _: None)
 
     return replace

@@ -62,7 +62,7 @@ def fits(monkeypatch, fit_result):
         run.keep(orbit, result, fit_result.sources[["source_id"]])
 
     monkeypatch.setattr(dask_workers, "_fit", fit)
-    monkeypatch.setattr(fit_survey, "_gather", lambda _: None)
+    monkeypatch.setattr(fit_survey, "gather", lambda _: None)
     return refused
 
 

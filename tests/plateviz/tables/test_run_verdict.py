@@ -7,72 +7,7 @@ import pytest
 from plateviz.tables.run_diagnosis import RunTests, diagnose_run, no_tests
 from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.verdict import as_plain
-from solver.data.run_schema import FIELD_DEGREES, ORBIT_CAUSES, ZONAL_FIELD
-
-N_ORBITS = 40
-GOOD = {"state": "good", "name": "", "title": "", "significance": 0.0, "spoils": "", "action": ""}
-DRIFTS = {
-    "state": "bad",
-    "name": "distortion-drifts",
-    "title": "the distortion drifts",
-    "significance": 6.0,
-    "spoils": "It spoils the positions, by up to 0.3 mas rms.",
-    "action": "let the distortion drift in the fit",
-}
-
-
-def causes(n_drifting=0):
-    rows = [
-        {
-            **(DRIFTS if orbit < n_drifting else GOOD),
-            "orbit_id": orbit,
-            "options": "--drift 2" if orbit < n_drifting else "",
-            "is_large": orbit < n_drifting,
-        }
-        for orbit in range(N_ORBITS)
-    ]
-    return pd.DataFrame(rows)[ORBIT_CAUSES.names]
-
-
-def orbit_tests(shift=0.0, seed=1):
-    """Chances of five tests in all orbits, of which one is more significant by `shift`."""
-    random = np.random.default_rng(seed)
-    sigma = np.abs(random.standard_normal((N_ORBITS, 5)) + [shift, 0, 0, 0, 0])
-    names = ["noise", "exposures", "sources", "shift of a detector, 1", "reference stars, all, α"]
-    return pd.DataFrame(
-        {
-            "orbit_id": np.repeat(np.arange(N_ORBITS), 5),
-            "name": names * N_ORBITS,
-            "sigma": sigma.ravel(),
-        }
-    )
-
-
-def calibrations(slope=0.0):
-    random = np.random.default_rng(2)
-    orbits = np.arange(N_ORBITS)
-    values = random.standard_normal((N_ORBITS, 3)) + slope * orbits[:, None] * [0.0, 1.0, 0.0]
-    table = pd.DataFrame(
-        {
-            "orbit_id": np.repeat(orbits, 3),
-            "epoch": np.repeat(61_800.0 + 10.0 * orbits, 3),
-            "position_angle": np.repeat(np.where(orbits % 10 < 5, 58.0, 238.0), 3),
-            "label": ["A 2 0", "A 1 1", "A 0 2"] * N_ORBITS,
-            "value": values.ravel(),
-        }
-    )
-    return table.assign(group="distortion, degree 2", unit="um")
-
-
-def zonal(chi2):
-    """A field of 12 tested directions."""
-    degrees = np.array(FIELD_DEGREES * 2)
-    columns = {"axis": ["ra"] * 10 + ["dec"] * 10, "coefficient": 0.1}
-    columns |= {"degree_ra": degrees[:, 0], "degree_dec": degrees[:, 1]}
-    columns |= {f"scatter_{number:02d}": 0.01 for number in range(20)}
-    columns |= {"centre_ra": 266.0, "centre_dec": -29.0, "half_ra": 0.5, "half_dec": 0.5}
-    columns |= {"chi2": chi2, "dof": 12.0, "rms": 0.4, "typical": 0.15}
-    return pd.DataFrame(columns)[ZONAL_FIELD.names]
+from tests.plateviz.run_tables import N_ORBITS, calibrations, causes, orbit_tests, zonal
 
 
 def tables(**changes):
@@ -102,8 +37,9 @@ def test_good_run_is_trusted_with_all_its_tests(good):
     verdict = judged(good)
     assert (verdict.state, verdict.headline) == ("good", "This run can be trusted.")
     assert not verdict.causes
-    # Two shares, five tests of the orbits, trend and jump, smooth errors, two kinds of source.
-    assert len(verdict.tests) == 12
+    # Two shares, five tests of the orbits and the furthest, trend and jump, smooth errors, and two
+    # kinds of source.
+    assert len(verdict.tests) == 13
     assert not any(test.is_found for test in verdict.tests)
     assert any("0.15 mas along each axis" in sentence for sentence in verdict.reasons)
 
@@ -135,6 +71,27 @@ def test_single_bad_orbit_is_named_but_no_flaw_of_the_run(good):
     verdict = judged(good, orbit_causes=causes(1))
     assert verdict.state == "good"
     assert "Solutions not to be trusted: orbit 0." in verdict.notable
+
+
+def test_orbit_that_is_far_off_is_named(good):
+    tests = orbit_tests()
+    tests.loc[tests["orbit_id"] == 7, "sigma"] = [9.0, 1.0, 1.0, 1.0, 1.0]
+    verdict = judged(good, orbit_tests=tests)
+    assert verdict.state == "warn"
+    assert "flawed-orbit" in [cause.name for cause in verdict.causes]
+    (cause,) = (one for one in verdict.causes if one.name == "flawed-orbit")
+    assert cause.title == "orbit 7 has a flaw"
+    assert "“noise”" in cause.words
+
+
+def test_number_far_off_in_one_of_many_orbits_is_chance(good):
+    orbits, motions = good
+    row = orbits.index[3]
+    off = orbits.copy()
+    off.loc[row, "normalised_deviation_ra"] *= 1.5
+    verdict = run_verdict(off, motions, tables())
+    assert verdict.state == "good"
+    assert any("far from their expected values" in sentence for sentence in verdict.notable)
 
 
 def test_weak_flaw_of_all_orbits_is_seen_in_all_together(good):

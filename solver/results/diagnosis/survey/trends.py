@@ -28,6 +28,7 @@ class Series(NamedTuple):
     Attributes
     ----------
     group : its name
+    orbits : orbit_id
     labels, units : of the parameters
     time : from -1 to 1
     season : 1 where the position angle is that of the first orbit, else -1; 0 if all are alike
@@ -35,6 +36,7 @@ class Series(NamedTuple):
     """
 
     group: str
+    orbits: tuple[int, ...]
     labels: tuple[str, ...]
     units: tuple[str, ...]
     time: Float[np.ndarray, " orbit"]
@@ -72,6 +74,7 @@ def all_series(calibrations: pd.DataFrame) -> Iterator[Series]:
         half = max(0.5 * float(np.ptp(epochs)), 1e-9)
         yield Series(
             str(group),
+            tuple(int(orbit) for orbit in table.index),
             tuple(map(str, table.columns)),
             tuple(units),
             (epochs - 0.5 * (epochs.max() + epochs.min())) / half,

@@ -90,15 +90,17 @@ def zonal_test(
     chi2, dof = float(deviates @ deviates), int(tested.sum())
     chance = log_chance(chi2, float(dof))
     square = max((chi2 - dof) / float(information.sum()), 0.0)
-    # The most likely field, if all are expected to be as large as this one is.
-    shrunk = square * np.sqrt(information) / (1.0 + square * information)
+    typical = _half_seen(dof) / float(information.sum())
+    # The most likely field, if one of this size, or one that could just be seen, is expected.
+    size = max(square, typical)
+    shrunk = size * np.sqrt(information) / (1.0 + size * information)
     return Zonal(
         chi2,
         dof,
         chance,
         sigmas(chance),
         float(np.sqrt(square)),
-        float(np.sqrt(_half_seen(dof) / information.sum())),
+        float(np.sqrt(typical)),
         directions @ (shrunk * deviates),
         directions * shrunk,
         half_width,

@@ -1,0 +1,26 @@
+"""Table of the trends of a run's calibration."""
+
+import numpy as np
+import pytest
+
+from plateviz.tables.calibration_trends import calibration_trends
+from tests.plateviz.run_tables import N_ORBITS, calibrations
+
+
+def test_trend_is_that_of_the_parameter_that_changes_most():
+    table = calibration_trends(calibrations(0.2))
+    assert set(table["group"]) == {"distortion, degree 2"}
+    assert set(table["label"]) == {"A 1 1"}
+    assert len(table) == N_ORBITS
+    assert table["change"].iloc[0] == pytest.approx(0.2 * (N_ORBITS - 1), rel=0.2)
+    assert np.ptp(table["trend"]) == pytest.approx(table["change"].iloc[0])
+    assert table["offset"].mean() == pytest.approx(0.0, abs=1e-12)
+    assert table["scatter"].iloc[0] == pytest.approx(1.0, rel=0.3)
+    assert table["sigma"].iloc[0] > 5.0
+    assert set(table["season"]) == {1, -1}
+
+
+def test_no_or_few_orbits_have_no_trends():
+    table = calibrations()
+    assert calibration_trends(table.iloc[:0]).empty
+    assert calibration_trends(table[table["orbit_id"] < 5]).empty

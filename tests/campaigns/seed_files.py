@@ -196,7 +196,7 @@ def make_run(folder: Path, orbit: OrbitData, complete: bool = True) -> Run:
             source_id=FIRST_ID + np.arange(N_SOURCES), orbit_id=number
         )
         summary = {**result.summary, "epoch_mjd": 62000.0 + number, "iterations": 3}
-        run.keep(number, replace(result, settings=settings, summary=summary), history)
+        run.keep(number, replace(result, settings=settings, summary=summary), {"history": history})
     if complete:
         _gather(run, random)
         run.mark_complete()

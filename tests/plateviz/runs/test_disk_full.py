@@ -143,7 +143,7 @@ def test_run_that_was_killed_while_it_began_is_begun(survey_folder):
 
 def test_failure_of_an_orbit_that_was_fitted_since_is_removed(survey_folder, fit_result):
     run = begin_run(survey_folder, "failed", SETTINGS)
-    run.keep(1, fit_result, fit_result.sources)
+    run.keep(1, fit_result, {"history": fit_result.sources})
     run.keep_failure(1, "killed before this was removed")
     run.remove_abandoned()
     assert run.failures() == {}

@@ -51,7 +51,7 @@ def made(results, fitted_survey):
     begin_run(fitted_survey, "default", FitSettings())
     run = Run(fitted_survey, "default")
     for orbit, result in results.items():
-        run.keep(orbit, result, history_of(result, orbit))
+        run.keep(orbit, result, {"history": history_of(result, orbit)})
     return run
 
 

@@ -62,7 +62,7 @@ def test_failure_is_recorded_until_the_orbit_is_fitted(survey_folder, fit_result
     run = begin_run(survey_folder, "failing", FitSettings())
     run.keep_failure(1, "orbit 1: no light")
     assert run.failures() == {1: "orbit 1: no light"}
-    run.keep(1, fit_result, fit_result.sources)
+    run.keep(1, fit_result, {"history": fit_result.sources})
     assert run.failures() == {}
     assert run.complete_orbits() == [1]
 
@@ -72,7 +72,7 @@ def test_what_is_written_is_counted(survey_folder, fit_result):
     n_orbits = len(survey_orbits(survey_folder))
     assert SurveyRun(run).written() == Written(n_orbits, 0, 0, False, False)
     run.keep_failure(1, "orbit 1: no light")
-    run.keep(0, fit_result, fit_result.sources)
+    run.keep(0, fit_result, {"history": fit_result.sources})
     assert SurveyRun(run).written() == Written(n_orbits, 1, 1, False, False)
 
 

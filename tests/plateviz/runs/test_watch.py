@@ -59,7 +59,7 @@ def fits(monkeypatch, fit_result):
             reason = refused[orbit]
             raise FitError(reason() if callable(reason) else reason)
         result = with_verdict(replace(fit_result, provenance=read.provenance))
-        run.keep(orbit, result, fit_result.sources[["source_id"]])
+        run.keep(orbit, result, {"history": fit_result.sources[["source_id"]]})
 
     monkeypatch.setattr(dask_workers, "_fit", fit)
     monkeypatch.setattr(fit_survey, "gather", lambda _: None)

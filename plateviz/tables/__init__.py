@@ -6,6 +6,7 @@ if it is None.
 """
 
 from plateviz.tables.calibration import calibration_tables, distortion
+from plateviz.tables.calibration_trends import calibration_trends
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.convergence import convergence, loss_excess
 from plateviz.tables.detector_shifts import (
@@ -90,6 +91,7 @@ __all__ = [
     "TrackStatistics",
     "binned_vectors",
     "calibration_tables",
+    "calibration_trends",
     "comparison",
     "convergence",
     "correlation_statistics",

@@ -25,6 +25,8 @@ from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
 # Measurements from which the covariance is computed, and exposures of each field.
 _MOST_ROWS, _LEAST_EXPOSURES = 12_000, 4
 _ARCSEC_RAD, _PPM = np.pi / 180.0 / 3600.0, 1e-6
+# Of sums of weights, relative.
+_ROUNDING = 1e-9
 # Directions of which the fit leaves less than this share are not tested.
 _LEAST_LEFT = 0.02
 # Highest degree of a distortion.
@@ -148,7 +150,9 @@ def _subset(rows: Rows, camera: Camera, n_sources: int) -> tuple[Rows, float]:
         of_field = np.flatnonzero(camera.field == field)
         count = min(max(each, _LEAST_EXPOSURES), len(of_field))
         for group in np.array_split(of_field, count):
-            heaviest = group[np.argmax(of_exposure[group])]
+            # The first of equal ones: their sums differ by rounding, with the order of the rows.
+            is_heavy = of_exposure[group] >= (1.0 - _ROUNDING) * of_exposure[group].max()
+            heaviest = group[np.argmax(is_heavy)]
             factor[heaviest] = of_exposure[group].sum() / max(of_exposure[heaviest], 1e-300)
     some = rows.of(np.flatnonzero(factor[rows.exposure] > 0.0))
     some = some._replace(weight=some.weight * factor[some.exposure])

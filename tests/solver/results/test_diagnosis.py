@@ -88,9 +88,14 @@ def test_covariance_of_patterns_is_that_of_the_whole_problem(small_orbit, proble
     "causes",
     [
         {"drift": 3, "drift_in_time": 2, "focal_anisotropy": True},
-        {"breathing": 3, "detector_motion": True},
-        {"field_distortion": 2, "charge_transfer": True, "magnitude_shift": True},
-        {"detector_distortion": 3, "pixel_phase": True},
+        *(
+            pytest.param(causes, marks=pytest.mark.full)
+            for causes in (
+                {"breathing": 3, "detector_motion": True},
+                {"field_distortion": 2, "charge_transfer": True, "magnitude_shift": True},
+                {"detector_distortion": 3, "pixel_phase": True},
+            )
+        ),
     ],
     ids=lambda causes: next(iter(causes)),
 )

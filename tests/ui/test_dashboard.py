@@ -141,7 +141,8 @@ def test_what_is_drawn_keeps_its_layout(walked):
     for name in ("footprint", "weak-directions", "deviation"):
         see(walked, name)
     assert rests(walked)
-    assert metric("LayoutCount") - before < 200
+    # Some two hundred: a few for each card, and those of the page while it is turned.
+    assert metric("LayoutCount") - before < 300
     # What asks for a layout meanwhile is laid out with the page, once for a picture.
     assert walked.evaluate(LAYOUTS_OF_TEN) == [0, 1]
 

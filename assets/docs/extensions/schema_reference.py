@@ -48,6 +48,7 @@ _AXES: dict[Axis, str] = {
     "breathing": "term, cosine and sine",
     "field": "term and field",
     "own": "term and detector",
+    "walk": "term and exposure",
     "det": "detector",
     "motion": "detector and field",
 }

@@ -192,6 +192,13 @@ def _survey_instrument(folder: Path) -> Values:
     return {"instrument": SurveyFolder(str(folder)).read_instrument()}
 
 
+class _Judge:
+    """Has judged every solution; of a page's solutions the campaign reads no verdict."""
+
+    def has_judged(self, _: object) -> bool:
+        return True
+
+
 class _Store:
     """The store of a dashboard over a run, without a solver."""
 
@@ -202,6 +209,7 @@ class _Store:
         self.orbits = self.origin.orbits()
         self.instrument = self.origin.read_instrument()
         self.made, self.kept = MadeSolutions(), KeptSolutions(self.origin.solutions)
+        self.judge = _Judge()
 
     def runs(self) -> list[SurveyRun]:
         return survey_runs(Path(self.origin.directory))

@@ -27,8 +27,8 @@ expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
 
 N_ORBITS = 3
-# They ask for more orbits of a source than a small survey has.
-EMPTY = {"reference-scatter", "motion-pulls"}
+# They ask for more orbits, or for more of a source, than a small survey has.
+EMPTY = {"reference-scatter", "motion-pulls", "calibration-trends"}
 
 # Rows of the longest data source of each figure that is drawn, words apart, by its name.
 ROWS = f"""() => {{ {VIEWS}

@@ -66,6 +66,9 @@ class FakeRun:
     def counts(self):
         return self._survey.motions[list(SOURCE_COUNTS)]
 
+    def test_table(self, name):
+        return None
+
     def motion(self, source_id):
         rows = self._survey.motions
         found = rows[rows["source_id"] == source_id]

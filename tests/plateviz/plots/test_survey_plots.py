@@ -7,8 +7,10 @@ import pytest
 from plateviz import plots, tables
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.style import ROW_LIMIT
+from plateviz.tables.run_diagnosis import no_tests
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from tests.plateviz.plots.drawn import plots_of, subtitle_of
+from tests.plateviz.run_tables import calibrations
 
 
 @pytest.mark.parametrize("name", ["reference_scatter", "sky_track", "time_series"])
@@ -224,8 +226,9 @@ def test_source_of_few_orbits_is_drawn(survey, number):
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_gallery_draws_every_figure_of_a_survey(survey, errors_by_count, theme):
+    tests = no_tests()._replace(calibrations=calibrations(0.2))
     full = SurveyTables(
-        survey.orbits, survey.motions, survey.catalogue, survey.truth, errors_by_count
+        survey.orbits, survey.motions, survey.catalogue, survey.truth, errors_by_count, tests=tests
     )
     bare = SurveyTables(survey.orbits, survey.motions.head(0), survey.catalogue)
     for figure in survey_figures():

@@ -33,8 +33,8 @@ class FakeRun:
         self._result = replace(result, settings=self._settings)
         self.survey = Path("sky")
         self.n_fitted = 2 if is_complete else 1
-        self.read, self.expected = [], []
-        self.also_written = {}
+        self.read, self.expected, self.also_written = [], [], {}
+        self.test_table = lambda _: None
 
     def header(self):
         return {"settings": self._settings.to_dict()}
@@ -65,9 +65,6 @@ class FakeRun:
 
     def counts(self):
         return self._survey.motions[list(SOURCE_COUNTS)]
-
-    def test_table(self, name):
-        return None
 
     def motion(self, source_id):
         rows = self._survey.motions

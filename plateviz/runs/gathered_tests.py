@@ -51,7 +51,10 @@ def write_test_tables(run: Run) -> None:
     ]
     tests, causes = [], []
     for orbit, summary in summaries.items():
-        verdict = summary.get("verdict") or {}
+        # Orbits of older versions have none: they are not known to be good.
+        verdict = summary.get("verdict")
+        if not verdict:
+            continue
         for test in verdict.get("tests", []):
             tests.append({"orbit_id": orbit, "name": test["name"], "sigma": test["sigma"]})
         causes += [{"orbit_id": orbit, **row} for row in _causes(verdict)]
@@ -63,7 +66,7 @@ def write_test_tables(run: Run) -> None:
 
 def _causes(verdict: dict) -> Iterator[dict]:
     """Yield the causes of an orbit's verdict, or one row without a cause."""
-    state = str(verdict.get("state", "good"))
+    state = str(verdict["state"])
     causes = verdict.get("causes") or [{**_NO_CAUSE, "options": (), "is_large": False}]
     for cause in causes:
         plain = {name: cause[name] for name in ORBIT_CAUSES.names if name in cause}

@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.special import bdtrc, chdtrc, chdtri
+from scipy.special import chdtrc, chdtri
 
 from solver.data.run_schema import RUN_TABLES
 from solver.results.diagnosis.rate import (
     discoveries,
     log_chance,
+    log_chance_binomial,
     log_chance_normal,
     of_many,
     sigmas,
@@ -94,8 +95,7 @@ def _shares(states: pd.Series) -> list[Test]:
 
 
 def _share(name: str, subject: str, count: int, total: int, rate: float) -> Test:
-    with np.errstate(divide="ignore"):
-        chance = float(np.log(bdtrc(count - 1, total, rate))) if count else 0.0
+    chance = log_chance_binomial(count, total, rate)
     scatter = float(np.sqrt(total * rate * (1.0 - rate)))
     return Test(name, subject, (), count, total * rate, scatter, chance, sigmas(chance))
 

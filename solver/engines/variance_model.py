@@ -83,7 +83,7 @@ class VarianceModel(NamedTuple):
         squares, expected = (found.whitened**2).sum(axis=1), 2.0 - found.trace
         columns = self._derivatives(at)
         information = columns.T @ (expected[:, None] * columns)
-        _check_distinct(information)
+        self._check_distinct(information)
         right = columns.T @ (squares - expected)
         raw = np.linalg.solve(information, right)
         if self.has_floor and at[-1] == 0.0 and raw[-1] < 0.0:
@@ -94,6 +94,22 @@ class VarianceModel(NamedTuple):
         bounded = np.clip(raw[:count], np.expm1(-_MAX_STEP), np.expm1(_MAX_STEP))
         moved = np.append(np.log1p(bounded), np.maximum(raw[count:], -at[count:]))
         return moved, np.sqrt(2.0 * np.diag(np.linalg.inv(information)))
+
+    def _check_distinct(self, information: Float[np.ndarray, "n n"]) -> None:
+        scale = np.sqrt(np.diag(information))
+        if scale.all() and not (
+            len(scale) and np.linalg.eigvalsh(information / np.outer(scale, scale))[0] < _INDISTINCT
+        ):
+            return
+        if self.has_floor:
+            raise InputError(
+                "noise floor: expected stated uncertainties that differ between measurements, "
+                "found the same for all, for which a floor does what a factor does; leave one of "
+                "them out"
+            )
+        raise InputError(
+            "noise by magnitude: expected stars of different magnitudes, found the same for all"
+        )
 
     def _unit(self) -> float:
         return float(np.mean(self.stated**2))
@@ -109,12 +125,3 @@ class VarianceModel(NamedTuple):
             return columns
         of_floor = (self._unit() / variance).mean(axis=1)
         return np.column_stack([columns, of_floor])
-
-
-def _check_distinct(information: Float[np.ndarray, "n n"]) -> None:
-    scale = np.sqrt(np.diag(information))
-    if len(scale) and np.linalg.eigvalsh(information / np.outer(scale, scale))[0] < _INDISTINCT:
-        raise InputError(
-            "noise floor: expected stated uncertainties that differ between measurements, found "
-            "the same for all, for which a floor does what a factor does; leave one of them out"
-        )

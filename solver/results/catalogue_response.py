@@ -30,6 +30,8 @@ from solver.model.directions import mean_direction, places_about
 from solver.problem.problem import Problem
 from solver.results.diagnostics import induced_shift
 
+# Fewer stars that are no reference stars do not say how the frame follows.
+_LEAST_STARS = 2 * len(FRAME_DEGREES)
 # Coefficients of the quadratic terms of the distortion along one axis.
 _QUADRATIC = 3
 
@@ -43,8 +45,14 @@ def sky_statistics(
     ----------
     reduced : the problem linearised at the solution
     result : the solution
+
+    Returns
+    -------
+    No tables if too few stars are no reference stars.
     """
     is_reference = problem.sources["is_reference"].to_numpy(bool)
+    if (~is_reference).sum() < _LEAST_STARS:
+        return {}
     references, precision = problem.sources[is_reference], problem.priors.precision
     centre = mean_direction(references["ra"].to_numpy(), references["dec"].to_numpy())
     at = places_about(centre, *problem.sources[["ra", "dec"]].to_numpy().T)

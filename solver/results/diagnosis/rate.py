@@ -1,7 +1,7 @@
 """Probabilities of a statistic by chance, in sigmas, and the rate of false discoveries."""
 
 import numpy as np
-from scipy.special import chdtrc, gammainc, gammaln, log_ndtr, ndtri_exp
+from scipy.special import bdtrc, chdtrc, gammainc, gammaln, log_ndtr, ndtri_exp
 
 # Larger chi2 are no more certain, and may be infinite.
 _LARGEST = 1e9
@@ -48,6 +48,18 @@ def log_chance_poisson(count: int, expected: float) -> float:
     return float(count * np.log(max(expected, 1e-300)) - expected - gammaln(count + 1.0))
 
 
+def log_chance_binomial(count: int, total: int, rate: float) -> float:
+    """Return the logarithm of the probability of `count` or more of `total` at a rate of each."""
+    if count <= 0:
+        return 0.0
+    chance = float(bdtrc(count - 1, total, rate))
+    if chance > 0.0:
+        return float(np.log(chance))
+    # The first term of the sum, far in the tail.
+    ways = gammaln(total + 1.0) - gammaln(count + 1.0) - gammaln(total - count + 1.0)
+    return float(ways + count * np.log(rate) + (total - count) * np.log1p(-rate))
+
+
 def sigmas(log_probability: float) -> float:
     """Return the distance in sigmas at which a unit normal value has this two-sided chance."""
     if log_probability >= 0.0:
@@ -72,7 +84,7 @@ def discoveries(log_probabilities: np.ndarray, rate: float) -> np.ndarray:
     ----------
     log_probabilities : of each test by chance; NaN where a test could not be made
     """
-    known = np.flatnonzero(np.isfinite(log_probabilities))
+    known = np.flatnonzero(~np.isnan(log_probabilities))
     order = known[np.argsort(log_probabilities[known])]
     limits = np.log(rate * np.arange(1, len(order) + 1) / max(len(order), 1))
     below = np.flatnonzero(log_probabilities[order] <= limits)

@@ -84,6 +84,15 @@ def test_orbit_that_is_far_off_is_named(good):
     assert "“noise”" in cause.words
 
 
+def test_number_far_off_in_an_orbit_without_a_verdict_is_a_fault(good):
+    orbits, motions = good
+    off = orbits.copy()
+    off.loc[off.index[3], "normalised_deviation_ra"] *= 1.5
+    known = causes()
+    known = known[known["orbit_id"] != off["orbit_id"].iloc[3]]
+    assert run_verdict(off, motions, tables(orbit_causes=known)).state == "bad"
+
+
 def test_number_far_off_in_one_of_many_orbits_is_chance(good):
     orbits, motions = good
     row = orbits.index[3]

@@ -106,6 +106,12 @@ def test_noise_by_magnitude_needs_magnitudes(small_orbit):
         fit_orbit(small_orbit.data, small_orbit.instrument, FitSettings(noise_by_magnitude=True))
 
 
+def test_noise_by_magnitude_needs_magnitudes_that_differ(small_orbit):
+    data = replace(small_orbit.data, catalogue=small_orbit.data.catalogue.assign(magnitude=14.0))
+    with pytest.raises(InputError, match="expected stars of different magnitudes"):
+        fit_orbit(data, small_orbit.instrument, FitSettings(noise_by_magnitude=True))
+
+
 def floored(data, floor, stated):
     """Return the tables with smaller stated uncertainties, and noise of these and a floor."""
     rows, rng = data.measurements, np.random.default_rng(0)

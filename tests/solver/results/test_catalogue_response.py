@@ -113,6 +113,20 @@ def test_covariance_of_the_noise_is_one(statistics):
     assert values.min() > -1e-6 * values.max()
 
 
+def test_orbit_of_reference_stars_alone_has_none(small_orbit):
+    data = small_orbit.data
+    is_reference = data.catalogue["is_reference"].to_numpy(bool)
+    known = data.catalogue.loc[is_reference, "source_id"]
+    of_known = data.measurements["source_id"].isin(known)
+    few = replace(
+        data,
+        catalogue=data.catalogue[is_reference].reset_index(drop=True),
+        measurements=data.measurements[of_known].reset_index(drop=True),
+    )
+    fitter = OrbitFitter(few, small_orbit.instrument)
+    assert fitter.sky_statistics(fitter.fit(SETTINGS.with_(order=1))) == {}
+
+
 def test_orbit_without_quadratic_terms_has_fewer_statistics(small_orbit):
     _, found = fitted(small_orbit, settings=SETTINGS.with_(order=1))
     counts = found["sky_statistics"]["kind"].value_counts()

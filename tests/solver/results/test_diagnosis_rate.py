@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from solver.results.diagnosis.rate import discoveries, log_chance, of_many, sigmas
+from solver.results.diagnosis.rate import (
+    discoveries,
+    log_chance,
+    log_chance_binomial,
+    of_many,
+    sigmas,
+)
 
 
 @pytest.mark.parametrize(("chi2", "dof"), [(3.0, 2.0), (40.0, 6.0), (600.0, 30.0)])
@@ -30,6 +36,13 @@ def test_sigmas_are_those_of_a_normal_value():
 def test_most_extreme_of_many_is_less_rare():
     assert np.exp(of_many(np.log(0.01), 5)) == pytest.approx(1.0 - 0.99**5)
     assert of_many(-100.0, 10) == pytest.approx(-100.0 + np.log(10.0))
+
+
+def test_all_of_many_orbits_are_no_chance():
+    assert log_chance_binomial(2, 10, 0.1) == pytest.approx(np.log(1.0 - 0.9**10 - 0.9**9))
+    assert log_chance_binomial(200, 200, 0.02) == pytest.approx(200.0 * np.log(0.02))
+    # The most certain of all is a discovery.
+    assert discoveries(np.array([-np.inf, np.log(0.9)]), 0.02).tolist() == [True, False]
 
 
 def test_discoveries_follow_benjamini_and_hochberg():

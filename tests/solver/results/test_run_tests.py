@@ -236,3 +236,11 @@ def test_calibration_of_an_orbit_has_no_common_change_of_the_detectors(result):
     assert set(before["group"]) >= {"focal length", "distortion, degree 2", "distortion, degree 5"}
     assert not before.duplicated(["group", "label"]).any()
     np.testing.assert_allclose(after["value"], before["value"], rtol=2e-3, atol=1e-3)
+
+
+def test_position_angles_about_zero_have_their_mean_there(result):
+    table = result.calibration.copy()
+    of_angle = table["group"] == "position_angle"
+    table.loc[of_angle, "value"] = np.resize([359.9, 0.1], of_angle.sum())
+    angle = orbit_calibration(table, 3, 61_800.0)["position_angle"]
+    assert np.cos(np.radians(angle)).min() > 0.999

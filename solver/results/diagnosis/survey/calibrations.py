@@ -25,9 +25,11 @@ def orbit_calibration(calibration: pd.DataFrame, orbit: int, epoch: float) -> pd
     """
     groups = dict(iter(calibration.groupby("group")))
     parts = [*_focal_length(groups), *_distortion(groups), *_detectors(groups)]
-    angle = groups["position_angle"]["value"].to_numpy()
+    # The angles may lie on both sides of zero.
+    angle = np.radians(groups["position_angle"]["value"].to_numpy())
+    mean = np.degrees(np.arctan2(np.sin(angle).mean(), np.cos(angle).mean())) % 360.0
     return pd.concat(parts, ignore_index=True).assign(
-        orbit_id=orbit, epoch=epoch, position_angle=float(np.mean(angle))
+        orbit_id=orbit, epoch=epoch, position_angle=float(mean)
     )[CALIBRATIONS.names]
 
 

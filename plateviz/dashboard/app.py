@@ -250,7 +250,7 @@ class _Ticker:
             self._watched = job
             job.watch(self._call)
             self._start_looking()
-        is_pending = self._pages.is_pending or session.judging.is_pending
+        is_pending = self._pages.is_pending or session.judging.is_any_pending
         if is_pending and self._document is not None:
             # Another thread is at work, and would wait for a page that asks without a pause.
             self._is_to_tick = True

@@ -13,7 +13,10 @@ class Judging(param.Parameterized):
     A solution is shown before it is judged; what needs its verdict waits.
     """
 
-    is_pending = param.Boolean(default=False, doc="whether a solution is being judged")
+    is_pending = param.Boolean(
+        default=False, doc="whether the solution on the screen is being judged"
+    )
+    is_any_pending = param.Boolean(default=False, doc="whether either solution is being judged")
 
     def __init__(self, session: Any, judge: Judge) -> None:  # noqa: ANN401 it imports this module
         """Follow `shown` and `other` of `session`."""
@@ -23,6 +26,8 @@ class Judging(param.Parameterized):
 
     def look(self, *_: object) -> None:
         """Look whether the verdicts are there; called again and again while they are not."""
-        both = (self._session.shown, self._session.other)
-        has_verdict = [self._judge.has_judged(one.result) for one in both if one is not None]
-        self.is_pending = not all(has_verdict)
+        shown, other = (
+            one is not None and not self._judge.has_judged(one.result)
+            for one in (self._session.shown, self._session.other)
+        )
+        self.param.update(is_pending=shown, is_any_pending=shown or other)

@@ -97,10 +97,11 @@ def _of_solution(navigation: Navigation) -> PageCode:
         second = as_python(origin, other.orbit, other.settings, "other").removeprefix(PREAMBLE)
         python += [second, "solution = solution.compared_with(other)"]
     if workspace is OrbitWorkspace.EXPLORE:
-        python.append(_explored_as_python(navigation.exploration, "solution", session))
+        drawn = _explored_as_python(navigation.exploration, "solution", session)
     else:
-        python.append(figures_as_python("solution", calls))
-    words = [_about(navigation, f"the solution ({shown.settings.describe()})")]
+        drawn = figures_as_python("solution", calls)
+    python.append(drawn)
+    words = [_about(navigation, f"the solution ({shown.settings.describe()})", drawn)]
     words += [_OF_WHAT_IF] if _is_step(shown, other) else []
     words += [_OF_OTHER_ORBIT] if other is not None and not compared else []
     return PageCode(" ".join(words), "\n".join(commands), "\n".join(filter(None, python)))
@@ -123,7 +124,7 @@ def _of_run(
         options = (*options, *_explored(exploration))
         figures = _explored_as_python(exploration, variable, navigation.session)
     python = "\n".join(filter(None, [opened, figures]))
-    about = _about(navigation, f"what is shown of run {run.name}")
+    about = _about(navigation, f"what is shown of run {run.name}", figures)
     return PageCode(about, report_of_run(survey, run.name, *options), python)
 
 
@@ -141,12 +142,10 @@ def _explored_as_python(exploration: Exploration, variable: str, session: Sessio
     return explored_as_python(variable, exploration.table, columns, session.theme)
 
 
-def _about(navigation: Navigation, what: str) -> str:
+def _about(navigation: Navigation, what: str, drawn: str) -> str:
     title = title_of(navigation.workspace)
-    return (
-        f"These make {what} on the screen again and the figures of {title}, each in its own unit. "
-        "The report has all figures."
-    )
+    figures = f" and the figures of {title}, each in its own unit" if drawn else ""
+    return f"These make {what} on the screen again{figures}. The report has all figures."
 
 
 def _is_step(shown: Solution, other: Solution | None) -> bool:

@@ -1,10 +1,11 @@
 """Judge: verdicts on the solutions that pages show, made elsewhere, once for all pages."""
 
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 from weakref import finalize
 
 from plateviz.runs.scratch_result import is_judged_later
-from plateviz.tables.verdict import Verdict, is_judged, orbit_verdict
+from plateviz.tables.verdict import is_judged, orbit_verdict
 from solver.data.result import FitResult
 
 
@@ -19,7 +20,7 @@ class Judge:
         executor : runs what takes a while
         """
         self._executor = executor
-        self._begun: dict[int, Future[Verdict]] = {}
+        self._begun: dict[int, Future[None]] = {}
 
     def has_judged(self, result: FitResult) -> bool:
         """Return whether `orbit_verdict` takes no time any more; if not, somebody is at it.
@@ -33,6 +34,12 @@ class Judge:
             return True
         key = id(result)
         if key not in self._begun:
-            self._begun[key] = self._executor.submit(orbit_verdict, result)
+            self._begun[key] = self._executor.submit(_judge, result)
             finalize(result, self._begun.pop, key, None)
         return self._begun[key].done()
+
+
+def _judge(result: FitResult) -> None:
+    # What is wrong is raised again where the verdict is used; kept, it would hold the solution.
+    with suppress(Exception):
+        orbit_verdict(result)

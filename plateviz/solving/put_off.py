@@ -2,6 +2,9 @@
 
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
+
+from solver.errors import InputError
 
 # What such work needs is large: some 100 MB for the eigenmodes of a full orbit.
 _MOST = 2
@@ -21,16 +24,19 @@ class PutOff:
         self._waiting: deque[Work] = deque()
 
     def add(self, work: Work, *, is_next: bool = False) -> None:
-        """Put work off; if too much of its kind waits, do the oldest now.
+        """Put work off.
 
         Parameters
         ----------
         is_next : whether a page waits for it
         """
-        of_its_kind = self._next if is_next else self._waiting
-        of_its_kind.append(work)
-        if len(of_its_kind) > _MOST:
-            of_its_kind.popleft()()
+        (self._next if is_next else self._waiting).append(work)
+
+    def limit(self) -> None:
+        """Do the oldest now of what too much of its kind waits."""
+        for waiting in (self._next, self._waiting):
+            while len(waiting) > _MOST:
+                _do(waiting.popleft())
 
     def finish_next(self) -> None:
         """Do what a page waits for."""
@@ -44,4 +50,10 @@ class PutOff:
 
 def _finish(waiting: deque[Work]) -> None:
     while waiting:
-        waiting.popleft()()
+        _do(waiting.popleft())
+
+
+def _do(work: Work) -> None:
+    # A full disk is said where the solution is used, which does without, or by the next fit.
+    with suppress(InputError):
+        work()

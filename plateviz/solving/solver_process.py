@@ -43,6 +43,8 @@ from solver.simulate.survey import simulate_survey
 Send = Callable[[dict], None]
 # Work in steps that speeds up likely next requests; done while no request waits.
 Speculative = Iterator[None]
+# Seconds in which the next request of a hand on a slider comes, before the verdict is begun.
+_NEXT_S = 0.05
 # Idle seconds before speculative work starts. Meanwhile a browser draws the answer; where the two
 # share the cores, it would take a third longer.
 _IDLE_S = 1.0
@@ -100,14 +102,14 @@ def _next_request(
     requests: queue.Queue[Request | None], speculative: Speculative, put_off: PutOff
 ) -> Request | None:
     """Wait for a request; do what was put off and speculative work once the process is idle."""
-    if requests.empty():
-        put_off.finish_next()
-    try:
-        # A page that has received a solution may send a request, too.
-        return requests.get(timeout=_IDLE_S)
-    except queue.Empty:
-        pass
-    put_off.finish()
+    put_off.limit()
+    # A request that waits is sent once the one before is done, and a page that has received a
+    # solution may send one, too.
+    for seconds, work in ((_NEXT_S, put_off.finish_next), (_IDLE_S, put_off.finish)):
+        try:
+            return requests.get(timeout=seconds)
+        except queue.Empty:
+            work()
     for _ in speculative:
         if not requests.empty():
             break

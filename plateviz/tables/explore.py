@@ -118,8 +118,9 @@ class ExplorableTable(NamedTuple):
             sources = self.sources()
             return CodedItems(sources.ids.tolist(), sources.codes)
         names = ("field_id", "plate_id") if kind == "exposures" else ("detector_id",)
-        codes, items = pd.MultiIndex.from_arrays([self.read(name) for name in names]).factorize()
-        found = items.tolist()
+        rows = pd.DataFrame({name: self.read(name) for name in names})
+        codes = rows.groupby(list(names), sort=False).ngroup().to_numpy()
+        found = list(rows.drop_duplicates().itertuples(index=False, name=None))
         return CodedItems(found if kind == "exposures" else [one for (one,) in found], codes)
 
     def numbers(self, name: str) -> np.ndarray:

@@ -56,7 +56,7 @@ class CompareView(pn.viewable.Viewer):
         self._is_offering = False
         self._other.param.watch(self._choose, "value")
         self._session.param.watch(self._fill, ["shown", "other", "theme"])
-        self._session.judging.param.watch(self._fill, "is_pending")
+        self._session.judging.param.watch(self._fill, "is_any_pending")
         self._session.param.watch(self._offer, ["shown", "other"])
         self._session.journal.param.watch(self._offer, "made")
         navigation.param.watch(self._offer, ["run_name", "orbit_workspace"])
@@ -104,7 +104,7 @@ class CompareView(pn.viewable.Viewer):
             text = self._message or "Fit with other settings, or choose what to compare with."
             self._table.object = paragraph(text, "empty", session.theme)
             return
-        if session.judging.is_pending:
+        if session.judging.is_any_pending:
             self._table.object = paragraph(
                 "The solutions are being judged.", "empty", session.theme
             )

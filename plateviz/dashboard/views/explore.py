@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import panel as pn
 import panel_material_ui as pmui
+import param
 from astropy.table import Table
 
 from plateviz.dashboard.downloads import rows_of
@@ -124,8 +125,7 @@ class ExploreView(pn.viewable.Viewer):
         self._words = markup_pane()
         self._words.visible = False
         self._workspace = workspace(self.grid, self._controls())
-        names = list(self._exploration.param.values())
-        self._exploration.param.watch(self._change, names)
+        self._exploration.param.watch(self._change, list(self._exploration.param.values()))
         session.selection.param.watch(self._show_selected, [*KINDS])
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -227,10 +227,12 @@ class ExploreView(pn.viewable.Viewer):
         self._figure.change(self._session.theme)
         self._wake()
 
-    def _show_selected(self, *_: object) -> None:
+    def _show_selected(self, *events: param.parameterized.Event) -> None:
         """Mark what is selected among cells; points are marked by themselves."""
-        if self._drawn is not None and self._drawn.table.size > ROW_LIMIT:
-            self._redraw()
+        if (drawn := self._drawn) is not None and drawn.table.size > ROW_LIMIT:
+            kind = drawn.table.kind(drawn.chosen.selects)
+            if any(event.name == kind for event in events):
+                self._redraw()
 
     def _zoom(self, limits: tuple[Limits, Limits] | None) -> None:
         self._exploration.limits = limits

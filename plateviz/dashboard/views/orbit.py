@@ -144,14 +144,14 @@ class OrbitPage(pn.viewable.Viewer):
         )
 
     def _plot(self, diagnostic: Diagnostic) -> Figure | Pending | None:
-        if diagnostic.needs_verdict and self._session.judging.is_pending:
+        of_both = self._compare.figure if diagnostic is BOTH and self._compare else None
+        judging, needing = self._session.judging, of_both or diagnostic
+        if needing.needs_verdict and (judging.is_any_pending if of_both else judging.is_pending):
             return PENDING
         chosen = chosen_of(self._session)
         if chosen is None:
             return None
-        figure = diagnostic.plot(chosen)
-        if diagnostic is BOTH and self._compare is not None:
-            figure = figure_of_both(self._compare.figure, chosen)
+        figure = figure_of_both(of_both, chosen) if of_both else diagnostic.plot(chosen)
         return self._session.units.figure(figure)
 
     def _show_workspace(self, *_: object) -> None:

@@ -231,6 +231,9 @@ class SaveButton(pn.custom.JSComponent):
         message: dict[str, object] = {"text": f"{could_not}; the server's log says why."}
         try:
             with later.turn(wait):
+                if document is not None and document.session_context is None:
+                    # The page was closed while the file waited.
+                    return
                 made = later.make(progress)
             message = made._asdict()
         except InputError as error:

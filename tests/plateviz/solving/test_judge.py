@@ -1,6 +1,7 @@
 """Solutions are judged in another thread, once for all pages."""
 
 import gc
+import weakref
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 
@@ -64,7 +65,9 @@ def test_solution_whose_solver_has_ended_is_judged_here(fit_result, tmp_path, mo
     result = read_scratch_result(tmp_path / "result")
     assert not Judge(waiting).has_judged(result)
     ((work, arguments),) = waiting.waiting
-    assert work(*arguments) == orbit_verdict(with_verdict(fit_result))
+    work(*arguments)
+    assert is_judged(result)
+    assert orbit_verdict(result) == orbit_verdict(with_verdict(fit_result))
 
 
 def test_solution_that_cannot_be_judged_says_so_where_its_verdict_is_used(fit_result):
@@ -75,6 +78,12 @@ def test_solution_that_cannot_be_judged_says_so_where_its_verdict_is_used(fit_re
     assert judge.has_judged(broken)
     with pytest.raises(KeyError, match="order"):
         orbit_verdict(broken)
+    # Its fault does not keep it in memory.
+    reference = weakref.ref(broken)
+    del broken
+    gc.collect()
+    assert reference() is None
+    assert judge._begun == {}
 
 
 def test_judge_forgets_a_solution_that_nobody_shows(fit_result):

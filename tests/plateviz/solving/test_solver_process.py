@@ -1,10 +1,11 @@
 """Speculative work of the solver process, which gives way to requests."""
 
 import queue
+import threading
 
 import pytest
 
-from plateviz.solving import fitters
+from plateviz.solving import fitters, solver_process
 from plateviz.solving.fitters import fitter_of, prepare
 from plateviz.solving.origin import SurveyFolder, origin_to_dict
 from plateviz.solving.put_off import PutOff
@@ -63,10 +64,13 @@ def test_verdict_is_next_and_eigenmodes_are_when_idle(requests, monkeypatch):
     done, put_off = [], PutOff()
     put_off.add(lambda: done.append("eigenmodes"))
     put_off.add(lambda: done.append("verdict"), is_next=True)
-    requests.put({"job": "1"})
+    # The server sends the next request once it has heard that the one before is done.
+    monkeypatch.setattr(solver_process, "_NEXT_S", 20.0)
+    threading.Timer(0.02, requests.put, [{"job": "1"}]).start()
     _next_request(requests, iter(()), put_off)
     assert done == []
-    monkeypatch.setattr(requests, "get", lambda timeout: {"job": "2"})
+    monkeypatch.setattr(solver_process, "_NEXT_S", 0.0)
+    put_off.add(lambda: requests.put({"job": "2"}), is_next=True)
     _next_request(requests, iter(()), put_off)
     assert done == ["verdict"]
 
@@ -75,10 +79,21 @@ def test_few_results_wait_for_their_eigenmodes():
     done, put_off = [], PutOff()
     for number in range(4):
         put_off.add(lambda number=number: done.append(number))
+    put_off.limit()
     assert done == [0, 1]
     put_off.finish()
     put_off.finish()
     assert done == [0, 1, 2, 3]
+
+
+def test_what_cannot_be_written_ends_nothing(requests):
+    def full():
+        raise InputError("the disk is full")
+
+    put_off = PutOff()
+    put_off.add(full, is_next=True)
+    put_off.add(lambda: requests.put({"job": "1"}))
+    assert _next_request(requests, iter(()), put_off) == {"job": "1"}
 
 
 class Fitter:

@@ -3,6 +3,7 @@
 import json
 import threading
 import time
+from types import SimpleNamespace
 
 import panel as pn
 import pytest
@@ -53,7 +54,7 @@ def test_message_that_is_no_choice_is_ignored(sent, message):
 class Page:
     """The document of a page, whose thread runs what is asked for at once."""
 
-    session_context = None
+    session_context = SimpleNamespace(request=SimpleNamespace(arguments={}))
 
     def add_next_tick_callback(self, act):
         act()
@@ -96,6 +97,19 @@ def test_file_that_waits_for_those_of_other_pages_says_its_place(sent, monkeypat
             text = f"Waiting for {words} of other pages before it …"
             until(lambda told={"text": text, "more": True}: told in sent)
     until(lambda: sent.count({"name": "a.html", "content": b"x"}) == 2)
+
+
+def test_file_that_waits_is_not_made_once_its_page_is_closed(sent, monkeypatch):
+    page, turns, made = Page(), Turns(), []
+    monkeypatch.setattr(type(pn.state), "curdoc", page)
+    choices = {"HTML": lambda: Later(lambda _: made.append("a.html"), turns)}
+    button = SaveButton("A report", choices)
+    with turns.turn(pytest.fail):
+        button._handle_msg("HTML")
+        until(lambda: sent)
+        page.session_context = None
+    until(lambda: not button._is_making)
+    assert made == []
 
 
 def test_file_that_cannot_be_made_is_told(sent, monkeypatch):

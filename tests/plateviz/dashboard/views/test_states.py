@@ -1,5 +1,7 @@
 """Every pane says whether it is loading, ready, out of date, failed or empty, and what to do."""
 
+from dataclasses import replace
+
 import pytest
 
 from plateviz.dashboard.navigation import Navigation
@@ -95,6 +97,16 @@ def test_solution_is_shown_while_it_is_being_judged(fresh):
     assert tests.is_pending
     fresh.turn_to_workspace(OrbitWorkspace.ORDERS)
     session.compare_with(session.shown._replace(orbit=5))
+    assert "The solutions are being judged." in page._compare._table.object
+    session.figure_of_both = "solution-tests"
+    both = figure(page, "both-solutions")
+    both.draw()
+    assert both.is_pending
+
+    # Of one that is judged, nothing waits for the other.
+    session.store.judge.has_judged = lambda result: result is session.shown.result
+    session.other = session.other._replace(result=replace(session.other.result))
+    assert "<summary>This solution" in head.object
     assert "The solutions are being judged." in page._compare._table.object
 
     session.store.judge.has_judged = lambda _: True

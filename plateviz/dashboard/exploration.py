@@ -10,7 +10,7 @@ import param
 from plateviz.dashboard.address_parts import chosen, in_words
 from plateviz.dashboard.selected import KINDS
 from plateviz.plots.explored_rows import Columns
-from plateviz.plots.explored_text import SWITCHES, numbers_in, parts_of
+from plateviz.plots.explored_text import parts_of, read_parts
 
 # A control shows an empty value as if nothing were chosen.
 NONE = "none"
@@ -77,7 +77,8 @@ class Exploration(param.Parameterized):
             for name in defaults
             if name in requested and getattr(self, name) != requested[name]
         ]
-        switches, limits, invalid = _requested(requested)
+        self.selects = chosen("selects", requested, KINDS, self.selects, problems)
+        switches, limits, invalid = read_parts(requested)
         self.param.update(**switches)
         # Another kind of axis forgets its limits, so that they are set last.
         self.param.update(**limits)
@@ -116,35 +117,3 @@ class Exploration(param.Parameterized):
         if names & {"table", "only"}:
             values |= dict(zip(("lowest", "highest"), _ALL, strict=True))
         self.param.update(**values)
-
-
-def _requested(
-    address: Mapping[str, str],
-) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
-    """Return switches and limits that an address requests, and what of it is invalid."""
-    wanted = [name for name in address.get("with", "").split(",") if name]
-    limits: dict[str, Any] = {}
-    between, zoom = (
-        numbers_in(address.get(name, ""), n) for name, n in (("between", 2), ("zoom", 4))
-    )
-    if zoom is not None and not all(map(math.isfinite, zoom)):
-        zoom = None
-    if between is not None:
-        limits |= {"lowest": between[0], "highest": between[1]}
-    if zoom is not None:
-        limits["limits"] = (zoom[:2], zoom[2:])
-    invalid = [
-        f"with: expected {', '.join(SWITCHES)}, found {in_words(name)}"
-        for name in wanted
-        if name not in SWITCHES
-    ]
-    for name, found, n in (("between", between, 2), ("zoom", zoom, 4)):
-        if name in address and found is None:
-            text = in_words(address[name])
-            invalid.append(f"{name}: expected {n} numbers with ~ between them, found {text}")
-    switches: dict[str, Any] = {name: True for name in SWITCHES if name in wanted}
-    if (selects := address.get("selects")) in KINDS:
-        switches["selects"] = selects
-    elif selects is not None:
-        invalid.append(f"selects: expected {', '.join(KINDS)}, found {in_words(selects)}")
-    return switches, limits, invalid

@@ -3,7 +3,6 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection
-from functools import partial
 from typing import TYPE_CHECKING
 
 from plateviz.notebook.figures import FigureSpec, NotebookFigure, figure_collection
@@ -51,11 +50,9 @@ class Explores(ABC):
         InputError
             If there are no such rows, columns or theme, or files of the run cannot be read.
         """
-        from plateviz.plots.explore import explored_figure
+        from plateviz.plots.explored import explored
         from plateviz.plots.explored_rows import Columns
-        from plateviz.plots.explored_text import require_columns, require_rows
 
-        require_rows(rows, self._explorable_rows())
         lowest, highest = between
         chosen = Columns(
             x,
@@ -69,11 +66,8 @@ class Explores(ABC):
             median,
             zoom,
         )
-        table = self._explorable(rows)
-        require_columns(chosen, rows, table.columns)
-        plot = partial(explored_figure, table, chosen)
-        caption = f"A row is one of the {rows}; with many rows in the frame, their number in cells."
-        spec = FigureSpec("explore", f"{y} against {x}", caption, plot)
+        found = explored(rows, chosen, self._explorable_rows(), self._explorable)
+        spec = FigureSpec("explore", *found)
         return figure_collection([spec], theme)["explore"]
 
     @abstractmethod

@@ -5,6 +5,7 @@ import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
 from plateviz.plots.explored_rows import Columns
@@ -16,6 +17,8 @@ SWITCHES: Mapping[str, str] = MappingProxyType(
 """Names of the switches, and what they are called on the page."""
 _NUMBER = r"-?(?:\d+(?:\.\d*)?(?:e[+-]?\d+)?|inf)"
 _NUMBERS = re.compile(rf"{_NUMBER}(?:~{_NUMBER})*")
+# Of a wrong value in a message, characters.
+_LONGEST = 80
 _KEYS = ("rows", "x", "y", "colour", "only", "between", "with", "selects", "zoom")
 
 
@@ -59,20 +62,43 @@ def parse_explored(text: str) -> tuple[str, Columns]:
     if unknown or not {"rows", "x", "y"} <= set(parts):
         raise InputError(
             "explore: expected parts such as rows=measurements&x=focal_x&y=residual_x out of "
-            f"{', '.join(_KEYS)}, found {text[:80]!r}"
+            f"{', '.join(_KEYS)}, found {_quoted(text)}"
         )
     chosen = Columns(parts["x"], parts["y"], parts.get("colour", ""), parts.get("only", ""))
+    switches, limits, problems = read_parts(parts)
+    if problems:
+        raise InputError(f"explore: {problems[0]}")
+    return parts["rows"], replace(chosen, **switches, **limits)
+
+
+def read_parts(
+    parts: Mapping[str, str],
+) -> tuple[dict[str, bool], dict[str, Any], list[str]]:
+    """Return the switches and the limits of `Columns` in parts of an address.
+
+    Returns
+    -------
+    The switches that are on, the limits, and what of the parts is invalid, in words.
+    """
     wanted = list(filter(None, parts.get("with", "").split(",")))
-    if not set(wanted) <= set(SWITCHES):
-        raise InputError(f"explore: with: expected {', '.join(SWITCHES)}, found {parts['with']!r}")
-    chosen = replace(chosen, **{name: True for name in wanted})
-    if "between" in parts:
-        lowest, highest = _required("between", parts["between"], 2)
-        chosen = replace(chosen, lowest=lowest, highest=highest)
-    if "zoom" in parts:
-        ends = _required("zoom", parts["zoom"], 4)
-        chosen = replace(chosen, limits=(ends[:2], ends[2:]))
-    return parts["rows"], chosen
+    problems = [
+        f"with: expected {', '.join(SWITCHES)}, found {_quoted(name)}"
+        for name in wanted
+        if name not in SWITCHES
+    ]
+    limits: dict[str, Any] = {}
+    for name, count in (("between", 2), ("zoom", 4)):
+        if name not in parts:
+            continue
+        numbers = _numbers_in(parts[name], count)
+        if numbers is None or (name == "zoom" and not all(map(math.isfinite, numbers))):
+            found = _quoted(parts[name])
+            problems.append(f"{name}: expected {count} numbers with ~ between them, found {found}")
+        elif name == "between":
+            limits |= {"lowest": numbers[0], "highest": numbers[1]}
+        else:
+            limits["limits"] = (numbers[:2], numbers[2:])
+    return {name: True for name in SWITCHES if name in wanted}, limits, problems
 
 
 def require_columns(chosen: Columns, rows: str, names: Collection[str]) -> None:
@@ -91,7 +117,7 @@ def require_rows(rows: str, known: Collection[str]) -> None:
         raise InputError(f"explore: expected rows out of {', '.join(known)}, found {rows!r}")
 
 
-def numbers_in(text: str, count: int) -> tuple[float, ...] | None:
+def _numbers_in(text: str, count: int) -> tuple[float, ...] | None:
     """Return the numbers of a part of an address; None if they are not numbers or not so many."""
     if not _NUMBERS.fullmatch(text):
         return None
@@ -99,13 +125,8 @@ def numbers_in(text: str, count: int) -> tuple[float, ...] | None:
     return numbers if len(numbers) == count else None
 
 
-def _required(name: str, text: str, count: int) -> tuple[float, ...]:
-    numbers = numbers_in(text, count)
-    if numbers is None or (count > 2 and not all(map(math.isfinite, numbers))):
-        raise InputError(
-            f"explore: {name}: expected {count} numbers with ~ between, found {text!r}"
-        )
-    return numbers
+def _quoted(text: str) -> str:
+    return repr(text[:_LONGEST])
 
 
 def _joined(numbers: tuple[float, ...]) -> str:

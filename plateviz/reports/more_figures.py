@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from plateviz.plots.both_solutions import comparable_figures, of_both
 from plateviz.plots.diagnostic import Chosen
-from plateviz.plots.explore import explored_figure
-from plateviz.plots.explored_text import parse_explored, require_columns, require_rows
+from plateviz.plots.explored import explored
+from plateviz.plots.explored_text import parse_explored
 from plateviz.reports.report import ReportFigure
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
@@ -70,17 +70,9 @@ def _explored(
 ) -> list[ReportFigure]:
     figures, names = [], tuple(known)
     for number, text in enumerate(texts):
-        rows, chosen = parse_explored(text)
-        require_rows(rows, names)
-        table = table_of(rows)
-        require_columns(chosen, rows, table.columns)
+        found = explored(*parse_explored(text), names, table_of)
+        plots = {"All": found.plot}
         figures.append(
-            ReportFigure(
-                f"explore-{number}",
-                f"{chosen.y} against {chosen.x}",
-                f"A row is one of the {rows}; with many rows in the frame, their number in cells.",
-                {"All": partial(explored_figure, table, chosen)},
-                is_wide=True,
-            )
+            ReportFigure(f"explore-{number}", found.title, found.caption, plots, is_wide=True)
         )
     return figures

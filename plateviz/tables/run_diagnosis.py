@@ -8,7 +8,6 @@ from scipy.special import chdtrc, chdtri
 
 from solver.data.run_schema import RUN_TABLES
 from solver.results.diagnosis.rate import (
-    discoveries,
     log_chance,
     log_chance_binomial,
     log_chance_normal,
@@ -16,7 +15,7 @@ from solver.results.diagnosis.rate import (
     sigmas,
 )
 from solver.results.diagnosis.survey.trends import Trend, all_series, trend_tests
-from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Test
+from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Test, discovered
 
 # Orbits share the errors of the reference stars, so that these tests are not independent.
 _SHARED = "reference star"
@@ -59,8 +58,7 @@ class RunDiagnosis(NamedTuple):
 
     def found(self, rate: float) -> tuple[Test, ...]:
         """Return the tests that are discoveries at a rate of false alarms over all tests."""
-        far = discoveries(np.array([test.log_chance for test in self.tests]), rate)
-        return tuple(test for test, is_far in zip(self.tests, far, strict=True) if is_far)
+        return discovered(self.tests, rate)
 
 
 def diagnose_run(motions: pd.DataFrame, tables: RunTests) -> RunDiagnosis:

@@ -25,6 +25,9 @@ from solver.units import factor_between
 Axis = Literal["src", "exp", "coef", "drift", "breathing", "field", "own", "walk", "det", "motion"]
 # Axes of the coefficients that all measurements share, in the order of their columns.
 TERM_AXES: tuple[Axis, ...] = ("coef", "drift", "breathing", "field", "own")
+# Axes of all coefficients of distortion terms, and of what has elements for each exposure.
+DISTORTION_AXES: tuple[Axis, ...] = (*TERM_AXES, "walk")
+EXPOSURE_AXES: tuple[Axis, ...] = ("exp", "walk")
 Family = Literal["normal", "gamma", "uniform"]
 
 
@@ -94,4 +97,4 @@ class Group:
     @property
     def is_term(self) -> bool:
         """Whether the group's elements are coefficients of distortion terms."""
-        return self.axis in (*TERM_AXES, "walk")
+        return self.axis in DISTORTION_AXES

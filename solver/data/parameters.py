@@ -5,7 +5,7 @@ dashboard's controls and the result tables are derived from this table. A new gr
 entry here and one term in `solver.model.forward`.
 """
 
-from solver.data.parameter_group import TERM_AXES, Group, Published
+from solver.data.parameter_group import DISTORTION_AXES, Group, Published
 from solver.data.parameter_group import Axis as Axis
 from solver.data.parameter_group import Family as Family
 
@@ -183,7 +183,7 @@ def _pair(name: str, label: str, symbols: str, rest: tuple, setting: str) -> tup
     rest : axis, unit and width of the prior, which is normal about zero
     """
     axis, unit, width = rest
-    letters = "AB" if axis in (*TERM_AXES, "walk") else "xy"
+    letters = "AB" if axis in DISTORTION_AXES else "xy"
     x, y = (
         Group(
             f"{name}_{direction}",

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from solver.data.parameter_group import EXPOSURE_AXES
 from solver.linear.chi2 import Gradient
 from solver.linear.normal_equations import DetectorSums, NormalEquations, accumulate
 from solver.problem.parameter_vector import VectorLayout
@@ -97,7 +98,7 @@ def _detectors_contribution(
     owner = np.empty(layout.size, dtype=np.int64)
     for group in (*layout.local_groups, *layout.on("walk")):
         columns = layout.columns(group)
-        count = layout.n_exp if group.axis in ("exp", "walk") else layout.n_det
+        count = layout.n_exp if group.axis in EXPOSURE_AXES else layout.n_det
         owner[columns] = np.repeat(np.arange(count), len(columns) // count)
     coefficients = sums.coefficients[detectors].sum(axis=0)
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from solver.data.parameter_group import Axis
+from solver.data.parameter_group import EXPOSURE_AXES, Axis
 from solver.data.parameters import BY_NAME
 from solver.linear.chi2 import Gradient
 from solver.linear.contribution import Contribution, contribution_of
@@ -156,7 +156,7 @@ def _columns(old: Problem, new: Problem) -> Int[np.ndarray, " calib"]:
         own = old.layout.columns(group)
         columns[new.layout.columns(group)] = (
             own.reshape(old.layout.n_exp, -1)[kept].ravel()
-            if group.axis in ("exp", "walk")
+            if group.axis in EXPOSURE_AXES
             else own[: len(new.layout.columns(group))]
         )
     return columns

@@ -12,14 +12,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from solver.model.distortion import basis
-from solver.units import RAD_PER_ARCSEC
+from solver.units import PIX_PER_MPIX, RAD_PER_ARCSEC
 
 AnyArray = Any
 # Optional group -> values, in the group's unit; only of those that the fit includes.
 Values = Mapping[str, Float[AnyArray, " _"]]
 Pair = tuple[Float[AnyArray, "*obs"], Float[AnyArray, "*obs"]]
 
-_PPM, _PIX_PER_MPIX = 1e-6, 1e-3
+_PPM = 1e-6
 
 
 class TermFamily(eqx.Module):
@@ -50,7 +50,7 @@ class Causes(eqx.Module):
     families : of distortion terms
     element : index of the detector in its field, among the elements of the axis `motion`
     moves : one where the detector may have moved, zero in the first field
-    faintness : flux^(-1/2) of the sources, one at `REFERENCE_MAGNITUDE`
+    faintness : flux^(-1/2) of the sources, as from `solver.data.magnitudes`
     pixels : number of pixels of the detectors along their axes
     """
 
@@ -148,17 +148,17 @@ def shifted_on_detector(
     faintness = jnp.asarray(causes.faintness)[source]
     for axis, direction in enumerate("xy"):
         if f"magnitude_shift_{direction}" in values:
-            shift = _PIX_PER_MPIX * values[f"magnitude_shift_{direction}"][detector]
+            shift = PIX_PER_MPIX * values[f"magnitude_shift_{direction}"][detector]
             shifts[axis].append(faintness * shift)
         if f"charge_transfer_{direction}" in values:
-            shift = _PIX_PER_MPIX * values[f"charge_transfer_{direction}"][detector]
+            shift = PIX_PER_MPIX * values[f"charge_transfer_{direction}"][detector]
             # From the edge of the detector: what the charge of the star has crossed.
             crossed = pixel[axis] / jnp.asarray(causes.pixels)[detector, axis] + 0.5
             shifts[axis].append(faintness * shift * crossed)
     if "phase_sine_x" in values:
         for axis, direction in enumerate("xy"):
             sine, cosine = (
-                _PIX_PER_MPIX * values[f"{name}_{direction}"][detector]
+                PIX_PER_MPIX * values[f"{name}_{direction}"][detector]
                 for name in ("phase_sine", "phase_cosine")
             )
             angle = 2.0 * jnp.pi * pixel[axis]

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from numpy.polynomial import legendre
 
 from solver.data.instrument import Instrument
+from solver.data.magnitudes import faintness
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.model.causes import Causes, TermFamily
@@ -16,8 +17,6 @@ from solver.problem.elements import field_numbers
 from solver.problem.padding import pad
 
 _MINUTES_PER_DAY = 1440.0
-# Magnitude at which a shift by magnitude has the size of its parameter.
-REFERENCE_MAGNITUDE = 17.0
 
 
 def causes_of(
@@ -108,7 +107,7 @@ def _faintness(sources: pd.DataFrame, settings: FitSettings) -> Float[np.ndarray
         raise InputError(
             "shift by magnitude: expected a column magnitude in the catalogue, found none"
         )
-    return np.nan_to_num(10.0 ** (0.2 * (magnitude - REFERENCE_MAGNITUDE)))
+    return faintness(magnitude)
 
 
 def padded(causes: Causes, sizes: Mapping[str, int]) -> Causes:

@@ -11,13 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
+from solver.data.magnitudes import faintness
 from solver.data.result import FitResult
 from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
-from solver.units import RAD_PER_ARCSEC
-
-# Magnitude at which a shift by magnitude has the size of its parameter.
-_REFERENCE_MAGNITUDE = 17.0
-_PIX_PER_MPIX = 1e-3
+from solver.units import PIX_PER_MPIX, RAD_PER_ARCSEC
 
 
 class Column(NamedTuple):
@@ -94,20 +91,20 @@ def _of_terms(
 
 
 def _of_detectors(
-    camera: Camera, rows: Rows, widths: dict[str, np.ndarray], faintness: np.ndarray
+    camera: Camera, rows: Rows, widths: dict[str, np.ndarray], fainter: np.ndarray
 ) -> Iterator[Column]:
     """Yield the columns of the groups with one parameter of each detector."""
     pixel = rows.pixel
     crossed = 0.5 * pixel / camera.half[rows.detector] + 0.5
     angle, none = 2.0 * np.pi * pixel, np.zeros(rows.n)
-    shift = _PIX_PER_MPIX * faintness
+    shift = PIX_PER_MPIX * fainter
     shifts: dict[str, tuple[np.ndarray, int]] = {"detector_skew": (RAD_PER_ARCSEC * pixel[:, 1], 0)}
     for axis, direction in enumerate("xy"):
         along = {
             "magnitude_shift": shift,
             "charge_transfer": shift * crossed[:, axis],
-            "phase_sine": _PIX_PER_MPIX * np.sin(angle[:, axis]),
-            "phase_cosine": _PIX_PER_MPIX * np.cos(angle[:, axis]),
+            "phase_sine": PIX_PER_MPIX * np.sin(angle[:, axis]),
+            "phase_cosine": PIX_PER_MPIX * np.cos(angle[:, axis]),
         }
         shifts |= {f"{name}_{direction}": (value, axis) for name, value in along.items()}
     for name, (value, axis) in shifts.items():
@@ -144,8 +141,7 @@ def _faintness(result: FitResult) -> np.ndarray:
     """Return flux^(-1/2) of the sources, zero without a magnitude."""
     if "magnitude" not in result.sources:
         return np.zeros(len(result.sources))
-    magnitude = result.sources["magnitude"].to_numpy(dtype=float)
-    return np.nan_to_num(10.0 ** (0.2 * (magnitude - _REFERENCE_MAGNITUDE)))
+    return faintness(result.sources["magnitude"].to_numpy(dtype=float))
 
 
 # What a fit adjusts until a test of the size of the residuals finds nothing.

@@ -1,5 +1,6 @@
 """All tests of one solution, with their chance, in one table."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -58,6 +59,12 @@ class Test(NamedTuple):
     size_um: float = float("nan")
 
 
+def discovered(tests: Sequence[Test], rate: float) -> tuple[Test, ...]:
+    """Return the tests that are discoveries at a rate of false alarms over all of them."""
+    far = discoveries(np.array([test.log_chance for test in tests]), rate)
+    return tuple(test for test, is_far in zip(tests, far, strict=True) if is_far)
+
+
 class Diagnosis(NamedTuple):
     """The tests of one solution and what they were computed from.
 
@@ -88,8 +95,7 @@ class Diagnosis(NamedTuple):
 
     def found(self, rate: float) -> tuple[Test, ...]:
         """Return the tests that are discoveries at a rate of false alarms over all tests."""
-        far = discoveries(np.array([test.log_chance for test in self.tests]), rate)
-        return tuple(test for test, is_far in zip(self.tests, far, strict=True) if is_far)
+        return discovered(self.tests, rate)
 
     def frame(self) -> pd.DataFrame:
         """Return the tests as a table, a row each."""

@@ -69,10 +69,10 @@ def test_address_is_read_back(exploration, between):
         (
             {"rows": "sources", "with": "log x,table", "between": "a~b", "selects": "limits"},
             [
+                "selects: expected sources, exposures, detectors",
                 "with: expected is_log_x",
                 "with: expected is_log_x",
                 "between: expected 2 numbers",
-                "selects: expected sources, exposures, detectors",
             ],
         ),
     ],

@@ -327,6 +327,9 @@ def test_a_change_is_tried_at_once_kept_and_fitted(page):
     canvas = page.locator(".figure-convergence canvas").first
     assert not is_faded(canvas)
     turn_to_workspace(page, OrbitWorkspace.VERDICT)
+    # The server draws it anew at once until the browser has told that it is out of sight.
+    expect(canvas).to_be_hidden()
+    page.wait_for_timeout(500)
     fitted = chi2(page)
     set_order(page, 4)
     expect(shown(page)).to_contain_text("what if: order 4")

@@ -51,6 +51,11 @@ BACKGROUNDS = f"""() => {{ {VIEWS}
   for (const name in colours) colours[name] = [...colours[name]].join();
   return colours; }}"""
 
+ARROWS = f"""() => {{ {VIEWS} return figures.filter(view => card(view) === 'residual-map')
+  .flatMap(view => view.model.renderers.filter(r => r.glyph?.type === 'Segment'))
+  .map(r => JSON.stringify(Object.values(r.data_source.data).map(c => Array.from(c))))
+  .join() }}"""
+
 
 @pytest.fixture(scope="session")
 def chromium_path():
@@ -131,21 +136,21 @@ def see(page, name):
 
 
 def until(page, condition):
-    """Wait for what only the models of the page can tell; figures are drawn in batches."""
+    """Wait for what only the models of the page can tell, and give it.
+
+    Figures are drawn in batches, and while Bokeh builds some it may not list its others: what was
+    found once may be missing in the next moment.
+    """
     for _ in range(300):
-        if condition():
-            return
+        if found := condition():
+            return found
         page.wait_for_timeout(100)
     pytest.fail("it did not come about in 30 s")
 
 
 def residual_arrows(page):
-    return page.evaluate(
-        f"""() => {{ {VIEWS} return figures.filter(view => card(view) === 'residual-map')
-          .flatMap(view => view.model.renderers.filter(r => r.glyph?.type === 'Segment'))
-          .map(r => JSON.stringify(Object.values(r.data_source.data).map(c => Array.from(c))))
-          .join() }}"""
-    )
+    """Wait until the residual map is drawn, and give its arrows as text."""
+    return until(page, lambda: page.evaluate(ARROWS))
 
 
 def is_faded(locator):
@@ -215,7 +220,7 @@ def explored(page):
 
 def turn_dark(page, figures):
     """Change the theme from light to dark and go to each figure until it is drawn in it."""
-    assert set(page.evaluate(BACKGROUNDS).values()) == {"#ffffff"}
+    until(page, lambda: set(page.evaluate(BACKGROUNDS).values()) == {"#ffffff"})
     page.get_by_label("Toggle theme").click()
     for figure in figures:
         see(page, figure.name)

@@ -246,8 +246,9 @@ def test_sources_are_selected_in_one_figure_shown_in_all_saved_and_left_out(page
     expect(bar).to_have_count(0)
     drag(page, "residual-map", (0.3, 0.4), (0.6, 0.7))
     expect(bar).to_be_visible()
-    until(page, lambda: selected(page, "footprint")[0] > 0)
-    n_selected, n_sources = selected(page, "footprint")
+    [[n_selected, n_sources]] = until(
+        page, lambda: [rows for rows in [selected(page, "footprint")] if rows[0] > 0]
+    )
     assert 0 < n_selected < n_sources
     page.get_by_role("button", name="List", exact=True).click()
     window = page.get_by_role("dialog")

@@ -30,15 +30,13 @@ N_ORBITS = 3
 # They ask for more orbits, or for more of a source, than a small survey has.
 EMPTY = {"reference-scatter", "motion-pulls", "calibration-trends"}
 
-# Rows of the longest data source of each figure that is drawn, words apart, by its name.
-ROWS = f"""() => {{ {VIEWS}
-  const rows = {{}};
-  for (const figure of figures) {{
-    const shown = figure.model.renderers.filter(r => r.visible && r.glyph?.type !== 'Text');
-    rows[card(figure)] = Math.max(rows[card(figure)] ?? 0,
-                                  ...shown.map(r => r.data_source?.get_length() ?? 0));
-  }}
-  return rows; }}"""
+# Rows of the longest data source of a figure, words apart, in a list: empty until it is drawn.
+ROWS_OF = f"""name => {{ {VIEWS}
+  const drawn = figures.filter(view => card(view) === name);
+  const shown = drawn.flatMap(view => view.model.renderers)
+    .filter(r => r.visible && r.glyph?.type !== 'Text');
+  const rows = shown.map(r => r.data_source?.get_length() ?? 0);
+  return drawn.length ? [Math.max(0, ...rows)] : []; }}"""
 # Where the first point of a figure that links somewhere is on the screen, and its value.
 POINT = f"""([name, key]) => {{ {VIEWS}
   for (const figure of figures.filter(view => card(view) === name))
@@ -100,8 +98,7 @@ def drawn(page, figures):
     rows = {}
     for figure in figures:
         see(page, figure.name)
-        until(page, lambda name=figure.name: name in page.evaluate(ROWS))
-        rows[figure.name] = page.evaluate(ROWS)[figure.name]
+        [rows[figure.name]] = until(page, lambda name=figure.name: page.evaluate(ROWS_OF, name))
     return rows
 
 
@@ -109,7 +106,7 @@ def tap(page, name, key):
     """Tap the first point of a figure; give the value of its column `key`."""
     see(page, name)
     page.wait_for_timeout(500)
-    point = page.evaluate(POINT, [name, key])
+    point = until(page, lambda: page.evaluate(POINT, [name, key]))
     page.mouse.click(point["x"], point["y"])
     return point["value"]
 

@@ -133,6 +133,11 @@ def test_every_figure_is_drawn_when_near_and_within_the_screen(walked):
     require_marks_where_they_are(walked)
 
 
+def test_the_page_waits_for_no_typeface(walked):
+    names = "[...document.fonts].filter(one => one.status !== 'unloaded').map(one => one.family)"
+    assert walked.evaluate(names) == []
+
+
 def test_what_is_drawn_keeps_its_layout(walked):
     """When other workspaces are shown: every figure has some forty."""
     assert rests(walked)

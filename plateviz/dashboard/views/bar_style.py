@@ -2,7 +2,7 @@
 
 BAR_STYLE = """
 button.in-bar { height: 30px; padding: 0 8px; border: 0; border-radius: 4px;
-                font: 500 13px/30px Roboto, Helvetica, Arial, sans-serif; letter-spacing: normal;
+                font: 500 13px/30px Helvetica, Arial, sans-serif; letter-spacing: normal;
                 color: #ffffff; background: transparent; cursor: pointer; }
 button.in-bar:hover, button.in-bar:focus-visible { color: #ffffff;
                                                    background: rgb(255 255 255 / 20%); }

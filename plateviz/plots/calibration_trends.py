@@ -83,7 +83,7 @@ _PAGE_WIDTH = 270
 
 
 def _plot(tables: SurveyTables) -> Figure:
-    return plot_calibration_trends(calibration_trends(tables.tests.calibrations), width=_PAGE_WIDTH)
+    return plot_calibration_trends(calibration_trends(tables.tests), width=_PAGE_WIDTH)
 
 
 SURVEY_FIGURES = (

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run_tests import read_run_tests
+from plateviz.runs.run_tests import RunTables, read_run_tables
 from plateviz.tables.survey_tables import SurveyTables
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.errors import InputError
@@ -21,19 +21,24 @@ from solver.io.survey import (
 )
 
 
-def survey_tables(run: SurveyRun) -> SurveyTables:
+def survey_tables(run: SurveyRun, read: RunTables | None = None) -> SurveyTables:
     """Return the tables of a run and of its survey.
+
+    Parameters
+    ----------
+    read : tables of the run that were read before; None to read them
 
     Raises
     ------
     InputError
         If a file of the survey cannot be read.
     """
+    orbits, motions, tests = read or read_run_tables(run)
     sides = (_pair(run.survey, "field_l_deg"), _pair(run.survey, "field_b_deg"))
     return SurveyTables(
-        orbits=run.orbits(),
-        motions=run.motions(),
-        tests=read_run_tests(run),
+        orbits=orbits,
+        motions=motions,
+        tests=tests,
         catalogue=read_survey_table(run.survey / REFERENCE, CATALOGUE),
         truth=_truth(run.survey),
         errors_by_count=run.errors_by_count(),

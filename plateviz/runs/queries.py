@@ -4,7 +4,7 @@ Each orbit's directory contains its part of the history. After orbits are added,
 gathered into one file sorted by source, from which one source can be read without the rest.
 """
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from functools import cached_property
 from pathlib import Path
 
@@ -85,6 +85,12 @@ class SurveyRun:
     def written(self) -> Written:
         """Return what the run has now; takes a millisecond for each hundred orbits."""
         return self._run.written()
+
+    def stamp(self) -> Hashable:
+        """Return what differs once anything of the run is written; InputError if it is gone."""
+        with reading(str(self.directory), "a run"):
+            found = [path.stat() for path in (self.directory, self.survey)]
+        return self.written(), *((one.st_ino, one.st_mtime_ns) for one in found)
 
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""

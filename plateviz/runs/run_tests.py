@@ -1,5 +1,7 @@
 """Reading of the tables from which a run is tested, and of its verdict."""
 
+from typing import NamedTuple
+
 import pandas as pd
 
 from plateviz.runs.queries import SurveyRun
@@ -8,6 +10,21 @@ from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.verdict import Verdict
 from solver.data.columns import Table
 from solver.data.run_schema import RUN_TABLES
+
+
+class RunTables(NamedTuple):
+    """The tables from which a run is judged.
+
+    Attributes
+    ----------
+    orbits : `survey_schema.RUN_ORBITS`
+    motions : `survey_schema.MOTIONS`
+    tests : from which the run as a whole is tested
+    """
+
+    orbits: pd.DataFrame
+    motions: pd.DataFrame
+    tests: RunTests
 
 
 def read_run_tests(run: SurveyRun) -> RunTests:
@@ -21,9 +38,14 @@ def read_run_tests(run: SurveyRun) -> RunTests:
     return RunTests(*(_read(run, table) for table in RUN_TABLES))
 
 
+def read_run_tables(run: SurveyRun) -> RunTables:
+    """Return the tables from which a run is judged; raises as `read_run_tests`."""
+    return RunTables(run.orbits(), run.motions(), read_run_tests(run))
+
+
 def read_run_verdict(run: SurveyRun) -> Verdict:
     """Return the verdict on a run; raises as `read_run_tests`."""
-    return run_verdict(run.orbits(), run.motions(), read_run_tests(run))
+    return run_verdict(*read_run_tables(run))
 
 
 def _read(run: SurveyRun, table: Table) -> pd.DataFrame:

@@ -23,6 +23,7 @@ from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.judge import Judge
 from plateviz.solving.made_solutions import MadeSolution, MadeSolutions
 from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
+from plateviz.solving.run_reader import RunReader
 from plateviz.solving.solver_pool import Solver
 from plateviz.solving.turns import Turns
 from solver.data.instrument import Instrument
@@ -50,6 +51,7 @@ class SolutionStore:
     columns : the columns of runs that were read last
     background : runs what takes a while, for all sessions
     judge : of the solutions that are shown
+    run_reader : of the runs that are shown
     reports : turns of those who make a report
     """
 
@@ -76,6 +78,7 @@ class SolutionStore:
         self.columns = ColumnCache()
         self.background = ThreadPoolExecutor(_READERS, thread_name_prefix="reader")
         self.judge = Judge(self.background)
+        self.run_reader = RunReader(self.background)
         self.reports = Turns()
 
     @property

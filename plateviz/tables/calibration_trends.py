@@ -1,11 +1,14 @@
 """Table of the calibration of all orbits against time, with its trends."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import unit_text
+from plateviz.tables.run_diagnosis import RunTests
 from solver.model.apparent_motion import julian_year
-from solver.results.diagnosis.survey.trends import Series, all_series, trend_tests
+from solver.results.diagnosis.survey.trends import Series, Trend
 
 _COLUMNS = [
     *("group", "label", "unit", "orbit_id", "year", "season", "offset", "trend"),
@@ -13,12 +16,12 @@ _COLUMNS = [
 ]
 
 
-def calibration_trends(calibrations: pd.DataFrame) -> pd.DataFrame:
+def calibration_trends(tests: RunTests) -> pd.DataFrame:
     """Return the parameter of each group that changes most from orbit to orbit.
 
     Parameters
     ----------
-    calibrations : `run_schema.CALIBRATIONS`
+    tests : of the run
 
     Returns
     -------
@@ -28,19 +31,19 @@ def calibration_trends(calibrations: pd.DataFrame) -> pd.DataFrame:
     first orbit to the last) and `scatter` (about the line), and `sigma` (of the group's trend); no
     rows with too few orbits
     """
-    if calibrations.empty:
+    if tests.calibrations.empty:
         return pd.DataFrame(columns=_COLUMNS)
-    epochs = calibrations.drop_duplicates("orbit_id").set_index("orbit_id")["epoch"]
-    parts = [_of_group(series, epochs) for series in all_series(calibrations)]
+    epochs = tests.calibrations.drop_duplicates("orbit_id").set_index("orbit_id")["epoch"]
+    parts = [_of_group(series, trends, epochs) for series, trends in tests.trends]
     found = [part for part in parts if len(part)]
     return pd.concat(found, ignore_index=True) if found else pd.DataFrame(columns=_COLUMNS)
 
 
-def _of_group(series: Series, epochs: pd.Series) -> pd.DataFrame:
-    trends = [one for one in trend_tests(series) if one.test.subject == "trend"]
-    if not trends:
+def _of_group(series: Series, trends: Sequence[Trend], epochs: pd.Series) -> pd.DataFrame:
+    lines = [one for one in trends if one.test.subject == "trend"]
+    if not lines:
         return pd.DataFrame(columns=_COLUMNS)
-    (trend,) = trends
+    (trend,) = lines
     values = series.values[:, series.labels.index(trend.label)]
     line = 0.5 * trend.change * (series.time - series.time.mean())
     offset = values - values.mean()

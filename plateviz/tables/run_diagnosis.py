@@ -1,5 +1,7 @@
 """All tests of a run with their chance: what single orbits show, all together, and time."""
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +16,7 @@ from solver.results.diagnosis.rate import (
     of_many,
     sigmas,
 )
-from solver.results.diagnosis.survey.trends import Trend, all_series, trend_tests
+from solver.results.diagnosis.survey.trends import Series, Trend, all_series, trend_tests
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Test, discovered
 
 # Orbits share the errors of the reference stars, so that these tests are not independent.
@@ -22,8 +24,9 @@ _SHARED = "reference star"
 _LEAST_ORBITS = 2
 
 
-class RunTests(NamedTuple):
-    """The tables from which a run is tested.
+@dataclass(frozen=True, eq=False)
+class RunTests:
+    """The tables from which a run is tested, and what verdict and figures share.
 
     Attributes
     ----------
@@ -35,6 +38,11 @@ class RunTests(NamedTuple):
     orbit_tests: pd.DataFrame
     orbit_causes: pd.DataFrame
     zonal: pd.DataFrame
+
+    @cached_property
+    def trends(self) -> tuple[tuple[Series, list[Trend]], ...]:
+        """The values of each group of the calibration over the orbits, and their tests."""
+        return tuple((series, trend_tests(series)) for series in all_series(self.calibrations))
 
 
 def no_tests() -> RunTests:
@@ -70,7 +78,7 @@ def diagnose_run(motions: pd.DataFrame, tables: RunTests) -> RunDiagnosis:
     tables : of the same run
     """
     states = tables.orbit_causes.drop_duplicates("orbit_id").set_index("orbit_id")["state"]
-    trends = [trend for series in all_series(tables.calibrations) for trend in trend_tests(series)]
+    trends = [trend for _, of_series in tables.trends for trend in of_series]
     tests = [
         *_shares(states),
         *_together(tables.orbit_tests),

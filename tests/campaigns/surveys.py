@@ -112,7 +112,9 @@ def fit(trial: Trial, folder: Path) -> None:
         gather(run)
         found = SurveyRun(run)
         folder.mkdir(parents=True, exist_ok=True)
-        for table_, frame in zip(RUN_TABLES, read_run_tests(found), strict=True):
+        tests = read_run_tests(found)
+        frames = (tests.calibrations, tests.orbit_tests, tests.orbit_causes, tests.zonal)
+        for table_, frame in zip(RUN_TABLES, frames, strict=True):
             frame.to_parquet(folder / f"{table_.name}.parquet")
         found.motions().to_parquet(folder / "motions.parquet")
         found.orbits().to_parquet(folder / "orbits.parquet")

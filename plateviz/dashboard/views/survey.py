@@ -1,6 +1,7 @@
 """SurveyPage: the orbits of a run and the quality of their fits, and figures of the survey."""
 
 from collections.abc import Callable
+from concurrent.futures import Future
 from functools import partial
 
 import pandas as pd
@@ -9,6 +10,7 @@ import panel_material_ui as pmui
 from astropy.table import Table
 
 from plateviz.dashboard.downloads import described
+from plateviz.dashboard.latest_answer import PENDING, Pending
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.row_origins import RunRows
 from plateviz.dashboard.selected import KINDS
@@ -38,16 +40,14 @@ from plateviz.plots.gallery import survey_figures
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.reports.summary_strip import strip
-from plateviz.runs.load_tables import survey_tables
-from plateviz.runs.run_tests import read_run_tests
+from plateviz.solving.run_reader import ReadRun
 from plateviz.tables import orbit_list, orbit_states, run_strip
 from plateviz.tables.headings import ORBITS_OF_RUN
-from plateviz.tables.run_verdict import run_verdict
-from plateviz.tables.survey_tables import SurveyTables
-from plateviz.tables.verdict import Verdict
 from solver.data.survey_schema import MOTIONS, RUN_ORBITS
 from solver.errors import InputError
 
+# As high as the headline of a verdict, so that nothing moves when this comes.
+_BEING_READ = "<p class='verdict judging'>This run is being read and judged.</p>"
 _WHAT_TO_DO = "What was read before stays. Reload the page once the run is there again."
 
 
@@ -67,9 +67,8 @@ class SurveyPage(pn.viewable.Viewer):
         self._navigation, self._wake = navigation, wake
         self._session = navigation.session
         self._grids: dict[SurveyWorkspace, FigureGrid] = {}
-        self._tables: SurveyTables | None = None
-        self._orbits = self._motions = pd.DataFrame()
-        self._verdict: Verdict | None = None
+        self._shown: ReadRun | None = None
+        self._being_read: Future[ReadRun] | None = None
         self._failure = ""
         self._head, self._strip = markup_pane(), markup_pane()
         self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=8)
@@ -105,6 +104,23 @@ class SurveyPage(pn.viewable.Viewer):
         """The figures of the workspace on the screen."""
         return self._grids[self._navigation.survey_workspace]
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether another thread reads and judges the run."""
+        return self._being_read is not None
+
+    def look(self) -> None:
+        """Show the run once it is read; called again and again until then."""
+        read = self._being_read
+        if read is None or not read.done():
+            return
+        self._being_read = None
+        try:
+            self._shown = read.result()
+        except InputError as error:
+            self._failure = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
+        self._show()
+
     def _workspace(self, one: SurveyWorkspace) -> pn.viewable.Viewable:
         if one is SurveyWorkspace.EXPLORE:
             links = {"orbit_id": self._open_orbit}
@@ -133,9 +149,12 @@ class SurveyPage(pn.viewable.Viewer):
         return f"run-{self._navigation.run_name}"
 
     def _run_tables(self) -> dict[str, Table]:
-        tables = {"orbits": described(self._orbits, RUN_ORBITS)}
-        if len(self._motions):
-            tables["motions"] = described(self._motions, MOTIONS)
+        if self._shown is None:
+            return {}
+        orbits, motions = self._shown.tables[:2]
+        tables = {"orbits": described(orbits, RUN_ORBITS)}
+        if len(motions):
+            tables["motions"] = described(motions, MOTIONS)
         return tables
 
     def _figure_view(self, figure: SurveyFigure) -> FigureView:
@@ -148,31 +167,35 @@ class SurveyPage(pn.viewable.Viewer):
             theme=session.theme,
         )
 
-    def _plot(self, figure: SurveyFigure) -> Figure | None:
-        run = self._navigation.run
-        if run is None:
+    def _plot(self, figure: SurveyFigure) -> Figure | Pending | None:
+        if self._navigation.run is None:
             return None
-        if self._tables is None:
-            self._tables = survey_tables(run)
-        return self._session.units.figure(figure.plot(self._tables))
+        if self._being_read is not None or self._shown is None:
+            return PENDING
+        # The tables of the figures take longer, and are read when the first figure is drawn.
+        tables = self._shown.whole(self._session.store.background)
+        if not tables.done():
+            return PENDING
+        return self._session.units.figure(figure.plot(tables.result()))
 
     def _read(self, *_: object) -> None:
-        # The tables of the figures take longer, and are read when the first figure is drawn.
-        self._tables = None
-        run = self._navigation.run
-        self._failure = ""
+        run, store = self._navigation.run, self._session.store
+        self._failure, self._being_read = "", None
         if run is not None:
             try:
-                orbits, motions, tests = run.orbits(), run.motions(), read_run_tests(run)
-                self._orbits, self._motions = orbits, motions
-                self._verdict = run_verdict(orbits, motions, tests)
+                self._being_read = store.run_reader.read(run)
             except InputError as error:
                 self._failure = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
-        self._show()
+        if run is not None and self._shown is not None and self._shown.run.name != run.name:
+            self._shown = None
+        if self._being_read is not None and self._being_read.done():
+            self.look()
+        else:
+            self._show()
 
     def _show(self, *_: object) -> None:
         theme, words = self._session.theme, self._navigation.why_no_run
-        if self._orbits.empty:
+        if self._shown is None:
             # Nothing was read before that could stay.
             words = words or self._failure
         self._save.theme = theme
@@ -181,17 +204,23 @@ class SurveyPage(pn.viewable.Viewer):
             self._head.object = paragraph(words, "empty", theme)
             return
         self._show_head()
-        items = self._session.units.text(strip(run_strip(self._orbits, self._motions)))
-        self._strip.object = themed(items, theme)
-        self._table.show(orbit_list(self._orbits), theme, orbit_states(self._orbits))
+        if self._shown is None:
+            self._strip.object = ""
+        else:
+            orbits, motions = self._shown.tables[:2]
+            items = self._session.units.text(strip(run_strip(orbits, motions)))
+            self._strip.object = themed(items, theme)
+            self._table.show(orbit_list(orbits), theme, orbit_states(orbits))
         for grid in self._grids.values():
             grid.change(theme)
 
     def _show_head(self, *_: object) -> None:
-        if self._navigation.run is None or self._verdict is None:
+        if self._navigation.run is None:
             return
         title = titled("Run", self._navigation.run_name)
-        verdict = self._session.units.text(judged(self._verdict))
+        verdict = _BEING_READ
+        if self._shown is not None:
+            verdict = self._session.units.text(judged(self._shown.verdict))
         head = f"<div class='head'>{verdict}{title}</div>"
         if self._failure:
             head += paragraph(self._failure, "outdated", self._session.theme)

@@ -34,7 +34,7 @@ class FakeRun:
         self.survey = Path("sky")
         self.n_fitted = 2 if is_complete else 1
         self.read, self.expected, self.also_written = [], [], {}
-        self.test_table = lambda _: None
+        self.test_table, self.stamp = lambda _: None, self.written
 
     def header(self):
         return {"settings": self._settings.to_dict()}

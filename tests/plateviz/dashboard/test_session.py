@@ -1,5 +1,6 @@
 """Session: its rules, with a fake store whose jobs are ended by the test."""
 
+from concurrent.futures import Executor, Future
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,10 +20,23 @@ from plateviz.dashboard.state import (
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.solving.job import Job
 from plateviz.solving.made_solutions import MadeSolutions
+from plateviz.solving.run_reader import RunReader
 from plateviz.solving.turns import Turns
 from solver.data.instrument import MINI_MOCK
 from solver.data.settings import SETTINGS, FitSettings
 from solver.errors import InputError
+
+
+class AtOnce(Executor):
+    """Runs what it is given before it returns."""
+
+    def submit(self, work, /, *arguments):
+        answer = Future()
+        try:
+            answer.set_result(work(*arguments))
+        except InputError as error:
+            answer.set_exception(error)
+        return answer
 
 
 class FakeStore:
@@ -38,6 +52,8 @@ class FakeStore:
         self.requested, self.prepared, self.cancelled, self.abandoned = [], [], [], []
         self.left = []
         self.judge = SimpleNamespace(has_judged=lambda _: True)
+        self.background = AtOnce()
+        self.run_reader = RunReader(self.background)
         self.is_shared, self.reports = False, Turns()
         self.made, self.kept = MadeSolutions(), KeptSolutions(Path("nowhere"))
         self.selections = SimpleNamespace(all=dict, keep=lambda *_: None, forget=lambda *_: None)

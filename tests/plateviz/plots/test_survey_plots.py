@@ -1,5 +1,7 @@
 """Contents of the plots of a survey and of its sources."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -226,7 +228,7 @@ def test_source_of_few_orbits_is_drawn(survey, number):
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_gallery_draws_every_figure_of_a_survey(survey, errors_by_count, theme):
-    tests = no_tests()._replace(calibrations=calibrations(0.2))
+    tests = replace(no_tests(), calibrations=calibrations(0.2))
     full = SurveyTables(
         survey.orbits, survey.motions, survey.catalogue, survey.truth, errors_by_count, tests=tests
     )

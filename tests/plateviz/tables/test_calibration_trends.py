@@ -1,14 +1,23 @@
 """Table of the trends of a run's calibration."""
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 
+from plateviz.tables import run_diagnosis
 from plateviz.tables.calibration_trends import calibration_trends
+from plateviz.tables.run_diagnosis import diagnose_run, no_tests
 from tests.plateviz.run_tables import N_ORBITS, calibrations
 
 
+def trends_of(table):
+    return calibration_trends(replace(no_tests(), calibrations=table))
+
+
 def test_trend_is_that_of_the_parameter_that_changes_most():
-    table = calibration_trends(calibrations(0.2))
+    table = trends_of(calibrations(0.2))
     assert set(table["group"]) == {"distortion, degree 2"}
     assert set(table["label"]) == {"A 1 1"}
     assert len(table) == N_ORBITS
@@ -20,7 +29,16 @@ def test_trend_is_that_of_the_parameter_that_changes_most():
     assert set(table["season"]) == {1, -1}
 
 
+def test_verdict_and_table_share_their_tests(monkeypatch):
+    made, make = [], run_diagnosis.all_series
+    monkeypatch.setattr(run_diagnosis, "all_series", lambda one: made.append(one) or make(one))
+    tests = replace(no_tests(), calibrations=calibrations(0.2))
+    assert diagnose_run(pd.DataFrame(), tests).trends
+    assert len(calibration_trends(tests))
+    assert len(made) == 1
+
+
 def test_no_or_few_orbits_have_no_trends():
     table = calibrations()
-    assert calibration_trends(table.iloc[:0]).empty
-    assert calibration_trends(table[table["orbit_id"] < 5]).empty
+    assert trends_of(table.iloc[:0]).empty
+    assert trends_of(table[table["orbit_id"] < 5]).empty

@@ -15,9 +15,11 @@ from plateviz.dashboard.views.summary import HeadView, StripView
 from plateviz.dashboard.views.survey import SurveyPage
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace
+from plateviz.solving.run_reader import RunReader
 from solver.errors import InputError
 from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
 from tests.plateviz.dashboard.test_session import finish
+from tests.plateviz.solving.waiting import Waiting
 
 LOADING = "The first solution is being computed."
 STALE = "Another solution is being computed"
@@ -149,6 +151,10 @@ class LostRun(FakeRun):
 
     is_lost = False
 
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.stamp = lambda: self.is_lost
+
     def orbits(self):
         if self.is_lost:
             raise InputError("runs/default: expected a run, found nothing")
@@ -174,6 +180,37 @@ def test_run_that_is_gone_is_said_and_what_was_read_stays(fit_result, survey):
     run.is_lost = False
     page._read()
     assert "cannot be read" not in page._head.object
+
+
+def test_run_is_read_and_judged_elsewhere(fit_result, survey):
+    store, waiting = SurveyStore(fit_result, [FakeRun("default", survey, fit_result)]), Waiting()
+    store.run_reader = RunReader(waiting)
+    page = SurveyPage(Navigation(Session(store)), wake)
+    assert page.is_pending
+    page.look()
+    assert "This run is being read and judged." in page._head.object
+    waiting.work()
+    page.look()
+    assert not page.is_pending
+    assert "This run" in page._head.object
+    assert "being read" not in page._head.object
+    assert len(page._table._table.value) == len(survey.orbits)
+    # The next page has it at once.
+    page = SurveyPage(Navigation(Session(store)), wake)
+    assert not page.is_pending
+    assert "being read" not in page._head.object
+
+
+def test_other_run_is_not_shown_with_the_verdict_on_the_one_before(fit_result, survey):
+    runs = [FakeRun(name, survey, fit_result) for name in ("first", "second")]
+    store, waiting = SurveyStore(fit_result, runs), Waiting()
+    navigation = Navigation(Session(store))
+    page = SurveyPage(navigation, wake)
+    store.run_reader = RunReader(waiting)
+    navigation.run_name = "second"
+    assert "second" in page._head.object
+    assert "being read" in page._head.object
+    assert page._run_tables() == {}
 
 
 def test_run_that_was_gone_before_the_page_is_said_instead(fit_result, survey):

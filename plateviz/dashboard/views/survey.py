@@ -52,7 +52,11 @@ _WHAT_TO_DO = "What was read before stays. Reload the page once the run is there
 
 
 class SurveyPage(pn.viewable.Viewer):
-    """The Survey view: the run on the screen."""
+    """The Survey view: the run on the screen.
+
+    The reasons of its verdict are open in the Verdict workspace: elsewhere the figures have the
+    room.
+    """
 
     def __init__(
         self, navigation: Navigation, wake: Callable[..., object], **params: object
@@ -87,7 +91,7 @@ class SurveyPage(pn.viewable.Viewer):
             margin=0,
         )
         navigation.param.watch(self._read, ["run_name", "written"])
-        navigation.param.watch(self._show_head, "growth")
+        navigation.param.watch(self._show_head, ["growth", "survey_workspace"])
         navigation.param.watch(self._show_workspace, "survey_workspace")
         self._session.param.watch(self._show, "theme")
         self._session.units.param.watch(self._show, "unit")
@@ -219,8 +223,9 @@ class SurveyPage(pn.viewable.Viewer):
             return
         title = titled("Run", self._navigation.run_name)
         verdict = _BEING_READ
+        is_open = self._navigation.survey_workspace is SurveyWorkspace.VERDICT
         if self._shown is not None:
-            verdict = self._session.units.text(judged(self._shown.verdict))
+            verdict = self._session.units.text(judged(self._shown.verdict, is_open=is_open))
         head = f"<div class='head'>{verdict}{title}</div>"
         if self._failure:
             head += paragraph(self._failure, "outdated", self._session.theme)

@@ -14,7 +14,7 @@ from plateviz.dashboard.views.source import SourcePage
 from plateviz.dashboard.views.summary import HeadView, StripView
 from plateviz.dashboard.views.survey import SurveyPage
 from plateviz.plots.gallery import diagnostics
-from plateviz.plots.workspace import OrbitWorkspace
+from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.solving.run_reader import RunReader
 from solver.errors import InputError
 from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
@@ -211,6 +211,16 @@ def test_other_run_is_not_shown_with_the_verdict_on_the_one_before(fit_result, s
     assert "second" in page._head.object
     assert "being read" in page._head.object
     assert page._run_tables() == {}
+
+
+def test_reasons_of_the_verdict_leave_the_room_to_figures_elsewhere(fit_result, survey):
+    run = FakeRun("default", survey, fit_result)
+    navigation = Navigation(Session(SurveyStore(fit_result, [run])))
+    page = SurveyPage(navigation, wake)
+    # This run is not good.
+    assert "<details class='verdict bad' open>" in page._head.object
+    navigation.turn_to_workspace(SurveyWorkspace.CATALOGUE)
+    assert "<details class='verdict bad'>" in page._head.object
 
 
 def test_run_that_was_gone_before_the_page_is_said_instead(fit_result, survey):

@@ -7,9 +7,8 @@ from typing import Any
 import param
 
 from plateviz.dashboard.address_parts import in_words
+from plateviz.dashboard.prior_widths import default_widths, width_texts, widths_of
 from plateviz.dashboard.selected import MANY, Selected, SelectedIds, checked_name, parsed
-from solver.data.parameters import PARAMETERS
-from solver.data.prior_text import format_width
 from solver.data.result import FitResult
 from solver.data.setting_kinds import Change, Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
@@ -236,7 +235,10 @@ class FitChoices(param.Parameterized):
         Those without a control are as of the last `load`.
         """
         return self._loaded.with_(
-            **{name: _setting_value(one, getattr(self, name)) for name, one in CONTROLS.items()}
+            **{
+                name: _setting_value(one, getattr(self, name), self._loaded)
+                for name, one in CONTROLS.items()
+            }
         )
 
     def load(self, settings: FitSettings) -> None:
@@ -270,14 +272,10 @@ def _parameter(one: Setting, default: Any) -> param.Parameter:  # noqa: ANN401
     raise TypeError(f"{one.label}: expected a setting with a control, found a {type(one).__name__}")
 
 
-def _setting_value(one: Setting, control_value: Any) -> Any:  # noqa: ANN401
-    """Return the value of a setting from the value of its control."""
+def _setting_value(one: Setting, control_value: Any, loaded: FitSettings) -> Any:  # noqa: ANN401
+    """Return the value of a setting from that of its control, which was made from `loaded`."""
     if isinstance(one, PriorWidths):
-        defaults = default_widths()
-        changed = {
-            name: text for name, text in control_value.items() if text.strip() != defaults[name]
-        }
-        return one.parse(f"{name}={text}" for name, text in changed.items())
+        return widths_of(control_value, loaded)
     if isinstance(one, Texts):
         return one.parse(control_value.replace(",", " ").split())
     return control_value
@@ -286,15 +284,10 @@ def _setting_value(one: Setting, control_value: Any) -> Any:  # noqa: ANN401
 def _control_value(one: Setting, settings: FitSettings, name: str) -> Any:  # noqa: ANN401
     """Return the value of the control of a setting."""
     if isinstance(one, PriorWidths):
-        return {g.name: format_width(g.name, settings.width(g.name)) for g in PARAMETERS}
+        return width_texts(settings)
     value = getattr(settings, name)
     return ", ".join(one.texts(value)) if isinstance(one, Texts) else value
 
 
 for _name, _one in CONTROLS.items():
     FitChoices.param.add_parameter(_name, _parameter(_one, DEFAULTS[_name]))
-
-
-def default_widths() -> dict[str, str]:
-    """Return the paper's prior widths as texts."""
-    return _control_value(SETTINGS["prior_widths"], FitSettings(), "prior_widths")

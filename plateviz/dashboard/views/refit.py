@@ -7,9 +7,9 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.prior_widths import default_widths
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.stage import Stage
-from plateviz.dashboard.state import default_widths
 from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.fit_controls import TIGHT, controls, width_input
 from plateviz.dashboard.views.solution_window import SolutionWindow

@@ -2,11 +2,11 @@
 
 import pytest
 
+from plateviz.dashboard.prior_widths import default_widths
 from plateviz.dashboard.selected import NOTHING, Selected
 from plateviz.dashboard.selection_actions import SelectionActions
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.stage import Stage
-from plateviz.dashboard.state import default_widths
 from plateviz.runs.kept_selections import KeptSelections
 from solver.data.settings import FitSettings
 from solver.errors import InputError

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from plateviz.dashboard.prior_widths import default_widths
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.stage import Stage
@@ -15,7 +16,6 @@ from plateviz.dashboard.state import (
     CONTROLS,
     FitChoices,
     Selection,
-    default_widths,
 )
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.solving.job import Job

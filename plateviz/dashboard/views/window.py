@@ -8,6 +8,9 @@ import panel_material_ui as pmui
 
 from plateviz.dashboard.views.figure import Part
 
+# By default it has a grey of the light theme in both.
+_CROSS = {"& .MuiIconButton-root[aria-label=close]": {"color": "text.primary"}}
+
 
 class HasWindow(Protocol):
     """A part of the page that is a window."""
@@ -34,6 +37,7 @@ def window(title: str, *contents: Part, width: str) -> pmui.Dialog:
         show_close_button=True,
         close_on_click=True,
         width_option=width,
+        sx=_CROSS,
     )
 
 

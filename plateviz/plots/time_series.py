@@ -10,6 +10,7 @@ from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS
 from plateviz.plots.survey_figure import SourceFigure
 from plateviz.plots.units import orbits_text
 from plateviz.plots.workspace import SourceWorkspace
+from plateviz.tables.labels import short_id
 from plateviz.tables.survey_tables import SourceTables
 from plateviz.tables.time_series import series_of
 
@@ -69,7 +70,7 @@ def _offsets(rows: pd.DataFrame, axis: str, xlim: Limits, width: int) -> Figure:
             error_bars(orbits, "year", "offset_mas", "sigma_mas", SERIES_COLOURS[0]),
             _points(orbits, "offset_mas", "estimate ± 1σ"),
         ],
-        title=f"{_NAMES[axis]} of source {orbits['id'].iloc[0]}",
+        title=f"{_NAMES[axis]} of source {short_id(orbits['id'].iloc[0])}",
         subtitle=f"{orbits_text(len(orbits))}; {_remarks(orbits)}",
         x=Axis(_XLABEL, xlim),
         y=Axis(f"{_NAMES[axis]} minus {_ZEROS[zero]} (mas)", _offset_limits(rows)),

@@ -7,6 +7,7 @@ import pandas as pd
 _EXPOSURE = re.compile(r"field (-?\d+), exposure (-?\d+)")
 _IN_A_RESULT = re.compile(r"field (-?\d+) plate (-?\d+)")
 _MJD_UNIX_EPOCH = 40587.0
+_LONG_ID, _SHORT_ID = 10, 6
 _MINUTE = "%Y-%m-%d %H:%M"
 
 
@@ -40,6 +41,11 @@ def element_labels(labels: pd.Series) -> pd.Series:
 def id_strings(ids: pd.Series) -> pd.Series:
     """Return the ids as text, because a browser represents integers exactly up to 2**53 only."""
     return ids.astype("int64").astype(str)
+
+
+def short_id(source: str) -> str:
+    """Return the end of a long id, for a title beside which the whole id stands."""
+    return source if len(source) <= _LONG_ID else f"…{source[-_SHORT_ID:]}"
 
 
 def unit_text(unit: str) -> str:

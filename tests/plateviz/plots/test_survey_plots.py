@@ -9,6 +9,7 @@ import pytest
 from plateviz import plots, tables
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.style import ROW_LIMIT
+from plateviz.tables.labels import short_id
 from plateviz.tables.run_diagnosis import no_tests
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from tests.plateviz.plots.drawn import plots_of, subtitle_of
@@ -245,3 +246,8 @@ def test_gallery_separates_the_pages_and_sorts_their_figures():
     assert all(page == sorted(page) for page in orders)
     names = [f.name for page in (diagnostics, survey_figures, source_figures) for f in page()]
     assert len(names) == len(set(names))
+
+
+def test_long_id_is_short_in_a_narrow_title_and_whole_in_the_hover():
+    assert short_id("4040356967235058635") == "…058635"
+    assert short_id("1234567890") == "1234567890"

@@ -17,20 +17,28 @@ class Stage(Enum):
     FAILED = "the last request failed"
 
 
+_NO_POINTS = "There are no points in that area; nothing is selected"
+
+
 class RequestState(param.Parameterized):
     """State of what was asked for last.
 
     `stage` and `message` are the state of the last request. `notice` says what of the last address,
-    or saved view, cannot be shown.
+    or saved view, cannot be shown, `remark` why the last drag has selected nothing.
     """
 
     stage = param.ClassSelector(class_=Stage, default=Stage.LOADING)
     message = param.String(default="")
     notice = param.String(default="")
+    remark = param.String(default="")
 
     def refuse(self, message: str) -> None:
         """Show why a request failed; the last solution stays."""
         self.param.update(stage=Stage.FAILED, message=message)
+
+    def note_area(self, has_points: bool) -> None:
+        """Say if there are no points in the area that a person has drawn to select some."""
+        self.remark = "" if has_points else _NO_POINTS
 
     def note(self, problems: Iterable[str]) -> None:
         """Add what of an address cannot be shown to the notice."""

@@ -105,6 +105,7 @@ class ExploreView(pn.viewable.Viewer):
             select_area=self._take_area,
             select_exposures=selection.select_exposures,
             select_detectors=selection.select_detectors,
+            note_area=session.note_area,
         )
         self._figure = FigureView(
             _Text(origin.caption, origin.document),
@@ -280,8 +281,7 @@ class ExploreView(pn.viewable.Viewer):
     def _show_controls(self, drawn: _Drawn) -> None:
         """Offer what can be selected, and the limits of the column that limits the rows."""
         self._selects.visible = len(drawn.table.kinds) > 1
-        is_limited = bool(drawn.chosen.only)
-        limits = (drawn.chosen.lowest, drawn.chosen.highest)
+        is_limited, limits = bool(drawn.chosen.only), (drawn.chosen.lowest, drawn.chosen.highest)
         with self._following():
             for entry, limit, end in zip(self._limits, limits, drawn.extent.only, strict=True):
                 entry.param.update(

@@ -138,6 +138,7 @@ class OrbitPage(pn.viewable.Viewer):
                 select=self._session.selection.select_sources,
                 select_exposures=self._session.selection.select_exposures,
                 select_detectors=self._session.selection.select_detectors,
+                note_area=self._session.note_area,
             ),
             saved=Saved(self._session.selection.subject),
             theme=self._session.theme,

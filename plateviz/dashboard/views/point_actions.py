@@ -22,6 +22,8 @@ Links = Mapping[str, Callable[[str], object]]
 Select = Callable[[frozenset[Any]], object]
 """Called with what a person has selected: ids of sources or detectors, or pairs of exposures."""
 
+NoteArea = Callable[[bool], object]
+"""Called when a person has drawn an area among points: whether any of them is in it."""
 SelectArea = Callable[[np.ndarray], object]
 """Called with the corners, (n, 2), of an area where a person has drawn one and there are no points.
 """
@@ -45,12 +47,14 @@ class PointActions:
         *,
         select_exposures: Select | None = None,
         select_detectors: Select | None = None,
+        note_area: NoteArea | None = None,
     ) -> None:
         """Begin without a figure; `select` is for points of sources."""
-        self._links, self._select_area = links, select_area
+        self._links, self._select_area, self._note_area = links, select_area, note_area
         selects = zip(SELECTED_BY, (select, select_exposures, select_detectors), strict=True)
         self._selects = {column: one for column, one in selects if one is not None}
         self._followed: set[str] = set()
+        self._heard: set[str] = set()
         self._frames: dict[str, _FrameTools] = {}
         self._selectable: list[list[BokehGlyphs]] = []
         self._selected: SelectedIds = NO_IDS
@@ -65,10 +69,9 @@ class PointActions:
         for frame in drawn.frames:
             selectable = [one for one in frame.glyphs() if selected_column(one) is not None]
             self._selectable.append(selectable)
-            if self._select_area is not None and frame.plot.id not in self._frames:
-                self._tools_of(frame).select_anywhere()
-                take_area = partial(self._take_area, frame)
-                frame.plot.on_event(SelectionGeometry, lambda event, take=take_area: take(event))
+            if frame.plot.id not in self._heard:
+                self._heard.add(frame.plot.id)
+                self._hear(frame)
             for glyphs in frame.glyphs():
                 if glyphs.source.id in self._followed:
                     continue
@@ -78,6 +81,14 @@ class PointActions:
                 elif column := next((c for c in self._links if c in glyphs.source.data), None):
                     self._followed.add(glyphs.source.id)
                     self._open_on_tap(frame, glyphs, column)
+
+    def _hear(self, frame: BokehFrame) -> None:
+        """Answer to the areas that a person draws."""
+        if self._select_area is not None:
+            self._tools_of(frame).select_anywhere()
+        if self._select_area is not None or self._note_area is not None:
+            take_area = partial(self._take_area, frame)
+            frame.plot.on_event(SelectionGeometry, lambda event, take=take_area: take(event))
 
     def show(self, selected: SelectedIds) -> None:
         """Show what is selected: rows of a selected source, exposure or detector stand out."""
@@ -137,14 +148,17 @@ class PointActions:
         return (str(ids[row]) for row in rows if 0 <= row < len(ids))
 
     def _take_area(self, frame: BokehFrame, event: Event) -> None:
-        if not isinstance(event, SelectionGeometry) or self._select_area is None:
+        if not isinstance(event, SelectionGeometry) or not event.final:
             return
-        has_points = any(
-            one.kind == "points" and one.renderer.visible and selected_column(one) is not None
-            for one in frame.glyphs()
-        )
         corners = _corners(event.geometry or {})
-        if event.final and corners is not None and not has_points:
+        if corners is None:
+            return
+        selectable = [one for one in frame.glyphs() if selected_column(one) is not None]
+        if any(one.kind == "points" and one.renderer.visible for one in selectable):
+            # The points have answered before.
+            if self._note_area is not None:
+                self._note_area(any(True for one in selectable for _ in self._chosen(one)))
+        elif self._select_area is not None:
             self._select_area(corners)
 
     def _open_on_tap(self, frame: BokehFrame, glyphs: BokehGlyphs, column: str) -> None:

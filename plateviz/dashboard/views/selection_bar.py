@@ -1,14 +1,15 @@
 """SelectionBar: what is selected, and what can be done with it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.downloads import Done, Later
-from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.same_machine import is_same_machine
 from plateviz.dashboard.selected import KINDS, Selected
 from plateviz.dashboard.selected_tables import (
@@ -25,6 +26,8 @@ from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.dashboard.views.selection_list import SelectionList
 from solver.errors import InputError
+
+_WORDS: Mapping[str, Any] = MappingProxyType({"variant": "body2", "margin": (0, 8), "sx": IN_BAR})
 
 
 class SelectionBar(pn.viewable.Viewer):
@@ -50,8 +53,10 @@ class SelectionBar(pn.viewable.Viewer):
             pn.state.on_session_destroyed(lambda _: self._sender.close())
         self._session.selection.param.watch(self._show, [*KINDS, "kept"])
         self._session.choices.param.watch(self._show, "exclusions")
-        self._session.param.watch(self._show, ["shown", "theme"])
+        self._session.param.watch(self._show, ["shown", "theme", "remark"])
         navigation.param.watch(self._show, "view")
+        self._session.selection.param.watch(self._forget_remark, [*KINDS])
+        navigation.param.watch(self._forget_remark, ["view", *WORKSPACES.values()])
         self._show()
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -60,7 +65,7 @@ class SelectionBar(pn.viewable.Viewer):
 
     def _make(self) -> None:
         actions = self._actions
-        self._words = pmui.Typography("", variant="body2", margin=(0, 8), sx=IN_BAR)
+        self._words = pmui.Typography("", **_WORDS)
         self._list, self._kept = SelectionList(self._navigation), KeptSelections(self._navigation)
         self._open = self._button("Open", self._open_source)
         self._leave_out = self._button("Leave out of the fit", actions.leave_out)
@@ -99,6 +104,9 @@ class SelectionBar(pn.viewable.Viewer):
 
     def _show(self, *_: object) -> None:
         session, selected = self._session, self._session.selection.selected
+        if session.remark and not selected:
+            self._row[:] = [pmui.Typography(session.remark, **_WORDS)]
+            return
         if not selected and not session.selection.kept:
             self._row.clear()
             return
@@ -119,6 +127,9 @@ class SelectionBar(pn.viewable.Viewer):
         shown = self._parts if selected else [self._keep]
         if list(self._row) != shown:
             self._row[:] = shown
+
+    def _forget_remark(self, *_: object) -> None:
+        self._session.remark = ""
 
     def _open_source(self) -> None:
         (source,) = self._session.selection.sources

@@ -166,7 +166,11 @@ class SurveyPage(pn.viewable.Viewer):
         return FigureView(
             figure,
             partial(self._plot, figure),
-            actions=PointActions({"orbit_id": self._open_orbit}, session.selection.select_sources),
+            actions=PointActions(
+                {"orbit_id": self._open_orbit},
+                session.selection.select_sources,
+                note_area=session.note_area,
+            ),
             saved=Saved(self._subject),
             theme=session.theme,
         )

@@ -52,6 +52,22 @@ def shown(bar):
     return [part.label for part in bar.__panel__() if getattr(part, "label", "") and part.visible]
 
 
+def test_bar_says_that_an_area_was_empty_until_something_is_done(navigation, session):
+    bar = SelectionBar(navigation)
+    for forget in (
+        lambda: session.selection.select_sources(frozenset({1})),
+        lambda: navigation.turn_to(View.SOURCE),
+        lambda: session.note_area(has_points=True),
+    ):
+        session.selection.select_sources(frozenset())
+        navigation.turn_to(View.ORBIT)
+        session.note_area(has_points=False)
+        (remark,) = bar.__panel__()
+        assert remark.object == "There are no points in that area; nothing is selected"
+        forget()
+        assert remark not in list(bar.__panel__())
+
+
 def test_bar_offers_what_can_be_done(navigation, session):
     bar = SelectionBar(navigation)
     assert len(bar.__panel__()) == 0

@@ -14,6 +14,7 @@ from param.parameterized import Watcher
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.at_rest import AtRest
+from plateviz.dashboard.lost_run import look_for_run
 from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.page_request import WINDOW
 from plateviz.dashboard.rooms import Rooms, Window, window_from
@@ -39,6 +40,8 @@ _PROGRESS_MILLISECONDS = 250
 _PENDING_MILLISECONDS = 50
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
+# Milliseconds between two looks whether the run is there at all.
+_LOOK_FOR_RUN = 10_000
 # The solver prepares what-ifs once a page has been at rest for so long. Before, the browser draws
 # and a person may step on to the next orbit, for which a fit would take the cores.
 _REST_SECONDS = 3.0
@@ -176,6 +179,9 @@ class _Ticker:
             self._tick, period=_PROGRESS_MILLISECONDS, start=False
         )
         self._looks = pn.state.add_periodic_callback(self._look, period=_LOOK, start=False)
+        self._looks_for_run = pn.state.add_periodic_callback(
+            self._look_for_run, period=_LOOK_FOR_RUN, start=False
+        )
         self._navigation: Navigation | None = None
         self._pages: Pages | None = None
         self._watched: Job | None = None
@@ -204,6 +210,7 @@ class _Ticker:
             self._rest = AtRest(session.prepare_what_ifs, _REST_SECONDS, later)
             self.wake()
             self._follow_run()
+            self._looks_for_run.start()
 
         pn.state.onload(begin)
 
@@ -238,6 +245,10 @@ class _Ticker:
             return
         if self._navigation is None or not self._navigation.look_again():
             self._looks.stop()
+
+    def _look_for_run(self) -> None:
+        if self._navigation is not None:
+            look_for_run(self._navigation)
 
     def _tick(self) -> None:
         self._is_to_tick = False

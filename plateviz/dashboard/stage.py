@@ -24,13 +24,15 @@ class RequestState(param.Parameterized):
     """State of what was asked for last.
 
     `stage` and `message` are the state of the last request. `notice` says what of the last address,
-    or saved view, cannot be shown, `remark` why the last drag has selected nothing.
+    or saved view, cannot be shown, `remark` why the last drag has selected nothing, and `loss` that
+    the run on the screen is gone.
     """
 
     stage = param.ClassSelector(class_=Stage, default=Stage.LOADING)
     message = param.String(default="")
     notice = param.String(default="")
     remark = param.String(default="")
+    loss = param.String(default="")
 
     def refuse(self, message: str) -> None:
         """Show why a request failed; the last solution stays."""

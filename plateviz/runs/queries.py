@@ -82,6 +82,10 @@ class SurveyRun:
         """Whether the tables over all orbits are there: of all orbits or of those not failed."""
         return self._run.is_gathered
 
+    def is_there(self) -> bool:
+        """Return whether nobody has removed the run; costs one look at its directory."""
+        return self.directory.is_dir()
+
     def written(self) -> Written:
         """Return what the run has now; takes a millisecond for each hundred orbits."""
         return self._run.written()

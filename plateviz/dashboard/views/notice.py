@@ -1,4 +1,4 @@
-"""NoticeView: what of an address, or of a saved view, cannot be shown."""
+"""NoticeView: what of an address or a saved view cannot be shown, and that the run is gone."""
 
 from html import escape
 
@@ -9,14 +9,17 @@ from plateviz.dashboard.session import Session
 
 
 class NoticeView(pn.viewable.Viewer):
-    """One message above the page until it is closed; nothing while there is nothing to say."""
+    """Messages above the page; nothing while there is nothing to say.
+
+    That of an address stays until it is closed, that of a run until the run is there again.
+    """
 
     def __init__(self, session: Session, **params: object) -> None:
         """Follow `session`."""
         super().__init__(**params)
         self._session = session
         self._row = pmui.Column(margin=0, sizing_mode="stretch_width")
-        session.param.watch(self._show, "notice")
+        session.param.watch(self._show, ["notice", "loss"])
         self._show()
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -24,19 +27,24 @@ class NoticeView(pn.viewable.Viewer):
         return self._row
 
     def _show(self, *_: object) -> None:
-        if not self._session.notice:
-            self._row.clear()
-            return
-        alert = pmui.Alert(
-            # It is taken for Markdown, in which HTML would be kept.
-            object=escape(self._session.notice),
-            severity="warning",
-            closeable=True,
-            margin=(6, 0),
-            sizing_mode="stretch_width",
-        )
-        alert.param.watch(self._close, "closed")
-        self._row[:] = [alert]
+        alerts = []
+        if self._session.loss:
+            alerts.append(_alert(self._session.loss))
+        if self._session.notice:
+            alerts.append(_alert(self._session.notice, closeable=True))
+            alerts[-1].param.watch(self._close, "closed")
+        self._row[:] = alerts
 
     def _close(self, *_: object) -> None:
         self._session.notice = ""
+
+
+def _alert(text: str, closeable: bool = False) -> pmui.Alert:
+    return pmui.Alert(
+        # It is taken for Markdown, in which HTML would be kept.
+        object=escape(text),
+        severity="warning",
+        closeable=closeable,
+        margin=(6, 0),
+        sizing_mode="stretch_width",
+    )

@@ -1,0 +1,37 @@
+"""A page that nobody touches says that its run is gone, and no more once it is there again."""
+
+import shutil
+
+from plateviz.dashboard.lost_run import look_for_run
+from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.session import Session
+from plateviz.dashboard.views.notice import NoticeView
+from plateviz.runs.new_run import begin_run
+from plateviz.runs.queries import survey_runs
+from solver.data.settings import FitSettings
+from tests.plateviz.dashboard.test_navigation import SurveyStore
+
+
+def test_removed_run_is_said_until_it_is_there_again(fit_result, survey_folder):
+    run = begin_run(survey_folder, "default", FitSettings())
+    navigation = Navigation(Session(SurveyStore(fit_result, survey_runs(survey_folder))))
+    notice = NoticeView(navigation.session).__panel__()
+    look_for_run(navigation)
+    assert len(notice) == 0
+    shutil.move(run.directory, survey_folder / "elsewhere")
+    navigation.session.note(["orbit: expected one of this page, found 'x'"])
+    look_for_run(navigation)
+    lost, other = notice
+    assert "The run default is not on the disk any more" in lost.object
+    assert not lost.closeable
+    other.closed = True
+    assert [alert.object for alert in notice] == [lost.object]
+    shutil.move(survey_folder / "elsewhere", run.directory)
+    look_for_run(navigation)
+    assert len(notice) == 0
+
+
+def test_page_of_files_has_no_run_to_lose(fit_result):
+    navigation = Navigation(Session(SurveyStore(fit_result, [])))
+    look_for_run(navigation)
+    assert navigation.session.loss == ""

@@ -78,6 +78,9 @@ class BokehGlyphs:
             nonselection_glyph=self._faded,
             name=glyphs.name,
         )
+        self._is_all_faded = False
+        if self._faded is not None:
+            self.renderer.muted_glyph = self._faded
         self._mapper: models.ContinuousColorMapper | None = None
         self._categories: dict[str, models.CategoricalMapper] = {}
         self.hover: models.HoverTool | None = None
@@ -125,6 +128,12 @@ class BokehGlyphs:
         others = {name: one for name, one in columns.items() if not _is_same(data[name], one)}
         if others:
             data.update(others)
+
+    def fade(self, is_faded: bool) -> None:
+        """Fade all rows, or none; Bokeh fades rows beside selected ones of the same table only."""
+        # A person may have muted them by their name in the legend.
+        if self._faded is not None and is_faded is not self._is_all_faded:
+            self._is_all_faded = self.renderer.muted = is_faded
 
     def hide(self) -> None:
         """Show nothing until other values come."""

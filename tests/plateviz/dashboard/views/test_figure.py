@@ -252,6 +252,35 @@ def selecting(table, hover):
     return view, plot(view).renderers[0].data_source, chosen
 
 
+def test_points_beside_selected_ones_of_another_table_are_faded():
+    axes = {"x": Axis("x (mm)", (0.0, 9.0)), "y": Axis("y (mm)", (0.0, 2.0))}
+    tables = [
+        points(
+            pd.DataFrame({"x": [0.0, 1.0], "y": 1.0, "id": ids}),
+            *("x", "y"),
+            name=name,
+            color="mark",
+            hover=[("source", "@{id}")],
+        )
+        for name, ids in {"first": ["7", "8"], "second": ["9", "10"]}.items()
+    ]
+    figure = framed(tables, title="Classes", width=200, height=100, **axes)
+    view = FigureView(diagnostics()[0], lambda: figure, actions=PointActions(select=print))
+    come_near(view)
+    view.draw()
+
+    def faded(*ids):
+        view.show_selected({"id": frozenset(ids)})
+        view.draw()
+        return [renderer.muted for renderer in plot(view).renderers]
+
+    assert faded("8") == [False, True]
+    assert faded("8", "9") == [False, False]
+    # Where nothing stands out, nothing is faded.
+    assert faded("11") == [False, False]
+    assert faded() == [False, False]
+
+
 EXPOSURES = ["field 0, exposure 3", "field 0, exposure 4", "field 0, exposure 3"]
 
 

@@ -25,6 +25,16 @@ _UNHURRIED = {
     "& .MuiLinearProgress-bar": {"animationDelay": "1s", "animationFillMode": "backwards"}
 }
 
+# All of the head of a card opens it, not only its mark, which by default has a grey of the light
+# theme in both.
+_HEAD = {
+    "& .MuiCardHeader-root": {"position": "relative", "overflow": "hidden"},
+    "& .MuiCardHeader-action .MuiIconButton-root": {
+        "color": "text.primary",
+        "&::after": {"content": '""', "position": "absolute", "inset": "-14px -400px"},
+    },
+}
+
 
 class RefitView(pn.viewable.Viewer):
     """Controls of a refit, its progress, and the selection of a solution."""
@@ -98,6 +108,7 @@ class RefitView(pn.viewable.Viewer):
             margin=(8, 10),
             elevation=0,
             variant="outlined",
+            sx=_HEAD,
         )
 
         def opened(*_: object) -> None:

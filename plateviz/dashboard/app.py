@@ -93,6 +93,8 @@ def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
     page.param.watch(lambda event: _set_theme(session, event.new), "dark_theme")
     system.is_dark = page.dark_theme
     _set_theme(session, page.dark_theme)
+    system.follow(session.theme)
+    session.param.watch(lambda event: system.follow(event.new), "theme")
     pages.draw_first()
     system.param.watch(lambda event: page.param.update(dark_theme=event.new), "is_dark")
     if pn.state.curdoc is not None and pn.state.location is not None:

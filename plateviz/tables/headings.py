@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 _ALPHA, _DELTA = "Reference sources, α", "Reference sources, δ"
-_CATALOGUE, _TRUTH, _SIGMA = "minus catalogue, mas", "minus truth, mas", "marginal σ, mas"
+_CATALOGUE, _TRUTH, _SIGMA = "− catalogue, mas", "− truth, mas", "marginal σ, mas"
 _PRIOR = "minus prior, mas"
 _STANDARDISED = "rms residual over its σ"
 

@@ -27,7 +27,7 @@ def test_columns_of_angles_and_their_headings_are_in_the_unit(units):
     units.unit = "µas"
     table = pd.DataFrame({name: [1.5] for name in ORBITS_OF_SOURCE})
     shown, headings = units.columns(table, ORBITS_OF_SOURCE), units.headings(ORBITS_OF_SOURCE)
-    assert headings["offset_ra"] == ("Δα cos δ", "0", "minus catalogue, µas")
+    assert headings["offset_ra"] == ("Δα cos δ", "0", "− catalogue, µas")
     assert headings["chi2_per_dof"] == ORBITS_OF_SOURCE["chi2_per_dof"]
     angles = [name for name, one in ORBITS_OF_SOURCE.items() if one.group.endswith(", mas")]
     assert len(angles) == 6

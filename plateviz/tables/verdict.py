@@ -75,7 +75,7 @@ def is_judged(result: FitResult) -> bool:
 def orbit_verdict(result: FitResult) -> Verdict:
     """Return the verdict on one fitted orbit: that of the result itself, or a new one, once.
 
-    A new one of a full orbit takes half a second.
+    A new one of a full orbit takes a quarter of a second.
     """
     if _NAME not in result.derived:
         stored = _stored(result)

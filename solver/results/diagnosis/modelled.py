@@ -17,18 +17,35 @@ from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
 from solver.units import PIX_PER_MPIX, RAD_PER_ARCSEC
 
 
-class Column(NamedTuple):
-    """The displacement by one parameter: along x and y of the focal plane, per unit of `sigma`.
+class Scalar(NamedTuple):
+    """A displacement along x by one parameter, and the same along y by another.
 
     Attributes
     ----------
-    x, y : of each row, um, shape (n,)
-    sigma : width of the parameter's prior
+    value : of each row, um, shape (n,), per unit of the sigmas
+    sigma_x, sigma_y : widths of the priors
+    """
+
+    value: np.ndarray
+    sigma_x: float
+    sigma_y: float
+
+
+class Vector(NamedTuple):
+    """A displacement along both axes of the focal plane by one parameter.
+
+    Attributes
+    ----------
+    x, y : of each row, um, shape (n,), per unit of `sigma`
+    sigma : width of the prior
     """
 
     x: np.ndarray
     y: np.ndarray
     sigma: float
+
+
+Column = Scalar | Vector
 
 
 def has_anisotropy(result: FitResult) -> bool:
@@ -77,7 +94,6 @@ def _of_terms(
             own / half,
         ),
     )
-    zeros = np.zeros(rows.n)
     for name, order, factors, place in families:
         sigmas = widths.get(f"{name}_x", np.empty(0)), widths.get(f"{name}_y", np.empty(0))
         terms = [(n - j, j) for n in range(2, order + 1) for j in range(n + 1)]
@@ -86,8 +102,7 @@ def _of_terms(
         in_x, in_y = (legendre.legvander(along, order).T for along in place.T)
         values = (factor * in_x[k] * in_y[j] for factor in factors for k, j in terms)
         for number, value in enumerate(values):
-            yield Column(value, zeros, sigmas[0][number])
-            yield Column(zeros, value, sigmas[1][number])
+            yield Scalar(value, sigmas[0][number], sigmas[1][number])
 
 
 def _of_detectors(
@@ -95,7 +110,7 @@ def _of_detectors(
 ) -> Iterator[Column]:
     """Yield the columns of the groups with one parameter of each detector."""
     pixel = rows.pixel
-    crossed = 0.5 * pixel / camera.half[rows.detector] + 0.5
+    crossed = 0.5 * rows.local + 0.5
     angle, none = 2.0 * np.pi * pixel, np.zeros(rows.n)
     shift = PIX_PER_MPIX * fainter
     shifts: dict[str, tuple[np.ndarray, int]] = {"detector_skew": (RAD_PER_ARCSEC * pixel[:, 1], 0)}
@@ -111,10 +126,10 @@ def _of_detectors(
         if name not in widths:
             continue
         pixels = np.stack([value, none] if axis == 0 else [none, value], axis=1)
-        x, y = onto_focal_plane(pixels * camera.pitch[rows.detector], camera.turn[rows.detector]).T
+        x, y = onto_focal_plane(pixels * camera.pitch[rows.detector], camera.turn, rows.detector).T
         for detector, sigma in enumerate(widths[name]):
             on = rows.detector == detector
-            yield Column(x * on, y * on, sigma)
+            yield Vector(x * on, y * on, sigma)
 
 
 def _of_motion(
@@ -124,17 +139,17 @@ def _of_motion(
     if "detector_turn" not in widths:
         return
     field = np.unique(result.exposures["field_id"].to_numpy(), return_inverse=True)[1]
-    of_row, none = field[rows.exposure], np.zeros(rows.n)
+    of_row = field[rows.exposure]
     pixel = RAD_PER_ARCSEC * rows.pixel * camera.pitch[rows.detector]
     turned = np.stack([-pixel[:, 1], pixel[:, 0]], axis=1)
-    x, y = onto_focal_plane(turned, camera.turn[rows.detector]).T
+    x, y = onto_focal_plane(turned, camera.turn, rows.detector).T
     later = max(int(field.max()), 1)
     for element in range(len(camera.turn) * later):
         moved = (rows.detector == element // later) & (of_row == element % later + 1)
         on = moved.astype(float)
-        yield Column(on, none, widths["detector_motion_x"][element])
-        yield Column(none, on, widths["detector_motion_y"][element])
-        yield Column(x * on, y * on, widths["detector_turn"][element])
+        sigmas = (widths[f"detector_motion_{axis}"][element] for axis in "xy")
+        yield Scalar(on, *sigmas)
+        yield Vector(x * on, y * on, widths["detector_turn"][element])
 
 
 def _faintness(result: FitResult) -> np.ndarray:

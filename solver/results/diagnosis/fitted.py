@@ -9,7 +9,14 @@ from scipy import sparse
 
 from solver.data.result import FitResult
 from solver.results.diagnosis.columns import Columns
-from solver.results.diagnosis.modelled import Column, Scalar, Vector, has_anisotropy, modelled
+from solver.results.diagnosis.modelled import (
+    Column,
+    Scalar,
+    Vector,
+    has_anisotropy,
+    modelled,
+    prior_widths,
+)
 from solver.results.diagnosis.patterns import legendre_at
 from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
 from solver.units import RAD_PER_ARCSEC
@@ -28,8 +35,7 @@ def shared_columns(result: FitResult, camera: Camera, rows: Rows) -> list[Column
     They are per um of the detectors' places, pitches and the distortion, per rad, and per unit of
     each cause.
     """
-    calibration = result.calibration
-    width = {name: rows_["prior_sigma"].to_numpy() for name, rows_ in calibration.groupby("group")}
+    calibration, width = result.calibration, prior_widths(result)
     pixel, zeros = rows.pixel * camera.pitch[rows.detector], np.zeros(rows.n)
     vectors = (
         ("detector_rotation", (-pixel[:, 1], pixel[:, 0]), RAD_PER_ARCSEC),
@@ -51,7 +57,7 @@ def shared_columns(result: FitResult, camera: Camera, rows: Rows) -> list[Column
         k, j = (int(one) for one in label[2:-1].split(","))
         sigmas = (width[f"distortion_{axis}"][number] for axis in "xy")
         columns.append(Scalar(in_x[k] * in_y[j], *sigmas))
-    return [*columns, *modelled(result, camera, rows)]
+    return [*columns, *modelled(result, camera, rows, width)]
 
 
 def precision_of(columns: Sequence[Column]) -> np.ndarray:

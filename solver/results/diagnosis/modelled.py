@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.polynomial import legendre
 
 from solver.data.magnitudes import faintness
@@ -53,11 +54,22 @@ def has_anisotropy(result: FitResult) -> bool:
     return bool((result.calibration["group"] == "focal_anisotropy").any())
 
 
-def modelled(result: FitResult, camera: Camera, rows: Rows) -> Iterator[Column]:
-    """Yield the columns of the causes that a fit includes, but for those of each exposure."""
-    widths = {
-        name: group["prior_sigma"].to_numpy() for name, group in result.calibration.groupby("group")
-    }
+def prior_widths(result: FitResult) -> dict[str, np.ndarray]:
+    """Return the widths of the priors of each group of parameters, by its name."""
+    group, names = pd.factorize(result.calibration["group"])
+    sigma = result.calibration["prior_sigma"].to_numpy()
+    return {name: sigma[group == number] for number, name in enumerate(names)}
+
+
+def modelled(
+    result: FitResult, camera: Camera, rows: Rows, widths: dict[str, np.ndarray]
+) -> Iterator[Column]:
+    """Yield the columns of the causes that a fit includes, but for those of each exposure.
+
+    Parameters
+    ----------
+    widths : of the priors
+    """
     yield from _of_terms(result, camera, rows, widths)
     yield from _of_detectors(camera, rows, widths, _faintness(result)[rows.source])
     yield from _of_motion(result, camera, rows, widths)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import sparse
+from scipy import linalg, sparse
 
 from solver.data.result import FitResult
 from solver.results.diagnosis.columns import Columns
@@ -16,6 +16,8 @@ from solver.results.diagnosis.modelled import (
     has_anisotropy,
     modelled,
     prior_widths,
+    walk_precision,
+    walk_terms,
 )
 from solver.results.diagnosis.patterns import legendre_at
 from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
@@ -69,35 +71,40 @@ def precision_of(columns: Sequence[Column]) -> np.ndarray:
 
 
 class OfExposures(NamedTuple):
-    """Parameters of each exposure: shift along x and y, turn, scale, and anisotropy if fitted.
+    """Parameters of each exposure: shift along x and y, turn, scale, and causes that are fitted.
 
+    These are the anisotropy, and the terms of the distortion that walk, along x and then along y.
     Exposures without rows have none.
 
     Attributes
     ----------
     gram : products with each other, shape (parameters, parameters)
     with_columns : with columns, shape (parameters, columns)
-    precision : of their priors, shape (parameters,)
-    basis : 1, x and y of the exposure of each row, weighted, shape (n, 3 exposures)
+    precision : of their priors, shape (parameters, parameters)
+    basis : functions of the exposure of each row, weighted, shape (n, functions x exposures)
+    in_x, in_y : displacement along x and along y by each parameter of an exposure, from the
+        functions, shape (parameters, functions)
     """
 
     gram: np.ndarray
     with_columns: np.ndarray
     precision: np.ndarray
     basis: sparse.csr_matrix
+    in_x: np.ndarray
+    in_y: np.ndarray
 
 
 def with_exposures(result: FitResult, camera: Camera, rows: Rows, columns: Columns) -> OfExposures:
     """Return the parameters of each exposure, and their products with columns."""
-    precision = [0.0] * 4
-    if has_anisotropy(result):
-        rows_of = result.calibration["group"] == "focal_anisotropy"
-        width = float(result.calibration.loc[rows_of, "prior_sigma"].iloc[0])
-        precision.append((0.5 * _PPM * width * camera.scale) ** -2)
-    kinds = len(precision)
-    basis = np.sqrt(rows.weight) * np.stack([np.ones(rows.n), *rows.at.T])
     taken = np.flatnonzero(np.diff(rows.first))
-    n, in_x, in_y = columns.scalar.shape[1], _IN_X[:kinds], _IN_Y[:kinds]
+    walk, in_walk = walk_terms(result, rows), walk_precision(result, taken)
+    in_x, in_y, own_precision = _of_one_exposure(result, camera, len(walk))
+    basis = np.sqrt(rows.weight) * np.stack([np.ones(rows.n), *rows.at.T, *walk])
+    kinds, width = in_x.shape
+    precision = np.zeros((len(taken), kinds, len(taken), kinds))
+    for kind, one in enumerate([*own_precision, *np.repeat(in_walk, len(walk), axis=0)]):
+        precision[:, kind, :, kind] = one * np.eye(len(taken)) if np.ndim(one) == 0 else one
+    n = columns.scalar.shape[1]
     gram = np.zeros((len(taken), kinds, len(taken), kinds))
     products = np.empty((len(taken), kinds, columns.count))
     for e, (first, last) in enumerate(zip(rows.first[taken], rows.first[taken + 1], strict=True)):
@@ -107,14 +114,33 @@ def with_exposures(result: FitResult, camera: Camera, rows: Rows, columns: Colum
         products[e, :, 2 * n :] = in_x @ (own @ some.x) + in_y @ (own @ some.y)
         gram[e, :, e] = in_x @ square @ in_x.T + in_y @ square @ in_y.T
     size = len(taken) * kinds
-    place = 3 * np.searchsorted(taken, rows.exposure)[:, None] + np.arange(3)
-    each = (basis.T.ravel(), place.ravel(), 3 * np.arange(rows.n + 1))
+    place = width * np.searchsorted(taken, rows.exposure)[:, None] + np.arange(width)
+    each = (basis.T.ravel(), place.ravel(), width * np.arange(rows.n + 1))
     return OfExposures(
         gram.reshape(size, size),
         products.reshape(size, -1),
-        np.tile(precision, len(taken)),
-        sparse.csr_matrix(each, shape=(rows.n, 3 * len(taken))),
+        precision.reshape(size, size),
+        sparse.csr_matrix(each, shape=(rows.n, width * len(taken))),
+        in_x,
+        in_y,
     )
+
+
+def _of_one_exposure(
+    result: FitResult, camera: Camera, n_walk: int
+) -> tuple[np.ndarray, np.ndarray, list[float]]:
+    """Return `in_x` and `in_y` of `OfExposures`, and the precision of all but the walks."""
+    precision = [0.0] * 4
+    if has_anisotropy(result):
+        rows_of = result.calibration["group"] == "focal_anisotropy"
+        width = float(result.calibration.loc[rows_of, "prior_sigma"].iloc[0])
+        precision.append((0.5 * _PPM * width * camera.scale) ** -2)
+    none, each = np.zeros((n_walk, n_walk)), np.eye(n_walk)
+    in_x, in_y = (
+        linalg.block_diag(one[: len(precision)], np.concatenate(walks))
+        for one, walks in ((_IN_X, (each, none)), (_IN_Y, (none, each)))
+    )
+    return in_x, in_y, precision
 
 
 def with_sources(
@@ -144,8 +170,7 @@ def with_sources(
     ra[:, n : 2 * n] = -dec[:, :n]
     ra[:, 2 * n :] = c @ columns.x - s @ columns.y
     dec[:, 2 * n :] = s @ columns.x + c @ columns.y
-    kinds = 3 * len(exposures.precision) // exposures.basis.shape[1]
-    in_x, in_y = _IN_X[:kinds].T, _IN_Y[:kinds].T
-    along, across = ((one @ exposures.basis).toarray().reshape(-1, 3) for one in (c, s))
+    in_x, in_y = exposures.in_x.T, exposures.in_y.T
+    along, across = ((one @ exposures.basis).toarray().reshape(-1, len(in_x)) for one in (c, s))
     of_exposures = np.concatenate([along @ in_x - across @ in_y, across @ in_x + along @ in_y])
     return of_columns, of_exposures.reshape(2 * count, -1)

@@ -11,9 +11,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.polynomial import legendre
+from scipy import linalg
 
 from solver.data.magnitudes import faintness
 from solver.data.result import FitResult
+from solver.problem.walks import MEAN_WIDTH_UM
 from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
 from solver.units import PIX_PER_MPIX, RAD_PER_ARCSEC
 
@@ -73,6 +75,28 @@ def modelled(
     yield from _of_terms(result, camera, rows, widths)
     yield from _of_detectors(camera, rows, widths, _faintness(result)[rows.source])
     yield from _of_motion(result, camera, rows, widths)
+
+
+def walk_terms(result: FitResult, rows: Rows) -> list[np.ndarray]:
+    """Return the terms of the distortion that change from exposure to exposure as random walks."""
+    degree = min(result.settings.drift_walk, int(result.summary["order"]))
+    x, y = (legendre.legvander(along, max(degree, 1)).T for along in rows.at.T)
+    return [x[n - j] * y[j] for n in range(2, degree + 1) for j in range(n + 1)]
+
+
+def walk_precision(result: FitResult, exposures: np.ndarray) -> np.ndarray:
+    """Return the precision of the prior of walks along x and along y at some of the exposures.
+
+    The steps from each exposure to the next one in time are independent, and the mean is of
+    little width: it belongs to the constant distortion. Shape (2, exposures, exposures).
+    """
+    place = np.argsort(np.argsort(result.exposures["obstime"].to_numpy(), kind="stable"))
+    steps = np.minimum.outer(place, place).astype(float)
+    steps -= steps.mean(axis=0) + steps.mean(axis=1)[:, None] - steps.mean()
+    some = steps[np.ix_(exposures, exposures)]
+    widths = [result.settings.width(f"drift_walk_{axis}") for axis in "xy"]
+    # The width may be infinite.
+    return np.array([linalg.pinvh(some + (MEAN_WIDTH_UM / one) ** 2) / one**2 for one in widths])
 
 
 def _of_terms(

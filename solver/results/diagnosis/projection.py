@@ -117,7 +117,7 @@ def project(result: FitResult, camera: Camera, rows: Rows, patterns: Patterns) -
             [between[:, others].T, gram[np.ix_(others, others)]],
         ]
     )
-    fitted[np.diag_indices(len(fitted))] += [*exposures.precision, *precision_of(shared)]
+    fitted += linalg.block_diag(exposures.precision, np.diag(precision_of(shared)))
     # Shifts of all exposures against those of all detectors may have no prior.
     fitted[np.diag_indices(len(fitted))] *= 1.0 + 1e-9
     factor = linalg.cho_factor(fitted, lower=True, check_finite=False)

@@ -91,6 +91,7 @@ def test_covariance_of_patterns_is_that_of_the_whole_problem(small_orbit, proble
     "causes",
     [
         {"drift": 3, "drift_in_time": 2, "focal_anisotropy": True},
+        {"drift_walk": 2, "prior_widths": {"drift_walk_x": 0.3, "drift_walk_y": 0.1}},
         *(
             pytest.param(causes, marks=pytest.mark.full)
             for causes in (
@@ -107,7 +108,8 @@ def test_covariance_of_patterns_allows_for_modelled_causes(small_orbit, make_den
     catalogue = small_orbit.data.catalogue
     magnitude = random.uniform(14.0, 18.0, len(catalogue))
     data = replace(small_orbit.data, catalogue=catalogue.assign(magnitude=magnitude))
-    settings = FitSettings(prior_widths=TIGHT_PRIORS, **causes)
+    widths = {**TIGHT_PRIORS, **causes.get("prior_widths", {})}
+    settings = FitSettings(**{**causes, "prior_widths": widths})
     fit = fit_orbit(data, small_orbit.instrument, settings)
     problem = build_problem(data, small_orbit.instrument, settings)
     mode = find_mode(problem, settings)

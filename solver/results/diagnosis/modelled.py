@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.polynomial import legendre
 from scipy import linalg
 
+from solver.data.distortion_terms import terms
 from solver.data.magnitudes import faintness
 from solver.data.result import FitResult
 from solver.problem.walks import MEAN_WIDTH_UM
@@ -81,7 +82,7 @@ def walk_terms(result: FitResult, rows: Rows) -> list[np.ndarray]:
     """Return the terms of the distortion that change from exposure to exposure as random walks."""
     degree = min(result.settings.drift_walk, int(result.summary["order"]))
     x, y = (legendre.legvander(along, max(degree, 1)).T for along in rows.at.T)
-    return [x[n - j] * y[j] for n in range(2, degree + 1) for j in range(n + 1)]
+    return [x[k] * y[j] for k, j in terms(degree)]
 
 
 def walk_precision(result: FitResult, exposures: np.ndarray) -> np.ndarray:
@@ -132,11 +133,11 @@ def _of_terms(
     )
     for name, order, factors, place in families:
         sigmas = widths.get(f"{name}_x", np.empty(0)), widths.get(f"{name}_y", np.empty(0))
-        terms = [(n - j, j) for n in range(2, order + 1) for j in range(n + 1)]
-        if len(sigmas[0]) != len(factors) * len(terms):
+        of_order = terms(order)
+        if len(sigmas[0]) != len(factors) * len(of_order):
             continue
         in_x, in_y = (legendre.legvander(along, order).T for along in place.T)
-        values = (factor * in_x[k] * in_y[j] for factor in factors for k, j in terms)
+        values = (factor * in_x[k] * in_y[j] for factor in factors for k, j in of_order)
         for number, value in enumerate(values):
             yield Scalar(value, sigmas[0][number], sigmas[1][number])
 

@@ -10,7 +10,7 @@ from tests.campaigns.carried import carry_over
 from tests.campaigns.trials import read_records, run_trials
 from tests.campaigns.verdict_cases import CASES, CLEAN, FACTORS, ORBITS, numbers, trial_of
 from tests.campaigns.verdict_page import BEGIN, END, figure, tables, with_tables
-from tests.campaigns.verdict_version import code_of, verdict_version
+from tests.campaigns.verdict_version import code_of, verdict_files, verdict_version
 
 DOCUMENTS = Path(__file__).resolve().parent.parent / "assets" / "docs"
 
@@ -39,6 +39,13 @@ def test_version_is_that_of_the_code_and_not_of_its_words():
     assert code_of(source) == code_of(source.replace("Say so.", "Say it.").replace("# one", ""))
     assert code_of(source) != code_of(source.replace("return 1", "return 2"))
     assert verdict_version() == verdict_version()
+
+
+def test_version_changes_with_the_name_of_a_cause():
+    code = "".join(code_of(path.read_text("utf-8")) for path in verdict_files())
+    for case in CASES:
+        for name in case.causes:
+            assert f"'{name.removesuffix('-x').removesuffix('-y')}" in code, name
 
 
 def test_trials_of_another_version_are_run_again(tmp_path):

@@ -6,10 +6,11 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from tests.campaigns.carried import carry_over
 from tests.campaigns.trials import read_records, run_trials
 from tests.campaigns.verdict_cases import CASES, CLEAN, FACTORS, ORBITS, numbers, trial_of
 from tests.campaigns.verdict_page import BEGIN, END, figure, tables, with_tables
-from tests.campaigns.verdict_version import code_of, verdict_version
+from tests.campaigns.verdict_version import code_of, verdict_files, verdict_version
 
 DOCUMENTS = Path(__file__).resolve().parent.parent / "assets" / "docs"
 
@@ -40,6 +41,13 @@ def test_version_is_that_of_the_code_and_not_of_its_words():
     assert verdict_version() == verdict_version()
 
 
+def test_version_changes_with_the_name_of_a_cause():
+    code = "".join(code_of(path.read_text("utf-8")) for path in verdict_files())
+    for case in CASES:
+        for name in case.causes:
+            assert f"'{name.removesuffix('-x').removesuffix('-y')}" in code, name
+
+
 def test_trials_of_another_version_are_run_again(tmp_path):
     path, ran = tmp_path / "trials.jsonl", []
 
@@ -54,6 +62,51 @@ def test_trials_of_another_version_are_run_again(tmp_path):
     assert ran == [0, 1, 0, 1]
     assert set(read_records(path, "a")) == set(read_records(path, "b")) == {0, 1}
     assert read_records(path, "c") == {}
+
+
+def recorded_trials(path, version="a"):
+    """Record trials of all cases, whose state depends on the number, and return how to repeat."""
+
+    def trial(number):
+        state = "bad" if number % 2 else "good"
+        return {"state": state, "causes": [], "converged": True, "sigma": round(number / 9.0, 1)}
+
+    run_trials(path, [1000 * slot + 1 for slot in range(len(CASES) * 6)], trial, version=version)
+    return trial
+
+
+def test_records_are_carried_over_to_a_version_that_judges_alike(tmp_path):
+    path = tmp_path / "trials.jsonl"
+    trial = recorded_trials(path)
+    repeated = []
+
+    def alike(number):
+        repeated.append(number)
+        return trial(number) | {"sigma": trial(number)["sigma"] + 0.1, "seconds": 3.0}
+
+    before = read_records(path, "a")
+    assert carry_over(path, alike, "a", "b", 60) == []
+    assert len(repeated) >= 60
+    cases = Counter(trial_of(number).case for number in repeated)
+    assert len(cases) == len(CASES) + 1
+    assert {trial_of(number).factor for number in repeated} == {0.0, *FACTORS}
+    assert read_records(path, "b") == before
+    assert read_records(path, "a") == {}
+
+
+@pytest.mark.parametrize(
+    "change", [{"state": "warn"}, {"causes": ["noise"]}, {"converged": False}, {"sigma": -1.0}]
+)
+def test_records_stay_if_a_verdict_differs(tmp_path, change):
+    path = tmp_path / "trials.jsonl"
+    trial, odd = recorded_trials(path), 4001
+    before = path.read_bytes()
+    other = lambda number: trial(number) | (change if number == odd else {})  # noqa: E731
+    (line,) = carry_over(path, other, "a", "b", 10_000)
+    assert line.startswith(f"{odd}: recorded state")
+    assert path.read_bytes() == before
+    with pytest.raises(ValueError, match="expected records of version c"):
+        carry_over(path, other, "c", "b", 60)
 
 
 @pytest.fixture

@@ -8,11 +8,11 @@ import pandas as pd
 from plateviz.tables.run_causes import run_causes
 from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests, diagnose_run
 from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
-from plateviz.tables.tests_in_words import TestInWords
+from plateviz.tables.tests_in_words import TestInWords, discoveries_in_words
 from plateviz.tables.verdict import Verdict, worst
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Test
 
-_MOST_NAMED, _MOST_ORBITS = 3, 20
+_MOST_ORBITS = 20
 _HEADLINES = {
     "good": "This run can be trusted.",
     "warn": "This run can be used with care.",
@@ -63,22 +63,13 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
 
 
 def _tested(diagnosis: RunDiagnosis, found: Sequence[Test], tables: RunTests) -> list[str]:
-    total = len(diagnosis.tests)
     if tables.orbit_causes.empty:
         return [
             "The run has not been tested as a whole: it is not gathered yet, or an older version "
             "made it."
         ]
-    chance = f"in {100 * CARE_RATE:.0f} % of good runs any of them would"
-    if not found:
-        return [
-            f"None of {total} tests of the run finds anything that chance does not explain; "
-            f"{chance}."
-        ]
-    named = ", ".join(one.name for one in found[:_MOST_NAMED])
     return [
-        f"{len(found)} of {total} tests of the run find what chance does not explain, among "
-        f"them: {named}; {chance}."
+        discoveries_in_words(diagnosis.tests, found, tests="tests of the run", good="good runs")
     ]
 
 

@@ -1,5 +1,6 @@
 """The tests of a solution as a table in words."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from solver.results.diagnosis.rate import discoveries
 from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test
 
 _NM_PER_UM = 1000.0
+_MOST_NAMED = 3
 _DEGREES = ("drift", "bend", "step")
 _DETECTORS = ("shift", "turn", "cells")
 _AXES = ("phase", "magnitude")
@@ -52,6 +54,30 @@ def tests_in_words(diagnosis: Diagnosis) -> list[TestInWords]:
         )
         for test, is_found in zip(diagnosis.tests, discoveries(chances, CARE_RATE), strict=True)
     ]
+
+
+def discoveries_in_words(
+    all_tests: Sequence[Test],
+    found: Sequence[Test],
+    *,
+    tests: str = "tests",
+    good: str = "good solutions",
+) -> str:
+    """Return a sentence on how many of the tests are discoveries, and which.
+
+    Parameters
+    ----------
+    tests, good : words for the tests, and for what has no flaw
+    """
+    total = len(all_tests)
+    chance = f"in {100 * CARE_RATE:.0f} % of {good} any of them would"
+    if not found:
+        return f"None of {total} {tests} finds anything that chance does not explain; {chance}."
+    named = ", ".join(dict.fromkeys(one.name for one in found[:_MOST_NAMED]))
+    return (
+        f"{len(found)} of {total} {tests} find what chance does not explain, among them: {named}; "
+        f"{chance}."
+    )
 
 
 def _about(test: Test) -> str:

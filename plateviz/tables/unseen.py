@@ -41,10 +41,10 @@ def quadratic_mas(result: FitResult) -> float:
     scale = float(result.summary.get("distortion_scale_um", np.nan))
     if len(terms) < 3 or not scale > 0.0:
         return float("nan")
-    x, y = (result.residuals[["focal_x", "focal_y"]].to_numpy(dtype=float) / scale).T
-    values = np.stack([1.5 * x**2, x * y, 1.5 * y**2])
-    displacement = terms[["distortion_x", "distortion_y"]].to_numpy().T @ values
-    variance = float(displacement.var(axis=1).sum())
+    x, y = (result.residuals[f"focal_{axis}"].to_numpy(dtype=float) / scale for axis in "xy")
+    covariance = np.cov(np.stack([1.5 * x * x, x * y, 1.5 * y * y]), bias=True)
+    coefficients = terms[["distortion_x", "distortion_y"]].to_numpy()
+    variance = float(np.sum(coefficients * (covariance @ coefficients)))
     focal_length = float(result.values_on("exp")["focal_length"].mean())
     return float(np.sqrt(variance)) / (focal_length * RAD_PER_MAS)
 

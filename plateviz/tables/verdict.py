@@ -11,17 +11,16 @@ from plateviz.tables.causes import Cause, causes_in_words
 from plateviz.tables.notable_in_orbit import notable_sentences
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
-from plateviz.tables.tests_in_words import TestInWords, tests_in_words
+from plateviz.tables.tests_in_words import TestInWords, discoveries_in_words, tests_in_words
 from plateviz.tables.unseen import unseen_sentences
 from solver.data.result import FitResult
 from solver.results.diagnosis.causes import find_causes
-from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Diagnosis, Test, diagnose
+from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, diagnose
 
 # Of the verdict in the summary of a result.
 _NAME = "verdict"
 # Tail probabilities of a single chi2: three and four sigmas of a normal, one-sided.
 _UNLIKELY, _FAR_OFF = 1.35e-3, 3.2e-5
-_MOST_NAMED = 3
 _HEADLINES: dict[State, str] = {
     "good": "This solution can be trusted.",
     "warn": "This solution can be used with care.",
@@ -75,7 +74,7 @@ def is_judged(result: FitResult) -> bool:
 def orbit_verdict(result: FitResult) -> Verdict:
     """Return the verdict on one fitted orbit: that of the result itself, or a new one, once.
 
-    A new one of a full orbit takes half a second.
+    A new one of a full orbit takes a quarter of a second.
     """
     if _NAME not in result.derived:
         stored = _stored(result)
@@ -115,26 +114,14 @@ def _judge(result: FitResult) -> Verdict:
         headline = f"{headline[:-1]}: {causes[0].title}."
     items = summary_strip(result)
     reasons = [_converged(result), *(cause.sentence() for cause in causes)]
-    reasons += [_tested(diagnosis, found), *map(_sentence, _judged(items))]
+    reasons += [discoveries_in_words(diagnosis.tests, found), *map(_sentence, _judged(items))]
     reasons += [_common_error(result), *unseen_sentences(result)]
     faults = [] if converged else [_converged(result)]
     faults += [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
     if found and not causes:
-        faults.append(_tested(diagnosis, found))
+        faults.append(discoveries_in_words(diagnosis.tests, found))
     tests = tests_in_words(diagnosis)
     return Verdict(state, headline, reasons, notable_sentences(result), faults, causes, tests)
-
-
-def _tested(diagnosis: Diagnosis, found: Sequence[Test]) -> str:
-    total = len(diagnosis.tests)
-    chance = f"in {100 * CARE_RATE:.0f} % of good solutions any of them would"
-    if not found:
-        return f"None of {total} tests finds anything that chance does not explain; {chance}."
-    named = ", ".join(dict.fromkeys(one.name for one in found[:_MOST_NAMED]))
-    return (
-        f"{len(found)} of {total} tests find what chance does not explain, among them: {named}; "
-        f"{chance}."
-    )
 
 
 def _judged(items: list[SummaryItem]) -> list[SummaryItem]:

@@ -125,6 +125,13 @@ class FitResult:
         One row per element of the axis, in order, and one column per group on the axis.
         """
         names = [group.name for group in self.groups_on(axis)]
-        rows = self.calibration[self.calibration["group"].isin(names)]
-        wide = rows.pivot(index="element", columns="group", values=column)
-        return wide.reindex(columns=names).sort_index()
+        groups, elements = (self.calibration[name].to_numpy() for name in ("group", "element"))
+        values, rows = self.calibration[column].to_numpy(), [groups == name for name in names]
+        wide = {
+            name: pd.Series(values[of], elements[of]) for name, of in zip(names, rows, strict=True)
+        }
+        return (
+            pd.DataFrame(wide, columns=names)
+            .sort_index()
+            .rename_axis(index="element", columns="group")
+        )

@@ -16,6 +16,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from solver.data.distortion_terms import terms
 from solver.data.parameters import OPTIONAL_GROUPS
 from solver.model.aberration import Components, aberrate, lorentz_factor
 from solver.model.causes import (
@@ -26,7 +27,7 @@ from solver.model.causes import (
     walked,
 )
 from solver.model.detector import to_pixel
-from solver.model.distortion import basis, terms
+from solver.model.distortion import basis
 from solver.model.projection import displace, focal_axes, project
 from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
 

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Int
 
+from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.parameter_group import Axis
 from solver.data.settings import FitSettings
-from solver.model.distortion import terms
 
 
 class Element(NamedTuple):

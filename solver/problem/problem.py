@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Bool, Float
 
+from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.parameters import BY_NAME, SOURCES
@@ -19,7 +20,6 @@ from solver.errors import InputError
 from solver.model.astrometry import propagate, sky_position
 from solver.model.causes import Causes
 from solver.model.directions import displaced, tangent_frame
-from solver.model.distortion import terms
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry
 from solver.problem.causes import causes_of, padded

@@ -78,8 +78,11 @@ class Walks(NamedTuple):
         self, width: Float[np.ndarray, " calib"]
     ) -> Float[np.ndarray, " calib"]:
         """Return prior widths with that of the mean at the first element of each walk."""
-        width[self.columns[:, :1]] = MEAN_WIDTH_UM
-        return width
+        if not self.columns.size:
+            return width
+        found = width.copy()
+        found[self.columns[:, 0]] = MEAN_WIDTH_UM
+        return found
 
     def _matrix(self) -> Float[np.ndarray, "exp exp"]:
         """Return the matrix from the elements of a walk to its mean and steps."""

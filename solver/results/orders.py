@@ -34,13 +34,13 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Bool, Float, Int
 
+from solver.data.distortion_terms import terms
 from solver.data.schema import ORDERS
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, find_mode, objective
 from solver.engines.what_if import solve_what_if
 from solver.linear.chi2 import gradient
 from solver.linear.covariances import covariances
-from solver.model.distortion import terms
 from solver.problem.parameter_vector import PER_COEFFICIENT
 from solver.problem.problem import Problem, thinned
 from solver.results.diagnostics import effective_parameters, log_evidence

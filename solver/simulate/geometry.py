@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Array, Float
 
+from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.parameters import CALIBRATION_GROUPS, SOURCES
 from solver.data.settings import FitSettings
 from solver.model.directions import tangent_frame
-from solver.model.distortion import terms
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry
 from solver.problem.elements import elements

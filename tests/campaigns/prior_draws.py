@@ -18,13 +18,13 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from solver.data.distortion_terms import terms
 from solver.data.instrument import MINI_MOCK, Instrument
 from solver.data.orbit import OrbitData
 from solver.data.parameters import BY_NAME
 from solver.data.settings import FitSettings
 from solver.model.correlation import ASTROMETRY
 from solver.model.directions import tangent_frame
-from solver.model.distortion import terms
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.measure import measure_orbit
 from solver.simulate.placement import place_detectors

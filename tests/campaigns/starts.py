@@ -46,7 +46,7 @@ from solver.engines.gauss_newton import Mode, find_mode
 from solver.errors import FitError, InputError
 from solver.fit import fit_orbit
 from solver.io.read_orbit import read_orbit
-from solver.model.distortion import terms
+from solver.data.distortion_terms import terms
 from solver.problem.problem import Problem, build_problem
 from solver.units import MAS_PER_DEG
 from tests.benchmarks.machine import write

@@ -72,3 +72,22 @@ def read_records(path: Path, version: str | None = None) -> dict[int, Record]:
             continue
         records[int(record.pop("trial"))] = record
     return records
+
+
+def mark_records(path: Path, before: str, version: str) -> None:
+    """Mark the records of a version in a file with another one, all or none of them."""
+    lines = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        try:
+            record = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        if record.get("version") == before:
+            record["version"] = version
+        lines.append(json.dumps(record) + "\n")
+    written = path.with_name(f"{path.name}.part")
+    with written.open("w", encoding="utf-8") as file:
+        file.writelines(lines)
+        file.flush()
+        os.fsync(file.fileno())
+    written.replace(path)

@@ -5,17 +5,26 @@ import hashlib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-# What decides on the state of a solution, and on the first cause.
-_PARTS = ("solver/results/diagnosis/*.py", "plateviz/tables/causes.py")
+# What decides on the state of a solution and on the first cause, and what names it.
+_PARTS = (
+    "solver/results/diagnosis/*.py",
+    "plateviz/tables/causes.py",
+    "plateviz/tables/*cause_words.py",
+    "plateviz/tables/verdict.py",
+)
 
 
 def verdict_version() -> str:
     """Return a digest of the code of the verdict, the same for other words and comments."""
-    paths = sorted(path for part in _PARTS for path in ROOT.glob(part))
     digest = hashlib.sha256()
-    for path in paths:
+    for path in verdict_files():
         digest.update(code_of(path.read_text(encoding="utf-8")).encode())
     return digest.hexdigest()[:12]
+
+
+def verdict_files() -> list[Path]:
+    """Return the files of the verdict."""
+    return sorted(path for part in _PARTS for path in ROOT.glob(part))
 
 
 def code_of(source: str) -> str:

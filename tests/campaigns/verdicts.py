@@ -1,11 +1,14 @@
 """Measure the verdict: its false alarms, and from which size on it sees and names each defect.
 
     python tests/campaigns/verdicts.py [--trials N] [--records FILE] [--write assets/docs]
+    python tests/campaigns/verdicts.py --carry-over VERSION [--sample N] [--records FILE]
 
 Sparse orbits of some 1,300 sources are simulated without and with each defect that one orbit can
 show, at five amplitudes, and fitted with the default settings; and at the largest with its cause
 modelled. Each trial takes about two seconds of a core, all of them three hours. Trials are recorded
 with the version of the verdict; a stopped campaign goes on, and runs those of other versions again.
+The second form instead repeats a sample of the trials of another version, and marks all of its
+records with the present one if each has the same verdict.
 """
 
 import argparse
@@ -29,6 +32,7 @@ from solver.errors import FitError, InputError
 from solver.fit import fit_orbit
 from solver.simulate.defects.defect import Case
 from tests.benchmarks.machine import write
+from tests.campaigns.carried import carry_over
 from tests.campaigns.defects import SETTINGS, pulls, sparse_orbit
 from tests.campaigns.trials import Record, read_records, run_trials
 from tests.campaigns.true_causes import deviations, truth_of
@@ -40,11 +44,27 @@ from tests.campaigns.verdict_version import verdict_version
 def main() -> int:
     arguments = parse_arguments()
     version = verdict_version()
+    if arguments.carry_over:
+        return carry(arguments.records, arguments.carry_over, version, arguments.sample)
     chosen = numbers()[: arguments.trials]
     run_trials(arguments.records, chosen, trial, after=report, version=version)
     if arguments.write:
         write_page(arguments.write, read_records(arguments.records, version))
     return 0
+
+
+def carry(records: Path, before: str, version: str, count: int) -> int:
+    """Carry the records of a version over to the present one, or say which trials differ."""
+    try:
+        different = carry_over(records, trial, before, version, count)
+    except ValueError as error:
+        write(str(error))
+        return 2
+    if different:
+        write("Nothing is changed: the verdicts of these trials differ.")
+    for line in different:
+        write(line)
+    return 1 if different else 0
 
 
 def trial(number: int) -> Record:
@@ -104,6 +124,10 @@ def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Measure the verdict.")
     parser.add_argument("--trials", type=int, help="the first so many, all by default")
     parser.add_argument("--records", type=Path, default=Path("verdicts.jsonl"))
+    parser.add_argument(
+        "--carry-over", metavar="VERSION", help="mark its records with the present version"
+    )
+    parser.add_argument("--sample", type=int, default=60, help="trials repeated before that")
     parser.add_argument("--write", type=Path, help="folder of verdicts.md and its figure")
     return parser.parse_args()
 

@@ -183,7 +183,7 @@ def wrong_identifications(diagnosis: Diagnosis) -> list[Found]:
 def _of_outliers(diagnosis: Diagnosis) -> list[Found]:
     """Return outliers as a cause, or the wrong identifications that make most of them."""
     rows, swapped = diagnosis.rows, wrong_identifications(diagnosis)
-    far = float(np.square(rows.whitened[rows.is_far]).sum())
+    far = float(rows.chi2[rows.is_far].sum())
     if swapped and diagnosis.swapped.chi2 > _OF_OUTLIERS * far:
         return swapped
     test = next(one for one in diagnosis.tests if one.subject == "outliers")

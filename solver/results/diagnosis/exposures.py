@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.results.diagnosis.rows import Camera, Rows
+from solver.results.diagnosis.rows import Rows
 
 # Waves of the pointing while the rows of the detectors are read.
 WAVES = 4
@@ -34,14 +34,14 @@ class ExposureChi2(NamedTuple):
     scale: np.ndarray
 
 
-def exposure_chi2(camera: Camera, rows: Rows) -> ExposureChi2:
+def exposure_chi2(rows: Rows) -> ExposureChi2:
     """Return the chi2 of patterns of each exposure, with pointing, roll and scale fitted.
 
     The positions of the sources take a share of each residual, which the weights allow for. The
     chi2 are divided by that of the exposure per degree of freedom, unless that is below one, so
     that an exposure with more noise does not stand out.
     """
-    gram, along = _sums(camera, rows)
+    gram, along = _sums(rows)
     turn, scale = [(2, 0, -1.0), (1, 1, 1.0)], [(1, 0, 1.0), (2, 1, 1.0)]
     base = _pairs([(0, 0, 1.0)], [(0, 1, 1.0)], turn, scale)
     stretch = _pairs([(1, 0, 1.0), (2, 1, -1.0)])
@@ -63,29 +63,37 @@ def exposure_chi2(camera: Camera, rows: Rows) -> ExposureChi2:
 def _scale(rows: Rows) -> np.ndarray:
     """Return chi2 over its expected value of each exposure, at least one, without outliers."""
     n, kept = len(rows.first) - 1, ~rows.is_far
-    chi2 = np.bincount(rows.exposure, kept * np.square(rows.whitened).sum(axis=1), n)
+    chi2 = np.bincount(rows.exposure, kept * rows.chi2, n)
     dof = np.bincount(rows.exposure, kept * 2.0 * rows.left, n)
     return np.maximum(chi2 / np.maximum(dof, 1e-9), 1.0)
 
 
-def _sums(camera: Camera, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+def _sums(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
     """Return the products of the scalar functions of each exposure, and with the residuals.
 
     Shapes (exposures, size, size) and (exposures, 2 size), those along x first.
     """
     n = len(rows.first) - 1
     gram, along = np.zeros((n, _SIZE, _SIZE)), np.zeros((n, 2 * _SIZE))
-    read = np.pi * (rows.pixel[:, 1] / camera.half[rows.detector, 1] + 1.0)
+    read = np.pi * (rows.local[:, 1] + 1.0)
+    root = np.sqrt(rows.weight * rows.left) * ~rows.is_far
+    vector = rows.weight * rows.residual.T
+    functions = np.empty((_SIZE, max(np.diff(rows.first), default=0)))
     for e, (first, last) in enumerate(itertools.pairwise(rows.first)):
-        x, y = rows.at[first:last].T
+        some = functions[:, : last - first]
+        (x, y), angle = rows.at[first:last].T, read[first:last]
+        some[0], some[1], some[2] = 1.0, x, y
+        some[3], some[4], some[5] = x * x, x * y, y * y
+        cosines, sines = some[_SMOOTH : _SMOOTH + WAVES], some[_SMOOTH + WAVES :]
+        np.cos(angle, out=cosines[0])
+        np.sin(angle, out=sines[0])
         # Harmonics of a wave by multiplication, four times as fast as sines.
-        wave = np.exp(1j * read[first:last])
-        waves = np.cumprod(np.tile(wave, (WAVES, 1)), axis=0)
-        smooth = (np.ones_like(x), x, y, x * x, x * y, y * y)
-        functions = np.concatenate([smooth, waves.real, waves.imag])
-        weight, left = rows.weight[first:last], rows.left[first:last] * ~rows.is_far[first:last]
-        gram[e] = (functions * (weight * left)) @ functions.T
-        along[e] = ((functions * weight) @ rows.residual[first:last]).T.ravel()
+        for k in range(1, WAVES):
+            cosines[k] = cosines[k - 1] * cosines[0] - sines[k - 1] * sines[0]
+            sines[k] = sines[k - 1] * cosines[0] + cosines[k - 1] * sines[0]
+        along[e] = (vector[:, first:last] @ some.T).ravel()
+        some *= root[first:last]
+        gram[e] = some @ some.T
     return gram, along
 
 

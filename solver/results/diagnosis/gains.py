@@ -87,5 +87,4 @@ def of_slope(noise: Scatter, slope: Scatter) -> float:
 
 def of_outliers(rows: Rows) -> float:
     """Return the gain of leaving out the outliers."""
-    squares = np.square(rows.whitened[rows.is_far]).sum()
-    return float(squares - 2.0 * PER_PARAMETER * rows.is_far.sum())
+    return float(rows.chi2[rows.is_far].sum() - 2.0 * PER_PARAMETER * rows.is_far.sum())

@@ -9,21 +9,39 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.polynomial import legendre
+from scipy import linalg
 
+from solver.data.distortion_terms import terms
 from solver.data.magnitudes import faintness
 from solver.data.result import FitResult
+from solver.problem.walks import MEAN_WIDTH_UM
 from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
 from solver.units import PIX_PER_MPIX, RAD_PER_ARCSEC
 
 
-class Column(NamedTuple):
-    """The displacement by one parameter: along x and y of the focal plane, per unit of `sigma`.
+class Scalar(NamedTuple):
+    """A displacement along x by one parameter, and the same along y by another.
 
     Attributes
     ----------
-    x, y : of each row, um, shape (n,)
-    sigma : width of the parameter's prior
+    value : of each row, um, shape (n,), per unit of the sigmas
+    sigma_x, sigma_y : widths of the priors
+    """
+
+    value: np.ndarray
+    sigma_x: float
+    sigma_y: float
+
+
+class Vector(NamedTuple):
+    """A displacement along both axes of the focal plane by one parameter.
+
+    Attributes
+    ----------
+    x, y : of each row, um, shape (n,), per unit of `sigma`
+    sigma : width of the prior
     """
 
     x: np.ndarray
@@ -31,19 +49,55 @@ class Column(NamedTuple):
     sigma: float
 
 
+Column = Scalar | Vector
+
+
 def has_anisotropy(result: FitResult) -> bool:
     """Return whether each exposure has a focal length for each axis."""
     return bool((result.calibration["group"] == "focal_anisotropy").any())
 
 
-def modelled(result: FitResult, camera: Camera, rows: Rows) -> Iterator[Column]:
-    """Yield the columns of the causes that a fit includes, but for those of each exposure."""
-    widths = {
-        name: group["prior_sigma"].to_numpy() for name, group in result.calibration.groupby("group")
-    }
+def prior_widths(result: FitResult) -> dict[str, np.ndarray]:
+    """Return the widths of the priors of each group of parameters, by its name."""
+    group, names = pd.factorize(result.calibration["group"])
+    sigma = result.calibration["prior_sigma"].to_numpy()
+    return {name: sigma[group == number] for number, name in enumerate(names)}
+
+
+def modelled(
+    result: FitResult, camera: Camera, rows: Rows, widths: dict[str, np.ndarray]
+) -> Iterator[Column]:
+    """Yield the columns of the causes that a fit includes, but for those of each exposure.
+
+    Parameters
+    ----------
+    widths : of the priors
+    """
     yield from _of_terms(result, camera, rows, widths)
     yield from _of_detectors(camera, rows, widths, _faintness(result)[rows.source])
     yield from _of_motion(result, camera, rows, widths)
+
+
+def walk_terms(result: FitResult, rows: Rows) -> list[np.ndarray]:
+    """Return the terms of the distortion that change from exposure to exposure as random walks."""
+    degree = min(result.settings.drift_walk, int(result.summary["order"]))
+    x, y = (legendre.legvander(along, max(degree, 1)).T for along in rows.at.T)
+    return [x[k] * y[j] for k, j in terms(degree)]
+
+
+def walk_precision(result: FitResult, exposures: np.ndarray) -> np.ndarray:
+    """Return the precision of the prior of walks along x and along y at some of the exposures.
+
+    The steps from each exposure to the next one in time are independent, and the mean is of
+    little width: it belongs to the constant distortion. Shape (2, exposures, exposures).
+    """
+    place = np.argsort(np.argsort(result.exposures["obstime"].to_numpy(), kind="stable"))
+    steps = np.minimum.outer(place, place).astype(float)
+    steps -= steps.mean(axis=0) + steps.mean(axis=1)[:, None] - steps.mean()
+    some = steps[np.ix_(exposures, exposures)]
+    widths = [result.settings.width(f"drift_walk_{axis}") for axis in "xy"]
+    # The width may be infinite.
+    return np.array([linalg.pinvh(some + (MEAN_WIDTH_UM / one) ** 2) / one**2 for one in widths])
 
 
 def _of_terms(
@@ -77,17 +131,15 @@ def _of_terms(
             own / half,
         ),
     )
-    zeros = np.zeros(rows.n)
     for name, order, factors, place in families:
         sigmas = widths.get(f"{name}_x", np.empty(0)), widths.get(f"{name}_y", np.empty(0))
-        terms = [(n - j, j) for n in range(2, order + 1) for j in range(n + 1)]
-        if len(sigmas[0]) != len(factors) * len(terms):
+        of_order = terms(order)
+        if len(sigmas[0]) != len(factors) * len(of_order):
             continue
         in_x, in_y = (legendre.legvander(along, order).T for along in place.T)
-        values = (factor * in_x[k] * in_y[j] for factor in factors for k, j in terms)
+        values = (factor * in_x[k] * in_y[j] for factor in factors for k, j in of_order)
         for number, value in enumerate(values):
-            yield Column(value, zeros, sigmas[0][number])
-            yield Column(zeros, value, sigmas[1][number])
+            yield Scalar(value, sigmas[0][number], sigmas[1][number])
 
 
 def _of_detectors(
@@ -95,7 +147,7 @@ def _of_detectors(
 ) -> Iterator[Column]:
     """Yield the columns of the groups with one parameter of each detector."""
     pixel = rows.pixel
-    crossed = 0.5 * pixel / camera.half[rows.detector] + 0.5
+    crossed = 0.5 * rows.local + 0.5
     angle, none = 2.0 * np.pi * pixel, np.zeros(rows.n)
     shift = PIX_PER_MPIX * fainter
     shifts: dict[str, tuple[np.ndarray, int]] = {"detector_skew": (RAD_PER_ARCSEC * pixel[:, 1], 0)}
@@ -111,10 +163,10 @@ def _of_detectors(
         if name not in widths:
             continue
         pixels = np.stack([value, none] if axis == 0 else [none, value], axis=1)
-        x, y = onto_focal_plane(pixels * camera.pitch[rows.detector], camera.turn[rows.detector]).T
+        x, y = onto_focal_plane(pixels * camera.pitch[rows.detector], camera.turn, rows.detector).T
         for detector, sigma in enumerate(widths[name]):
             on = rows.detector == detector
-            yield Column(x * on, y * on, sigma)
+            yield Vector(x * on, y * on, sigma)
 
 
 def _of_motion(
@@ -124,17 +176,17 @@ def _of_motion(
     if "detector_turn" not in widths:
         return
     field = np.unique(result.exposures["field_id"].to_numpy(), return_inverse=True)[1]
-    of_row, none = field[rows.exposure], np.zeros(rows.n)
+    of_row = field[rows.exposure]
     pixel = RAD_PER_ARCSEC * rows.pixel * camera.pitch[rows.detector]
     turned = np.stack([-pixel[:, 1], pixel[:, 0]], axis=1)
-    x, y = onto_focal_plane(turned, camera.turn[rows.detector]).T
+    x, y = onto_focal_plane(turned, camera.turn, rows.detector).T
     later = max(int(field.max()), 1)
     for element in range(len(camera.turn) * later):
         moved = (rows.detector == element // later) & (of_row == element % later + 1)
         on = moved.astype(float)
-        yield Column(on, none, widths["detector_motion_x"][element])
-        yield Column(none, on, widths["detector_motion_y"][element])
-        yield Column(x * on, y * on, widths["detector_turn"][element])
+        sigmas = (widths[f"detector_motion_{axis}"][element] for axis in "xy")
+        yield Scalar(on, *sigmas)
+        yield Vector(x * on, y * on, widths["detector_turn"][element])
 
 
 def _faintness(result: FitResult) -> np.ndarray:

@@ -4,7 +4,6 @@ A pattern is a vector function of the position times a function of the time. Pat
 same cause make up a `Family`.
 """
 
-import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -61,6 +60,9 @@ class Patterns:
     ----------
     camera : instrument and exposures
     degrees : of the terms; `VARIABLE`, and the ones above the fitted order
+    terms : the degrees of each in x and in y
+    place, time : spatial function and time of each column but those of the cells
+    faintness : of each source, relative to a typical one
     times : functions of the time, shape (times, exposures): constant, linear, quadratic, cubic,
         cosine and sine of the orbital phase, and a step at changes from a field to the next
     families : the causes that are looked for
@@ -78,17 +80,17 @@ class Patterns:
         known = np.isfinite(magnitude)
         self.has_magnitude = bool(known.any()) and float(np.ptp(magnitude[known])) > 0.0
         typical = np.median(magnitude[known]) if known.any() else 0.0
-        self._faintness = 10.0 ** (0.2 * (np.where(known, magnitude, typical) - typical))
+        self.faintness = 10.0 ** (0.2 * (np.where(known, magnitude, typical) - typical))
         self.times = _times(camera)
         above = range(order + 1, order + 1 + ABOVE)
         self.degrees = [*VARIABLE, *(n for n in above if n not in VARIABLE)]
-        self._terms = [(n - j, j) for n in self.degrees for j in range(n + 1)]
-        self._place, self._time = np.array(list(self._columns(order))).T
+        self.terms = [(n - j, j) for n in self.degrees for j in range(n + 1)]
+        self.place, self.time = np.array(list(self._columns(order))).T
         self.families = families(self, order)
 
     def __len__(self) -> int:
         """Return the number of columns."""
-        return len(self._place) + 2 * self.n_cells
+        return len(self.place) + 2 * self.n_cells
 
     @property
     def n_cells(self) -> int:
@@ -102,21 +104,21 @@ class Patterns:
 
     def column(self, place: int, time: int) -> int:
         """Return the column of a spatial function and a time."""
-        return int(np.flatnonzero((self._place == place) & (self._time == time))[0])
+        return int(np.flatnonzero((self.place == place) & (self.time == time))[0])
 
     def of_degree(self, degree: int, time: int) -> np.ndarray:
         """Return the columns of the terms of a degree at a time, x and y of each in turn."""
-        places = [i for i, (k, j) in enumerate(self._terms) if k + j == degree]
+        places = [i for i, (k, j) in enumerate(self.terms) if k + j == degree]
         return np.array([self.column(2 * i + axis, time) for i in places for axis in (0, 1)])
 
     def of_detector(self, detector: int, time: int) -> np.ndarray:
         """Return the columns of a detector's shift along x and y and of its turn."""
-        first = 2 * len(self._terms) + 3 * detector
+        first = 2 * len(self.terms) + 3 * detector
         return np.array([self.column(first + i, time) for i in range(3)])
 
     def of_axis(self, axis: int, *, magnitude: bool) -> np.ndarray:
         """Return the two columns of the pixel phase, or of the magnitude, along an axis."""
-        first = 2 * len(self._terms) + 3 * len(self.camera.turn) + 2 * axis + 4 * magnitude
+        first = 2 * len(self.terms) + 3 * len(self.camera.turn) + 2 * axis + 4 * magnitude
         return np.array([self.column(first + i, 0) for i in range(2)])
 
     @property
@@ -126,81 +128,21 @@ class Patterns:
 
     def of_cells(self, detector: int | None = None) -> np.ndarray:
         """Return the columns of the cells, of all detectors or of one."""
-        first, each = len(self._place), 2 * CELLS**2
+        first, each = len(self.place), 2 * CELLS**2
         columns = np.arange(first, len(self))
         return columns if detector is None else columns[detector * each : (detector + 1) * each]
 
-    def of_rows(self, rows: Rows) -> np.ndarray:
-        """Return all columns at some rows, shape (columns, 2, n)."""
-        terms, others = self._terms_at(rows), self._others_at(rows)
-        times = self.times[:, rows.exposure]
-        out = np.zeros((len(self), 2, rows.n))
-        for column, (place, time) in enumerate(zip(self._place, self._time, strict=True)):
-            if place < 2 * len(terms):
-                np.multiply(terms[place // 2], times[time], out=out[column, place % 2])
-            else:
-                np.multiply(others[place - 2 * len(terms)], times[time], out=out[column])
-        cells, number = len(self._place) + 2 * self._cells(rows), np.arange(rows.n)
-        for axis in range(2):
-            out[cells + axis, axis, number] = 1.0
-        return out
-
-    def products(self, rows: Rows) -> np.ndarray:
-        """Return the products of all columns with the weighted residuals, shape (columns,)."""
-        weighted = rows.weight[:, None] * rows.residual
-        by_exposure = []
-        for first, last in itertools.pairwise(rows.first):
-            some, vector = rows.of(slice(first, last)), weighted[first:last]
-            terms = self._terms_at(some) @ vector
-            others = np.tensordot(self._others_at(some), vector.T, axes=2)
-            by_exposure.append(np.concatenate([terms.ravel(), others]))
-        products = (self.times @ np.array(by_exposure))[self._time, self._place]
-        cells = self._cells(rows)
-        of_cells = [np.bincount(cells, one, minlength=self.n_cells) for one in weighted.T]
-        return np.concatenate([products, np.stack(of_cells, axis=1).ravel()])
-
     def _columns(self, order: int) -> Iterator[tuple[int, int]]:
         """Yield the spatial function and the time of each column but those of the cells."""
-        for i, (k, j) in enumerate(self._terms):
+        for i, (k, j) in enumerate(self.terms):
             changes = k + j in VARIABLE
             times = [LINEAR, COSINE, SINE, *range(N_SMOOTH, len(self.times))] if changes else []
             times += [0] if k + j > order else []
             yield from ((2 * i + axis, time) for axis in (0, 1) for time in times)
-        first, n_det = 2 * len(self._terms), len(self.camera.turn)
+        first, n_det = 2 * len(self.terms), len(self.camera.turn)
         yield from ((first + i, time) for i in range(3 * n_det) for time in range(1, N_POWERS))
         first += 3 * n_det
         yield from ((first + i, 0) for i in range(8 if self.has_magnitude else 4))
-
-    def _terms_at(self, rows: Rows) -> np.ndarray:
-        """Return the terms of the distortion, shape (terms, n)."""
-        in_x, in_y = (legendre_at(along, max(self.degrees)) for along in rows.at.T)
-        return np.stack([in_x[k] * in_y[j] for k, j in self._terms])
-
-    def _others_at(self, rows: Rows) -> np.ndarray:
-        """Return the other spatial functions, vectors, shape (functions, 2, n)."""
-        turn, n_det = self.camera.turn[rows.detector], len(self.camera.turn)
-        c, s = np.cos(turn), np.sin(turn)
-        axes = np.array([[c, -s], [s, c]])
-        local = rows.pixel / self.camera.half[rows.detector]
-        turned = local[:, 0] * axes[1] - local[:, 1] * axes[0]
-        out = np.zeros((3 * n_det + 4 + 4 * self.has_magnitude, 2, rows.n))
-        for d in range(n_det):
-            on = rows.detector == d
-            out[3 * d, 0], out[3 * d + 1, 1], out[3 * d + 2] = on, on, on * turned
-        faintness = self._faintness[rows.source] if self.has_magnitude else None
-        for axis, direction in enumerate(axes):
-            angle, first = 2.0 * np.pi * rows.pixel[:, axis], 3 * n_det + 2 * axis
-            out[first], out[first + 1] = np.sin(angle) * direction, np.cos(angle) * direction
-            if faintness is not None:
-                out[first + 4] = faintness * direction
-                out[first + 5] = faintness * local[:, axis] * direction
-        return out
-
-    def _cells(self, rows: Rows) -> np.ndarray:
-        """Return the number of the cell of each row."""
-        share = 0.5 * (rows.pixel / self.camera.half[rows.detector] + 1.0)
-        column, row = np.clip((CELLS * share).astype(np.int64), 0, CELLS - 1).T
-        return (rows.detector * CELLS + row) * CELLS + column
 
 
 def families(patterns: Patterns, order: int) -> list[Family]:
@@ -243,6 +185,13 @@ def _times(camera: Camera) -> np.ndarray:
     changes = np.unique(np.linspace(1, last, min(last, _MOST_STEPS)).round())
     phase = np.array([np.cos(camera.phase), np.sin(camera.phase)])
     return np.concatenate([smooth, phase, (camera.field >= changes[:, None]) - 0.5])
+
+
+def cell_of(rows: Rows) -> np.ndarray:
+    """Return the number of the cell of each row."""
+    # The largest coordinate is in the last cell.
+    column, row = np.minimum((0.5 * CELLS * (rows.local.T + 1.0)).astype(np.intp), CELLS - 1)
+    return (rows.detector * CELLS + row) * CELLS + column
 
 
 def legendre_at(along: np.ndarray, degree: int) -> list[np.ndarray]:

@@ -14,23 +14,26 @@ sources, scaled up; the products take all.
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
-from scipy import linalg, sparse
+from scipy import linalg
 
 from solver.data.result import FitResult
-from solver.results.diagnosis.modelled import has_anisotropy, modelled
-from solver.results.diagnosis.patterns import Family, Patterns, legendre_at
-from solver.results.diagnosis.rows import Camera, Rows, onto_focal_plane
+from solver.results.diagnosis.columns import columns_at, order_of
+from solver.results.diagnosis.fitted import (
+    precision_of,
+    shared_columns,
+    with_exposures,
+    with_sources,
+)
+from solver.results.diagnosis.patterns import Family, Patterns
+from solver.results.diagnosis.products import products
+from solver.results.diagnosis.rows import Camera, Rows
 
 # Measurements from which the covariance is computed, and exposures of each field.
 _MOST_ROWS, _LEAST_EXPOSURES = 12_000, 4
-_ARCSEC_RAD, _PPM = np.pi / 180.0 / 3600.0, 1e-6
 # Of sums of weights, relative.
 _ROUNDING = 1e-9
 # Directions of which the fit leaves less than this share are not tested.
 _LEAST_LEFT = 0.02
-# Highest degree of a distortion.
-_HIGHEST = 9
 
 
 class Evidence(NamedTuple):
@@ -98,41 +101,37 @@ class Projection(NamedTuple):
 def project(result: FitResult, camera: Camera, rows: Rows, patterns: Patterns) -> Projection:
     """Return the products of the patterns with the residuals, and their covariance."""
     some, ratio = _subset(rows, camera, len(result.sources))
-    root = np.sqrt(some.weight)
-    shape = (-1, 2 * some.n)
-    of_patterns = (patterns.of_rows(some) * root).reshape(shape)
-    shared, precision = _shared(result, camera, some)
-    dense = np.concatenate([of_patterns, (shared * root).reshape(shape)])
-    own, own_precision = _of_exposures(result, camera, some, root)
-    sources, places = _of_sources(result, camera, some, root)
+    shared = shared_columns(result, camera, some)
+    columns = columns_at(patterns, some).with_(shared, np.sqrt(some.weight))
+    ours = order_of(patterns, columns.scalar.shape[1])
+    others = np.setdiff1d(np.arange(columns.count), ours)
     # All sums over the rows, less what the positions of the sources absorb.
-    with_sources = np.asarray(sources @ dense.T)
-    own_sources = (sources @ own.T).toarray()
-    gram = dense @ dense.T
-    total = ratio * gram[: len(patterns), : len(patterns)]
-    gram -= with_sources.T @ (places[:, None] * with_sources)
-    between = np.asarray(own @ dense.T) - own_sources.T @ (places[:, None] * with_sources)
-    exposures = (own @ own.T).toarray() - own_sources.T @ (places[:, None] * own_sources)
-    n, n_own = len(patterns), own.shape[0]
-    fitted = np.empty((n_own + len(precision),) * 2)
-    fitted[:n_own, :n_own] = exposures
-    fitted[:n_own, n_own:] = between[:, n:]
-    fitted[n_own:, :n_own] = between[:, n:].T
-    fitted[n_own:, n_own:] = gram[n:, n:]
-    cross = ratio * np.concatenate([between[:, :n], gram[n:, :n]])
-    fitted *= ratio
-    fitted[np.diag_indices(len(fitted))] += np.concatenate([own_precision, precision])
+    gram, exposures = columns.gram(), with_exposures(result, camera, some, columns)
+    total = ratio * gram[np.ix_(ours, ours)]
+    of_columns, of_exposures = with_sources(result, camera, some, columns, exposures)
+    gram -= of_columns.T @ of_columns
+    between = exposures.with_columns - of_exposures.T @ of_columns
+    fitted = ratio * np.block(
+        [
+            [exposures.gram - of_exposures.T @ of_exposures, between[:, others]],
+            [between[:, others].T, gram[np.ix_(others, others)]],
+        ]
+    )
+    fitted += linalg.block_diag(exposures.precision, np.diag(precision_of(shared)))
     # Shifts of all exposures against those of all detectors may have no prior.
     fitted[np.diag_indices(len(fitted))] *= 1.0 + 1e-9
     factor = linalg.cho_factor(fitted, lower=True, check_finite=False)
-    left = ratio * gram[:n, :n] - cross.T @ linalg.cho_solve(factor, cross, check_finite=False)
+    cross = ratio * np.concatenate([between[:, ours], gram[np.ix_(others, ours)]])
+    left = ratio * gram[np.ix_(ours, ours)]
+    left -= cross.T @ linalg.cho_solve(factor, cross, check_finite=False)
     # In few exposures, a source takes too much of what changes from one exposure to the next.
-    fast = np.ix_(patterns.fast, patterns.fast)
-    kept = of_patterns[patterns.fast] * np.tile(np.sqrt(some.left), 2)
-    left[fast] = ratio * (kept @ kept.T)
+    fast = patterns.fast
+    number = ours[fast] - 2 * columns.scalar.shape[1]
+    kept = np.concatenate([columns.x[:, number], columns.y[:, number]])
+    left[np.ix_(fast, fast)] = ratio * kept.T @ (np.tile(some.left, 2)[:, None] * kept)
     if result.settings.pixel_phase:
-        left[patterns.fast] = left[:, patterns.fast] = 0.0
-    return Projection(patterns.products(rows), total, left, float(rows.weight.sum()))
+        left[fast] = left[:, fast] = 0.0
+    return Projection(products(patterns, rows), total, left, float(rows.weight.sum()))
 
 
 def _subset(rows: Rows, camera: Camera, n_sources: int) -> tuple[Rows, float]:
@@ -164,97 +163,3 @@ def _subset(rows: Rows, camera: Camera, n_sources: int) -> tuple[Rows, float]:
     chosen[order[: int(np.searchsorted(np.cumsum(counts), _MOST_ROWS)) + 1]] = True
     part = some.of(np.flatnonzero(chosen[some.source]))
     return part, float(some.weight.sum() / part.weight.sum())
-
-
-def _shared(result: FitResult, camera: Camera, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
-    """Return the columns of what exposures share, and the precision of their priors.
-
-    These are the detectors, the distortion and the causes that the fit includes. Shapes
-    (columns, 2, n) and (columns,); per um, rad, um and um, and per unit of each cause.
-    """
-    calibration = result.calibration
-    width = {name: rows_["prior_sigma"].to_numpy() for name, rows_ in calibration.groupby("group")}
-    n_det, n = len(camera.turn), rows.n
-    turn, columns, sigmas = camera.turn[rows.detector], [], []
-    pixel = rows.pixel * camera.pitch[rows.detector]
-    ones, zeros = np.ones(n), np.zeros(n)
-    kinds = (
-        ("detector_x", (ones, zeros), 1.0),
-        ("detector_y", (zeros, ones), 1.0),
-        (
-            "detector_rotation",
-            onto_focal_plane(np.stack([-pixel[:, 1], pixel[:, 0]], axis=1), turn).T,
-            _ARCSEC_RAD,
-        ),
-        ("pitch_x", onto_focal_plane(np.stack([rows.pixel[:, 0], zeros], axis=1), turn).T, 1.0),
-        ("pitch_y", onto_focal_plane(np.stack([zeros, rows.pixel[:, 1]], axis=1), turn).T, 1.0),
-    )
-    for name, vector, unit in kinds:
-        for d in range(n_det):
-            columns.append(np.asarray(vector) * (rows.detector == d))
-            sigmas.append(unit * width[name][d])
-    labels = calibration.loc[calibration["group"] == "distortion_x", "label"]
-    in_x, in_y = (legendre_at(along, _HIGHEST) for along in rows.at.T)
-    for number, label in enumerate(labels):
-        k, j = (int(one) for one in label[2:-1].split(","))
-        value = in_x[k] * in_y[j]
-        for axis, name in enumerate(("distortion_x", "distortion_y")):
-            vector = np.zeros((2, n))
-            vector[axis] = value
-            columns.append(vector)
-            sigmas.append(width[name][number])
-    for cause in modelled(result, camera, rows):
-        columns.append(np.stack([cause.x, cause.y]))
-        sigmas.append(cause.sigma)
-    return np.stack(columns), 1.0 / np.square(np.maximum(sigmas, 1e-12))
-
-
-def _of_exposures(
-    result: FitResult, camera: Camera, rows: Rows, root: np.ndarray
-) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """Return the columns of each exposure, and the precision of their priors.
-
-    They are shift along x and y, turn, scale and, where the fit has it, the anisotropy; shapes
-    (columns, 2 n) and (columns,). Exposures without rows have none.
-    """
-    n, x, y = rows.n, *(root * rows.at.T)
-    none = np.zeros(n)
-    parts = [(root, none), (none, root), (-y, x), (x, y)]
-    precision = [0.0] * len(parts)
-    if has_anisotropy(result):
-        parts.append((-x, y))
-        rows_of = result.calibration["group"] == "focal_anisotropy"
-        width = float(result.calibration.loc[rows_of, "prior_sigma"].iloc[0])
-        precision.append((0.5 * _PPM * width * camera.scale) ** -2)
-    code, taken = pd.factorize(rows.exposure)
-    line = np.concatenate([len(parts) * code + number for number in range(len(parts))])
-    along = np.tile(np.arange(n), len(parts))
-    in_x, in_y = (np.concatenate([part[axis] for part in parts]) for axis in (0, 1))
-    lines, places = np.concatenate([line, line]), np.concatenate([along, n + along])
-    shape = (len(parts) * len(taken), 2 * n)
-    columns = sparse.csr_matrix((np.concatenate([in_x, in_y]), (lines, places)), shape=shape)
-    columns.eliminate_zeros()
-    return columns, np.tile(precision, len(taken))
-
-
-def _of_sources(
-    result: FitResult, camera: Camera, rows: Rows, root: np.ndarray
-) -> tuple[sparse.csr_matrix, np.ndarray]:
-    """Return the columns of the sources, shape (2 sources, 2 n), and the variances, um^2.
-
-    The variances are those of the positions if all else is held fixed, shape (2 sources,).
-    """
-    n = rows.n
-    source, known = pd.factorize(rows.source)
-    roll = camera.roll[rows.exposure]
-    c, s = root * np.cos(roll), root * np.sin(roll)
-    along = np.arange(n)
-    line = np.concatenate([2 * source, 2 * source + 1, 2 * source, 2 * source + 1])
-    place = (line, np.concatenate([along, along, n + along, n + along]))
-    columns = sparse.csr_matrix(
-        (np.concatenate([c, s, -s, c]), place), shape=(2 * len(known), 2 * n)
-    )
-    names = ["prior_sigma_ra", "prior_sigma_dec"]
-    prior = camera.um_per_mas**2 * np.square(result.sources[names].to_numpy()[known]).mean(axis=1)
-    precision = np.bincount(source, rows.weight, minlength=len(known)) + 1.0 / prior
-    return columns, np.repeat(1.0 / precision, 2)

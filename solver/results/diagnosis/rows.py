@@ -1,6 +1,5 @@
 """The residuals of a solution on the focal plane, in the order of the exposures."""
 
-import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -24,14 +23,15 @@ class Rows(NamedTuple):
     Attributes
     ----------
     exposure, detector, source : index into the exposures, the detectors and the sources of the
-        result, shape (n,); exposures ascend
+        result, shape (n,); exposures ascend, and in each of them the detectors
     first : row of the first measurement of each exposure, and n, shape (exposures + 1,)
     at : position on the focal plane over `Camera.scale`, shape (n, 2)
     pixel : measured position, from the centre of the detector, pixels, shape (n, 2)
+    local : the same over `Camera.half`, shape (n, 2)
     residual : measured minus predicted, um, shape (n, 2)
     weight : inverse variance of a measurement along one axis, um^-2, shape (n,)
     left : share of an error of the measurement that stays in its residual, shape (n,)
-    whitened : residual over the stated uncertainty along the axes of the detector, shape (n, 2)
+    chi2 : of the residual along both axes, by the stated uncertainties, shape (n,)
     is_far : whether the measurement is an outlier, shape (n,); its `residual` is zero
     """
 
@@ -41,10 +41,11 @@ class Rows(NamedTuple):
     first: np.ndarray
     at: np.ndarray
     pixel: np.ndarray
+    local: np.ndarray
     residual: np.ndarray
     weight: np.ndarray
     left: np.ndarray
-    whitened: np.ndarray
+    chi2: np.ndarray
     is_far: np.ndarray
 
     @property
@@ -94,33 +95,33 @@ def camera_rows(result: FitResult) -> tuple[Camera, Rows]:
     table, detectors = result.residuals, result.values_on("det")
     rotation = result.calibration["group"] == "detector_rotation"
     labels = result.calibration.loc[rotation, "label"].str.split().str[-1]
-    ids = labels.to_numpy(dtype=np.int64)
-    order = np.argsort(ids)
-    found = np.searchsorted(ids[order], table["detector_id"].to_numpy())
     turn = np.radians(detectors["detector_rotation"].to_numpy())
     pitch = detectors[["pitch_x", "pitch_y"]].to_numpy()
-    exposure = result.exposure_index
-    is_sorted = bool(np.all(exposure[1:] >= exposure[:-1]))
-    by_exposure = slice(None) if is_sorted else np.argsort(exposure, kind="stable")
-    exposure = exposure[by_exposure]
-    detector = order[found][by_exposure]
+    detector = pd.Index(labels.to_numpy(dtype=np.int64)).get_indexer(table["detector_id"])
+    exposure, n_det = result.exposure_index, len(turn)
+    key = exposure * n_det + detector
+    # Sixteen bits are sorted by their digits, ten times as fast as more.
+    order = np.argsort(key.astype(np.min_scalar_type(key.max(initial=0))), kind="stable")
+    exposure, detector = exposure.take(order), detector.take(order)
+
+    def column(name: str) -> np.ndarray:
+        return table[name].to_numpy().take(order)
 
     def pair(name: str) -> np.ndarray:
-        return table[[f"{name}x", f"{name}y"]].to_numpy()[by_exposure]
+        # Each axis is contiguous.
+        return np.stack([column(f"{name}x"), column(f"{name}y")]).T
 
-    pixel, sigma, focal = pair("n"), pair("s"), pair("focal_")
-    residual, variance = pair("residual_"), np.square(sigma * pitch[detector]).mean(axis=1)
+    pixel, sigma, focal, residual = pair("n"), pair("s"), pair("focal_"), pair("residual_")
+    um, half = pitch.T.take(detector, axis=1).T, _largest(pixel, detector, n_det)
     first = np.searchsorted(exposure, np.arange(len(result.exposures) + 1))
-    left = 1.0 - np.clip(0.5 * table["leverage"].to_numpy()[by_exposure], 0.0, 1.0)
-    is_far = _far(residual / sigma, left, first)
+    left = 1.0 - np.clip(0.5 * column("leverage"), 0.0, 1.0)
+    squares = np.square(residual / sigma)
+    is_far = _far(squares.max(axis=1), left, first)
     # Older results lack it; the largest coordinate is near.
     largest = np.abs(focal).max(initial=1.0)
     scale = float(result.summary.get("distortion_scale_um", largest))
-    half = np.array(
-        [np.abs(pixel[detector == one]).max(axis=0, initial=1.0) for one in range(len(turn))]
-    )
     # Few ids are searched for: all of them would take ten times as long.
-    source, known = pd.factorize(table["source_id"].to_numpy()[by_exposure])
+    source, known = pd.factorize(column("source_id"))
     rows = Rows(
         exposure,
         detector,
@@ -128,35 +129,53 @@ def camera_rows(result: FitResult) -> tuple[Camera, Rows]:
         first,
         focal / scale,
         pixel,
-        onto_focal_plane(residual * pitch[detector], turn[detector]) * ~is_far[:, None],
-        1.0 / variance,
+        pixel / half.T.take(detector, axis=1).T,
+        onto_focal_plane(residual * um * ~is_far[:, None], turn, detector),
+        1.0 / np.square(sigma * um).mean(axis=1),
         left,
-        residual / sigma,
+        squares.sum(axis=1),
         is_far,
     )
     return _camera(result, turn, pitch, half, scale), rows
 
 
-def onto_focal_plane(vector: np.ndarray, turn: np.ndarray) -> np.ndarray:
+def _largest(pixel: np.ndarray, detector: np.ndarray, n_det: int) -> np.ndarray:
+    """Return the largest coordinate on each detector along its axes, at least one."""
+    starts = np.flatnonzero(np.diff(detector, prepend=-1))
+    largest = np.ones((n_det, 2))
+    if len(starts):
+        np.maximum.at(largest, detector[starts], np.maximum.reduceat(np.abs(pixel), starts))
+    return largest
+
+
+def onto_focal_plane(vector: np.ndarray, turn: np.ndarray, detector: np.ndarray) -> np.ndarray:
     """Return vectors along the axes of their detectors as vectors on the focal plane.
 
     Parameters
     ----------
-    turn : rotation of the detector of each vector, rad; the inverse of Eq. (exp:model:nxny)
+    vector : shape (n, 2)
+    turn : rotation of each detector, rad; the inverse of Eq. (exp:model:nxny)
+    detector : of each vector, shape (n,)
     """
-    c, s = np.cos(turn), np.sin(turn)
+    c, s = np.cos(turn).take(detector), np.sin(turn).take(detector)
     x, y = vector[:, 0], vector[:, 1]
-    return np.stack([c * x + s * y, c * y - s * x], axis=1)
+    return np.stack([c * x + s * y, c * y - s * x]).T
 
 
-def _far(whitened: np.ndarray, left: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Return which measurements are far off, by the scatter of their exposure, which is robust."""
-    squares = np.square(whitened).max(axis=1) / np.maximum(left, _LEAST_LEFT)
-    is_far = np.zeros(len(squares), dtype=bool)
-    for start, end in itertools.pairwise(first):
-        if end > start:
-            scale = max(float(np.median(squares[start:end])) / _MEDIAN_OF_LARGER, 1.0)
-            is_far[start:end] = squares[start:end] > FAR**2 * scale
+def _far(squares: np.ndarray, left: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Return which measurements are far off, by the scatter of their exposure, which is robust.
+
+    Parameters
+    ----------
+    squares : of the residual over its uncertainty, of the axis where it is larger
+    """
+    squares = squares / np.maximum(left, _LEAST_LEFT)
+    is_far = squares > FAR**2
+    # An exposure that scatters by more has fewer of them, never more.
+    for exposure in np.unique(np.searchsorted(first, np.flatnonzero(is_far), side="right") - 1):
+        rows = slice(first[exposure], first[exposure + 1])
+        scale = max(float(np.median(squares[rows])) / _MEDIAN_OF_LARGER, 1.0)
+        is_far[rows] = squares[rows] > FAR**2 * scale
     return is_far & (left > _LEAST_LEFT)
 
 

@@ -46,7 +46,7 @@ def scatter_tests(
     used = ~rows.is_far
     if without is not None:
         used &= ~np.isin(rows.exposure, without)
-    chi2, dof = used * np.square(rows.whitened).sum(axis=1), used * 2.0 * rows.left
+    chi2, dof = used * rows.chi2, used * 2.0 * rows.left
     total, freedom = float(chi2.sum()) - explained, max(float(dof.sum()), 1.0)
     scale = max(total / freedom, 1e-300)
     whole = float(_normalised(np.array([total]), np.array([freedom]))[0])

@@ -40,11 +40,15 @@ def swapped(result: FitResult) -> Swapped:
     near their places.
     """
     table = result.residuals
-    residual = table[["residual_x", "residual_y"]].to_numpy(dtype=float)
-    at = table[["nx", "ny"]].to_numpy(dtype=float)
-    chi2 = np.square(residual / table[["sx", "sy"]].to_numpy(dtype=float)).sum(axis=1)
+    # Each axis is contiguous.
+    residual, at, sigma = (
+        np.stack([table[name].to_numpy(dtype=float) for name in names]).T
+        for names in (("residual_x", "residual_y"), ("nx", "ny"), ("sx", "sy"))
+    )
+    chi2 = np.square(residual / sigma).sum(axis=1)
     chosen = np.flatnonzero(chi2 > FAR**2)
-    distance = np.hypot(*residual.T)
+    distance = np.zeros(len(table))
+    distance[chosen] = np.hypot(*residual[chosen].T)
     area = float(np.prod(np.ptp(at, axis=0)))
     share = np.pi * (_NEAR * distance) ** 2 / max(area, 1e-300)
     pairs, expected = [], 0.0

@@ -106,7 +106,7 @@ def diagnose(result: FitResult) -> Diagnosis:
     """Return the tests of a solution."""
     camera, rows = camera_rows(result)
     magnitude = source_magnitudes(result)
-    exposures = exposure_chi2(camera, rows)
+    exposures = exposure_chi2(rows)
     swings, swinging = _swings(exposures, camera.field)
     of_others = np.where(result.sources["is_reference"].to_numpy(bool), np.nan, magnitude)
     scatter = scatter_tests(rows, of_others, without=swinging)

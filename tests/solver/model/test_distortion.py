@@ -5,8 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial.legendre import legval2d
 
+from solver.data.distortion_terms import terms
 from solver.data.settings import MAX_ORDER
-from solver.model.distortion import basis, terms
+from solver.model.distortion import basis
 from tests.solver.small_orbit import at_centre
 
 ORDERS = range(MAX_ORDER + 1)

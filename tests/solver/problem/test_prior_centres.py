@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
+from solver.data.distortion_terms import terms
 from solver.data.parameters import BY_NAME
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.fit import fit_orbit
 from solver.model.astrometry import sky_position
-from solver.model.distortion import terms
 from solver.problem.problem import build_problem
 
 

@@ -90,3 +90,11 @@ def test_shares_of_the_priors_are_those_of_the_matrix(walking):
     expected = np.diag(priors.with_hessian(np.zeros((size, size)), theta) @ covariance)
     found = priors.shares(theta, np.diag(covariance), covariance)
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-6)
+
+
+def test_widths_of_means_are_those_of_another_array():
+    before = np.full(10, 0.3)
+    after = WALKS.with_widths_of_means(before)
+    assert np.all(before == 0.3)
+    np.testing.assert_array_equal(np.flatnonzero(after == MEAN_WIDTH_UM), [7, 9])
+    np.testing.assert_array_equal(after[[0, 1, 2, 3, 4, 5, 6, 8]], 0.3)

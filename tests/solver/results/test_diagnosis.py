@@ -12,6 +12,7 @@ from solver.engines.gauss_newton import find_mode
 from solver.fit import fit_orbit
 from solver.problem.problem import build_problem
 from solver.results.diagnosis.causes import find_causes
+from solver.results.diagnosis.columns import columns_at, order_of
 from solver.results.diagnosis.patterns import Patterns
 from solver.results.diagnosis.projection import project
 from solver.results.diagnosis.rows import camera_rows, onto_focal_plane
@@ -51,14 +52,16 @@ def covariances_of_patterns(fit, problem, dense):
     camera, rows = camera_rows(fit)
     patterns = Patterns(camera, ORDER, np.full(len(fit.sources), np.nan))
     projection = project(fit, camera, rows, patterns)
-    input_rows = np.argsort(fit.exposure_index, kind="stable")
+    input_rows = np.lexsort((fit.residuals["detector_id"], fit.exposure_index))
     working = np.empty(problem.n_obs, dtype=int)
     working[problem.measurements.row] = np.arange(problem.n_obs)
-    columns = patterns.of_rows(rows).transpose(2, 1, 0)
+    scalar, *vectors = columns_at(patterns, rows)
+    order, none = order_of(patterns, scalar.shape[1]), np.zeros_like(scalar)
+    parts = (scalar, none, vectors[0]), (none, scalar, vectors[1])
+    columns = [np.concatenate(part, axis=1)[:, order].ravel() for part in parts]
     # Back to the detectors' axes, in units of the uncertainty.
     back = onto_focal_plane(
-        np.stack([columns[:, 0].ravel(), columns[:, 1].ravel()], axis=1),
-        -np.repeat(camera.turn[rows.detector], len(patterns)),
+        np.stack(columns, axis=1), -camera.turn, np.repeat(rows.detector, len(patterns))
     )
     pixels = back.reshape(rows.n, len(patterns), 2).transpose(0, 2, 1)
     pixels *= np.sqrt(rows.weight)[:, None, None]
@@ -88,6 +91,7 @@ def test_covariance_of_patterns_is_that_of_the_whole_problem(small_orbit, proble
     "causes",
     [
         {"drift": 3, "drift_in_time": 2, "focal_anisotropy": True},
+        {"drift_walk": 2, "prior_widths": {"drift_walk_x": 0.3, "drift_walk_y": 0.1}},
         *(
             pytest.param(causes, marks=pytest.mark.full)
             for causes in (
@@ -104,7 +108,8 @@ def test_covariance_of_patterns_allows_for_modelled_causes(small_orbit, make_den
     catalogue = small_orbit.data.catalogue
     magnitude = random.uniform(14.0, 18.0, len(catalogue))
     data = replace(small_orbit.data, catalogue=catalogue.assign(magnitude=magnitude))
-    settings = FitSettings(prior_widths=TIGHT_PRIORS, **causes)
+    widths = {**TIGHT_PRIORS, **causes.get("prior_widths", {})}
+    settings = FitSettings(**{**causes, "prior_widths": widths})
     fit = fit_orbit(data, small_orbit.instrument, settings)
     problem = build_problem(data, small_orbit.instrument, settings)
     mode = find_mode(problem, settings)

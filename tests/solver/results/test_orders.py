@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver.data.distortion_terms import terms
 from solver.data.exclusions import of_rows
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.engines.gauss_newton import find_mode
 from solver.errors import CancelledError
 from solver.fit import OrbitFitter, fit_orbit
-from solver.model.distortion import terms
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.problem import build_problem, orders_held
 from solver.results.diagnostics import log_evidence

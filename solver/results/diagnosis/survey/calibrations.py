@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Complex
 
+from solver.data.distortion_terms import terms
 from solver.data.run_schema import CALIBRATIONS
 
 _PITCHES = ("pitch_x", "pitch_y")
@@ -42,15 +43,10 @@ def _distortion(groups: dict[str, pd.DataFrame]) -> Iterator[pd.DataFrame]:
     if "distortion_x" not in groups:
         return
     x, y = groups["distortion_x"], groups["distortion_y"]
-    degrees = np.array([sum(pair) for pair in _term_degrees(len(x))])
+    degrees = np.array([sum(pair) for pair in terms(len(x) + 1)[: len(x)]])
     for degree in np.unique(degrees):
         both = pd.concat([x[degrees == degree], y[degrees == degree]])
         yield _rows(f"distortion, degree {degree}", both["label"], both["value"], both)
-
-
-def _term_degrees(count: int) -> list[tuple[int, int]]:
-    every = ((n - j, j) for n in range(2, count + 2) for j in range(n + 1))
-    return [pair for _, pair in zip(range(count), every, strict=False)]
 
 
 def _detectors(groups: dict[str, pd.DataFrame]) -> Iterator[pd.DataFrame]:

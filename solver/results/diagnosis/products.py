@@ -1,0 +1,93 @@
+"""Products of the patterns with the residuals, over all measurements."""
+
+import itertools
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from solver.results.diagnosis.patterns import Patterns, cell_of
+from solver.results.diagnosis.rows import Rows
+
+
+def products(patterns: Patterns, rows: Rows) -> np.ndarray:
+    """Return the products of all patterns with the weighted residuals, um^-1, shape (columns,).
+
+    A pattern is a function of the place times one of the time: the functions of the place are
+    summed over each exposure.
+    """
+    vector = rows.weight * rows.residual.T
+    turn = patterns.camera.turn
+    c, s = np.cos(turn).take(rows.detector), np.sin(turn).take(rows.detector)
+    on_detector = c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]
+    by_exposure = [
+        _of_terms(patterns, rows, vector),
+        _of_moves(patterns, rows, vector, on_detector),
+    ]
+    in_place = np.concatenate(by_exposure)
+    is_in_place = patterns.place < len(in_place)
+    in_time = patterns.times @ in_place.T
+    cells, n_cells = cell_of(rows), patterns.n_cells
+    of_cells = np.stack([np.bincount(cells, along, n_cells) for along in vector], axis=1)
+    return np.concatenate(
+        [
+            in_time[patterns.time[is_in_place], patterns.place[is_in_place]],
+            _of_pixels(patterns, rows, on_detector),
+            of_cells.ravel(),
+        ]
+    )
+
+
+def _of_terms(patterns: Patterns, rows: Rows, vector: np.ndarray) -> np.ndarray:
+    """Return the products of the terms of the distortion, x and y of each, by exposure.
+
+    Powers of the place are summed, and made Legendre polynomials afterwards.
+
+    Parameters
+    ----------
+    vector : weighted residuals, shape (2, n)
+    """
+    size, n_exp = max(patterns.degrees) + 1, len(rows.first) - 1
+    sums = np.empty((2, n_exp, size, size))
+    powers = np.empty((3, size, max(np.diff(rows.first), default=0)))
+    for e, (first, last) in enumerate(itertools.pairwise(rows.first)):
+        in_x, in_y, weighted = powers[:, :, : last - first]
+        in_x[0], in_y[0] = 1.0, 1.0
+        for k in range(1, size):
+            np.multiply(in_x[k - 1], rows.at[first:last, 0], out=in_x[k])
+            np.multiply(in_y[k - 1], rows.at[first:last, 1], out=in_y[k])
+        for axis in (0, 1):
+            np.multiply(in_x, vector[axis, first:last], out=weighted)
+            np.matmul(weighted, in_y.T, out=sums[axis, e])
+    polynomials = np.zeros((size, size))
+    for degree in range(size):
+        polynomials[degree, : degree + 1] = legendre.leg2poly(np.eye(size)[degree, : degree + 1])
+    found = polynomials @ sums @ polynomials.T
+    return np.concatenate([found[:, :, k, j] for k, j in patterns.terms])
+
+
+def _of_moves(
+    patterns: Patterns, rows: Rows, vector: np.ndarray, on_detector: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Return the products of the shifts and the turn of each detector, by exposure."""
+    n_det, n_exp = len(patterns.camera.turn), len(rows.first) - 1
+    turned = rows.local[:, 0] * on_detector[1] - rows.local[:, 1] * on_detector[0]
+    group = rows.exposure * n_det + rows.detector
+    sums = np.stack([np.bincount(group, one, n_exp * n_det) for one in (*vector, turned)])
+    return sums.reshape(3, n_exp, n_det).transpose(2, 0, 1).reshape(-1, n_exp)
+
+
+def _of_pixels(
+    patterns: Patterns, rows: Rows, on_detector: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Return the products of the functions of the pixel phase and of the magnitude."""
+    found = []
+    for axis, along in enumerate(on_detector):
+        # With the tangent of half the angle: one function instead of two.
+        tangent = np.tan(np.pi * rows.pixel[:, axis])
+        share = along / (1.0 + tangent * tangent)
+        found += [2.0 * (tangent @ share), 2.0 * share.sum() - along.sum()]
+    if patterns.has_magnitude:
+        faintness = patterns.faintness.take(rows.source)
+        for axis, along in enumerate(on_detector):
+            found += [faintness @ along, (faintness * rows.local[:, axis]) @ along]
+    return np.array(found)

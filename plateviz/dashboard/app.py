@@ -14,6 +14,7 @@ from param.parameterized import Watcher
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.at_rest import AtRest
+from plateviz.dashboard.model_search import one_search
 from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.page_request import WINDOW
 from plateviz.dashboard.rooms import Rooms, Window, window_from
@@ -245,7 +246,7 @@ class _Ticker:
             return
         session = self._navigation.session
         # What follows from a new solution is sent as one message.
-        with pn.io.hold():
+        with pn.io.hold(), one_search(self._document):
             session.poll()
             session.judging.look()
             self._pages.draw_due()

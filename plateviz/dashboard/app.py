@@ -15,6 +15,7 @@ from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.at_rest import AtRest
 from plateviz.dashboard.lost_run import look_for_run
+from plateviz.dashboard.model_search import one_search
 from plateviz.dashboard.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.page_request import WINDOW
 from plateviz.dashboard.rooms import Rooms, Window, window_from
@@ -258,7 +259,7 @@ class _Ticker:
             return
         session = self._navigation.session
         # What follows from a new solution is sent as one message.
-        with pn.io.hold():
+        with pn.io.hold(), one_search(self._document):
             session.poll()
             session.judging.look()
             self._pages.draw_due()

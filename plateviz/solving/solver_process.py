@@ -43,10 +43,11 @@ from solver.simulate.survey import simulate_survey
 Send = Callable[[dict], None]
 # Work in steps that speeds up likely next requests; done while no request waits.
 Speculative = Iterator[None]
-# Seconds in which the next request of a hand on a slider comes, before the verdict is begun.
-_NEXT_S = 0.05
-# Idle seconds before speculative work starts. Meanwhile a browser draws the answer; where the two
-# share the cores, it would take a third longer.
+# Idle seconds before the verdict is begun. In these the server sends the solution, a browser draws
+# it, and the next request of a hand on a slider comes. On two cores, the figures would wait for it.
+_NEXT_S = 0.4
+# Idle seconds after that before speculative work starts. Where it shares the cores with a browser
+# that draws the verdict, this would take a third longer.
 _IDLE_S = 1.0
 # Time in which the process removes what it has not finished, once its server has ended.
 _END_S = 3.0

@@ -2,11 +2,11 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 
 import panel as pn
 import panel_material_ui as pmui
 
+from plateviz.dashboard.model_search import one_search
 from plateviz.dashboard.rooms import Room
 from plateviz.dashboard.selected import SelectedIds
 from plateviz.dashboard.views.figure import FigureView, Part
@@ -140,8 +140,6 @@ class FigureGrid(pn.viewable.Viewer):
         """
         due = [view for view in self._views if view.is_due]
         new = [view for view in due if not view.is_drawn]
-        document = pn.state.curdoc
-        # Otherwise Bokeh looks for what is new on the page after each change of a card.
-        with pn.io.hold(), nullcontext() if document is None else document.models.freeze():
+        with pn.io.hold(), one_search(pn.state.curdoc):
             for view in [view for view in due if view.is_drawn] + new[:most_new]:
                 view.draw()

@@ -41,8 +41,8 @@ _PROGRESS_MILLISECONDS = 250
 _PENDING_MILLISECONDS = 50
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
-# Milliseconds between two looks whether the run is there at all.
-_LOOK_FOR_RUN = 10_000
+# Seconds between two looks whether the run is there at all.
+_LOOK_FOR_RUN_SECONDS = 10.0
 # The solver prepares what-ifs once a page has been at rest for so long. Before, the browser draws
 # and a person may step on to the next orbit, for which a fit would take the cores.
 _REST_SECONDS = 3.0
@@ -182,9 +182,6 @@ class _Ticker:
             self._tick, period=_PROGRESS_MILLISECONDS, start=False
         )
         self._looks = pn.state.add_periodic_callback(self._look, period=_LOOK, start=False)
-        self._looks_for_run = pn.state.add_periodic_callback(
-            self._look_for_run, period=_LOOK_FOR_RUN, start=False
-        )
         self._navigation: Navigation | None = None
         self._pages: Pages | None = None
         self._watched: Job | None = None
@@ -192,6 +189,7 @@ class _Ticker:
         self._loop: IOLoop | None = None
         self._is_to_tick = False
         self._rest: AtRest | None = None
+        self._looks_for_run: AtRest | None = None
 
     def follow(self, navigation: Navigation, pages: Pages) -> None:
         """Begin once the page has loaded; drawing before would delay it."""
@@ -213,7 +211,10 @@ class _Ticker:
             self._rest = AtRest(session.prepare_what_ifs, _REST_SECONDS, later)
             self.wake()
             self._follow_run()
-            self._looks_for_run.start()
+            if self._document is not None:
+                look = partial(self._document.add_next_tick_callback, self._look_for_run)
+                self._looks_for_run = AtRest(look, _LOOK_FOR_RUN_SECONDS, later)
+                self._looks_for_run.begin()
 
         pn.state.onload(begin)
 
@@ -250,8 +251,9 @@ class _Ticker:
             self._looks.stop()
 
     def _look_for_run(self) -> None:
-        if self._navigation is not None:
+        if self._navigation is not None and self._looks_for_run is not None:
             look_for_run(self._navigation)
+            self._looks_for_run.begin()
 
     def _tick(self) -> None:
         self._is_to_tick = False

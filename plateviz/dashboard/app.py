@@ -211,9 +211,8 @@ class _Ticker:
             self._rest = AtRest(session.prepare_what_ifs, _REST_SECONDS, later)
             self.wake()
             self._follow_run()
-            if self._document is not None:
-                look = partial(self._document.add_next_tick_callback, self._look_for_run)
-                self._looks_for_run = AtRest(look, _LOOK_FOR_RUN_SECONDS, later)
+            if later is not None:
+                self._looks_for_run = AtRest(self._look_soon, _LOOK_FOR_RUN_SECONDS, later)
                 self._looks_for_run.begin()
 
         pn.state.onload(begin)
@@ -249,6 +248,11 @@ class _Ticker:
             return
         if self._navigation is None or not self._navigation.look_again():
             self._looks.stop()
+
+    def _look_soon(self) -> None:
+        # The time may come when the page has ended and is not yet forgotten.
+        if self._document is not None and self._document.session_context is not None:
+            self._document.add_next_tick_callback(self._look_for_run)
 
     def _look_for_run(self) -> None:
         if self._navigation is not None and self._looks_for_run is not None:

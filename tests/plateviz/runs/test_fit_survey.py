@@ -167,7 +167,8 @@ def test_errors_by_count_are_of_the_artificial_sources(run):
 
 def test_run_is_tested_from_its_own_tables(run):
     tests = read_run_tests(run)
-    for table, frame in zip(RUN_TABLES, tests, strict=True):
+    frames = tests.calibrations, tests.orbit_tests, tests.orbit_causes, tests.zonal
+    for table, frame in zip(RUN_TABLES, frames, strict=True):
         assert list(frame) == table.names
     assert set(tests.calibrations["orbit_id"]) == {0, 1, 2}
     assert set(tests.orbit_causes["orbit_id"]) == {0, 1, 2}

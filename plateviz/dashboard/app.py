@@ -225,8 +225,9 @@ class _Ticker:
             # Nothing calls back into a page without a document.
             self._start_looking()
             return
-        self._is_to_tick = True
-        self._document.add_next_tick_callback(self._tick)
+        if not self._has_ended:
+            self._is_to_tick = True
+            self._document.add_next_tick_callback(self._tick)
 
     def _start_looking(self) -> None:
         if not self._progress.running:
@@ -249,9 +250,13 @@ class _Ticker:
         if self._navigation is None or not self._navigation.look_again():
             self._looks.stop()
 
+    @property
+    def _has_ended(self) -> bool:
+        """Whether the page has been closed; a timer or a job may come before it is forgotten."""
+        return self._document is None or self._document.session_context is None
+
     def _look_soon(self) -> None:
-        # The time may come when the page has ended and is not yet forgotten.
-        if self._document is not None and self._document.session_context is not None:
+        if self._document is not None and not self._has_ended:
             self._document.add_next_tick_callback(self._look_for_run)
 
     def _look_for_run(self) -> None:

@@ -2,6 +2,9 @@
 
 import shutil
 
+from bokeh.document import Document
+
+from plateviz.dashboard.app import _Ticker
 from plateviz.dashboard.lost_run import look_for_run
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Session
@@ -35,3 +38,14 @@ def test_page_of_files_has_no_run_to_lose(fit_result):
     navigation = Navigation(Session(SurveyStore(fit_result, [])))
     look_for_run(navigation)
     assert navigation.session.loss == ""
+
+
+def test_page_that_has_ended_is_neither_looked_at_nor_woken(fit_result):
+    ticker, document, follower = _Ticker(), Document(), id
+    ticker._navigation = Navigation(Session(SurveyStore(fit_result, [])))
+    ticker._document = document
+    document.on_change(follower)
+    document.destroy(follower)
+    ticker._look_soon()
+    ticker.wake()
+    assert not ticker._is_to_tick

@@ -59,6 +59,8 @@ def test_afterwards_bokeh_looks_at_once(page):
     assert first.document is None
 
 
-def test_page_without_a_document():
+def test_without_a_document_nothing_is_kept_from_its_search(page):
+    _, column, searches = page
     with one_search(None):
-        pass
+        column.children = [Div()]
+        assert len(searches) == 1

@@ -43,8 +43,8 @@ _RAISED_ON_DAMAGE = (
 # Raised by code that did not foresee the damage: a message such as "'NoneType' object is not
 # subscriptable" does not describe the file.
 _UNFORESEEN = (ArithmeticError, AssertionError, AttributeError, LookupError, NameError, TypeError)
-# The name of an exception in the message of another one.
-_EXCEPTION = re.compile(r"\b\w*(?:Error|Exception): ")
+# The name of an exception in the message of another one, or the number of an error of the system.
+_EXCEPTION = re.compile(r"\b\w*(?:Error|Exception): |^\[Errno \d+\] ")
 _MAX_REASON_LENGTH = 300
 
 

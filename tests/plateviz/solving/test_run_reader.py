@@ -57,7 +57,7 @@ def test_run_that_could_not_be_read_is_tried_again(run):
 
 def test_run_that_is_gone_says_so(run):
     shutil.rmtree(run.directory)
-    with pytest.raises(InputError, match="default: expected a run"):
+    with pytest.raises(InputError, match="default: expected a run, found No such file"):
         RunReader(Waiting()).read(run)
 
 

@@ -3,8 +3,9 @@
 // Panel compiles the script of a component for each one of its kind that there is. Whenever a
 // container gets a part, Panel lays out all that is in the container anew, and then all that is in
 // the one around it, and each time the browser has to work out where everything is. Here containers
-// wait for the next picture of the screen, and are laid out together: those that are in another one
-// with it, except for cards, which have layouts of their own (see `own_layout.py`).
+// wait for the next picture of the screen in which all their parts are drawn, and are laid out
+// together: those that are in another one with it, except for cards, which have layouts of their
+// own (see `own_layout.py`).
 //
 // A component of React is drawn first and follows its model a moment later. What the server changed
 // in between, Panel would not show until it changes again; here it is read again then.
@@ -12,6 +13,9 @@
 // Columns of texts arrive packed.
 //
 // A table follows its model from when it is drawn.
+
+// Milliseconds that a layout waits for components that are being drawn.
+const LONGEST = 2000
 
 // The loader of components sends the event a second time.
 document.addEventListener("DOMContentLoaded", () => {
@@ -40,7 +44,19 @@ document.addEventListener("DOMContentLoaded", () => {
       if (among.has(view)) return true
     return false
   }
+  // A component of React is drawn after its container, and its parts after it: whatever is laid out
+  // before the last of them is laid out again.
+  const isDrawn = view => {
+    for (const part of view.child_views ?? [])
+      if (!isDrawn(part)) return false
+    return view._rendered !== false || !view.el.isConnected
+  }
+  let lastMoment = 0
   const layOut = () => {
+    if (performance.now() < lastMoment && ![...Bokeh.index].every(isDrawn)) {
+      requestAnimationFrame(layOut)
+      return
+    }
     const found = [...waiting.keys()].filter(view => !view.is_destroyed)
     const written = new Set(found.filter(view => waiting.get(view)))
     const laidOut = new Set(found)
@@ -55,7 +71,10 @@ document.addEventListener("DOMContentLoaded", () => {
     }
   }
   const wait = (view, isNew) => {
-    if (waiting.size === 0) requestAnimationFrame(layOut)
+    if (waiting.size === 0) {
+      lastMoment = performance.now() + LONGEST
+      requestAnimationFrame(layOut)
+    }
     waiting.set(view, isNew || waiting.get(view) === true)
   }
   views.write_layout = function () { this.update_layout() }

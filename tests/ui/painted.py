@@ -29,17 +29,24 @@ _BOTH = """() => {
   return [sum(together), sum(alone), sum(differences), differences.some(one => one > 0)];
 }"""
 
-# How often the page is laid out at once, and within a picture, when it is asked for ten times.
+# How often the page is laid out when it is asked for ten times: at once, while one of its parts is
+# still being drawn, and after.
 LAYOUTS_OF_TEN = """async () => {
-  const [page] = Bokeh.index
+  const [page] = Bokeh.index, [part] = page.child_views
   const now = page.compute_layout_now
+  const pictures = async count => {
+    while (count--) await new Promise(requestAnimationFrame)
+    return times
+  }
   let times = 0
   page.compute_layout_now = () => { times++; now.call(page) }
+  part._rendered = false
   for (let i = 0; i < 10; i++) page.invalidate_layout()
-  const atOnce = times
-  await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))
+  const found = [times, await pictures(4)]
+  part._rendered = true
+  found.push(await pictures(3))
   delete page.compute_layout_now
-  return [atOnce, times]
+  return found
 }"""
 
 

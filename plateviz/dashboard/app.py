@@ -284,7 +284,7 @@ class _Ticker:
             # Another thread is at work, and would wait for a page that asks without a pause.
             self._is_to_tick = True
             self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
-        elif is_pending or self._pages.is_due or (job is None and self._pages.complete()):
+        elif is_pending or self._pages.is_due or self._pages.complete(is_fitting=job is not None):
             self.wake()
         elif job is None:
             if self._progress.running:

@@ -15,7 +15,7 @@ from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.compare import CompareView
 from plateviz.dashboard.views.explore import ExploreView
-from plateviz.dashboard.views.figure import FigureView, card
+from plateviz.dashboard.views.figure import FigureView, Part, card
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import heading
 from plateviz.dashboard.views.point_actions import PointActions
@@ -52,16 +52,9 @@ class OrbitPage(pn.viewable.Viewer):
         self._grids: dict[OrbitWorkspace, FigureGrid] = {}
         self._following: list[FigureView] = []
         self._compare: CompareView | None = None
-        self._is_complete = False
+        self._controls = [self._shown_controls, self._refit_controls]
         self._stack = Stack({one: partial(self._workspace, one) for one in OrbitWorkspace})
-        self.sidebar = pmui.Column(
-            heading("Shown"),
-            SelectionView(navigation),
-            unit_selector(session),
-            heading("Refit"),
-            sizing_mode="stretch_width",
-            margin=0,
-        )
+        self.sidebar = pmui.Column(sizing_mode="stretch_width", margin=0)
         self._column = pmui.Column(
             HeadView(navigation), self._stack, sizing_mode="stretch_width", margin=0
         )
@@ -77,17 +70,33 @@ class OrbitPage(pn.viewable.Viewer):
         """Return the page without its sidebar."""
         return self._column
 
-    def complete(self) -> bool:
-        """Make the controls of a refit unless they are there; return whether they were made.
+    def complete(self, is_fitting: bool) -> bool:
+        """Make the controls that are not there yet, first those of what is shown.
 
         They are many, and the figures do not wait for them. Before the browser has laid the page
         out, it may lose what is added.
+
+        Parameters
+        ----------
+        is_fitting : whether a fit is at work, for which the controls of a refit wait
+
+        Returns
+        -------
+        whether some were made
         """
-        if self._is_complete or not self.figures.is_laid_out:
+        if not self._controls or not self.figures.is_laid_out:
             return False
-        self._is_complete = True
-        self.sidebar.append(RefitView(self._navigation))
+        if is_fitting and len(self._controls) == 1:
+            return False
+        self.sidebar.extend(self._controls.pop(0)())
         return True
+
+    def _shown_controls(self) -> list[Part]:
+        selection, units = SelectionView(self._navigation), unit_selector(self._session)
+        return [heading("Shown"), selection, units]
+
+    def _refit_controls(self) -> list[Part]:
+        return [heading("Refit"), RefitView(self._navigation)]
 
     @property
     def figures(self) -> FigureGrid:

@@ -120,10 +120,15 @@ class Pages(pn.viewable.Viewer):
                 grid.begin_with(self._rooms.of(self._window, cards), note)
         return grid
 
-    def complete(self) -> bool:
-        """Make a part of the page that can wait for the figures; return whether there was one."""
+    def complete(self, is_fitting: bool) -> bool:
+        """Make a part of the page that can wait for the figures; return whether there was one.
+
+        Parameters
+        ----------
+        is_fitting : whether a fit is at work, for which some parts wait
+        """
         page = self._page(self._navigation.view)
-        return isinstance(page, OrbitPage) and page.complete()
+        return isinstance(page, OrbitPage) and page.complete(is_fitting)
 
     def _page(self, view: View) -> Page:
         if view not in self._pages:

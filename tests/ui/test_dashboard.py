@@ -127,7 +127,8 @@ def test_every_figure_is_drawn_when_near_and_within_the_screen(walked):
     empty = [title for title, n in rows.items() if n == 0 and "Comparison" not in title]
     assert [t for t in empty if "Difference of" not in t] == []
     see(walked, "convergence")
-    assert not is_faded(walked.locator(".figure-convergence canvas").first)
+    # What changed while it was out of sight is faded until it is drawn anew.
+    until(walked, lambda: not is_faded(walked.locator(".figure-convergence canvas").first))
     # A part that asks without end whether it can be laid out would take a core.
     assert rests(walked)
     require_marks_where_they_are(walked)

@@ -202,7 +202,7 @@ class Session(RequestState):
             self._job, self._later = None, []
             self.refuse(reason)
         else:
-            self.message = self._job.progress_text
+            self.follow(self._job)
 
     def bring_up(self, solution: Solution) -> None:
         """Show an earlier solution; the fitted one on the screen becomes the other."""
@@ -260,8 +260,7 @@ class Session(RequestState):
     def _request(self, request: Request) -> None:
         self._requested = request
         self._job = self.store.request(*request)
-        stage = Stage.STALE if self.shown else Stage.LOADING
-        self.param.update(stage=stage, message=self._job.progress_text)
+        self.follow(self._job, stage=Stage.STALE if self.shown else Stage.LOADING)
         self.poll()
 
     def _cancel_job(self) -> None:

@@ -2,9 +2,14 @@
 
 from collections.abc import Iterable
 from enum import Enum
+from typing import Any
 
 import param
 
+from plateviz.solving.job import Job
+
+# A what-if is over sooner, as a rule, and nobody could read words on it.
+_BRIEF_SECONDS = 1.0
 _NOTICE = "Not all that was asked for can be shown: "
 
 
@@ -23,13 +28,15 @@ _NO_POINTS = "There are no points in that area; nothing is selected"
 class RequestState(param.Parameterized):
     """State of what was asked for last.
 
-    `stage` and `message` are the state of the last request. `notice` says what of the last address,
-    or saved view, cannot be shown, `remark` why the last drag has selected nothing, and `loss` that
-    the run on the screen is gone.
+    `stage` and `message` are the state of the last request, and `is_brief` is whether it is a
+    what-if that has only begun, of which nothing is said yet. `notice` says what of the last
+    address, or saved view, cannot be shown, `remark` why the last drag has selected nothing, and
+    `loss` that the run on the screen is gone.
     """
 
     stage = param.ClassSelector(class_=Stage, default=Stage.LOADING)
     message = param.String(default="")
+    is_brief = param.Boolean(default=False)
     notice = param.String(default="")
     remark = param.String(default="")
     loss = param.String(default="")
@@ -37,6 +44,11 @@ class RequestState(param.Parameterized):
     def refuse(self, message: str) -> None:
         """Show why a request failed; the last solution stays."""
         self.param.update(stage=Stage.FAILED, message=message)
+
+    def follow(self, job: Job, **changes: Any) -> None:  # noqa: ANN401 values of any parameters
+        """Take over how far a job is, with other changes of the state."""
+        is_brief = bool(job.request.get("what_if")) and job.seconds < _BRIEF_SECONDS
+        self.param.update(message=job.progress_text, is_brief=is_brief, **changes)
 
     def note_area(self, has_points: bool) -> None:
         """Say if there are no points in the area that a person has drawn to select some."""

@@ -50,7 +50,7 @@ class CalibrationView(pn.viewable.Viewer):
         self._words = markup_pane()
         self._column = pmui.Column(self._words, self._tabs, margin=0, sizing_mode="stretch_width")
         session.param.watch(self._fill, "shown")
-        session.param.watch(self._say, ["shown", "stage", "theme"])
+        session.param.watch(self._say, ["shown", "stage", "is_brief", "theme"])
         session.selection.param.watch(self._show_selected, [*KINDS])
         self._fill()
         self._say()

@@ -94,7 +94,7 @@ class RefitView(pn.viewable.Viewer):
         self._reset.on_click(self._reset_priors)
         self._solutions.param.watch(self._select, "value")
         session.choices.param.watch(self._show_widths, "prior_widths")
-        session.param.watch(self._show_stage, ["stage", "message"])
+        session.param.watch(self._show_stage, ["stage", "message", "is_brief"])
         session.param.watch(self._show_solutions, ["solutions", "shown"])
         self._show_stage()
         self._show_solutions()
@@ -155,7 +155,8 @@ class RefitView(pn.viewable.Viewer):
             entry.value = self._session.choices.prior_widths[name]
 
     def _show_stage(self, *_: object) -> None:
-        stage, message = self._session.stage, self._session.message
+        stage = self._session.stage
+        message = "" if self._session.is_brief else self._session.message
         is_busy = stage in (Stage.LOADING, Stage.STALE)
         self._bar.visible = is_busy
         self._stop.disabled = not is_busy

@@ -14,10 +14,14 @@ def missing_text(session: Session) -> str:
 
 
 def outdated_text(session: Session) -> str:
-    """Return why the solution on the screen is not the requested one; empty if it is."""
+    """Return why the solution on the screen is not the requested one; empty if it is.
+
+    Of a what-if that has only begun nothing is said: what is on the screen would move twice, each
+    time that a slider moves.
+    """
     if session.shown is None:
         return ""
-    if session.stage is Stage.STALE:
+    if session.stage is Stage.STALE and not session.is_brief:
         so_far = f": {session.message}" if session.message else ""
         return f"Another solution is being computed{so_far}. This is still the last one."
     if session.stage is Stage.FAILED:

@@ -37,7 +37,8 @@ class HeadView(pn.viewable.Viewer):
         self._session.param.watch(self._write, ["shown", "other", "stage", "theme"])
         self._session.judging.param.watch(self._write, "is_pending")
         self._session.units.param.watch(self._write, "unit")
-        self._session.param.watch(self._write_outdated, ["shown", "stage", "message", "theme"])
+        told = ["shown", "stage", "message", "is_brief", "theme"]
+        self._session.param.watch(self._write_outdated, told)
         navigation.param.watch(self._write, "orbit_workspace")
         self._write()
         self._write_outdated()

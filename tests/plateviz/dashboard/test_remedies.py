@@ -79,7 +79,7 @@ def judged(result, verdict):
 
 
 def buttons(view):
-    return [row[0] for row in view.__panel__() if len(row) == 2]
+    return [row[0] for row in view.__panel__() if row[0].visible]
 
 
 def shown(view):
@@ -112,4 +112,24 @@ def test_rows_follow_the_solution_on_the_screen(live):
     live.shown = live.shown._replace(settings=DRIFT)
     assert (len(view.__panel__()), buttons(view)) == (1, [])
     live.shown = live.shown._replace(result=judged(live.shown.result, good))
+    assert not view.__panel__().visible
+
+
+def test_rows_stay_faded_while_another_solution_of_the_orbit_is_judged(live):
+    bad = Verdict("bad", "", [], [], causes=[cause("--drift 2")])
+    worse = Verdict("bad", "", [], [], causes=[cause("--drift 3"), cause()])
+    live.shown = live.shown._replace(result=judged(live.shown.result, bad))
+    view, judge = RemediesView(live), live.store.judge
+    (row,) = view.__panel__()
+    judge.has_judged = lambda result: "verdict" in result.derived
+    live.shown = live.shown._replace(result=replace(live.shown.result))
+    assert list(view.__panel__()) == [row]
+    assert (row[0].disabled, "'stale'" in row[1].object) == (True, True)
+    # What was there takes the new words.
+    live.shown = live.shown._replace(result=judged(live.shown.result, worse))
+    assert [one is row for one in view.__panel__()] == [True, False]
+    assert (row[0].disabled, "'stale'" in row[1].object) == (False, False)
+    assert "--drift 3" in shown(view)
+    # Those of another orbit would be wrong.
+    live.shown = live.shown._replace(orbit=5, result=replace(live.shown.result))
     assert not view.__panel__().visible

@@ -10,6 +10,7 @@ from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.orbit import OrbitPage
+from plateviz.dashboard.views.refit import RefitView
 from plateviz.dashboard.views.source import SourcePage
 from plateviz.dashboard.views.summary import HeadView, StripView
 from plateviz.dashboard.views.survey import SurveyPage
@@ -84,6 +85,20 @@ def test_panes_of_an_orbit_go_through_their_states(fresh):
         assert "<0>" not in pane.object
     assert not view._tools.is_stale
     assert tabs.visible
+
+
+def test_nothing_is_said_of_a_what_if_that_has_only_begun(fresh, monkeypatch):
+    session = fresh.session
+    outdated, refit = HeadView(fresh).__panel__()[1], RefitView(fresh)
+    finish(session)
+    session.choices.order = 3
+    assert session.stage is Stage.STALE
+    assert session.message
+    assert (outdated.visible, refit._message.visible) == (False, False)
+    monkeypatch.setattr(type(session.job), "seconds", 1.6)
+    session.poll()
+    assert (outdated.visible, refit._message.visible) == (True, True)
+    assert f"{STALE}: {session.message}." in outdated.object
 
 
 def test_solution_is_shown_while_it_is_being_judged(fresh):

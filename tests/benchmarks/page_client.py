@@ -16,7 +16,7 @@ from urllib.parse import urljoin
 
 from bokeh.protocol import Protocol
 from bokeh.protocol.receiver import Receiver
-from tornado.httpclient import AsyncHTTPClient, HTTPRequest
+from tornado.httpclient import AsyncHTTPClient, HTTPError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
 _PATIENCE_SECONDS = 20.0
@@ -216,9 +216,13 @@ class PageClient:
         return found
 
     async def _fetch(self, path: str, **options: Any) -> bytes:  # noqa: ANN401 of Tornado
-        answer = await AsyncHTTPClient().fetch(
-            urljoin(self._address, path) if path else self._address, raise_error=False, **options
-        )
+        address = urljoin(self._address, path) if path else self._address
+        try:
+            answer = await AsyncHTTPClient().fetch(
+                address, raise_error=False, request_timeout=_PATIENCE_SECONDS, **options
+            )
+        except (HTTPError, OSError) as error:
+            raise PageError(f"{path or 'page'}: {error}") from error
         if answer.code >= 400:
             raise PageError(f"{path or 'page'}: status {answer.code}")
         return answer.body

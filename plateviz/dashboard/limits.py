@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 from tornado.httputil import HTTPServerRequest
 
+from plateviz.dashboard.traffic import Traffic
+
 _STATED = "X-Real-IP"
 # Addresses remembered; those that may ask for everything again are forgotten first.
 _MOST_REMEMBERED = 10_000
@@ -108,7 +110,7 @@ class Limits:
 
     Attributes
     ----------
-    latest : when the latest request has come, as from `time.monotonic`
+    traffic : requests and their answers
     """
 
     def __init__(self, pages: PageLimit, is_proxied: bool = False) -> None:
@@ -121,12 +123,11 @@ class Limits:
         self.pages = pages
         self.requests, self.messages = RateLimit(REQUESTS), RateLimit(MESSAGES)
         self.openings = RateLimit(OPENINGS)
-        self.latest = 0.0
+        self.traffic = Traffic()
         self._is_proxied = is_proxied
 
     def may_ask(self, client: str | None) -> bool:
         """Count a request of a client; return whether it is to be answered."""
-        self.latest = time.monotonic()
         return client is None or self.requests.allows(client)
 
     def may_open(self, client: str | None) -> bool:

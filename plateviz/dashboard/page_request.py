@@ -40,7 +40,7 @@ _LOADER = re.compile(r"<script[^>]*/es-module-shims[^>]*></script>")
 # Id of the element that the page is put into.
 _PLACE = "page"
 _MOST_BYTES = 2**16
-# A page asks for its files within so long of each other, and within so long in all.
+# No more files of a page follow after so long; and a session waits for them so long at most.
 _QUIET_SECONDS = 0.03
 _MOST_SECONDS = 0.3
 
@@ -132,8 +132,8 @@ class SessionHandler(DocHandler):
 
     async def _quiet(self) -> None:
         """Let the files of the page go first, which the browser runs meanwhile."""
-        end = time.monotonic() + _MOST_SECONDS
-        while time.monotonic() < min(end, self._limits.latest + _QUIET_SECONDS):
+        end, traffic = time.monotonic() + _MOST_SECONDS, self._limits.traffic
+        while traffic.quiet_seconds < _QUIET_SECONDS and time.monotonic() < end:
             await asyncio.sleep(_QUIET_SECONDS / 2)
 
     def _told(self) -> tuple[str, object]:

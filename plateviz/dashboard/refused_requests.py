@@ -38,6 +38,7 @@ class _TooMany(Matcher):
         self._limits = limits
 
     def match(self, request: HTTPServerRequest) -> dict[str, Any] | None:
+        self._limits.traffic.note(request)
         return None if self._limits.may_ask(self._limits.client_of(request)) else {}
 
 

@@ -10,8 +10,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from threading import Lock
+from typing import Any
 
-from threadpoolctl import ThreadpoolController
+from threadpoolctl import OpenBLASController, ThreadpoolController
 
 _POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
@@ -39,6 +41,36 @@ def use_one_thread() -> None:
     ThreadpoolController().limit(limits=1)
 
 
+class _Limit:
+    """The limit of BLAS to one thread, from the first thread that needs it to the last.
+
+    It is that of the process. If each thread removed it at the end of its own work, the rounding of
+    the others would change in the midst of theirs.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._inside = Lock(), 0
+        self._limited: Any = None
+
+    def enter(self) -> None:
+        with self._lock:
+            if self._inside == 0:
+                self._limited = _thread_pools().limit(limits=1, user_api="blas")
+            self._inside += 1
+
+    def leave(self) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                # Only the thread that set the limit, or any if none is known, may change it.
+                OpenBLASController.clear_controlling_thread(force=True)
+                self._limited.restore_original_limits()
+                OpenBLASController.clear_controlling_thread(force=True)
+
+
+_LIMIT = _Limit()
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Limit BLAS to one thread, in a block or in a decorated function.
@@ -47,8 +79,11 @@ def one_blas_thread() -> Iterator[None]:
     browser that draws, and where products are small, that was measured to make work up to a
     hundred times slower. Large work is divided among threads of Python instead.
     """
-    with _thread_pools().limit(limits=1, user_api="blas"):
+    _LIMIT.enter()
+    try:
         yield
+    finally:
+        _LIMIT.leave()
 
 
 @cache

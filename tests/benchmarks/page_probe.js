@@ -91,7 +91,7 @@ window.plateviz = (() => {
     return [corner(-1), corner(1)];
   };
   // The elements that match, inside of components too.
-  const elements = selector => {
+  const elements = (selector, within = document) => {
     const found = [];
     const walk = root => {
       for (const e of root.querySelectorAll("*")) {
@@ -99,19 +99,22 @@ window.plateviz = (() => {
         if (e.shadowRoot) walk(e.shadowRoot);
       }
     };
-    walk(document);
+    walk(within);
+    if (within.shadowRoot) walk(within.shadowRoot);
     return found;
   };
   const texts = () => elements(".solution, .strip").map(e => e.textContent).join();
-  // Whether all that is in view is drawn and judged in a theme: no card is faded, each plot has the
-  // background, and the server has sent nothing for a while.
+  // Whether all that is in view is drawn and judged in a theme: no card is empty or faded, each plot
+  // has the background, and the server has sent nothing for a while.
   const isWhole = (background, quietMs) => {
     const isQuiet = messages.length > 0 && now() - messages.at(-1).at > quietMs;
     if (!window.Bokeh?.index || !isQuiet || document.fonts.status !== "loaded") return false;
-    const cards = elements(".card, .tabulator").filter(e => e.checkVisibility());
+    const cards = elements(".figure, .tabulator").filter(e => e.checkVisibility());
     const isFaded = e => e.checkVisibility() && isInView(e) && getComputedStyle(e).opacity < 1;
+    const isEmpty = e => isInView(e) && !e.matches(".tabulator")
+      && !elements("canvas, .empty, .tabulator, input", e).length;
     const isWaiting = e => isInView(e) && e.textContent.includes("Being drawn.");
-    return cards.length > 0
+    return cards.length > 0 && !cards.some(isEmpty)
       && !elements(".fading").some(isFaded) && !elements(".empty").some(isWaiting)
       && !elements(".judging").some(e => e.checkVisibility())
       && plots().every(view => view.model.background_fill_color === background);

@@ -27,6 +27,7 @@ from plateviz.dashboard.views.browser_session import BrowserSession
 from plateviz.dashboard.views.figure import Part
 from plateviz.dashboard.views.figure_painting import FigurePainting
 from plateviz.dashboard.views.keyboard import Keyboard
+from plateviz.dashboard.views.page_style import PAGE_STYLE
 from plateviz.dashboard.views.pages import Pages
 from plateviz.dashboard.views.report_button import report_button
 from plateviz.dashboard.views.selection_bar import SelectionBar
@@ -47,12 +48,6 @@ _LOOK_FOR_RUN_SECONDS = 10.0
 # and a person may step on to the next orbit, for which a fit would take the cores.
 _REST_SECONDS = 3.0
 _SIDEBAR_WIDTH = 264
-# The typeface of the figures, which every system has. That of Material UI is in 16 files without
-# the ranges of their characters: the browser loads one after the other, and lays out the page anew
-# after each.
-_TYPE = {"fontSize": 13, "fontFamily": "Helvetica, Arial, sans-serif"}
-# The bar has one line of words, and its height is missing below.
-_LOW_BAR = {"styleOverrides": {"root": {"minHeight": "48px !important"}}}
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
 
@@ -115,7 +110,7 @@ def empty_page(store: SolutionStore, **contents: list[Part]) -> pmui.Page:
         # The page's template puts it into an attribute as it is.
         meta_title=escape(title, quote=True),
         sidebar_width=_SIDEBAR_WIDTH,
-        theme_config={"typography": _TYPE, "components": {"MuiToolbar": _LOW_BAR}},
+        theme_config=PAGE_STYLE,
         **contents,
     )
     # The page would show whether the server is busy, for which the server would keep it for ever.

@@ -10,7 +10,7 @@ from plateviz.figures.figure import MARGIN, Axis, Figure, Frame, Ramp
 from plateviz.figures.fitting_texts import with_fitting_texts
 from plateviz.figures.text_width import has_room_for_words, text_width, wrapped
 from plateviz.figures.theme import LABEL_SIZE, SMALL_SIZE, TITLE_SIZE
-from plateviz.figures.words import words_of_row
+from plateviz.figures.words import MENU, words_of_row
 
 # Screen pixels around a frame: label of the left axis, its shortest tick labels, margin on the
 # right, colour bar.
@@ -193,7 +193,7 @@ def _towards_the_middle(frame: Frame) -> Frame:
     label = max(text_width(line, LABEL_SIZE) for line in frame.x.label.split("\n"))
     needed = max(
         *(text_width(line, TITLE_SIZE, is_bold=True) + frame.corner for line in words.title),
-        *(text_width(line, SMALL_SIZE) for line in words.subtitle),
+        *(text_width(line, SMALL_SIZE) + MENU for line in words.subtitle),
         frame.legend_columns * _legend_entry(frame),
         (label + frame.width) / 2,
     )
@@ -240,13 +240,15 @@ def _y_room(row: list[Frame]) -> int:
 
 
 def _quality(figure: Figure) -> float:
-    """Return the shortest side of a frame, less where a word of a title has to be broken."""
+    """Return the shortest side of a frame, less where a place is empty or a word is broken."""
     least = min(min(frame.width, 2 * frame.frame_height) for frame in figure)
     is_whole = all(
         has_room_for_words(frame.title, frame.width + frame.margin, TITLE_SIZE, is_bold=True)
         for frame in figure
     )
-    return least if is_whole else least / 2.0
+    places = figure.columns * math.ceil(len(figure) / figure.columns)
+    filled = least * len(figure) / places
+    return filled if is_whole else filled / 2.0
 
 
 def _least_height(figure: Figure) -> float:

@@ -9,6 +9,8 @@ from plateviz.figures.theme import SMALL_SIZE, TITLE_SIZE
 
 # Bokeh drops empty lines, but not one with a space of no width.
 _EMPTY = "\u200b"
+# Room to the right of the subtitle for the button of the menu that has the tools, screen pixels.
+MENU = 20
 
 
 class Words(NamedTuple):
@@ -19,7 +21,10 @@ class Words(NamedTuple):
 
 
 def words_of(frame: Frame) -> Words:
-    """Return the words of a frame, wrapped to its width and its margin."""
+    """Return the words of a frame, wrapped to its width and its margin.
+
+    The toolbar takes what the subtitle leaves of the width, and covers it if that is nothing.
+    """
     width = frame.width + frame.margin
     title, beside = (
         wrapped(frame.title, room, TITLE_SIZE, is_bold=True)
@@ -28,7 +33,7 @@ def words_of(frame: Frame) -> Words:
     # Beside what covers the corner, or below it where there is too little room beside it.
     is_whole = has_room_for_words(frame.title, width - frame.corner, TITLE_SIZE, is_bold=True)
     title = beside if is_whole and len(beside) <= len(title) + 1 else [_EMPTY, *title]
-    return Words(title, wrapped(frame.subtitle, width, SMALL_SIZE))
+    return Words(title, wrapped(frame.subtitle, width - MENU, SMALL_SIZE))
 
 
 def words_of_row(row: Sequence[Frame]) -> list[Words]:

@@ -6,14 +6,15 @@ from plateviz.figures.figure import Axis, Figure, Limits, framed, message, side_
 from plateviz.figures.glyphs import line, points
 from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
-from plateviz.plots.units import number_text
+from plateviz.plots.units import finer_unit, number_text
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.calibration_trends import calibration_trends
 from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Trends of the calibration"
 _XLABEL, _YLABEL = "epoch (Julian year, TCB)", "value minus mean"
-_HOVER = [("orbit", "@{orbit_id}"), ("value minus mean", "@{offset}{0.00000} @{unit}")]
+_HOVER = [("orbit", "@{orbit_id}"), ("value minus mean", "@{offset}{0.000} @{unit}")]
+_ARCSEC_PER_DEG = 3600.0
 _ANGLES = {1: "angle of the first orbit", -1: "other angle", 0: "orbits"}
 
 
@@ -33,6 +34,7 @@ def plot_calibration_trends(table: pd.DataFrame, *, width: int = PANEL_WIDTH) ->
 
 
 def _panel(rows: pd.DataFrame, group: str, width: int) -> Figure:
+    rows = _in_finer_unit(rows)
     ordered = rows.sort_values("year")
     unit = str(rows["unit"].iloc[0])
     seasons = [season for season in _ANGLES if (rows["season"] == season).any()]
@@ -62,6 +64,19 @@ def _panel(rows: pd.DataFrame, group: str, width: int) -> Figure:
         height=round(0.62 * width),
         legend_columns=2,
     )
+
+
+def _in_finer_unit(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows in a unit in which the values are not small fractions."""
+    unit, factor = str(rows["unit"].iloc[0]), 1.0
+    if unit == "deg":
+        unit, factor = "arcsec", _ARCSEC_PER_DEG
+    largest = factor * float(rows["offset"].abs().max())
+    if largest > 0.0:
+        unit, finer = finer_unit(largest, unit)
+        factor *= finer
+    values = {name: factor * rows[name] for name in ("offset", "trend", "change", "scatter")}
+    return rows.assign(unit=unit, **values)
 
 
 def _subtitle(first: pd.Series, unit: str) -> str:

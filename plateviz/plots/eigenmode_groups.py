@@ -8,7 +8,7 @@ import pandas as pd
 from plateviz.figures.figure import Axis, Figure, Glyphs, Ramp, framed, message
 from plateviz.figures.glyphs import rectangles, texts
 from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.units import angle_text
+from plateviz.plots.units import angle_text, finer_unit
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.eigenmodes import eigenmode_groups
 
@@ -25,8 +25,6 @@ _CELL_HOVER = [
 _SMALL = "10px"
 # Cells with a smaller share have no text.
 _LEAST_LABELLED_SHARE = 0.005
-# Units in steps of a factor of a thousand.
-_UNITS = {"arcsec": ("arcsec", "mas", "µas"), "µm": ("µm", "nm", "pm")}
 
 
 def plot_eigenmode_groups(table: pd.DataFrame, *, width: int = _PAGE_WIDTH) -> Figure:
@@ -101,11 +99,10 @@ def _amount(move: float, unit: str) -> str:
     """Return a move to two digits in a suitable unit."""
     if move <= 0.0:
         return f"0 {unit}"
-    units = _UNITS.get(unit, (unit,))
-    step = min(max(0, math.ceil(-math.log10(move) / 3.0 - 1e-9)), len(units) - 1)
-    value = move * 1000.0**step
+    finer, factor = finer_unit(move, unit)
+    value = move * factor
     decimals = max(0, 1 - math.floor(math.log10(value)))
-    return f"{value:,.{decimals}f} {units[step]}"
+    return f"{value:,.{decimals}f} {finer}"
 
 
 def _plot_groups(chosen: Chosen) -> Figure:

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message
-from plateviz.figures.glyphs import points, rectangles, vertical
+from plateviz.figures.glyphs import band, points, vertical
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.chance import largest_by_chance
@@ -35,7 +35,6 @@ def plot_solution_tests(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Fig
     limit, count = largest_by_chance(total), int(table["is_found"].sum())
     most = max(1.08 * float(table["sigma"].max()), _LEAST_RANGE)
     low, high = len(table) - 0.4, -0.6
-    band = {"left": [0.0], "right": [limit], "bottom": [high], "top": [low]}
     shown = {
         name: points(
             table[table["is_found"] == is_found],
@@ -51,7 +50,7 @@ def plot_solution_tests(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Fig
     ticks = [(float(row), name) for row, name in zip(table["row"], table["name"], strict=True)]
     return framed(
         [
-            rectangles(band, name="chance", color="band"),
+            band([0.0, limit], [high, high], [low, low], name="chance"),
             vertical(limit, name="limit"),
             *shown.values(),
         ],
@@ -80,6 +79,8 @@ DIAGNOSTICS = (
         27,
         _plot,
         needs_verdict=True,
+        # A row of the card's height for the name of each test.
+        least_height=580,
         equation="σ of a normal value with the same probability by chance",
     ),
 )

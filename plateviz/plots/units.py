@@ -5,6 +5,8 @@ import math
 from solver.units import UAS_PER_MAS
 
 _UAS_BELOW_MAS = 0.5
+# Units in steps of a factor of a thousand.
+_FINER = {"arcsec": ("arcsec", "mas", "µas"), "µm": ("µm", "nm", "pm")}
 
 
 def angle_unit(size_mas: float) -> tuple[str, float]:
@@ -17,6 +19,19 @@ def angle_text(value_mas: float) -> str:
     """Return an angle to two or three digits with its unit: "4.2 mas", "85 µas"."""
     unit, factor = angle_unit(abs(value_mas))
     return f"{number_text(value_mas * factor, 2)} {unit}"
+
+
+def finer_unit(size: float, unit: str) -> tuple[str, float]:
+    """Return the unit in which `size` is at least one, and the factor from `unit` to it.
+
+    Parameters
+    ----------
+    size : typical value, positive
+    unit : "arcsec" or "µm"; another one stays, and so does one that has no finer unit
+    """
+    units = _FINER.get(unit, (unit,))
+    step = min(max(0, math.ceil(-math.log10(size) / 3.0 - 1e-9)), len(units) - 1)
+    return units[step], 1000.0**step
 
 
 def orbits_text(number: int) -> str:

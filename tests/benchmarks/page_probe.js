@@ -25,11 +25,11 @@ window.plateviz = (() => {
     for (let e = view.el; e; e = e.parentElement ?? e.getRootNode().host)
       for (const name of e.classList ?? []) if (name.startsWith("figure-")) return name.slice(7);
   };
-  const isOnScreen = view => {
-    const box = view.el.getBoundingClientRect();
-    return box.width > 0 && box.bottom > 0 && box.top < innerHeight
-      && view.el.checkVisibility({ visibilityProperty: true });
+  const isInView = element => {
+    const box = element.getBoundingClientRect();
+    return box.width > 0 && box.bottom > 0 && box.top < innerHeight;
   };
+  const isOnScreen = ({ el }) => isInView(el) && el.checkVisibility({ visibilityProperty: true });
   // To look for the plots lays the page out, which would delay it in every picture.
   let known = [], looked = -Infinity;
   const plots = () => {
@@ -90,16 +90,34 @@ window.plateviz = (() => {
     window.plateviz.among = source;
     return [corner(-1), corner(1)];
   };
-  const texts = () => {
+  // The elements that match, inside of components too.
+  const elements = (selector, within = document) => {
     const found = [];
     const walk = root => {
       for (const e of root.querySelectorAll("*")) {
-        if (e.matches(".solution, .strip")) found.push(e.textContent);
+        if (e.matches(selector)) found.push(e);
         if (e.shadowRoot) walk(e.shadowRoot);
       }
     };
-    walk(document);
-    return found.join();
+    walk(within);
+    if (within.shadowRoot) walk(within.shadowRoot);
+    return found;
+  };
+  const texts = () => elements(".solution, .strip").map(e => e.textContent).join();
+  // Whether all that is in view is drawn and judged in a theme: no card is empty or faded, each plot
+  // has the background, and the server has sent nothing for a while.
+  const isWhole = (background, quietMs) => {
+    const isQuiet = messages.length > 0 && now() - messages.at(-1).at > quietMs;
+    if (!window.Bokeh?.index || !isQuiet || document.fonts.status !== "loaded") return false;
+    const cards = elements(".figure, .tabulator").filter(e => e.checkVisibility());
+    const isFaded = e => e.checkVisibility() && isInView(e) && getComputedStyle(e).opacity < 1;
+    const isEmpty = e => isInView(e) && !e.matches(".tabulator")
+      && !elements("canvas, .empty, .tabulator, input", e).length;
+    const isWaiting = e => isInView(e) && e.textContent.includes("Being drawn.");
+    return cards.length > 0 && !cards.some(isEmpty)
+      && !elements(".fading").some(isFaded) && !elements(".empty").some(isWaiting)
+      && !elements(".judging").some(e => e.checkVisibility())
+      && plots().every(view => view.model.background_fill_color === background);
   };
   // When a person last did something.
   let acted = 0;
@@ -112,5 +130,5 @@ window.plateviz = (() => {
       : requestAnimationFrame(look);
     look();
   });
-  return { agree, boxAround, messages, plots, shown, texts, until };
+  return { agree, boxAround, isWhole, messages, plots, shown, texts, until };
 })();

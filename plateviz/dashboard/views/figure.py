@@ -83,7 +83,7 @@ class FigureView(pn.viewable.Viewer):
         theme : of the first drawing
         """
         super().__init__(**params)
-        self.is_wide = figure.is_wide
+        self.is_wide, self.is_tall = figure.is_wide, figure.least_height >= 2 * _LEAST_HEIGHT
         self.card_name, self._plot_figure = figure.name, plot_figure
         self._actions, self._zoom = actions or PointActions(), zoom
         self._selected = self._shown_selected = NO_IDS
@@ -102,6 +102,8 @@ class FigureView(pn.viewable.Viewer):
         self._save = SaveButton(figure.title, choices, place="corner")
         least = max(_LEAST_HEIGHT, figure.least_height)
         self._card = _card(self.visibility, self._body, name=figure.name, least_height=least)
+        if self.is_tall:
+            self._card.styles = {**self._card.styles, "grid-row": "span 2"}
         self.change(theme)
         self._show_text("Being drawn.")
 

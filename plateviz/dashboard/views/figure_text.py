@@ -38,5 +38,8 @@ class FigureText(Protocol):
 
     @property
     def least_height(self) -> int:
-        """Height that its card needs, screen pixels; 0 where the height of any card is enough."""
+        """Height that its card needs, screen pixels; 0 where the height of any card is enough.
+
+        A card that needs the height of two takes two rows.
+        """
         ...

@@ -39,5 +39,7 @@ class SystemTheme(pn.custom.JSComponent):
         self.style = (
             f".bk-Tooltip {{ --tooltip-color: {colours.background}; "
             f"--tooltip-text: {colours.text}; --tooltip-border: {colours.muted}; "
-            f"--tooltip-arrow-color: {colours.muted}; opacity: 1; }}"
+            f"--tooltip-arrow-color: {colours.muted}; opacity: 1; "
+            # The values of three sources would cover their figure.
+            "font-size: 12px; line-height: 1.3; }"
         )

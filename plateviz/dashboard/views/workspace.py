@@ -18,9 +18,11 @@ def workspace(grid: FigureGrid, *above: Part, below: Sequence[Part] = ()) -> pmu
     ----------
     above, below : what stands above and below the cards
     """
-    rows = ["auto"] * len(above) + ["minmax(0, 1fr)"] + ["auto"] * len(below)
+    rows = ["auto"] * bool(above) + ["minmax(0, 1fr)"] + ["auto"] * len(below)
+    # In one row, whichever of them are hidden: the cards have the row that fills the window.
+    head = [_rows(*above)] if above else []
     return pmui.FlexBox(
-        *above,
+        *head,
         grid,
         *below,
         sx={
@@ -30,6 +32,15 @@ def workspace(grid: FigureGrid, *above: Part, below: Sequence[Part] = ()) -> pmu
             "gap": "8px",
             "minHeight": f"calc(100vh - {_ABOVE}px)",
         },
+        sizing_mode="stretch_width",
+        margin=0,
+    )
+
+
+def _rows(*parts: Part) -> pmui.FlexBox:
+    return pmui.FlexBox(
+        *parts,
+        sx={"display": "grid", "gridTemplateColumns": "minmax(0, 1fr)", "gap": "8px"},
         sizing_mode="stretch_width",
         margin=0,
     )

@@ -9,6 +9,7 @@ from plateviz.figures.figure import MARGIN, Axis, Figure, Ramp, framed, side_by_
 from plateviz.figures.glyphs import line, points
 from plateviz.figures.resized import resized
 from plateviz.figures.text_width import text_width
+from plateviz.figures.theme import SMALL_SIZE
 from plateviz.figures.words import words_of, words_of_row
 
 X = Axis("x (mm)", (0.0, 10.0))
@@ -100,6 +101,24 @@ def test_turned_labels_take_height():
 def test_frames_are_arranged_so_that_they_are_largest(area, columns):
     three = side_by_side([frame(height=None)] * 3, columns=2)
     assert resized(three, *area).columns == columns
+
+
+def test_no_place_of_an_arrangement_is_empty_where_another_is_about_as_large():
+    three = side_by_side([frame(height=100)] * 3, columns=3)
+    for area in ((800, 480), (700, 420)):
+        assert resized(three, *area).columns in (1, 3)
+
+
+def test_subtitle_leaves_the_menu_of_the_tools_free():
+    one = frame(subtitle="5,440 non-reference, 715 artificial, 325 reference sources")[0]
+    for width in range(120, 500, 7):
+        lines = words_of(replace(one, width=width, margin=0)).subtitle
+        assert max(text_width(line, SMALL_SIZE) for line in lines) <= width - 20
+    square = frame(height=None, y=(0.0, 10.0), subtitle=one.subtitle)
+    for area in ((540, 290), (540, 420), (700, 300)):
+        (fitted,) = resized(square, *area)
+        longest = max(text_width(line, SMALL_SIZE) for line in words_of(fitted).subtitle)
+        assert longest <= fitted.width + fitted.margin - 20
 
 
 def test_frames_above_one_another_with_one_x_axis_stay_so():

@@ -51,6 +51,16 @@ def test_every_plot_has_a_table_to_draw(drawings):
 
 
 @with_every_plot
+def test_every_colour_is_one_of_the_theme_or_a_value(figures, name):
+    """The browser draws nothing in a colour that it does not know."""
+    for frame in figures(name):
+        for glyphs in frame.glyphs:
+            colours = [look for key, look in glyphs.looks.items() if key.endswith("color")]
+            words = [one for one in colours if isinstance(one, str) and one[0] not in "#@"]
+            assert {"background", "text", "muted", "grid", "line", "mark"} >= set(words)
+
+
+@with_every_plot
 def test_axes_are_labelled_with_units(figures, name):
     for frame in figures(name):
         for axis in (frame.x, frame.y):

@@ -251,3 +251,18 @@ def test_gallery_separates_the_pages_and_sorts_their_figures():
 def test_long_id_is_short_in_a_narrow_title_and_whole_in_the_hover():
     assert short_id("4040356967235058635") == "…058635"
     assert short_id("1234567890") == "1234567890"
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "shown", "limit"),
+    [("µm", 1e-5, "pm", 50.0), ("µm", 1.0, "µm", 5.0), ("deg", 1e-4, "arcsec", 2.0)],
+)
+def test_trends_are_in_units_that_suit_their_values(drawings, unit, factor, shown, limit):
+    draw, table = drawings["calibration_trends"]
+    parts = ("offset", "trend", "change", "scatter")
+    scaled = table.assign(unit=unit, **{name: factor * table[name] for name in parts})
+    (frame,) = draw(scaled)
+    assert frame.y.label == f"value minus mean ({shown})"
+    assert max(frame.y.limits) == pytest.approx(limit, rel=0.3)
+    assert f"{shown},\n" in frame.subtitle
+    assert set(frame["angle of the first orbit"].columns["unit"]) == {shown}

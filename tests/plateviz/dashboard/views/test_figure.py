@@ -4,14 +4,12 @@ import time
 
 import numpy as np
 import pandas as pd
-import panel as pn
 import pytest
 from bokeh.events import RangesUpdate, Reset, SelectionGeometry
 
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.point_actions import PointActions
-from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures import glyphs
 from plateviz.figures.figure import Axis, Ramp, framed
 from plateviz.figures.glyphs import points
@@ -73,14 +71,6 @@ def test_card_is_as_high_as_its_figure_needs(view):
     card = FigureView(high, lambda: None).__panel__()
     assert card.styles["min-height"] == f"{high.least_height}px"
     assert high.least_height > 290
-
-
-def test_parts_of_a_workspace_stand_above_and_below_its_cards(view):
-    grid, first, last = FigureGrid([view], lambda *_: None), pn.Spacer(), pn.Spacer()
-    box = workspace(grid, first, below=[last])
-    assert [part for part in box if part in (first, last)] == [first, last]
-    assert box[1] is grid.__panel__() or grid.__panel__() in list(box[1])
-    assert box.sx["gridTemplateRows"] == "auto minmax(0, 1fr) auto"
 
 
 def test_grid_begins_with_the_rooms_that_an_earlier_page_had(view, monkeypatch):

@@ -1,0 +1,46 @@
+"""A workspace: its cards have the row that fills the window, tall ones two of the grid's rows."""
+
+import panel as pn
+import pytest
+
+from plateviz.dashboard.views.figure import FigureView
+from plateviz.dashboard.views.figure_grid import FigureGrid
+from plateviz.dashboard.views.workspace import workspace
+from plateviz.plots.gallery import diagnostics
+
+
+@pytest.fixture
+def view():
+    return FigureView(diagnostics()[0], lambda: None)
+
+
+def test_parts_of_a_workspace_stand_above_and_below_its_cards(view):
+    grid, first, last = FigureGrid([view], lambda *_: None), pn.Spacer(), pn.Spacer()
+    box = workspace(grid, first, below=[last])
+    head, middle, foot = box
+    assert list(head) == [first]
+    assert foot is last
+    assert middle is grid.__panel__() or grid.__panel__() in list(middle)
+    assert box.sx["gridTemplateRows"] == "auto minmax(0, 1fr) auto"
+
+
+def test_hidden_parts_leave_the_cards_the_row_that_fills_the_window(view):
+    """The browser gives the parts that are not hidden the rows in order."""
+    first, hidden = pn.Spacer(), pn.Spacer(visible=False)
+    box = workspace(FigureGrid([view], lambda *_: None), hidden, first)
+    assert [part.visible for part in box] == [True, True]
+    assert box.sx["gridTemplateRows"] == "auto minmax(0, 1fr)"
+
+
+def test_card_that_needs_the_height_of_two_takes_two_rows():
+    named = {one.name: one for one in diagnostics()}
+    tall, low = (
+        FigureView(named[name], lambda: None) for name in ("solution-tests", "residual-map")
+    )
+    wide = FigureView(named["mean-residual-map"], lambda: None)
+    assert tall.__panel__().styles["grid-row"] == "span 2"
+    assert "grid-row" not in low.__panel__().styles
+    FigureGrid([wide, tall, low], lambda *_: None)
+    assert "grid-column" not in wide.__panel__().styles
+    FigureGrid([wide, tall], lambda *_: None)
+    assert wide.__panel__().styles["grid-column"] == "1 / -1"

@@ -29,9 +29,10 @@ _MAX_ROUNDS = 20
 _TOLERANCE = 0.05
 # Largest step of the logarithm of the references' variance.
 _MAX_STEP = 1.0
-# Width of the prior of the logarithm of the references' variance, about the stated one. The data of
-# one orbit may hardly say anything about it, and would then make it vanish.
-_REFERENCE_WIDTH = 1.0
+# Prior of the logarithm of the references' variance, about the stated one: Student's t. The data of
+# one orbit may hardly say anything about it, and would then make it vanish. Where they say much,
+# the tails of the prior leave the estimate to them.
+_REFERENCE_WIDTH, _REFERENCE_DOF = 1.0, 4.0
 
 
 def estimate_noise(
@@ -145,7 +146,10 @@ def _step_of_references(
     # What the measurements moved: the identity where they alone decide.
     moved = np.eye(2) - precision @ covariance.source[chosen]
     expected = float(np.trace(moved, axis1=1, axis2=2).sum())
-    of_prior = _REFERENCE_WIDTH**-2.0
-    information = 0.5 * float(np.einsum("sij,sji->", moved, moved)) + of_prior
-    step = (0.5 * (squares - expected) - of_prior * now) / information
+    tail = _REFERENCE_DOF * _REFERENCE_WIDTH**2
+    of_prior = (_REFERENCE_DOF + 1.0) * now / (tail + now**2)
+    information = 0.5 * float(np.einsum("sij,sji->", moved, moved))
+    # What the prior says where it is most certain, which keeps the steps small.
+    information += (_REFERENCE_DOF + 1.0) / tail
+    step = (0.5 * (squares - expected) - of_prior) / information
     return float(np.clip(step, -_MAX_STEP, _MAX_STEP)), information**-0.5

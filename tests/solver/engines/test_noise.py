@@ -73,12 +73,15 @@ def test_noise_by_magnitude_is_recovered(small_orbit):
     magnitude = np.random.default_rng(0).uniform(10.0, 19.0, len(data.catalogue))
     catalogue = data.catalogue.assign(magnitude=magnitude)
     of_row = catalogue.set_index("source_id")["magnitude"][data.measurements["source_id"]]
-    true = np.exp(0.2 * (of_row.to_numpy() - 14.0))
+    from_mean = of_row.to_numpy() - of_row.mean()
+    true = np.exp(0.2 * from_mean - 0.02 * from_mean**2)
     given = replace(understated(data, true), catalogue=catalogue)
     result = fit_orbit(given, small_orbit.instrument, FitSettings(noise_by_magnitude=True))
-    factor, sigma = factor_of(result, "per magnitude")
-    assert np.log(factor) == pytest.approx(0.2, abs=4.0 * sigma)
-    assert sigma < 0.02
+    expected = {"per magnitude": 0.2, "per magnitude^2": -0.02, "per magnitude^3": 0.0}
+    for name, value in expected.items():
+        factor, sigma = factor_of(result, name)
+        assert np.log(factor) == pytest.approx(value, abs=4.0 * sigma)
+        assert sigma < 0.05
 
 
 def displaced_references(orbit, factor, seed):
@@ -123,6 +126,14 @@ def test_reference_errors_that_the_data_do_not_show_stay_as_stated(small_orbit):
 def test_noise_by_magnitude_needs_magnitudes(small_orbit):
     with pytest.raises(InputError, match="expected a column magnitude in the catalogue"):
         fit_orbit(small_orbit.data, small_orbit.instrument, FitSettings(noise_by_magnitude=True))
+
+
+def test_noise_of_two_magnitudes_is_linear_in_them(small_orbit):
+    catalogue = small_orbit.data.catalogue
+    of_two = np.where(np.arange(len(catalogue)) % 2, 12.0, 16.0)
+    data = replace(small_orbit.data, catalogue=catalogue.assign(magnitude=of_two))
+    result = fit_orbit(data, small_orbit.instrument, FitSettings(noise_by_magnitude=True))
+    assert set(result.summary["noise"]["log_factor"]) == {"all", "per magnitude"}
 
 
 def test_noise_by_magnitude_needs_magnitudes_that_differ(small_orbit):

@@ -199,7 +199,7 @@ class ModelSettings:
     )
     noise_by_magnitude: bool = _switch(
         "Noise by magnitude",
-        "Estimate a factor on the uncertainties whose logarithm is linear in the magnitude.",
+        "Estimate a factor on the uncertainties whose logarithm is cubic in the magnitude.",
         "noise-by-magnitude",
         "NOISEMAG",
         "noise by magnitude",

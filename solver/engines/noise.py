@@ -1,11 +1,11 @@
 """Noise model: by how much the errors differ from those stated, by restricted likelihood.
 
 The logarithm of the variance of a measurement is that of its stated variance plus a linear
-predictor: of its exposure, its star's magnitude, or neither. A floor may be added in quadrature
-(`solver.engines.variance_model`). The logarithm of the reference stars' catalogue variance has one
-addition for all. Where the restricted likelihood is largest, the squared residuals that go with
-each parameter sum to their expectation, which leverage lowers; scoring steps get there in a few
-fits.
+predictor: of its exposure, powers of its star's magnitude, or neither. A floor may be added in
+quadrature (`solver.engines.variance_model`). The logarithm of the reference stars' catalogue
+variance has one addition for all. Where the restricted likelihood is largest, the squared residuals
+that go with each parameter sum to their expectation, which leverage lowers; scoring steps get there
+in a few fits.
 """
 
 from collections.abc import Callable
@@ -25,13 +25,16 @@ from solver.problem.noise import Noise
 from solver.problem.problem import Problem
 
 _MAX_ROUNDS = 20
+# Degree of the logarithm of the variance as a polynomial in the magnitude.
+_MAGNITUDE_DEGREE = 3
 # A step that is this fraction of its uncertainty ends the search.
 _TOLERANCE = 0.05
 # Largest step of the logarithm of the references' variance.
 _MAX_STEP = 1.0
-# Width of the prior of the logarithm of the references' variance, about the stated one. The data of
-# one orbit may hardly say anything about it, and would then make it vanish.
-_REFERENCE_WIDTH = 1.0
+# Prior of the logarithm of the references' variance, about the stated one: Student's t. The data of
+# one orbit may hardly say anything about it, and would then make it vanish. Where they say much,
+# the tails of the prior leave the estimate to them.
+_REFERENCE_WIDTH, _REFERENCE_DOF = 1.0, 4.0
 
 
 def estimate_noise(
@@ -106,9 +109,10 @@ def _variance_model(problem: Problem, settings: FitSettings) -> VarianceModel:
         columns.append(np.ones((n_obs, 1)))
     if settings.noise_by_magnitude:
         magnitude = _magnitude(problem)[index.source]
-        centred = magnitude - np.nanmean(magnitude)
-        names.append("per magnitude")
-        columns.append(np.nan_to_num(centred)[:, None])
+        centred = np.nan_to_num(magnitude - np.nanmean(magnitude))
+        powers = _powers_of(magnitude)
+        names += ["per magnitude" if k == 1 else f"per magnitude^{k}" for k in powers]
+        columns += [centred[:, None] ** k for k in powers]
     stated, design = problem.measurements.sigma, np.concatenate(columns, axis=1)
     return VarianceModel(names, design, stated, settings.noise_floor)
 
@@ -117,6 +121,12 @@ def _magnitude(problem: Problem) -> Float[np.ndarray, " src"]:
     if "magnitude" in problem.sources and problem.sources["magnitude"].notna().any():
         return problem.sources["magnitude"].to_numpy(dtype=np.float64)
     raise InputError("noise by magnitude: expected a column magnitude in the catalogue, found none")
+
+
+def _powers_of(magnitude: Float[np.ndarray, " obs"]) -> range:
+    """Return the powers of the magnitude that the logarithm of the variance may have."""
+    distinct = len(np.unique(magnitude[np.isfinite(magnitude)]))
+    return range(1, min(_MAGNITUDE_DEGREE, max(distinct - 1, 1)) + 1)
 
 
 def _scaled(problem: Problem, sigma: Float[np.ndarray, "obs 2"], reference: float) -> Problem:
@@ -145,7 +155,10 @@ def _step_of_references(
     # What the measurements moved: the identity where they alone decide.
     moved = np.eye(2) - precision @ covariance.source[chosen]
     expected = float(np.trace(moved, axis1=1, axis2=2).sum())
-    of_prior = _REFERENCE_WIDTH**-2.0
-    information = 0.5 * float(np.einsum("sij,sji->", moved, moved)) + of_prior
-    step = (0.5 * (squares - expected) - of_prior * now) / information
+    tail = _REFERENCE_DOF * _REFERENCE_WIDTH**2
+    of_prior = (_REFERENCE_DOF + 1.0) * now / (tail + now**2)
+    information = 0.5 * float(np.einsum("sij,sji->", moved, moved))
+    # What the prior says where it is most certain, which keeps the steps small.
+    information += (_REFERENCE_DOF + 1.0) / tail
+    step = (0.5 * (squares - expected) - of_prior) / information
     return float(np.clip(step, -_MAX_STEP, _MAX_STEP)), information**-0.5

@@ -68,7 +68,7 @@ def plot_exposure_chi2(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figu
     if table.empty:
         return message(_CHI2, "No exposures", width=width, xlabel=_CHI2_X, ylabel=_CHI2_Y)
     expected = _BAND_SIGMAS * table["expected_sd"].to_numpy(dtype=float)
-    reach = max(float(expected.max()), float((table["chi2_per_dof"] - 1.0).abs().max()))
+    reach = 1.25 * max(float(expected.max()), float((table["chi2_per_dof"] - 1.0).abs().max()))
     # A step per exposure, because the band differs between exposures.
     edges = np.repeat(table["index"].to_numpy(dtype=float), 2) + np.tile([-0.5, 0.5], len(table))
     low, high = np.repeat(1.0 - expected, 2), np.repeat(1.0 + expected, 2)
@@ -91,7 +91,8 @@ def plot_exposure_chi2(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figu
         subtitle=f"{outside} of {len(table)} beyond ± 2σ = 2 √(2/dof), "
         f"{0.0455 * len(table):.1f} expected",
         x=Axis(_CHI2_X, (-0.5, len(table) - 0.5)),
-        y=Axis(_CHI2_Y, (1.0 - 1.25 * reach, 1.0 + 1.25 * reach)),
+        # Symmetric about 1, but chi2 is not negative.
+        y=Axis(_CHI2_Y, (max(0.0, 1.0 - reach), 1.0 + reach)),
         width=width,
         height=round(0.4 * width),
         legend_columns=3,

@@ -36,7 +36,10 @@ def _cell(item: SummaryItem, other: SummaryItem | None) -> str:
 
 
 def _other(item: SummaryItem, other: SummaryItem | None) -> str:
-    if other is None or other.value == item.value:
+    if other is None:
         return ""
+    if other.value == item.value:
+        # As high as in the other tiles, whose values are on one line.
+        return "" if item.is_count else "<span class='other'>&nbsp;</span>"
     value = other.value.partition(" (")[0]
     return f"<span class='other {other.state}'>(A) {escape(value)}</span>"

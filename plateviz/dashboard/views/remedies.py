@@ -108,14 +108,18 @@ class _Row:
 
 def _words(cause: Cause) -> str:
     title = f"{cause.title[0].upper()}{cause.title[1:]}"
-    options = f" <code>{escape(_options(cause))}</code>" if cause.options else ""
+    options = "".join(f" <code>{escape(one)}</code>" for one in cause.options[:_MOST_OPTIONS])
     action = f"{cause.action[0].upper()}{cause.action[1:]}"
     return (
         f"<p class='cause'><b>{escape(title)}</b>, {cause.significance:.0f} sigma. "
-        f"{escape(action)}.{options}<br><span>{escape(cause.spoils)}</span></p>"
+        f"{escape(action)}.{options}{_and_more(cause)}<br><span>{escape(cause.spoils)}</span></p>"
     )
 
 
 def _options(cause: Cause) -> str:
+    return " ".join(cause.options[:_MOST_OPTIONS]) + _and_more(cause)
+
+
+def _and_more(cause: Cause) -> str:
     n_more = len(cause.options) - _MOST_OPTIONS
-    return " ".join(cause.options[:_MOST_OPTIONS]) + (f" and {n_more} more" if n_more > 0 else "")
+    return f" and {n_more} more" if n_more > 0 else ""

@@ -95,7 +95,7 @@ def test_each_cause_has_a_row_and_each_remedy_a_button(live, fit_result):
     assert len(view.__panel__()) == 3
     assert "<b>The distortion drifts</b>, 43 sigma. Let it. <code>--drift 2</code>" in shown(view)
     assert "&lt;b&gt; is unknown" in shown(view)
-    assert f"{ids[2]} and 2 more" in shown(view)
+    assert f"<code>{ids[2]}</code> and 2 more" in shown(view)
     first, last = buttons(view)
     assert first.description == "Try it: solve the orbit with --drift 2."
     last.clicks += 1

@@ -22,4 +22,7 @@ def test_values_that_differ_stand_beside_each_other():
     html = strip([CHI2, DEVIATION, COUNT], others)
     assert html.count("(A)") == 1
     assert "<span class='other bad'>(A) 1.5</span></div>" in html
+    # The others leave its line free, so that all values are on one line; a count needs none.
+    assert html.count("<span class='other'>&nbsp;</span>") == 1
+    assert strip([COUNT], [COUNT]) == strip([COUNT])
     assert "<b>" not in html

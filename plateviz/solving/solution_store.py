@@ -1,8 +1,8 @@
-"""SolutionStore: one origin, one solver process, and all solutions made so far.
+"""SolutionStore: one origin, one solver process, and the solutions made so far.
 
 It belongs to the server and is shared by all its sessions. Solutions are files in a scratch
-folder, named after the orbit and the settings. The folder of a killed server is removed by the
-next one.
+folder, named after the orbit and the settings (see `scratch_results.py`). The folder of a killed
+server is removed by the next one.
 """
 
 import hashlib
@@ -10,7 +10,6 @@ import json
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from functools import lru_cache, partial
 from pathlib import Path
 
 from plateviz.runs.column_cache import ColumnCache
@@ -18,12 +17,12 @@ from plateviz.runs.kept_selections import KeptSelections
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.queries import SurveyRun, survey_runs
-from plateviz.runs.scratch_result import is_written, read_scratch_result
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.judge import Judge
 from plateviz.solving.made_solutions import MadeSolution, MadeSolutions
 from plateviz.solving.origin import Origin, SurveyFolder, origin_to_dict
 from plateviz.solving.run_reader import RunReader
+from plateviz.solving.scratch_results import ScratchResults
 from plateviz.solving.solver_pool import Solver
 from plateviz.solving.turns import Turns
 from solver.data.instrument import Instrument
@@ -73,7 +72,7 @@ class SolutionStore:
         with writing(temporary, "to make a folder for the solutions"):
             self._folder = ScratchFolder(temporary, "plateviz")
         self._scratch = self._folder.path
-        self._read = lru_cache(maxsize=16)(partial(read_scratch_result, hurry=solver.hurry))
+        self._results = ScratchResults(solver.hurry)
         self._of_runs = OrbitCache()
         self.columns = ColumnCache()
         self.background = ThreadPoolExecutor(_READERS, thread_name_prefix="reader")
@@ -111,6 +110,8 @@ class SolutionStore:
         """
         directory = self._directory(orbit, settings, what_if)
         with self._lock:
+            for removed in self._results.expect(directory):
+                self._jobs.pop(removed, None)
             job = self._jobs.get(directory)
             if job is None or job.status in (JobStatus.FAILED, JobStatus.CANCELLED):
                 job = self._solver.submit(Job(self._request(orbit, settings, what_if, directory)))
@@ -155,8 +156,7 @@ class SolutionStore:
 
         The eigenmodes of a what-if follow a moment later, and are waited for where they are used.
         """
-        directory = self._directory(orbit, settings, what_if)
-        return self._read(directory) if is_written(directory) else None
+        return self._results.get(self._directory(orbit, settings, what_if))
 
     def keep(self, made: MadeSolution, name: str) -> KeptSolution:
         """Keep a solution on disk under a name.
@@ -169,7 +169,9 @@ class SolutionStore:
         """
         result = self.result(*made[:3])
         if result is None:
-            raise InputError("expected a solution of this server, found that it was removed")
+            raise InputError(
+                "expected a solution, found that it made room for others: show it first"
+            )
         return self.kept.keep(name, made.orbit, made.is_step, result)
 
     def close(self) -> None:

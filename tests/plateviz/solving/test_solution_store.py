@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from plateviz.runs.worker_scratch import worker_scratch
+from plateviz.solving import scratch_results
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.origin import OrbitFiles, SurveyFolder, origin_from_dict, origin_to_dict
 from plateviz.solving.solution_store import SolutionStore
@@ -123,6 +124,19 @@ def test_process_that_dies_is_reported_and_replaced(store):
     assert job.wait(LONG) is JobStatus.FAILED
     assert "the solver process ended" in job.message
     assert store.request(1, FitSettings(order=6)).wait(LONG) is JobStatus.DONE
+
+
+def test_solution_that_made_room_for_others_is_computed_again(store, monkeypatch):
+    monkeypatch.setattr(store._results, "_most_bytes", 1)
+    monkeypatch.setattr(scratch_results, "_LEAST", 1)
+    first = store.request(0, FitSettings(order=1))
+    assert first.wait(LONG) is JobStatus.DONE
+    store.request(0, FitSettings(order=2))
+    assert store.result(0, FitSettings(order=1)) is None
+    again = store.request(0, FitSettings(order=1))
+    assert again is not first
+    assert again.wait(LONG) is JobStatus.DONE
+    assert store.result(0, FitSettings(order=1)) is not None
 
 
 def test_closing_cancels_jobs_and_removes_solutions(small_survey):

@@ -1,0 +1,87 @@
+"""ScratchResults: the results of a server, in its scratch folder.
+
+A result of a full orbit takes 43 MB, and ten people make thousands of them in a day. So what no
+page shows is removed once all together take much room, and computed again if a page asks for it.
+"""
+
+import shutil
+from collections import OrderedDict
+from collections.abc import Callable
+from contextlib import suppress
+from functools import lru_cache, partial
+from itertools import islice
+from pathlib import Path
+from threading import Lock
+from weakref import WeakValueDictionary
+
+from plateviz.runs.scratch_result import is_written, read_scratch_result
+from solver.data.result import FitResult
+
+MOST_BYTES = 2**31
+"""Room of all results together, unless pages show more."""
+# Results used last are not removed: a page may be about to show them.
+_LEAST, _MOST_READ = 16, 16
+
+
+class ScratchResults:
+    """Results by directory, in the order in which they were used last."""
+
+    def __init__(self, hurry: Callable[[], bool], most_bytes: int = MOST_BYTES) -> None:
+        """Begin without any; `hurry` is that of `read_scratch_result`."""
+        self._most_bytes = most_bytes
+        self._read = lru_cache(_MOST_READ)(partial(read_scratch_result, hurry=hurry))
+        self._lock = Lock()
+        # Directory -> size in bytes, 0 until it is written.
+        self._sizes: OrderedDict[Path, int] = OrderedDict()
+        # Those that are used somewhere.
+        self._in_use: WeakValueDictionary[Path, FitResult] = WeakValueDictionary()
+
+    def expect(self, directory: Path) -> list[Path]:
+        """Take into account that a directory is used, whether or not it is written.
+
+        Returns
+        -------
+        directories of results that are removed, to make room for it
+        """
+        with self._lock:
+            self._sizes.setdefault(directory, 0)
+            self._sizes.move_to_end(directory)
+            return self._removed()
+
+    def get(self, directory: Path) -> FitResult | None:
+        """Return the result of a directory; None if it is not written, or was removed."""
+        with self._lock:
+            if not is_written(directory):
+                return None
+            result = self._read(directory)
+            self._in_use[directory] = result
+            self._sizes.setdefault(directory, 0)
+            self._sizes.move_to_end(directory)
+            return result
+
+    def _removed(self) -> list[Path]:
+        for directory, size in self._sizes.items():
+            if not size and is_written(directory):
+                self._sizes[directory] = _size(directory)
+        total, removed = sum(self._sizes.values()), []
+        for directory in list(islice(self._sizes, max(0, len(self._sizes) - _LEAST))):
+            if total <= self._most_bytes:
+                break
+            if self._sizes[directory] and directory not in self._in_use and _remove(directory):
+                total -= self._sizes.pop(directory)
+                removed.append(directory)
+        return removed
+
+
+def _size(directory: Path) -> int:
+    return sum(file.stat().st_size for file in directory.iterdir())
+
+
+def _remove(directory: Path) -> bool:
+    """Remove a directory, of which nobody reads a part; return whether it is gone."""
+    gone = directory.with_name(f".{directory.name}-removed")
+    with suppress(OSError):
+        directory.rename(gone)
+        shutil.rmtree(gone, ignore_errors=True)
+        return True
+    return False

@@ -81,7 +81,7 @@ KEYS: Mapping[str, Key] = MappingProxyType(
         "D": Key("Previous detector", lambda n: _step_detector(n, -1)),
         "b": Key("Blink: exchange the two solutions", lambda n: n.session.exchange()),
         "f": Key("Fit with the settings of the controls", lambda n: n.session.refit()),
-        "k": Key("Keep the what-if", lambda n: n.session.keep()),
+        "k": Key("Add the what-if to the list of solutions", lambda n: n.session.list_what_if()),
     }
 )
 """Key -> what it does, in the order of the list that "?" shows."""

@@ -165,12 +165,12 @@ class Session(RequestState):
         """The solution on the screen, or the one before the what-ifs on the screen."""
         return self._fitted if self.shown is not None and self.shown.is_what_if else self.shown
 
-    def keep(self) -> None:
-        """Keep the what-if on the screen."""
+    def list_what_if(self) -> None:
+        """Add the what-if on the screen to the list, so that the next one does not replace it."""
         if self.shown is not None and self.shown.is_what_if:
-            kept = self.shown._replace(is_what_if=False)
-            self.param.update(solutions=[*self.solutions, kept], shown=kept)
-            self.journal.add(kept)
+            listed = self.shown._replace(is_what_if=False)
+            self.param.update(solutions=[*self.solutions, listed], shown=listed)
+            self.journal.add(listed)
 
     def cancel(self) -> None:
         """Cancel the waiting or running job."""
@@ -252,7 +252,7 @@ class Session(RequestState):
         return None if before is None or before.settings == solution.settings else before
 
     def _return_to(self, solution: Solution) -> None:
-        """Return from a what-if to a kept solution, alone if the what-if was compared with it."""
+        """Return from a what-if to a listed solution, alone if the what-if was compared with it."""
         if solution is not self.shown:
             other = self._beside(solution, self.fitted)
             self.param.update(shown=solution, other=other, stage=Stage.READY, message="")

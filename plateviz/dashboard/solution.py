@@ -31,7 +31,7 @@ class Solution(NamedTuple):
     orbit, settings : as of `Request`
     result : of the fit
     is_what_if : whether the next what-if replaces it
-    is_step : whether it was computed by a step from a fit, kept or not
+    is_step : whether it was computed by a step from a fit, listed or not
     run : name of the run that it was read from; empty for none
     kept : name of the kept solution that it was read from; empty for none
     """

@@ -66,10 +66,14 @@ class SolutionList:
     def entries(self) -> list[Entry]:
         """Return the solutions of the session, the kept ones, and those of the orbit in runs."""
         store, orbit = self._session.store, self._session.selection.orbit
+        what_if = self._what_if()
         made = [
             Entry(one, one.orbit, one.name, one.settings.describe(), _how(one.is_step))
             for one in reversed(self._session.journal.made)
         ]
+        if what_if is not None:
+            words = f"{_how(what_if.is_step)}, on the screen"
+            made.insert(0, Entry(what_if, what_if.orbit, "", what_if.settings.describe(), words))
         kept = [self._of_kept(one) for one in store.kept.all()]
         runs = [self._of_run(one, orbit) for one in self._navigation.runs]
         return [*made, *kept, *(one for one in runs if one is not None)]
@@ -104,12 +108,27 @@ class SolutionList:
             return Request(what.orbit, what.settings, what.is_step)
         return Solution(what.orbit, what.settings, result, is_step=what.is_step)
 
+    def rename(self, entry: Entry, name: str) -> None:
+        """Give a solution of the session a name; a what-if on the screen stays in the list."""
+        if isinstance(entry.what, MadeSolution):
+            if entry.what == self._what_if():
+                self._session.list_what_if()
+            self._session.journal.rename(entry.what, name)
+
     def keep(self, entry: Entry, name: str) -> None:
         """Keep a solution of the session on disk; InputError if it cannot be kept."""
         if not isinstance(entry.what, MadeSolution):
             raise InputError("this solution is on disk already")
         self._session.store.keep(entry.what, name)
-        self._session.journal.rename(entry.what, name)
+        self.rename(entry, name)
+
+    def _what_if(self) -> MadeSolution | None:
+        """Return the what-if on the screen, unless it is among the solutions of the session."""
+        shown = self._session.shown
+        if shown is None or not shown.is_what_if:
+            return None
+        made = MadeSolution(shown.orbit, shown.settings, shown.is_step)
+        return None if any(one.is_of(made) for one in self._session.journal.made) else made
 
     def _of_kept(self, kept: KeptSolution) -> Entry:
         try:

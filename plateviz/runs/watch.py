@@ -32,7 +32,8 @@ class Event(NamedTuple):
 
     Attributes
     ----------
-    kind : "watching", "fitted", "failed", "waiting", "damaged", "changed", "complete" or "ended"
+    kind : "watching", "fitting", "fitted", "failed", "waiting", "damaged", "changed", "complete" or
+        "ended"
     orbit : its id; None if it is not about one orbit
     message : in words
     figures : numbers and texts that belong to it, by name
@@ -156,6 +157,9 @@ class Watch:
         # The catalogue may have been replaced.
         begin_run(self.survey, self.name, self.settings, grows=True)
         arrivals.try_orbits(orbits)
+        if orbits:
+            counted = "1 orbit is" if len(orbits) == 1 else f"{len(orbits)} orbits are"
+            self._say("fitting", f"{counted} being fitted", orbits=orbits)
 
         def tell(progress: Progress) -> None:
             if progress.last is not None:

@@ -329,7 +329,7 @@ def keep_reload_and_show(page):
     expect(shown(page)).to_contain_text("lower: order 4")
 
 
-def test_a_change_is_tried_at_once_kept_and_fitted(page):
+def test_a_change_is_tried_at_once_listed_and_fitted(page):
     see(page, "convergence")
     canvas = page.locator(".figure-convergence canvas").first
     assert not is_faded(canvas)
@@ -344,7 +344,7 @@ def test_a_change_is_tried_at_once_kept_and_fitted(page):
     until(page, lambda: is_faded(canvas))
     see(page, "convergence")
     until(page, lambda: not is_faded(canvas))
-    page.get_by_role("button", name="Keep this solution").click()
+    page.get_by_role("button", name="Add to the list").click()
     expect(shown(page)).not_to_contain_text("what if")
     expect(shown(page)).to_contain_text("order 4")
     expect(page.get_by_role("radio")).to_have_count(2)

@@ -46,8 +46,11 @@ class RefitView(pn.viewable.Viewer):
         self._widths: dict[str, pmui.TextInput] = {}
         self._reset = pmui.Button(label="The paper's priors", variant="text", size="small")
         self._fit = pmui.Button(label="Fit", color="primary", sizing_mode="stretch_width")
-        self._keep = pmui.Button(
-            label="Keep this solution", variant="outlined", sizing_mode="stretch_width"
+        self._add = pmui.Button(
+            label="Add to the list",
+            description="Add to the list: the next what-if does not replace this one.",
+            variant="outlined",
+            sizing_mode="stretch_width",
         )
         self._stop = pmui.Button(
             label="Cancel", color="warning", variant="outlined", sizing_mode="stretch_width"
@@ -72,7 +75,7 @@ class RefitView(pn.viewable.Viewer):
             pmui.Row(self._fit, self._stop, sizing_mode="stretch_width", margin=0),
             self._bar,
             self._message,
-            self._keep,
+            self._add,
             self._solutions,
             pmui.Row(open_list, self._reproduce, margin=0),
             code_place,
@@ -90,7 +93,7 @@ class RefitView(pn.viewable.Viewer):
         session = self._session
         self._fit.on_click(lambda _: session.refit())
         self._stop.on_click(lambda _: session.cancel())
-        self._keep.on_click(lambda _: session.keep())
+        self._add.on_click(lambda _: session.list_what_if())
         self._reset.on_click(self._reset_priors)
         self._solutions.param.watch(self._select, "value")
         session.choices.param.watch(self._show_widths, "prior_widths")
@@ -168,13 +171,13 @@ class RefitView(pn.viewable.Viewer):
         )
 
     def _show_solutions(self, *_: object) -> None:
-        shown, kept = self._session.shown, list(self._session.solutions)
+        shown, listed = self._session.shown, list(self._session.solutions)
         self._reproduce.visible = shown is not None
-        self._keep.visible = shown is not None and shown.is_what_if
+        self._add.visible = shown is not None and shown.is_what_if
         if shown is not None and shown.is_what_if:
-            kept.append(shown)
+            listed.append(shown)
         solutions: dict[str, Solution] = {}
-        for solution in kept:
+        for solution in listed:
             # Different sources may be left out, of which the label has the number only.
             same = sum(other.label == solution.label for other in solutions.values())
             solutions[solution.label + (f" ({same + 1})" if same else "")] = solution

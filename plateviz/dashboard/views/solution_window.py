@@ -52,6 +52,7 @@ class SolutionWindow(pn.viewable.Viewer):
         )
         self._choice.param.watch(self._choose, "value")
         self._session.journal.param.watch(self._follow, "made")
+        self._session.param.watch(self._follow, "shown")
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the window."""
@@ -110,8 +111,8 @@ class SolutionWindow(pn.viewable.Viewer):
         self._session.compare_with(found)
 
     def _give_name(self) -> None:
-        if (entry := self._chosen) is not None and isinstance(entry.what, MadeSolution):
-            self._session.journal.rename(entry.what, self._name.value)
+        if (entry := self._chosen) is not None:
+            self._list.rename(entry, self._name.value)
 
     def _keep_on_disk(self) -> None:
         if (entry := self._chosen) is not None:

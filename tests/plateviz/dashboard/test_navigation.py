@@ -414,11 +414,11 @@ def test_address_of_a_what_if_shows_a_what_if_of_the_same_solution(navigation):
     assert opened.session.shown.run == "default"
 
 
-def test_address_of_a_kept_what_if_still_says_so(navigation):
+def test_address_of_a_listed_what_if_still_says_so(navigation):
     navigation.open_orbit(0)
     navigation.session.choices.order = 4
     end_job(navigation)
-    navigation.session.keep()
+    navigation.session.list_what_if()
     assert navigation.address()["solution"] == "order=4 what-if"
 
 

@@ -283,10 +283,10 @@ def test_reverted_change_returns_to_the_fit(live):
     assert (live.shown, live.other, live.job) == (first, None, None)
 
 
-def test_what_if_can_be_kept(live):
+def test_what_if_can_be_listed(live):
     live.choices.order = 4
     finish(live)
-    live.keep()
+    live.list_what_if()
     assert not live.shown.is_what_if
     assert [s.settings.order for s in live.solutions] == [5, 4]
     live.choices.order = 3

@@ -17,7 +17,7 @@ KEY = "0123456789abcdef" * 2
 
 @pytest.fixture
 def page(navigation, run, tmp_path, fit_result):
-    """A page with the orbit of a run and a kept what-if; its store has one kept solution."""
+    """A page with the orbit of a run and a listed what-if; its store has one kept solution."""
     store = navigation.session.store
     store.kept = KeptSolutions(tmp_path / "solutions")
     store.kept.keep("old", 0, False, fit_result)
@@ -25,7 +25,7 @@ def page(navigation, run, tmp_path, fit_result):
     navigation.open_orbit(0)
     navigation.session.choices.order = 4
     end_job(navigation)
-    navigation.session.keep()
+    navigation.session.list_what_if()
     return navigation
 
 
@@ -50,6 +50,34 @@ def test_list_has_the_solutions_of_the_session_the_kept_ones_and_those_of_runs(p
         "orbit 1: order 4 (fit)",
         "orbit 0: order 4 (what-if)",
         "orbit 0: old: order 5 (fit, kept)",
+    ]
+
+
+def test_what_if_on_the_screen_is_listed_and_stays_once_it_has_a_name(page):
+    session = page.session
+    session.choices.order = 3
+    end_job(page)
+    label = "orbit 0: order 3 (what-if, on the screen)"
+    assert labels(page)[0] == label
+    assert SolutionList(page).load(entry(page, label)).settings.order == 3
+    SolutionList(page).rename(entry(page, label), "low")
+    assert labels(page)[0] == "orbit 0: low: order 3 (what-if)"
+    assert not session.shown.is_what_if
+    session.choices.order = 2
+    end_job(page)
+    assert labels(page)[:2] == [
+        "orbit 0: order 2 (what-if, on the screen)",
+        "orbit 0: low: order 3 (what-if)",
+    ]
+
+
+def test_what_if_on_the_screen_that_an_earlier_page_has_listed_is_there_once(page):
+    page.session.journal.rename(MadeSolution(0, FitSettings(order=3), is_step=True), "low")
+    page.session.choices.order = 3
+    end_job(page)
+    assert page.session.shown.is_what_if
+    assert [label for label in labels(page) if "order 3" in label] == [
+        "orbit 0: low: order 3 (what-if)"
     ]
 
 
@@ -98,7 +126,7 @@ def test_named_solution_is_there_again_after_a_reload(page):
     assert [(one.name, one.settings.order) for one in again.journal.made] == [("lower", 4)]
 
 
-def test_what_was_made_before_the_browser_told_its_key_is_kept(page):
+def test_what_was_made_before_the_browser_told_its_key_stays(page):
     store = page.session.store.made
     store.remember(KEY, MadeSolution(1, FitSettings(), is_step=False))
     page.session.journal.resume(KEY)

@@ -11,10 +11,9 @@ from solver.data.instrument import MINI_MOCK, Instrument
 from solver.data.orbit import OrbitData
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
+from solver.engines.adjust import find_adjustments, with_adjustments
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, find_mode
-from solver.engines.noise import estimate_noise
-from solver.engines.robust import find_outliers, outlier_table
 from solver.engines.run_engine import Resumption, run_engine
 from solver.engines.warm_starts import WarmStart, likely, nearest
 from solver.engines.what_if import linearised, solve_what_if
@@ -22,7 +21,7 @@ from solver.errors import FitError, InputError
 from solver.linear.contribution import compiling
 from solver.linear.covariances import Covariances
 from solver.linear.source_elimination import ReducedSystem
-from solver.problem.noise import Noise
+from solver.problem.adjustments import Adjustments
 from solver.problem.problem import Problem, orders_held, rebuilt
 from solver.problem.problem_cache import ProblemCache
 from solver.results.catalogue_response import sky_statistics
@@ -70,8 +69,7 @@ class _LastFit(NamedTuple):
     problem: Problem
     mode: Mode
     covariance: Covariances
-    outliers: pd.DataFrame | None
-    noise: Noise | None
+    adjustments: Adjustments
     orders: pd.DataFrame | None
 
 
@@ -107,14 +105,8 @@ class OrbitFitter:
         A fit of the svi engine that was stopped continues where it stopped.
         """
         start = time.perf_counter()
-        data, problem = self._cache.get(settings)
-        outliers = None
-        if settings.robust:
-            outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
-            data, problem = self._cache.get(settings, outliers)
-        noise = estimate_noise(problem, settings, progress) if settings.has_noise_model else None
-        if noise is not None:
-            data, problem = self._cache.get(settings, outliers, noise)
+        adjustments = find_adjustments(self._cache, self._instrument, settings, progress)
+        data, problem = self._cache.get(settings, adjustments)
         prepared = time.perf_counter()
         estimate = run_engine(problem, settings, progress, resumption or self._resumption(settings))
         found = partial_result(
@@ -130,14 +122,13 @@ class OrbitFitter:
                 problem,
                 estimate.mode,
                 found.solution.covariance,
-                outliers,
-                noise,
+                adjustments,
                 orders,
             )
             self._starts = [WarmStart(settings, problem, estimate.mode)]
             self._attempted = [settings]
             self._compiling = compiling(estimate.mode.equations, problem)
-        result = _with_noise(_with_outliers(result, outliers), noise)
+        result = with_adjustments(result, adjustments)
         return _with_orders(result, orders, time.perf_counter() - fitted)
 
     @property
@@ -148,8 +139,8 @@ class OrbitFitter:
     def what_if(self, settings: FitSettings) -> FitResult | None:
         """Return the solution under other settings without a refit.
 
-        The outliers and the noise model are those of the last fit. So is the comparison of
-        distortion orders, if only the order differs.
+        Outliers, moves of detectors and the noise model are those of the last fit. So is the
+        comparison of distortion orders, if only the order differs.
 
         Returns
         -------
@@ -165,7 +156,7 @@ class OrbitFitter:
         if last is None or not last.settings.what_if_holds(settings):
             return None
         start = time.perf_counter()
-        data, problem = self._cache.get(settings, last.outliers, last.noise)
+        data, problem = self._cache.get(settings, last.adjustments)
         prepared = time.perf_counter()
         base = nearest(self._starts, settings)
         mode = base and solve_what_if(base.mode, base.problem, problem, settings)
@@ -177,7 +168,7 @@ class OrbitFitter:
         )
         same_but_order = settings == last.settings.with_(order=settings.order)
         orders = last.orders if same_but_order else None
-        result = _with_noise(_with_outliers(found.result, last.outliers), last.noise)
+        result = with_adjustments(found.result, last.adjustments)
         result = replace(result, orders=orders)
         return found._replace(result=result)
 
@@ -250,7 +241,7 @@ class OrbitFitter:
     def _warm_start(self, last: _LastFit, settings: FitSettings) -> list[WarmStart]:
         """Return a warm start for `settings`, in a list; an empty list if there is no solution."""
         try:
-            _, problem = self._cache.get(settings, last.outliers, last.noise)
+            _, problem = self._cache.get(settings, last.adjustments)
         except InputError:
             # A prior is shifted for a term that the lower order lacks, or too few data remain.
             return []
@@ -278,19 +269,6 @@ class OrbitFitter:
 
         is_same_fit = self._stopped is not None and self._stopped[0] == settings
         return Resumption(self._stopped[1] if is_same_fit and self._stopped else None, save)
-
-
-def _with_outliers(result: FitResult, outliers: pd.DataFrame | None) -> FitResult:
-    if outliers is None:
-        return result
-    summary = {**result.summary, "n_outliers": len(outliers)}
-    return replace(result, summary=summary, outliers=outliers.reset_index(drop=True))
-
-
-def _with_noise(result: FitResult, noise: Noise | None) -> FitResult:
-    if noise is None:
-        return result
-    return replace(result, summary={**result.summary, "noise": noise.entry})
 
 
 def _with_orders(result: FitResult, orders: pd.DataFrame | None, seconds: float) -> FitResult:

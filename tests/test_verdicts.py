@@ -71,7 +71,9 @@ def recorded_trials(path, version="a"):
         state = "bad" if number % 2 else "good"
         return {"state": state, "causes": [], "converged": True, "sigma": round(number / 9.0, 1)}
 
-    run_trials(path, [1000 * slot + 1 for slot in range(len(CASES) * 6)], trial, version=version)
+    run_trials(
+        path, [1000 * slot + 1 for slot in range(1 + 6 * len(CASES))], trial, version=version
+    )
     return trial
 
 
@@ -85,10 +87,10 @@ def test_records_are_carried_over_to_a_version_that_judges_alike(tmp_path):
         return trial(number) | {"sigma": trial(number)["sigma"] + 0.1, "seconds": 3.0}
 
     before = read_records(path, "a")
-    assert carry_over(path, alike, "a", "b", 60) == []
-    assert len(repeated) >= 60
-    cases = Counter(trial_of(number).case for number in repeated)
-    assert len(cases) == len(CASES) + 1
+    assert carry_over(path, alike, "a", "b", 160) == (len(before), [])
+    assert len(repeated) == len(set(repeated))
+    cases = {(trial_of(number).case, trial_of(number).is_modelled) for number in repeated}
+    assert len(cases) == 2 * len(CASES) + 1
     assert {trial_of(number).factor for number in repeated} == {0.0, *FACTORS}
     assert read_records(path, "b") == before
     assert read_records(path, "a") == {}
@@ -97,14 +99,18 @@ def test_records_are_carried_over_to_a_version_that_judges_alike(tmp_path):
 @pytest.mark.parametrize(
     "change", [{"state": "warn"}, {"causes": ["noise"]}, {"converged": False}, {"sigma": -1.0}]
 )
-def test_records_stay_if_a_verdict_differs(tmp_path, change):
+def test_records_of_a_case_stay_if_a_verdict_differs(tmp_path, change):
     path = tmp_path / "trials.jsonl"
     trial, odd = recorded_trials(path), 4001
-    before = path.read_bytes()
+    before = read_records(path, "a")
     other = lambda number: trial(number) | (change if number == odd else {})  # noqa: E731
-    (line,) = carry_over(path, other, "a", "b", 10_000)
-    assert line.startswith(f"{odd}: recorded state")
-    assert path.read_bytes() == before
+    carried, (line,) = carry_over(path, other, "a", "b", 10_000)
+    assert line.startswith(f"{trial_of(odd).case.name}, {odd}: recorded state")
+    # Those of the defect at any amplitude, and not those with its cause modelled.
+    assert set(read_records(path, "a")) == {1001, 2001, 3001, 4001, 5001}
+    assert carried == len(before) - 5
+    kept = {number: record for number, record in before.items() if not 1000 < number < 6000}
+    assert read_records(path, "b") == kept
     with pytest.raises(ValueError, match="expected records of version c"):
         carry_over(path, other, "c", "b", 60)
 

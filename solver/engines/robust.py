@@ -66,7 +66,7 @@ def find_outliers(
     for _ in range(_MAX_ROUNDS):
         if mode.reduced is None:
             return None
-        squares = (_whitened(problem, mode) ** 2).sum(axis=1)
+        squares = (whitened_residuals(problem, mode) ** 2).sum(axis=1)
         before, weight = weight, (_NU + 2.0) / (_NU + squares)
         if np.abs(weight - before).max() < _WEIGHT_TOLERANCE:
             break
@@ -104,7 +104,8 @@ def _weighted(problem: Problem, weight: Float[np.ndarray, " obs"]) -> Problem:
     return replace(problem, measurements=replace(measurements, sigma=sigma))
 
 
-def _whitened(problem: Problem, mode: Mode) -> Float[np.ndarray, "obs 2"]:
+def whitened_residuals(problem: Problem, mode: Mode) -> Float[np.ndarray, "obs 2"]:
+    """Return the residuals over their uncertainties, in working order."""
     residuals = [of_slots(c.residual) for c in chunks(problem, mode.theta, mode.sources)]
     return np.concatenate(residuals)[problem.measurements.tiles.place]
 

@@ -48,8 +48,8 @@ class Causes(eqx.Module):
     Attributes
     ----------
     families : of distortion terms
-    element : index of the detector in its field, among the elements of the axis `motion`
-    moves : one where the detector may have moved, zero in the first field
+    element : index of the detector in its span, among the elements of the axis `motion`
+    moves : one where the detector may have moved, zero in the first span
     faintness : flux^(-1/2) of the sources, as from `solver.data.magnitudes`
     pixels : number of pixels of the detectors along their axes
     """
@@ -119,7 +119,7 @@ def moved_detector(
     exposure: Int[AnyArray, "*#obs"],
     detector: Int[AnyArray, "*#obs"],
 ) -> tuple[Pair, Float[Array, "*#obs"]]:
-    """Return centre, um, and rotation, rad, of the detectors in the field of each exposure."""
+    """Return centre, um, and rotation, rad, of the detectors in the span of each exposure."""
     if causes is None or "detector_turn" not in values:
         return centre, rotation
     element = jnp.asarray(causes.element)[exposure, detector]

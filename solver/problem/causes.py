@@ -8,6 +8,7 @@ import pandas as pd
 from jaxtyping import Float
 from numpy.polynomial import legendre
 
+from solver.data.detector_spans import span_numbers
 from solver.data.instrument import Instrument
 from solver.data.magnitudes import faintness
 from solver.data.settings import FitSettings
@@ -31,12 +32,12 @@ def causes_of(
     """
     if not settings.optional_groups:
         return None
-    field, n_det = field_numbers(exposures), len(instrument.detectors)
-    n_moved = max(int(field.max()), 1)
-    moves = np.repeat((field > 0).astype(float)[:, None], n_det, axis=1)
+    span, n_det = span_numbers(exposures), len(instrument.detectors)
+    n_moved = max(int(span.max()), 1)
+    moves = np.repeat((span > 0).astype(float)[:, None], n_det, axis=1)
     return Causes(
         families=_families(exposures, instrument, settings),
-        element=n_moved * np.arange(n_det) + np.maximum(field - 1, 0)[:, None],
+        element=n_moved * np.arange(n_det) + np.maximum(span - 1, 0)[:, None],
         moves=moves,
         faintness=_faintness(sources, settings),
         pixels=np.array([(d.n_x, d.n_y) for d in instrument.detectors], dtype=float),

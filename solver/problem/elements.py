@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Int
 
+from solver.data.detector_spans import span_numbers
 from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.parameter_group import Axis
@@ -40,7 +41,7 @@ def elements(exposures: pd.DataFrame, instrument: Instrument, settings: FitSetti
         Element(f"{field}/{plate}", f"field {field} plate {plate}") for field, plate in plates
     ]
     phases = [Element("cos", "cos"), Element("sin", "sin")]
-    motions = [(d, f) for d in detectors for f in later] if settings.detector_motion else []
+    moved = _spans(exposures)[1:] if settings.detector_motion else []
     return {
         "exp": exposures_called,
         "coef": _terms(settings.order),
@@ -51,13 +52,31 @@ def elements(exposures: pd.DataFrame, instrument: Instrument, settings: FitSetti
         # Only terms that the distortion has can walk.
         "walk": _products(min(settings.drift_walk, settings.order), exposures_called),
         "det": _called("detector", detectors),
-        "motion": [Element(f"{d}/{f}", f"detector {d} field {f}") for d, f in motions],
+        "motion": [
+            Element(f"{detector}/{span.name}", f"detector {detector} {span.words}")
+            for detector in detectors
+            for span in moved
+        ],
     }
 
 
 def field_numbers(exposures: pd.DataFrame) -> Int[np.ndarray, " exp"]:
     """Return the number of the field of each exposure, from 0."""
     return np.unique(exposures["field_id"].to_numpy(), return_inverse=True)[1]
+
+
+def _spans(exposures: pd.DataFrame) -> list[Element]:
+    """Return the spans: a field, and in it what follows a move, by its first exposure."""
+    first = exposures.assign(span=span_numbers(exposures)).sort_values(["span", "obstime"])
+    first = first.drop_duplicates("span")
+    begins = ~first["field_id"].duplicated()
+    rows = zip(first["field_id"], first["plate_id"], begins, strict=True)
+    return [
+        Element(f"{field}", f"field {field}")
+        if is_first
+        else Element(f"{field}/{plate}", f"field {field} from plate {plate}")
+        for field, plate, is_first in rows
+    ]
 
 
 def _degrees(settings: FitSettings) -> range:

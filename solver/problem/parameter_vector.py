@@ -3,7 +3,7 @@
 Exposures come first, all groups of one exposure together with its walking distortion terms, then
 the two directions of the
 distortion and of its optional terms, then the detectors, all groups of one detector together,
-and last what moves from field to field. The parameters that one measurement depends on therefore
+and last what moves from span to span. The parameters that one measurement depends on therefore
 lie in few contiguous ranges.
 """
 
@@ -52,14 +52,14 @@ class VectorLayout:
     Attributes
     ----------
     optional : names of the optional groups, in table order, and their numbers of elements
-    fields : for each exposure, the number of its field
+    spans : for each exposure, the number of its span (`solver.data.detector_spans`)
     """
 
     n_exp: int
     n_coef: int
     n_det: int
     optional: tuple[tuple[str, int], ...] = ()
-    fields: tuple[int, ...] = ()
+    spans: tuple[int, ...] = ()
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
@@ -120,7 +120,7 @@ class VectorLayout:
 
     @property
     def first_motion(self) -> int:
-        """Column of the first parameter that moves from field to field."""
+        """Column of the first parameter that moves from span to span."""
         return self.first_detector + self.n_det * len(self.on("det"))
 
     def coefficients(self) -> slice:
@@ -136,15 +136,15 @@ class VectorLayout:
     ) -> Int[np.ndarray, "*n"]:
         """Return the element of an axis of local groups that measurements depend on.
 
-        Nothing moves in the first field; its measurements are given any element.
+        Nothing moves in the first span; its measurements are given any element.
         """
         if axis == "exp":
             return exposure
         if axis == "det":
             return detector
-        n_moved = max(max(self.fields, default=0), 1)
-        field = np.asarray(self.fields)[exposure]
-        return n_moved * detector + np.maximum(field - 1, 0)
+        n_moved = max(max(self.spans, default=0), 1)
+        span = np.asarray(self.spans)[exposure]
+        return n_moved * detector + np.maximum(span - 1, 0)
 
     def touched(
         self, exposure: Int[np.ndarray, "*n"], detector: Int[np.ndarray, "*n"]

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Bool, Float
 
+from solver.data.detector_spans import span_numbers
 from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
@@ -23,7 +24,7 @@ from solver.model.directions import displaced, tangent_frame
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry
 from solver.problem.causes import causes_of, padded
-from solver.problem.elements import Elements, elements, field_numbers
+from solver.problem.elements import Elements, elements
 from solver.problem.measurements import KEY, Measurements, sort_measurements
 from solver.problem.padding import pad
 from solver.problem.parameter_vector import VectorLayout
@@ -181,7 +182,7 @@ def _build(
         len(axes["coef"]),
         measurements.n_det,
         tuple((group.name, len(axes[group.axis])) for group in settings.optional_groups),
-        tuple(field_numbers(exposures).tolist()),
+        tuple(span_numbers(exposures).tolist()),
     )
     _check_freedom(len(measurements.row), len(sources), layout, settings.order)
     epoch = float(exposures["obstime"].mean())

@@ -7,13 +7,12 @@ are therefore kept and rebuilt for settings that select the same measurements, o
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
-from solver.data.exclusions import of_rows, thinned_orbit
+from solver.data.exclusions import thinned_orbit
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
-from solver.problem.noise import Noise
+from solver.problem.adjustments import UNADJUSTED, Adjustments
 from solver.problem.problem import Problem, build_problem, rebuilt, remaining
 
 # One problem for the fit and one for the what-ifs that follow it.
@@ -22,18 +21,12 @@ _CAPACITY = 2
 
 class _Entry(NamedTuple):
     selection: tuple[object, ...]
-    outliers: pd.DataFrame | None
-    noise: Noise | None
+    adjustments: Adjustments
     data: OrbitData
     problem: Problem
 
-    def matches(
-        self,
-        settings: FitSettings,
-        outliers: pd.DataFrame | None,
-        noise: Noise | None,
-    ) -> bool:
-        is_same = self.outliers is outliers and self.noise is noise
+    def matches(self, settings: FitSettings, adjustments: Adjustments) -> bool:
+        is_same = self.adjustments.is_same(adjustments)
         return is_same and self.selection == settings.selection()
 
 
@@ -47,17 +40,9 @@ class ProblemCache:
         self._entries: list[_Entry] = []
 
     def get(
-        self,
-        settings: FitSettings,
-        outliers: pd.DataFrame | None = None,
-        noise: Noise | None = None,
+        self, settings: FitSettings, adjustments: Adjustments = UNADJUSTED
     ) -> tuple[OrbitData, Problem]:
-        """Return the tables after exclusions and thinning, and their problem.
-
-        Parameters
-        ----------
-        outliers : further measurements to leave out, by the labels of the orbit's table
-        noise : uncertainties in place of those of the tables
+        """Return the tables after exclusions, thinning and adjustments, and their problem.
 
         Raises
         ------
@@ -66,27 +51,24 @@ class ProblemCache:
             remaining measurements are too few for the distortion order.
         """
         for entry in self._entries:
-            if entry.matches(settings, outliers, noise):
+            if entry.matches(settings, adjustments):
                 self._keep(entry)
                 return entry.data, rebuilt(entry.problem, self._instrument, settings)
         data = settings.exclusions.without(self._data)
         data = thinned_orbit(data, self._data, settings.thin)
-        if outliers is not None:
-            data = of_rows(data, ~data.measurements.index.isin(outliers.index))
-        if noise is not None:
-            data = noise.applied(data)
-        problem = self._of_fewer_rows(data, settings, noise)
+        data = adjustments.applied(data)
+        problem = self._of_fewer_rows(data, settings, adjustments)
         if problem is None:
             problem = build_problem(data, self._instrument, settings)
-        self._keep(_Entry(settings.selection(), outliers, noise, data, problem))
+        self._keep(_Entry(settings.selection(), adjustments, data, problem))
         return data, problem
 
     def _of_fewer_rows(
-        self, data: OrbitData, settings: FitSettings, noise: Noise | None
+        self, data: OrbitData, settings: FitSettings, adjustments: Adjustments
     ) -> Problem | None:
         """Return the problem of some tables, made from that of a table with more rows."""
         for entry in self._entries:
-            if entry.noise is not noise:
+            if not entry.adjustments.leaves_same(adjustments):
                 continue
             rows = entry.data.measurements.index
             if not 0 < len(data.measurements) < len(rows) or not rows.is_unique:

@@ -1,8 +1,9 @@
-"""Records of the verdict carried over to another version of it that judges alike."""
+"""Records of the verdict carried over to another version of it, of the cases it judges alike."""
 
 import itertools
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,10 +15,26 @@ _SAME = ("state", "causes", "converged", "failed")
 _ROUNDING = 0.101
 
 
+class CarriedOver(NamedTuple):
+    """What was carried over.
+
+    Attributes
+    ----------
+    records : number of records
+    different : trials whose verdicts differ, in words, a line each; their cases were left out
+    """
+
+    records: int
+    different: list[str]
+
+
 def carry_over(
     path: Path, trial: Callable[[int], Record], before: str, version: str, count: int
-) -> list[str]:
-    """Mark the records of a version with another one, if a sample of trials gives the same again.
+) -> CarriedOver:
+    """Mark the records of a version with another one where a sample of trials gives the same again.
+
+    A case is a defect with or without its cause in the model, or no defect. The records of a case
+    are marked if all trials that are repeated of it have the same verdict.
 
     Parameters
     ----------
@@ -25,10 +42,6 @@ def carry_over(
     trial : given its number, returns what is recorded
     before, version : version of the records, and the one that they are carried over to
     count : number of trials that are repeated, or a few more
-
-    Returns
-    -------
-    What differs, a line for each trial; if any does, the records are left as they are
 
     Raises
     ------
@@ -39,14 +52,15 @@ def carry_over(
     if not records:
         raise ValueError(f"expected records of version {before} in {path}, found none")
     repeated = {number: trial(number) for number in sample(records, count)}
-    different = [
-        f"{number}: recorded {_said(records[number])}, now {_said(found)}"
+    different = {
+        number: f"{_words(number)}, {number}: recorded {_said(records[number])}, now {_said(found)}"
         for number, found in repeated.items()
         if not is_same(records[number], found)
-    ]
-    if not different:
-        mark_records(path, before, version)
-    return different
+    }
+    changed = {_case_of(number) for number in different}
+    same = {number for number in records if _case_of(number) not in changed}
+    mark_records(path, before, version, same)
+    return CarriedOver(len(same), list(different.values()))
 
 
 def sample(numbers: Iterable[int], count: int) -> list[int]:
@@ -63,9 +77,15 @@ def is_same(record: Record, other: Record) -> bool:
     return apart < _ROUNDING and all(record.get(name) == other.get(name) for name in _SAME)
 
 
-def _case_of(number: int) -> str:
-    case = trial_of(number).case
-    return case.name if case else ""
+def _case_of(number: int) -> tuple[str, bool]:
+    """Return the defect of a trial, and whether its cause is modelled."""
+    trial = trial_of(number)
+    return (trial.case.name if trial.case else "", trial.is_modelled)
+
+
+def _words(number: int) -> str:
+    name, is_modelled = _case_of(number)
+    return f"{name or 'clean'}{' modelled' if is_modelled else ''}"
 
 
 def _said(record: Record) -> str:

@@ -5,7 +5,7 @@ Trials are numbered, and the number is the seed: a trial can be repeated alone, 
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import Any
@@ -74,15 +74,15 @@ def read_records(path: Path, version: str | None = None) -> dict[int, Record]:
     return records
 
 
-def mark_records(path: Path, before: str, version: str) -> None:
-    """Mark the records of a version in a file with another one, all or none of them."""
+def mark_records(path: Path, before: str, version: str, chosen: Collection[int]) -> None:
+    """Mark the chosen records of a version in a file with another one, all or none of them."""
     lines = []
     for line in path.read_text(encoding="utf-8").splitlines():
         try:
             record = json.loads(line)
         except json.JSONDecodeError:
             continue
-        if record.get("version") == before:
+        if record.get("version") == before and record["trial"] in chosen:
             record["version"] = version
         lines.append(json.dumps(record) + "\n")
     written = path.with_name(f"{path.name}.part")

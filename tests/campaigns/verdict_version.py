@@ -5,12 +5,16 @@ import hashlib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-# What decides on the state of a solution and on the first cause, and what names it.
+# What decides on the state of a solution and on the first cause, what names it, and what a fit
+# with a cause adjusts before its solution.
 _PARTS = (
     "solver/results/diagnosis/*.py",
     "plateviz/tables/causes.py",
     "plateviz/tables/*cause_words.py",
     "plateviz/tables/verdict.py",
+    "solver/engines/moves.py",
+    "solver/engines/noise.py",
+    "solver/engines/variance_model.py",
 )
 
 

@@ -7,8 +7,8 @@ Sparse orbits of some 1,300 sources are simulated without and with each defect t
 show, at five amplitudes, and fitted with the default settings; and at the largest with its cause
 modelled. Each trial takes about two seconds of a core, all of them three hours. Trials are recorded
 with the version of the verdict; a stopped campaign goes on, and runs those of other versions again.
-The second form instead repeats a sample of the trials of another version, and marks all of its
-records with the present one if each has the same verdict.
+The second form instead repeats a sample of the trials of another version, and marks its records
+with the present one, but for those of cases of which a trial has another verdict now.
 """
 
 import argparse
@@ -54,17 +54,18 @@ def main() -> int:
 
 
 def carry(records: Path, before: str, version: str, count: int) -> int:
-    """Carry the records of a version over to the present one, or say which trials differ."""
+    """Carry the records of a version over to the present one, and say which trials differ."""
     try:
-        different = carry_over(records, trial, before, version, count)
+        found = carry_over(records, trial, before, version, count)
     except ValueError as error:
         write(str(error))
         return 2
-    if different:
-        write("Nothing is changed: the verdicts of these trials differ.")
-    for line in different:
+    write(f"{found.records} records are carried over.")
+    if found.different:
+        write("Not those of the cases of these trials, whose verdicts differ:")
+    for line in found.different:
         write(line)
-    return 1 if different else 0
+    return 1 if found.different else 0
 
 
 def trial(number: int) -> Record:
@@ -127,7 +128,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument(
         "--carry-over", metavar="VERSION", help="mark its records with the present version"
     )
-    parser.add_argument("--sample", type=int, default=60, help="trials repeated before that")
+    parser.add_argument("--sample", type=int, default=160, help="trials repeated before that")
     parser.add_argument("--write", type=Path, help="folder of verdicts.md and its figure")
     return parser.parse_args()
 

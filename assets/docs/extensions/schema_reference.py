@@ -50,7 +50,7 @@ _AXES: dict[Axis, str] = {
     "own": "term and detector",
     "walk": "term and exposure",
     "det": "detector",
-    "motion": "detector and field",
+    "motion": "detector and field, or part of it after a move",
 }
 _DERIVED: dict[str, Callable] = {
     "RESULT": lambda result: layout.source_sigmas(result.sources),

@@ -75,7 +75,7 @@ def modelled(
     """
     yield from _of_terms(result, camera, rows, widths)
     yield from _of_detectors(camera, rows, widths, _faintness(result)[rows.source])
-    yield from _of_motion(result, camera, rows, widths)
+    yield from _of_motion(camera, rows, widths)
 
 
 def walk_terms(result: FitResult, rows: Rows) -> list[np.ndarray]:
@@ -169,18 +169,15 @@ def _of_detectors(
             yield Vector(x * on, y * on, sigma)
 
 
-def _of_motion(
-    result: FitResult, camera: Camera, rows: Rows, widths: dict[str, np.ndarray]
-) -> Iterator[Column]:
-    """Yield the columns of detectors that move and turn from field to field."""
+def _of_motion(camera: Camera, rows: Rows, widths: dict[str, np.ndarray]) -> Iterator[Column]:
+    """Yield the columns of detectors that move and turn from span to span."""
     if "detector_turn" not in widths:
         return
-    field = np.unique(result.exposures["field_id"].to_numpy(), return_inverse=True)[1]
-    of_row = field[rows.exposure]
+    of_row = camera.span[rows.exposure]
     pixel = RAD_PER_ARCSEC * rows.pixel * camera.pitch[rows.detector]
     turned = np.stack([-pixel[:, 1], pixel[:, 0]], axis=1)
     x, y = onto_focal_plane(turned, camera.turn, rows.detector).T
-    later = max(int(field.max()), 1)
+    later = max(int(camera.span.max()), 1)
     for element in range(len(camera.turn) * later):
         moved = (rows.detector == element // later) & (of_row == element % later + 1)
         on = moved.astype(float)

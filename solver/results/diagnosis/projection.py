@@ -28,7 +28,7 @@ from solver.results.diagnosis.patterns import Family, Patterns
 from solver.results.diagnosis.products import products
 from solver.results.diagnosis.rows import Camera, Rows
 
-# Measurements from which the covariance is computed, and exposures of each field.
+# Measurements from which the covariance is computed, and exposures of each span.
 _MOST_ROWS, _LEAST_EXPOSURES = 12_000, 4
 # Of sums of weights, relative.
 _ROUNDING = 1e-9
@@ -138,17 +138,17 @@ def _subset(rows: Rows, camera: Camera, n_sources: int) -> tuple[Rows, float]:
     """Return a part of the rows that stands for all, and how many of its sources one stands for.
 
     A source stays at one place of the focal plane while a field is exposed. So few exposures of
-    each field have nearly all that the data say, if each is given the weight of those about it:
-    the ones of most weight, since the noise may differ between exposures. What counts are the
-    sources: of these, as many are taken as there is time for.
+    each field, or of each span of it, have nearly all that the data say, if each is given the
+    weight of those about it: the ones of most weight, since the noise may differ between exposures.
+    What counts are the sources: of these, as many are taken as there is time for.
     """
-    each = max(int(_MOST_ROWS / max(rows.n, 1) * len(camera.time) / (camera.field.max() + 1)), 0)
+    each = max(int(_MOST_ROWS / max(rows.n, 1) * len(camera.time) / (camera.span.max() + 1)), 0)
     of_exposure = np.bincount(rows.exposure, rows.weight, len(camera.time))
     factor = np.zeros(len(camera.time))
-    for field in np.unique(camera.field):
-        of_field = np.flatnonzero(camera.field == field)
-        count = min(max(each, _LEAST_EXPOSURES), len(of_field))
-        for group in np.array_split(of_field, count):
+    for span in np.unique(camera.span):
+        of_span = np.flatnonzero(camera.span == span)
+        count = min(max(each, _LEAST_EXPOSURES), len(of_span))
+        for group in np.array_split(of_span, count):
             # The first of equal ones: their sums differ by rounding, with the order of the rows.
             is_heavy = of_exposure[group] >= (1.0 - _ROUNDING) * of_exposure[group].max()
             heaviest = group[np.argmax(is_heavy)]

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from solver.data.detector_spans import Move, span_numbers, with_moves
 from solver.data.result import FitResult
 from solver.units import RAD_PER_MAS
 
@@ -75,6 +76,7 @@ class Camera(NamedTuple):
     time : of each exposure, from -0.5 for the first to 0.5 for the last
     phase : of the satellite's orbit about the Earth, zero in the middle of the exposures, rad
     field : number of the field of each exposure, from 0, in order of time
+    span : of the exposures among which detectors do not move (`solver.data.detector_spans`)
     um_per_mas : on the focal plane
     """
 
@@ -87,6 +89,7 @@ class Camera(NamedTuple):
     time: np.ndarray
     phase: np.ndarray
     field: np.ndarray
+    span: np.ndarray
     um_per_mas: float
 
 
@@ -185,6 +188,7 @@ def _camera(
     exposures, fitted = result.exposures, result.values_on("exp")
     days = exposures["obstime"].to_numpy()
     span = max(float(np.ptp(days)), 1e-12)
+    moves = [Move(**one) for one in result.summary.get("detector_moves", [])]
     start = exposures.groupby("field_id")["obstime"].transform("min")
     roll = np.radians(fitted["position_angle"].to_numpy())
     period = result.settings.breathing_period / _MINUTES_PER_DAY
@@ -198,5 +202,6 @@ def _camera(
         (days - days.min()) / span - 0.5,
         2.0 * np.pi * (days - 0.5 * (days.min() + days.max())) / period,
         np.unique(start.to_numpy(), return_inverse=True)[1],
+        span_numbers(with_moves(exposures, moves)),
         float(fitted["focal_length"].mean()) * RAD_PER_MAS,
     )

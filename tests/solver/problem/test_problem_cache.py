@@ -4,6 +4,7 @@ import pytest
 
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
+from solver.problem.adjustments import Adjustments
 from solver.problem.priors import Priors
 from solver.problem.problem import build_problem
 from solver.problem.problem_cache import ProblemCache
@@ -91,7 +92,7 @@ def test_cache_distinguishes_outliers_of_different_fits(cache, small_orbit):
     rows = small_orbit.data.measurements
     _, none = cache.get(DEFAULT)
     for outliers in (rows.iloc[:3], rows.iloc[3:4]):
-        _, problem = cache.get(DEFAULT, outliers)
+        _, problem = cache.get(DEFAULT, Adjustments(outliers=outliers))
         remaining = rows.index.difference(outliers.index)
         np.testing.assert_array_equal(np.sort(problem.measurements.label), remaining)
     _, again = cache.get(DEFAULT)

@@ -1,0 +1,43 @@
+"""Spans: exposures among which no detector moves, where a fit lets detectors move.
+
+A field is one span, and two or more where a detector was found to move within it.
+"""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Int
+
+# Of the exposures: how often a detector has moved within the field until then.
+MOVES = "moves_in_field"
+
+
+class Move(NamedTuple):
+    """A move of a detector within a field.
+
+    Attributes
+    ----------
+    field_id, plate_id : of the first exposure after it
+    obstime : of that exposure, MJD in TCB
+    """
+
+    field_id: int
+    plate_id: int
+    obstime: float
+
+
+def with_moves(exposures: pd.DataFrame, moves: Iterable[Move]) -> pd.DataFrame:
+    """Return exposures that know of moves, by their time: some exposures may be left out."""
+    count = np.zeros(len(exposures), dtype=np.int64)
+    for move in moves:
+        in_field = exposures["field_id"] == move.field_id
+        count += (in_field & (exposures["obstime"] >= move.obstime)).to_numpy()
+    return exposures.assign(**{MOVES: count})
+
+
+def span_numbers(exposures: pd.DataFrame) -> Int[np.ndarray, " exp"]:
+    """Return the number of the span of each exposure, from 0, in order of the fields."""
+    names = ["field_id", MOVES] if MOVES in exposures else ["field_id"]
+    return exposures.groupby(names).ngroup().to_numpy()

@@ -1,0 +1,54 @@
+"""What a fit adjusts before its solution: outliers, moves of detectors, and the noise."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from solver.data.instrument import Instrument
+from solver.data.result import FitResult
+from solver.data.settings import FitSettings
+from solver.engines.gauss_newton import Iteration
+from solver.engines.moves import find_moves
+from solver.engines.noise import estimate_noise
+from solver.engines.robust import find_outliers, outlier_table
+from solver.problem.adjustments import UNADJUSTED, Adjustments
+from solver.problem.problem_cache import ProblemCache
+
+
+def find_adjustments(
+    cache: ProblemCache,
+    instrument: Instrument,
+    settings: FitSettings,
+    progress: Callable[[Iteration], None] = lambda _: None,
+) -> Adjustments:
+    """Return what the settings ask the fit to adjust, each found with those before it.
+
+    Raises
+    ------
+    InputError
+        If the settings exclude data that do not exist, or need more data than there are.
+    """
+    found = UNADJUSTED
+    data, problem = cache.get(settings)
+    if settings.robust:
+        outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
+        found = found._replace(outliers=outliers)
+        _, problem = cache.get(settings, found)
+    if settings.detector_motion:
+        found = found._replace(moves=find_moves(problem, instrument, settings, progress))
+        _, problem = cache.get(settings, found)
+    if settings.has_noise_model:
+        found = found._replace(noise=estimate_noise(problem, settings, progress))
+    return found
+
+
+def with_adjustments(result: FitResult, found: Adjustments) -> FitResult:
+    """Return a result with what was adjusted in its summary."""
+    summary, outliers = dict(result.summary), result.outliers
+    if found.outliers is not None:
+        summary["n_outliers"] = len(found.outliers)
+        outliers = found.outliers.reset_index(drop=True)
+    if found.moves:
+        summary["detector_moves"] = [move._asdict() for move in found.moves]
+    if found.noise is not None:
+        summary["noise"] = found.noise.entry
+    return replace(result, summary=summary, outliers=outliers)

@@ -35,7 +35,7 @@ from tests.benchmarks.machine import write
 from tests.campaigns.carried import carry_over
 from tests.campaigns.defects import SETTINGS, pulls, sparse_orbit
 from tests.campaigns.trials import Record, read_records, run_trials
-from tests.campaigns.true_causes import deviations, truth_of
+from tests.campaigns.true_causes import all_deviations
 from tests.campaigns.verdict_cases import Trial, numbers, trial_of
 from tests.campaigns.verdict_page import write_page
 from tests.campaigns.verdict_version import verdict_version
@@ -100,13 +100,11 @@ def of_truth(wanted: Trial, result: FitResult) -> dict[str, float | int]:
         return {}
     of_survey = replace(SETTINGS, seed=wanted.orbit)
     orbit_id = wanted.orbit % SETTINGS.orbits
-    truth = truth_of(
-        Case(case.name, wanted.factor * case.amplitude, of_survey, orbit_id), result.exposures
-    )
-    if not truth:
+    defect = Case(case.name, wanted.factor * case.amplitude, of_survey, orbit_id)
+    found = all_deviations(defect, result)
+    if not found:
         return {}
-    found = [np.ravel(deviations(result, group, values)) for group, values in truth.items()]
-    together = np.concatenate(found)
+    together = np.concatenate(list(found.values()))
     return {
         "deviation": round(float(np.sqrt(np.mean(together**2))), 3),
         "parameters": together.size,

@@ -182,13 +182,18 @@ def _far(squares: np.ndarray, left: np.ndarray, first: np.ndarray) -> np.ndarray
     return is_far & (left > _LEAST_LEFT)
 
 
+def detector_spans(result: FitResult) -> np.ndarray:
+    """Return the number of the span of each exposure in which detectors do not move, from 0."""
+    moves = [Move(**one) for one in result.summary.get("detector_moves", [])]
+    return span_numbers(with_moves(result.exposures, moves))
+
+
 def _camera(
     result: FitResult, turn: np.ndarray, pitch: np.ndarray, half: np.ndarray, scale: float
 ) -> Camera:
     exposures, fitted = result.exposures, result.values_on("exp")
     days = exposures["obstime"].to_numpy()
     span = max(float(np.ptp(days)), 1e-12)
-    moves = [Move(**one) for one in result.summary.get("detector_moves", [])]
     start = exposures.groupby("field_id")["obstime"].transform("min")
     roll = np.radians(fitted["position_angle"].to_numpy())
     period = result.settings.breathing_period / _MINUTES_PER_DAY
@@ -202,6 +207,6 @@ def _camera(
         (days - days.min()) / span - 0.5,
         2.0 * np.pi * (days - 0.5 * (days.min() + days.max())) / period,
         np.unique(start.to_numpy(), return_inverse=True)[1],
-        span_numbers(with_moves(exposures, moves)),
+        detector_spans(result),
         float(fitted["focal_length"].mean()) * RAD_PER_MAS,
     )

@@ -15,6 +15,7 @@ from plateviz.figures.figure import (
 from plateviz.figures.glyphs import horizontal, line, points, texts
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.style import PANEL_WIDTH
+from plateviz.plots.units import power_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.convergence import convergence, loss_excess
 
@@ -92,7 +93,7 @@ def _objective(table: pd.DataFrame, width: int) -> Figure:
     return framed(
         _trace(table, "objective"),
         title="Objective: χ² of data and priors",
-        subtitle=f"from {first:,.6g} to {last:,.6g}",
+        subtitle=f"from {power_text(first, 6)} to {power_text(last, 6)}",
         x=Axis(_XLABEL, _limits(table), ticks=_whole_ticks(table)),
         y=Axis("objective (χ²)", limits, is_log=is_log),
         width=width,
@@ -141,13 +142,14 @@ def _last_step(rows: pd.DataFrame, tolerance: float) -> str:
     last = rows.iloc[-1]
     verdict = "below" if last["largest_step"] < tolerance else "above"
     # The parameter is last, because it may be cut off: source ids have nineteen digits.
-    return f"{verdict} tolerance: {last['largest_step']:.2g} σ ({last['largest_parameter']})"
+    step = power_text(float(last["largest_step"]), 2)
+    return f"{verdict} tolerance: {step} σ ({last['largest_parameter']})"
 
 
 def _trace(rows: pd.DataFrame, column: str) -> list[Glyphs]:
     rows = rows.assign(
-        step_text=[f"{value:.2g}" for value in rows["largest_step"]],
-        damping_text=[f"{value:.2g}" for value in rows["damping"]],
+        step_text=[power_text(value, 2) for value in rows["largest_step"]],
+        damping_text=[power_text(value, 2) for value in rows["damping"]],
     )
     size = 7.0 if len(rows) <= _MARKERS_UP_TO else 0.0
     return [

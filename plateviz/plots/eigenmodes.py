@@ -11,6 +11,7 @@ from plateviz.figures.figure import Axis, Figure, Glyphs, framed, message, side_
 from plateviz.figures.glyphs import horizontal, points, rectangles, texts
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.style import CLASS_COLOURS, PANEL_WIDTH, SERIES_COLOURS
+from plateviz.plots.units import power_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.eigenmodes import (
     CALIBRATION,
@@ -73,7 +74,9 @@ def plot_eigenmode_spectrum(table: pd.DataFrame, *, width: int = PANEL_WIDTH) ->
             xlabel=_MODE_LABEL,
             ylabel=_SHARE_LABEL,
         )
-    rows = table.assign(relative_text=[f"{value:.1e}" for value in table["relative_information"]])
+    rows = table.assign(
+        relative_text=[power_text(value, 2) for value in table["relative_information"]]
+    )
     weak = int((rows["data_share"] < _WEAK_BELOW).sum())
     information = rows["relative_information"]
     ticks = [(float(tick), str(tick)) for tick in _MODE_TICKS if tick <= len(rows)]
@@ -94,7 +97,7 @@ def plot_eigenmode_spectrum(table: pd.DataFrame, *, width: int = PANEL_WIDTH) ->
             panel(
                 list(_points(rows, "relative_information")),
                 title="Information relative to other parameters fixed",
-                subtitle=f"smallest: {information.min():.1e}",
+                subtitle=f"smallest: {power_text(float(information.min()), 2)}",
                 y=Axis(
                     "relative information (ratio)",
                     (0.2 * float(information.min()), 5.0 * float(information.max())),

@@ -5,6 +5,7 @@ import pandas as pd
 from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Glyphs, framed, message
 from plateviz.figures.glyphs import points, rectangles, texts, vertical
 from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.units import power_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.prior_shares import prior_shares
 
@@ -19,6 +20,8 @@ _HOVER = [
     ("σ of the prior", "@{prior_sigma}{0.000} @{unit}"),
 ]
 _ROW_HEIGHT = 30
+# Shares below would be zero with two decimals.
+_LEAST = 0.005
 _TICKS = [(share, f"{share:g}") for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
 
 
@@ -62,7 +65,7 @@ def _largest(table: pd.DataFrame) -> list[Glyphs]:
     """Return the largest share of each group as a separate column without grid lines."""
     rows = table.groupby("row")
     largest, is_flat = rows["prior_share"].max(), rows["prior_sigma"].min() == float("inf")
-    words = ["flat" if is_flat[row] else _text(share) for row, share in largest.items()]
+    words = ["flat" if is_flat[row] else _rounded(share) for row, share in largest.items()]
     ground = {"left": [1.02], "right": [1.18], "bottom": [-0.55], "top": [len(largest) - 0.45]}
     x, y = [1.165] * len(largest), largest.index.to_numpy(dtype=float)
     return [
@@ -72,7 +75,11 @@ def _largest(table: pd.DataFrame) -> list[Glyphs]:
 
 
 def _text(share: float) -> str:
-    return f"{share:.2f}" if share >= 0.005 or share == 0.0 else f"{share:.0e}"
+    return f"{share:.2f}" if share >= _LEAST or share == 0.0 else power_text(share, 1)
+
+
+def _rounded(share: float) -> str:
+    return "< 0.01" if 0.0 < share < _LEAST else f"{share:.2f}"
 
 
 def _plot(chosen: Chosen) -> Figure:

@@ -5,6 +5,9 @@ import math
 from solver.units import UAS_PER_MAS
 
 _UAS_BELOW_MAS = 0.5
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+# Sizes of numbers that need no power of ten.
+_PLAIN = (1e-3, 1e6)
 # Units in steps of a factor of a thousand.
 _FINER = {"arcsec": ("arcsec", "mas", "µas"), "µm": ("µm", "nm", "pm")}
 
@@ -37,6 +40,18 @@ def finer_unit(size: float, unit: str) -> tuple[str, float]:
 def orbits_text(number: int) -> str:
     """Return a number of orbits as text: "1 orbit", "83 orbits"."""
     return f"{number:,} orbit{'' if number == 1 else 's'}"
+
+
+def power_text(value: float, digits: int) -> str:
+    """Return a number to so many digits, a very small or large one with a power of ten.
+
+    Such as "0.026", or "7.2 × 10⁻¹²" where seven digits or leading zeros would be needed.
+    """
+    text = f"{value:,.{digits}g}"
+    if value and math.isfinite(value) and not _PLAIN[0] <= abs(value) < _PLAIN[1]:
+        number, power = f"{value:.{digits - 1}e}".split("e")
+        text = f"{number} × 10{str(int(power)).translate(_RAISED)}"
+    return text
 
 
 def number_text(value: float, digits: int) -> str:

@@ -282,10 +282,9 @@ def _priors(
     layout: VectorLayout,
     walks: Walks,
 ) -> Priors:
+    has_width = {name for name in centres if np.isfinite(settings.width(name))}
     is_gamma = {
-        name: np.full(
-            len(values), BY_NAME[name].family == "gamma" and np.isfinite(settings.width(name))
-        )
+        name: np.full(len(values), BY_NAME[name].family == "gamma" and name in has_width)
         for name, values in centres.items()
     }
     return Priors(

@@ -86,9 +86,12 @@ class PageClient:
         body = json.dumps({"token": token, "window": _WINDOW})
         await self._fetch("session", method="POST", body=body)
         request = HTTPRequest(f"{self._address.replace('http', 'ws', 1)}ws{self._query}")
-        self._connection = await websocket_connect(
-            request, subprotocols=["bokeh", token], max_message_size=_MOST_BYTES
-        )
+        try:
+            self._connection = await websocket_connect(
+                request, subprotocols=["bokeh", token], max_message_size=_MOST_BYTES
+            )
+        except (HTTPError, OSError) as error:
+            raise PageError(f"websocket: {error}") from error
         self._listening = asyncio.create_task(self._listen())
         await self.until(lambda: self._is_there)
         await self._write("PULL-DOC-REQ", {})

@@ -251,7 +251,7 @@ def test_sources_are_selected_in_one_figure_shown_in_all_saved_and_left_out(page
     # A drag that begins beside the frame selects nothing, and is no error.
     drag(page, "residual-map", (0.05, 0.05), (0.6, 0.7))
     expect(bar).to_have_count(0)
-    drag(page, "residual-map", (0.3, 0.4), (0.6, 0.7))
+    drag(page, "residual-map", (0.45, 0.5), (0.7, 0.75))
     expect(bar).to_be_visible()
     [[n_selected, n_sources]] = until(
         page, lambda: [rows for rows in [selected(page, "footprint")] if rows[0] > 0]

@@ -43,7 +43,7 @@ class RequestState(param.Parameterized):
 
     def refuse(self, message: str) -> None:
         """Show why a request failed; the last solution stays."""
-        self.param.update(stage=Stage.FAILED, message=message)
+        self.param.update(stage=Stage.FAILED, message=message, is_brief=False)
 
     def follow(self, job: Job, **changes: Any) -> None:  # noqa: ANN401 values of any parameters
         """Take over how far a job is, with other changes of the state."""

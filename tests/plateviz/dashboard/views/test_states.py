@@ -95,6 +95,10 @@ def test_nothing_is_said_of_a_what_if_that_has_only_begun(fresh, monkeypatch):
     assert session.stage is Stage.STALE
     assert session.message
     assert (outdated.visible, refit._message.visible) == (False, False)
+    # What is refused is told at once.
+    session.refuse("no exposure")
+    assert (outdated.visible, refit._message.visible) == (True, True)
+    session.follow(session.job, stage=Stage.STALE)
     monkeypatch.setattr(type(session.job), "seconds", 1.6)
     session.poll()
     assert (outdated.visible, refit._message.visible) == (True, True)

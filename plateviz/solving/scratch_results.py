@@ -18,8 +18,8 @@ from plateviz.runs.scratch_result import is_written, read_scratch_result
 from solver.data.result import FitResult
 
 MOST_BYTES = 2**31
-"""Room of all results together, unless pages show more."""
-# Results used last are not removed: a page may be about to show them.
+"""Room of all results but those used last, unless pages show more."""
+# Of those used last, parts may still be written, and a page may be about to show them.
 _LEAST, _MOST_READ = 16, 16
 
 
@@ -31,7 +31,7 @@ class ScratchResults:
         self._most_bytes = most_bytes
         self._read = lru_cache(_MOST_READ)(partial(read_scratch_result, hurry=hurry))
         self._lock = Lock()
-        # Directory -> size in bytes, 0 until it is written.
+        # Directory -> size in bytes, 0 until it is known.
         self._sizes: OrderedDict[Path, int] = OrderedDict()
         # Those that are used somewhere.
         self._in_use: WeakValueDictionary[Path, FitResult] = WeakValueDictionary()
@@ -60,11 +60,12 @@ class ScratchResults:
             return result
 
     def _removed(self) -> list[Path]:
-        for directory, size in self._sizes.items():
-            if not size and is_written(directory):
+        old = list(islice(self._sizes, max(0, len(self._sizes) - _LEAST)))
+        for directory in old:
+            if not self._sizes[directory] and is_written(directory):
                 self._sizes[directory] = _size(directory)
-        total, removed = sum(self._sizes.values()), []
-        for directory in list(islice(self._sizes, max(0, len(self._sizes) - _LEAST))):
+        total, removed = sum(self._sizes[directory] for directory in old), []
+        for directory in old:
             if total <= self._most_bytes:
                 break
             if self._sizes[directory] and directory not in self._in_use and _remove(directory):
@@ -74,7 +75,12 @@ class ScratchResults:
 
 
 def _size(directory: Path) -> int:
-    return sum(file.stat().st_size for file in directory.iterdir())
+    """Return the bytes of the files of a directory; one may be renamed meanwhile."""
+    total = 0
+    for file in directory.iterdir():
+        with suppress(FileNotFoundError):
+            total += file.stat().st_size
+    return total
 
 
 def _remove(directory: Path) -> bool:

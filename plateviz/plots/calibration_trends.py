@@ -10,11 +10,11 @@ from plateviz.plots.units import finer_unit, number_text
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.calibration_trends import calibration_trends
 from plateviz.tables.survey_tables import SurveyTables
+from solver.units import ARCSEC_PER_DEG
 
 _TITLE = "Trends of the calibration"
 _XLABEL, _YLABEL = "epoch (Julian year, TCB)", "value minus mean"
 _HOVER = [("orbit", "@{orbit_id}"), ("value minus mean", "@{offset}{0.000} @{unit}")]
-_ARCSEC_PER_DEG = 3600.0
 _ANGLES = {1: "angle of the first orbit", -1: "other angle", 0: "orbits"}
 
 
@@ -70,7 +70,7 @@ def _in_finer_unit(rows: pd.DataFrame) -> pd.DataFrame:
     """Return the rows in a unit in which the values are not small fractions."""
     unit, factor = str(rows["unit"].iloc[0]), 1.0
     if unit == "deg":
-        unit, factor = "arcsec", _ARCSEC_PER_DEG
+        unit, factor = "arcsec", ARCSEC_PER_DEG
     largest = factor * float(rows["offset"].abs().max())
     if largest > 0.0:
         unit, finer = finer_unit(largest, unit)

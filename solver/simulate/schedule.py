@@ -13,9 +13,7 @@ from solver.simulate.seasons import Season
 from solver.simulate.settings import SurveySettings
 from solver.simulate.sky import galactic_to_icrs, position_angle_to_icrs
 from solver.simulate.streams import Stream
-from solver.units import ARCSEC_PER_DEG
-
-_SECONDS_PER_DAY = 86_400.0
+from solver.units import ARCSEC_PER_DEG, SECONDS_PER_DAY
 
 
 def schedule(settings: SurveySettings) -> pd.DataFrame:
@@ -49,7 +47,7 @@ def orbit_schedule(orbit_id: int, settings: SurveySettings) -> pd.DataFrame:
             "orbit_id": np.full(len(fields), orbit_id, dtype=np.int64),
             "field_id": fields,
             "plate_id": plates,
-            "obstime": start + seconds / _SECONDS_PER_DAY,
+            "obstime": start + seconds / SECONDS_PER_DAY,
             "glon": glon[fields],
             "glat": glat[fields],
             "pa": float(season.position_angle_deg),

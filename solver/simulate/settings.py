@@ -17,9 +17,7 @@ from solver.simulate.defects.table import BY_NAME
 from solver.simulate.defects.text import format_defect, parse_defects
 from solver.simulate.seasons import SEASONS, Season, read_season
 from solver.simulate.streams import Stream, generator
-
-_SECONDS_PER_DAY = 86_400.0
-
+from solver.units import SECONDS_PER_DAY
 
 # Eq. (exp:distortion) as rows k, l, A_kl, B_kl, um.
 _DISTORTION_UM = (
@@ -176,7 +174,7 @@ class SurveySettings:
     def orbit_days(self) -> float:
         """Time from the first exposure's start to the last one's end, days."""
         exposures = self.n_fields * self.exposures_per_field * self.exposure_s
-        return (exposures + (self.n_fields - 1) * self.field_change_s) / _SECONDS_PER_DAY
+        return (exposures + (self.n_fields - 1) * self.field_change_s) / SECONDS_PER_DAY
 
     @property
     def season_days(self) -> float:

@@ -8,9 +8,9 @@ from solver.results.diagnosis.rows import detector_spans
 from solver.simulate.defects.defect import Case
 from solver.simulate.defects.detectors import motion
 from solver.simulate.defects.distortion_terms import ORBITAL_PERIOD_S, of_higher_order
+from solver.units import SECONDS_PER_DAY
 
 _PERCENT = 0.01
-_SECONDS_PER_DAY = 86_400.0
 
 
 def true_terms(case: Case, degree: int) -> np.ndarray:
@@ -88,7 +88,7 @@ def truth_of(case: Case, exposures: pd.DataFrame) -> dict[str, np.ndarray | floa
         return {"drift_x": x, "drift_y": y}
     if case.name == "distortion-orbital":
         # The phase of the fit is zero halfway between the first and the last exposure.
-        half = 0.5 * _SECONDS_PER_DAY * float(np.ptp(exposures["obstime"]))
+        half = 0.5 * SECONDS_PER_DAY * float(np.ptp(exposures["obstime"]))
         phase = case.orbit_rng().uniform(0.0, 2.0 * np.pi)
         phase += 2.0 * np.pi * half / ORBITAL_PERIOD_S
         x, y = (

@@ -9,10 +9,10 @@ import pandas as pd
 from jaxtyping import Float
 
 from solver.simulate.defects.defect import Case, elapsed, survey_time
+from solver.units import SECONDS_PER_DAY
 
 # Period of a circular orbit 600 km above the Earth, the paper's section "Discussion".
 ORBITAL_PERIOD_S = 5_801.0
-_SECONDS_PER_DAY = 86_400.0
 
 _QUADRATIC, _CUBIC, _ABOVE_FIFTH = (2,), (3,), (6, 7)
 
@@ -39,7 +39,7 @@ def drifting(case: Case, attitude: pd.DataFrame) -> AddedTerms:
 
 def oscillating(case: Case, attitude: pd.DataFrame) -> AddedTerms:
     """Return quadratic terms that change with the phase of the satellite's orbit."""
-    seconds = _SECONDS_PER_DAY * (attitude["obstime"] - attitude["obstime"].min())
+    seconds = SECONDS_PER_DAY * (attitude["obstime"] - attitude["obstime"].min())
     phase = case.orbit_rng().uniform(0.0, 2.0 * np.pi)
     angle = 2.0 * np.pi * seconds.to_numpy() / ORBITAL_PERIOD_S + phase
     return _added(case, _QUADRATIC, np.cos(angle))

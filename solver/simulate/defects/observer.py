@@ -6,8 +6,8 @@ import pandas as pd
 
 from solver.simulate.defects.defect import Case
 from solver.simulate.defects.distortion_terms import ORBITAL_PERIOD_S
+from solver.units import SECONDS_PER_DAY
 
-_SECONDS_PER_DAY = 86_400.0
 _MJD_ZERO = 2400000.5
 _VELOCITY = ["satellite_vx", "satellite_vy", "satellite_vz"]
 
@@ -24,7 +24,7 @@ def satellite_velocity(case: Case, attitude: pd.DataFrame) -> pd.DataFrame:
     first = np.cross([0.0, 0.0, 1.0], sun)
     first /= np.linalg.norm(first)
     second = np.cross(sun, first)
-    turns = _SECONDS_PER_DAY * (time - time.min()) / ORBITAL_PERIOD_S
+    turns = SECONDS_PER_DAY * (time - time.min()) / ORBITAL_PERIOD_S
     phase = 2.0 * np.pi * (turns + case.orbit_rng().random())
     velocity = case.amplitude * (
         np.cos(phase)[:, None] * first[None, :] + np.sin(phase)[:, None] * second[None, :]
@@ -34,4 +34,4 @@ def satellite_velocity(case: Case, attitude: pd.DataFrame) -> pd.DataFrame:
 
 def exposure_times(case: Case, exposures: pd.DataFrame) -> pd.DataFrame:
     """Record times that are too late."""
-    return exposures.assign(obstime=exposures["obstime"] + case.amplitude / _SECONDS_PER_DAY)
+    return exposures.assign(obstime=exposures["obstime"] + case.amplitude / SECONDS_PER_DAY)

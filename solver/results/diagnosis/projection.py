@@ -25,7 +25,6 @@ from solver.results.diagnosis.fitted import (
     with_sources,
 )
 from solver.results.diagnosis.patterns import Family, Patterns
-from solver.results.diagnosis.products import products
 from solver.results.diagnosis.rows import Camera, Rows
 
 # Measurements from which the covariance is computed, and exposures of each span.
@@ -98,8 +97,10 @@ class Projection(NamedTuple):
         return self._replace(products=products, left=self.left - cross @ inverse @ cross.T)
 
 
-def project(result: FitResult, camera: Camera, rows: Rows, patterns: Patterns) -> Projection:
-    """Return the products of the patterns with the residuals, and their covariance."""
+def covariance_of_products(
+    result: FitResult, camera: Camera, rows: Rows, patterns: Patterns
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return `total` and `left` of `Projection`, which the residuals do not change."""
     some, ratio = _subset(rows, camera, len(result.sources))
     shared = shared_columns(result, camera, some)
     columns = columns_at(patterns, some).with_(shared, np.sqrt(some.weight))
@@ -131,7 +132,7 @@ def project(result: FitResult, camera: Camera, rows: Rows, patterns: Patterns) -
     left[np.ix_(fast, fast)] = ratio * kept.T @ (np.tile(some.left, 2)[:, None] * kept)
     if result.settings.pixel_phase:
         left[fast] = left[:, fast] = 0.0
-    return Projection(products(patterns, rows), total, left, float(rows.weight.sum()))
+    return total, left
 
 
 def _subset(rows: Rows, camera: Camera, n_sources: int) -> tuple[Rows, float]:

@@ -1,6 +1,7 @@
 """All tests of one solution, with their chance, in one table."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,8 @@ from solver.data.result import FitResult
 from solver.results.diagnosis.exposures import WAVES, ExposureChi2, exposure_chi2
 from solver.results.diagnosis.modelled import is_adjusted
 from solver.results.diagnosis.patterns import Family, Patterns
-from solver.results.diagnosis.projection import Projection, project
+from solver.results.diagnosis.products import products
+from solver.results.diagnosis.projection import Projection, covariance_of_products
 from solver.results.diagnosis.rate import discoveries, log_chance, of_many, sigmas
 from solver.results.diagnosis.references import (
     ReferenceChi2,
@@ -21,6 +23,7 @@ from solver.results.diagnosis.references import (
 from solver.results.diagnosis.rows import Camera, Rows, camera_rows
 from solver.results.diagnosis.scatter import scatter_tests
 from solver.results.diagnosis.swapped import Swapped, swapped
+from solver.runtime.threads import one_blas_thread
 
 # If all is well, the probability that any test is a discovery: a solution to be used with care,
 # and one that is not to be trusted.
@@ -102,20 +105,25 @@ class Diagnosis(NamedTuple):
         return pd.DataFrame(self.tests, columns=list(Test._fields))
 
 
+@one_blas_thread()
 def diagnose(result: FitResult) -> Diagnosis:
     """Return the tests of a solution."""
     camera, rows = camera_rows(result)
     magnitude = source_magnitudes(result)
-    exposures = exposure_chi2(rows)
-    swings, swinging = _swings(exposures, camera.field)
-    of_others = np.where(result.sources["is_reference"].to_numpy(bool), np.nan, magnitude)
-    scatter = scatter_tests(rows, of_others, without=swinging)
-    scale = max(scatter[0].value, 1.0)
-    still = np.isin(rows.exposure, swinging, invert=True)
-    rows = rows._replace(residual=rows.residual * still[:, None])
     patterns = Patterns(camera, int(result.summary["order"]), magnitude)
-    projection = project(result, camera, rows, patterns)
-    references, pairs = reference_chi2(result.sources), swapped(result)
+    # The covariance takes as long as all else here.
+    with ThreadPoolExecutor(1) as thread:
+        covariance = thread.submit(covariance_of_products, result, camera, rows, patterns)
+        exposures = exposure_chi2(rows)
+        swings, swinging = _swings(exposures, camera.field)
+        of_others = np.where(result.sources["is_reference"].to_numpy(bool), np.nan, magnitude)
+        scatter = scatter_tests(rows, of_others, without=swinging)
+        scale = max(scatter[0].value, 1.0)
+        still = np.isin(rows.exposure, swinging, invert=True)
+        rows = rows._replace(residual=rows.residual * still[:, None])
+        references, pairs = reference_chi2(result.sources), swapped(result)
+        along, weight = products(patterns, rows), float(rows.weight.sum())
+        projection = Projection(along, *covariance.result(), weight)
     tests = [
         *(Test(one.name, one.name, (), *one[1:5], sigmas(one.log_chance)) for one in scatter),
         _of_pairs(pairs),

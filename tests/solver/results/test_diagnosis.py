@@ -14,7 +14,7 @@ from solver.problem.problem import build_problem
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.columns import columns_at, order_of
 from solver.results.diagnosis.patterns import Patterns
-from solver.results.diagnosis.projection import project
+from solver.results.diagnosis.projection import covariance_of_products
 from solver.results.diagnosis.rows import camera_rows, onto_focal_plane
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, diagnose
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
@@ -51,7 +51,7 @@ def covariances_of_patterns(fit, problem, dense):
     """
     camera, rows = camera_rows(fit)
     patterns = Patterns(camera, ORDER, np.full(len(fit.sources), np.nan))
-    projection = project(fit, camera, rows, patterns)
+    total, left = covariance_of_products(fit, camera, rows, patterns)
     input_rows = np.lexsort((fit.residuals["detector_id"], fit.exposure_index))
     working = np.empty(problem.n_obs, dtype=int)
     working[problem.measurements.row] = np.arange(problem.n_obs)
@@ -71,9 +71,9 @@ def covariances_of_patterns(fit, problem, dense):
     along = dense.jacobian.T @ whitened
     exact = whitened.T @ whitened - along.T @ dense.covariance @ along
     # Some cells have no stars.
-    slow = np.setdiff1d(np.flatnonzero(np.diag(projection.total)), patterns.fast)
-    scale = np.sqrt(np.diag(projection.total)[slow])
-    return (one[np.ix_(slow, slow)] / np.outer(scale, scale) for one in (projection.left, exact))
+    slow = np.setdiff1d(np.flatnonzero(np.diag(total)), patterns.fast)
+    scale = np.sqrt(np.diag(total)[slow])
+    return (one[np.ix_(slow, slow)] / np.outer(scale, scale) for one in (left, exact))
 
 
 def test_covariance_of_patterns_is_that_of_the_whole_problem(small_orbit, problem, dense):

@@ -11,6 +11,7 @@ import argparse
 import statistics
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 # Import this checkout, whatever the working directory.
@@ -19,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 # Imported before NumPy, as in the program, because it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
+from plateviz.tables.verdict import with_verdict
 from solver.data.exclusions import Exclusions
 from solver.fit import fit_orbit
 from solver.engines.gauss_newton import Mode, find_mode
@@ -29,6 +31,7 @@ from solver.runtime.memory import keep_memory
 from solver.linear.normal_equations import accumulate
 from solver.linear.chi2 import gradient
 from solver.data.orbit import OrbitData
+from solver.data.result import FitResult
 from solver.problem.problem import Problem, build_problem, rebuilt
 from solver.linear.source_elimination import eliminate_sources
 from solver.data.settings import FitSettings
@@ -59,7 +62,7 @@ def main() -> None:
     peak = peak_memory_mib()
     fit_orbit(data, MINI_MOCK, WALKING)
     product, units, timings = unit_product(problem), [], {}
-    for name, work in stages(data, problem, settings).items():
+    for name, work in stages(data, problem, settings, warm).items():
         # Timed before each stage, because the speed of a shared machine varies.
         units.append(time_of(product, UNIT_REPEATS))
         timings[name] = time_of(work, arguments.repeat)
@@ -90,9 +93,14 @@ def parse_arguments() -> argparse.Namespace:
 
 
 def stages(
-    data: OrbitData, problem: Problem, settings: FitSettings
+    data: OrbitData, problem: Problem, settings: FitSettings, fit: FitResult
 ) -> dict[str, Callable[[], object]]:
-    """Return the timed stages by name."""
+    """Return the timed stages by name.
+
+    Parameters
+    ----------
+    fit : of these data
+    """
     mode = find_mode(problem, settings)
     theta, sources = mode.theta, mode.sources
     equations = accumulate(problem, theta, sources)
@@ -114,6 +122,8 @@ def stages(
         "svi, one step": svi_block(problem, settings, mode),
         "fit_orbit, with all tables": lambda: fit_orbit(data, MINI_MOCK, settings),
         "fit_orbit, random walk 2": lambda: fit_orbit(data, MINI_MOCK, WALKING),
+        # Of a copy, which keeps nothing of the time before.
+        "the verdict on a fit": lambda: with_verdict(replace(fit)),
     }
 
 

@@ -10,6 +10,7 @@ DIR is a survey with a run, such as `plateviz simulate DIR && plateviz survey DI
 - `closed`: the memory that 200 pages leave, opened and closed as fast as the server allows, after
   the first six;
 - `gets`: the memory that 500 requests of the page leave;
+- `few`: three pages without any harm, to compare with the next two;
 - `flood`: three pages while another client sends as many requests as it can;
 - `malformed`: three pages while a client sends 1,000 messages that are wrong.
 
@@ -65,8 +66,10 @@ _IN_TIME = 1.5
 _WHOLE = 15.0
 _PATIENCE_OF_MANY = 120.0
 _MORE_MB = 20.0
-# Pages that others disturb.
+# Pages that others disturb, or do not.
 _FEW = 3
+# How often a soak looks at the memory after its first minutes.
+_TIMES = 10
 # After so long the server has ended the session of a page that was closed, and given memory back.
 _FORGOTTEN_SECONDS = 45
 # Pages that are opened and closed before any is counted; of those that are, one in so many is
@@ -151,7 +154,7 @@ def soak(scene: Scene) -> None:
     memory: list[float] = []
 
     async def watch() -> None:
-        for duration in (first, seconds - first):
+        for duration in (first, *_TIMES * [(seconds - first) / _TIMES]):
             await asyncio.sleep(duration)
             memory.append(memory_mb(scene.process))
 
@@ -173,7 +176,8 @@ def soak(scene: Scene) -> None:
     )
     _report_actions(scene, "soak")
     report_memory("soak: memory after the first minutes", memory[0], "")
-    report_memory("soak: memory at the end", memory[1], "the same")
+    report_memory("soak: memory at the end", memory[-1], "the same")
+    write(f"    in equal steps between: {', '.join(f'{one:.0f}' for one in memory[1:-1])} MB")
 
 
 def closed(scene: Scene) -> None:
@@ -213,6 +217,12 @@ def gets(scene: Scene) -> None:
 
     more = asyncio.run(ask())
     report_memory(f"gets: {scene.asked.gets} requests of the page", more, f"{_MORE_MB:g} MB")
+
+
+def few(scene: Scene) -> None:
+    """Click on a few pages that nobody disturbs."""
+    _click(scene, _FEW, scene.asked.seconds)
+    _report_actions(scene, "few")
 
 
 def flood(scene: Scene) -> None:
@@ -265,6 +275,7 @@ PARTS: dict[str, Part] = {
     "soak": soak,
     "closed": closed,
     "gets": gets,
+    "few": few,
     "flood": flood,
     "malformed": malformed,
 }
@@ -364,7 +375,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--gets", type=int, default=500, help="requests of the page")
     parser.add_argument("--flood", type=int, default=20_000, help="most requests of the flood")
     parser.add_argument("--malformed", type=int, default=1000, help="messages that are wrong")
-    parser.add_argument("--seconds", type=float, default=60.0, help="of flood and malformed")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of few, flood and malformed")
     parser.add_argument("--pause", type=float, default=3.0, help="seconds between actions")
     parser.add_argument("--no-fits", action="store_true", help="sessions without fits with svi")
     parser.add_argument("--no-browser", action="store_true", help="without a page in Chromium")

@@ -19,7 +19,6 @@ from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWork
 from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.runs.queries import SurveyRun
 from plateviz.tables.explore import EXPLORABLE
-from solver.data.settings import FitSettings
 from solver.errors import InputError
 
 
@@ -204,9 +203,8 @@ class Navigation(param.Parameterized):
         self.param.update({WORKSPACES[self.view]: workspace})
 
     def choose_orbit(self, orbit: int | None) -> None:
-        """Show an orbit with the settings on the screen, from the run if it has that solution."""
-        shown = self.session.shown
-        self._show_orbit(orbit, shown.settings if shown else None)
+        """Show an orbit with the settings on the screen; before a what-if, what it changes."""
+        self._show_orbit(orbit, self.session.shown)
 
     def open_orbit(self, orbit: int) -> None:
         """Open the solution of an orbit in the run; fit the orbit if the run has none."""
@@ -215,7 +213,8 @@ class Navigation(param.Parameterized):
 
     def expect_orbit(self) -> None:
         """Let the orbit of the run be read ahead that is likely to be asked for next."""
-        selection, shown = self.session.selection, self.session.shown
+        # Of a what-if, the one that it changes.
+        selection, shown = self.session.selection, self.session.fitted
         run = self._runs.get(shown.run) if shown is not None else None
         if run is not None:
             run.expect(self._next_orbit.after(selection.orbit, selection.param["orbit"].objects))
@@ -231,14 +230,17 @@ class Navigation(param.Parameterized):
             self.find_source(text)
             self.view = View.SOURCE
 
-    def _show_orbit(self, orbit: int | None, settings: FitSettings | None) -> None:
+    def _show_orbit(self, orbit: int | None, last: Solution | None) -> None:
         session = self.session
         try:
-            found = self._default(orbit)
+            found = self._solution(None, orbit)
         except InputError as error:
             session.refuse(str(error))
             return
-        if isinstance(found, Request) or settings not in (None, found.settings):
+        is_other = last is not None and last.settings != found.settings
+        if last is not None and last.is_what_if and is_other:
+            session.open(Request(orbit, last.settings, is_what_if=True), found)
+        elif isinstance(found, Request) or is_other:
             session.show_orbit(orbit)
         else:
             session.show_result(found)
@@ -252,21 +254,18 @@ class Navigation(param.Parameterized):
             session.limit_selection()
             return
         try:
-            solution = self._find("solution", orbit) or self._default(orbit)
+            solution = self._find("solution", orbit) or self._solution(None, orbit)
             other = self._find("against", orbit)
             if other is None and isinstance(solution, Request) and solution.is_what_if:
                 # It is a change of that solution, to which the controls lead back.
-                other = self._default(orbit)
+                other = self._solution(None, orbit)
         except InputError as error:
             session.refuse(str(error))
             return
         session.open(solution, other)
 
-    def _default(self, orbit: int | None) -> Solution | Request:
-        """Return the solution of the run; InputError if it cannot be read."""
-        return self._solution(None, orbit)
-
     def _solution(self, text: str | None, orbit: int | None) -> Solution | Request:
+        """Return the solution of a text, None for that of the run; InputError if unreadable."""
         return find_solution(text, orbit, self.run, self._runs, self.session.store.kept)
 
     def _find(self, name: str, orbit: int | None) -> Solution | Request | None:

@@ -53,6 +53,21 @@ def test_list_has_the_solutions_of_the_session_the_kept_ones_and_those_of_runs(p
     ]
 
 
+def test_what_if_of_another_orbit_follows_the_solution_of_the_run(page, run, monkeypatch):
+    monkeypatch.setattr(run, "has_fitted", lambda orbit: True)
+    session = page.session
+    session.choices.order = 3
+    end_job(page)
+    assert session.shown.is_what_if
+    page.choose_orbit(1)
+    assert (session.shown.run, session.shown.orbit) == ("default", 1)
+    assert session.job is not None
+    end_job(page)
+    shown = session.shown
+    assert (shown.orbit, shown.is_what_if, shown.settings.order) == (1, True, 3)
+    assert (session.other.run, session.choices.order) == ("default", 3)
+
+
 def test_what_if_on_the_screen_is_listed_and_stays_once_it_has_a_name(page):
     session = page.session
     session.choices.order = 3

@@ -338,9 +338,14 @@ def _page(scene: Scene, open_page: Callable[[], Page]) -> Page:
 
 
 async def _opened(scene: Scene, query: str) -> PageClient:
-    """Return a page that has drawn its figures."""
-    page = await PageClient(scene.address, query).open()
-    await page.ready()
+    """Return a page that has drawn its figures; one that does not is closed."""
+    page = PageClient(scene.address, query)
+    try:
+        await page.open()
+        await page.ready()
+    except PageError:
+        await page.close()
+        raise
     return page
 
 

@@ -52,7 +52,7 @@ def writing(path: Path, what: str = "to write the file") -> Iterator[None]:
         yield
     except OSError as error:
         raise disk_error(error, path, what) or InputError(
-            f"{path}: expected {what}, found: {error}"
+            f"{path}: expected {what}, found: {error.strerror or error}"
         ) from error
 
 

@@ -22,8 +22,10 @@ from plateviz.solving.forecast import Forecast, JobTimes, about
 from plateviz.solving.job import Job
 from solver.io.scratch import temporary_folder
 
-# A fit checks for a cancellation between iterations, which take well under a second.
-_GRACE_SECONDS = 3.0
+# A fit checks for a cancellation between iterations, which take well under a second; but the first
+# one compiles, and other work may slow all down. A new process takes seconds, too, and has lost all
+# that what-ifs start from.
+_GRACE_SECONDS = 15.0
 # Time in which the process removes what it has not finished.
 _END_SECONDS = 5.0
 _SHORT_SECONDS = 5.0

@@ -1,13 +1,14 @@
 """The solution store with a real solver process, which fits, cancels, dies and restarts."""
 
 import json
+import signal
 import tempfile
 
 import pandas as pd
 import pytest
 
 from plateviz.runs.worker_scratch import worker_scratch
-from plateviz.solving import scratch_results
+from plateviz.solving import scratch_results, solver_queue
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.origin import OrbitFiles, SurveyFolder, origin_from_dict, origin_to_dict
 from plateviz.solving.solution_store import SolutionStore
@@ -124,6 +125,17 @@ def test_process_that_dies_is_reported_and_replaced(store):
     assert job.wait(LONG) is JobStatus.FAILED
     assert "the solver process ended" in job.message
     assert store.request(1, FitSettings(order=6)).wait(LONG) is JobStatus.DONE
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="no process can be stopped here")
+def test_process_that_does_not_give_up_a_fit_is_replaced(store, monkeypatch):
+    monkeypatch.setattr(solver_queue, "_GRACE_SECONDS", 0.2)
+    settings = FitSettings(order=6, prior_widths={"sources": 4.0})
+    job = store.request(1, settings)
+    store._solver._process.send_signal(signal.SIGSTOP)
+    store.cancel(job)
+    assert job.wait(LONG) is JobStatus.CANCELLED
+    assert store.request(1, settings).wait(LONG) is JobStatus.DONE
 
 
 def test_solution_that_made_room_for_others_is_computed_again(store, monkeypatch):

@@ -97,6 +97,14 @@ def test_exposures_that_each_scatter_are_no_move(small_orbit):
     assert "detector_moves" not in fit_orbit(data, small_orbit.instrument, MOVING).summary
 
 
+def test_exposures_of_the_same_time_are_not_divided(shifted, small_orbit):
+    _, place = shifted
+    exposures = small_orbit.data.exposures.copy()
+    exposures["obstime"] = exposures.groupby("field_id")["obstime"].transform("min")
+    data = replace(moved(small_orbit, 2, *place), exposures=exposures)
+    assert "detector_moves" not in fit_orbit(data, small_orbit.instrument, MOVING).summary
+
+
 def test_measurements_after_a_move_are_no_outliers(shifted, small_orbit):
     _, place = shifted
     data = moved(small_orbit, 2, *place)

@@ -40,7 +40,7 @@ _LOADER = re.compile(r"<script[^>]*/es-module-shims[^>]*></script>")
 # Id of the element that the page is put into.
 _PLACE = "page"
 _MOST_BYTES = 2**16
-# No more files of a page follow after so long; and a session waits for them so long at most.
+# Seconds without traffic after which a page has its files, and the longest wait for that.
 _QUIET_SECONDS = 0.03
 _MOST_SECONDS = 0.3
 

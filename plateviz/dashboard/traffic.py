@@ -1,4 +1,4 @@
-"""Traffic: since when a server neither gets requests nor sends what they asked for."""
+"""Traffic: how long a server has had no requests, and no answers on their way."""
 
 import time
 from weakref import WeakSet
@@ -24,7 +24,7 @@ class Traffic:
 
     @property
     def quiet_seconds(self) -> float:
-        """Seconds without a request, and since no answer was seen on its way."""
+        """Seconds since the last request, or since an answer was last seen on its way."""
         now = time.monotonic()
         if any(stream.writing() for stream in self._streams):
             self._latest = now

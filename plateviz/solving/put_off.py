@@ -33,7 +33,7 @@ class PutOff:
         (self._next if is_next else self._waiting).append(work)
 
     def limit(self) -> None:
-        """Do the oldest now of what too much of its kind waits."""
+        """Do the oldest work of each kind until no more than `_MOST` of it waits."""
         for waiting in (self._next, self._waiting):
             while len(waiting) > _MOST:
                 _do(waiting.popleft())

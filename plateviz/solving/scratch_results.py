@@ -19,7 +19,8 @@ from solver.data.result import FitResult
 
 MOST_BYTES = 2**31
 """Room of all results but those used last, unless pages show more."""
-# Of those used last, parts may still be written, and a page may be about to show them.
+# Results used last that are never removed: parts of them may still be written, and a page may be
+# about to show them. And results that are kept open once they are read.
 _LEAST, _MOST_READ = 16, 16
 
 

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 
-import numpy as np
-
 from plateviz.tables.cause_case import Case, Said
 from plateviz.tables.data_cause_words import (
     said_of_noise,
@@ -50,7 +48,9 @@ def _step(case: Case) -> Said:
     step = case.diagnosis.patterns.times[-case.diagnosis.patterns.n_steps :][
         case.found.test.what[1]
     ]
-    first = int(case.result.exposures["field_id"].iloc[int(np.flatnonzero(step > 0.0)[0])])
+    # The exposures are in order of the fields, which may be numbered otherwise than in time.
+    later = case.result.exposures[step > 0.0]
+    first = int(later.loc[later["obstime"].idxmin(), "field_id"])
     return Said(
         "distortion-steps",
         f"the distortion changes at field {first}",

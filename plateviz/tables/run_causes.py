@@ -65,6 +65,9 @@ def _of_orbits(diagnosis: RunDiagnosis, tables: RunTests) -> list[Cause]:
     named = tables.orbit_causes[tables.orbit_causes["name"] != ""]
     if not found & {"care", "bad", "together"} or named.empty:
         return []
+    # An orbit may name a cause several times, as for two detectors: the most certain one counts.
+    named = named.sort_values(["orbit_id", "significance"], ascending=[True, False])
+    named = named.drop_duplicates(["orbit_id", "name"])
     total = len(diagnosis.states)
     least = max(_LEAST_ORBITS, _LEAST_SHARE * total)
     return [
@@ -101,6 +104,11 @@ def _zonal(case: Case) -> Cause:
     row = case.tables.zonal.iloc[0]
     rms = float(row["rms"])
     typical = _typical_sigma(case.motions)
+    spoils = f"It spoils all positions, by about {rms:.2g} mas, which more orbits do not reduce"
+    if np.isfinite(typical):
+        spoils += (
+            f"; the motions fitted to all orbits have a typical uncertainty of {typical:.2g} mas"
+        )
     words = (
         "The reference stars of neighbouring places deviate together, and the frames of the "
         "orbits and their distortion follow as they would the catalogue, not the focal plane: "
@@ -112,8 +120,7 @@ def _zonal(case: Case) -> Cause:
         "the reference catalogue has smooth errors, which neighbouring stars share",
         words,
         float(case.test.sigma),
-        f"It spoils all positions, by about {rms:.2g} mas, which more orbits do not reduce; the "
-        f"motions fitted to all orbits have a typical uncertainty of {typical:.2g} mas.",
+        f"{spoils}.",
         "state larger errors of the reference stars, or use another catalogue",
         (f"--prior sources={max(_widened(case, rms), 1.1):.2f}",),
         rms > _LARGE_SHARE * typical,
@@ -121,18 +128,24 @@ def _zonal(case: Case) -> Cause:
 
 
 def _typical_sigma(motions: pd.DataFrame) -> float:
-    """Return the median uncertainty of the fitted positions, mas; NaN without motions."""
-    if motions.empty:
-        return float("nan")
-    many = ~motions["is_reference"] & (motions["n_orbits"] >= _MIN_ORBITS_OF_SOURCE)
-    return float(np.nanmedian(motions.loc[many, ["sigma_ra", "sigma_dec"]]))
+    """Return the median uncertainty of the fitted positions, mas; NaN if none is fitted."""
+    many = ~motions["is_reference"].astype(bool) & (motions["n_orbits"] >= _MIN_ORBITS_OF_SOURCE)
+    rows = motions[many] if many.any() else motions
+    return _median(rows[["sigma_ra", "sigma_dec"]])
 
 
 def _widened(case: Case, rms: float) -> float:
     """Return the factor on the errors of the reference stars that has room for the field."""
-    rows = case.motions[case.motions["is_reference"]]
-    stated = float(np.nanmedian(rows[["sigma_catalogue_ra", "sigma_catalogue_dec"]]))
+    rows = case.motions[case.motions["is_reference"].astype(bool)]
+    stated = _median(rows[["sigma_catalogue_ra", "sigma_catalogue_dec"]])
     return float(np.hypot(1.0, rms / stated)) if stated > 0.0 else 1.1
+
+
+def _median(table: pd.DataFrame) -> float:
+    """Return the median of the known values of a table; NaN if there is none."""
+    values = table.to_numpy(dtype=float)
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else float("nan")
 
 
 def _against_time(case: Case) -> Cause:
@@ -140,10 +153,9 @@ def _against_time(case: Case) -> Cause:
     kind, group = case.test.subject, case.test.name.partition(" of ")[2]
     unit = unit_text(trend.unit)
     change = f"{abs(trend.change):.3g} {unit}".rstrip()
-    orbits = case.tables.calibrations["orbit_id"].unique()
     how = {
         "trend": f"It changes by {change} from the first orbit to the last",
-        "jump": f"It changes by {change} at orbit {orbits[trend.at]}",
+        "jump": f"It changes by {change} at orbit {trend.orbit}",
         "season": f"It differs by {change} between position angles",
     }[kind]
     title = {

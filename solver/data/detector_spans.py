@@ -29,7 +29,10 @@ class Move(NamedTuple):
 
 
 def with_moves(exposures: pd.DataFrame, moves: Iterable[Move]) -> pd.DataFrame:
-    """Return exposures that know of moves, by their time: some exposures may be left out."""
+    """Return exposures with the column `MOVES`.
+
+    The time of a move decides: the exposure that it names may have been left out.
+    """
     count = np.zeros(len(exposures), dtype=np.int64)
     for move in moves:
         in_field = exposures["field_id"] == move.field_id

@@ -1,4 +1,4 @@
-"""What a fit adjusts before its solution: outliers, moves of detectors, and the noise."""
+"""What a fit adjusts before its solution: moves of detectors, outliers, and the noise."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,7 +9,7 @@ from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration
 from solver.engines.moves import find_moves
 from solver.engines.noise import estimate_noise
-from solver.engines.robust import find_outliers, outlier_table
+from solver.engines.robust import find_outliers, outlier_table, with_robust_weights
 from solver.problem.adjustments import UNADJUSTED, Adjustments
 from solver.problem.problem_cache import ProblemCache
 
@@ -29,12 +29,15 @@ def find_adjustments(
     """
     found = UNADJUSTED
     data, problem = cache.get(settings)
+    if settings.detector_motion:
+        # Before the outliers, for which all measurements of a detector that has moved would be
+        # taken; these have little weight meanwhile.
+        searched = with_robust_weights(problem, settings, progress) if settings.robust else problem
+        found = found._replace(moves=find_moves(searched, instrument, settings, progress))
+        data, problem = cache.get(settings, found)
     if settings.robust:
         outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
         found = found._replace(outliers=outliers)
-        _, problem = cache.get(settings, found)
-    if settings.detector_motion:
-        found = found._replace(moves=find_moves(problem, instrument, settings, progress))
         _, problem = cache.get(settings, found)
     if settings.has_noise_model:
         found = found._replace(noise=estimate_noise(problem, settings, progress))

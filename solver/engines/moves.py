@@ -107,9 +107,11 @@ def _clearest(problem: Problem, sums: _Sums) -> Move | None:
         rows = np.flatnonzero(spans == span)
         rows = rows[np.argsort(time[rows], kind="stable")]
         gain, chance = _gains(_Sums(sums.gram[:, rows], sums.along[:, rows]))
-        gains.append(gain)
-        chances.append(chance)
-        after.append(rows[1:])
+        # Exposures of the same time are not divided.
+        is_later = np.diff(time[rows]) > 0.0
+        gains.append(gain[:, is_later])
+        chances.append(chance[:, is_later])
+        after.append(rows[1:][is_later])
     candidates, first = np.concatenate(gains, axis=1), np.concatenate(after)
     likely = np.concatenate(chances, axis=1) < _FALSE_ALARMS / max(candidates.size, 1)
     if not likely.any():

@@ -143,7 +143,7 @@ def _scaled(problem: Problem, sigma: Float[np.ndarray, "obs 2"], reference: floa
 def _step_of_references(
     problem: Problem, mode: Mode, covariance: Covariances, now: float
 ) -> tuple[float, float]:
-    """Return the same for the variance of the reference stars' catalogue errors.
+    """Return a scoring step of the logarithm of the references' variance, and its uncertainty.
 
     Parameters
     ----------

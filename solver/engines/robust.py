@@ -61,6 +61,45 @@ def find_outliers(
     -------
     None if the problem has no solution; the fit that follows reports the reason.
     """
+    last = _reweighted_fit(problem, settings, progress)
+    if last is None:
+        return None
+    # The squared distance of a good measurement is exponentially distributed with mean two.
+    limit = 2.0 * np.log(problem.n_obs / _FALSE_ALARMS)
+    return _outliers(problem, last.mode, last.squares > limit)
+
+
+def with_robust_weights(
+    problem: Problem,
+    settings: FitSettings,
+    progress: Callable[[Iteration], None] = lambda _: None,
+) -> Problem:
+    """Return the problem with the uncertainties that give the measurements Student's t weights.
+
+    It is the same problem if it has no solution.
+    """
+    last = _reweighted_fit(problem, settings, progress)
+    return problem if last is None else _weighted(problem, last.weight)
+
+
+class _ReweightedFit(NamedTuple):
+    """The last fit of a series, in which the weights follow the residuals of the fit before.
+
+    Attributes
+    ----------
+    squares : squared distances of the measurements from their predictions, in stated sigmas
+    weight : Student's t weights at these distances
+    """
+
+    mode: Mode
+    squares: Float[np.ndarray, " obs"]
+    weight: Float[np.ndarray, " obs"]
+
+
+def _reweighted_fit(
+    problem: Problem, settings: FitSettings, progress: Callable[[Iteration], None]
+) -> _ReweightedFit | None:
+    """Fit with Student's t; None if the problem has no solution."""
     mode = find_mode(problem, settings, progress)
     weight = np.ones(problem.n_obs)
     for _ in range(_MAX_ROUNDS):
@@ -71,10 +110,7 @@ def find_outliers(
         if np.abs(weight - before).max() < _WEIGHT_TOLERANCE:
             break
         mode = find_mode(_weighted(problem, weight), settings, progress, start=mode)
-    # The squared distance of a good measurement is exponentially distributed with mean two.
-    limit = 2.0 * np.log(problem.n_obs / _FALSE_ALARMS)
-    found = squares > limit
-    return _outliers(problem, mode, found)
+    return _ReweightedFit(mode, squares, weight)
 
 
 def outlier_table(

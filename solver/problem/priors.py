@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from solver.data.parameters import BY_NAME
+from solver.data.parameters import BY_NAME, SOURCES
 from solver.data.settings import FitSettings
+from solver.problem.parameter_vector import VectorLayout
 from solver.problem.walks import NO_WALKS, Walks
 
 
@@ -122,6 +123,35 @@ class Priors(NamedTuple):
         centre, offset = self.centre[self.is_gamma], theta[self.is_gamma]
         logarithm = (shape - 1.0) * np.log(value / centre)
         return float(2.0 * np.sum(offset / self._gamma_scale() - logarithm))
+
+
+def priors_of(
+    covariance: Float[np.ndarray, "src 2 2"],
+    centres: dict[str, Float[np.ndarray, " _"]],
+    settings: FitSettings,
+    layout: VectorLayout,
+    walks: Walks,
+) -> Priors:
+    """Return the priors of a problem.
+
+    Parameters
+    ----------
+    covariance : of the catalogue's (alpha*, delta) of each source, mas^2
+    centres : group name -> absolute values at offset zero, in the group's unit
+    """
+    widths = group_widths(settings, centres)
+    # A flat prior has no shape.
+    is_gamma = {
+        name: np.isfinite(width) & (BY_NAME[name].family == "gamma")
+        for name, width in widths.items()
+    }
+    return Priors(
+        centre=layout.gather(centres),
+        width=walks.with_widths_of_means(layout.gather(widths)),
+        is_gamma=layout.gather(is_gamma).astype(bool),
+        precision=np.linalg.inv(covariance * settings.width(SOURCES.name) ** 2),
+        walks=walks,
+    )
 
 
 def group_widths(

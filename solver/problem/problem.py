@@ -29,9 +29,9 @@ from solver.problem.measurements import KEY, Measurements, sort_measurements
 from solver.problem.padding import pad
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.prior_centres import calibration_centres, catalogue_shift
-from solver.problem.priors import Priors, group_widths
+from solver.problem.priors import Priors, priors_of
 from solver.problem.source_blocks import SourceBlocks
-from solver.problem.walks import Walks, walks_of
+from solver.problem.walks import walks_of
 from solver.units import ARCSEC_PER_DEG, RAD_PER_MAS
 
 # Lower orders are computed with additional coefficients of zero, so that they share a compilation.
@@ -197,7 +197,7 @@ def _build(
         measurements=measurements,
         sources=sources,
         exposures=exposures,
-        priors=_priors(places.covariance, centres, settings, layout, walks),
+        priors=priors_of(places.covariance, centres, settings, layout, walks),
         layout=layout,
         epoch=epoch,
         elements=axes,
@@ -272,27 +272,6 @@ def _geometry(
         distortion_scale=np.array(instrument.distortion_scale_um),
         order=order,
         causes=None if causes is None else padded(causes, sizes),
-    )
-
-
-def _priors(
-    covariance: Float[np.ndarray, "src 2 2"],
-    centres: dict[str, Float[np.ndarray, " _"]],
-    settings: FitSettings,
-    layout: VectorLayout,
-    walks: Walks,
-) -> Priors:
-    has_width = {name for name in centres if np.isfinite(settings.width(name))}
-    is_gamma = {
-        name: np.full(len(values), BY_NAME[name].family == "gamma" and name in has_width)
-        for name, values in centres.items()
-    }
-    return Priors(
-        centre=layout.gather(centres),
-        width=walks.with_widths_of_means(layout.gather(group_widths(settings, centres))),
-        is_gamma=layout.gather(is_gamma).astype(bool),
-        precision=np.linalg.inv(covariance * settings.width(SOURCES.name) ** 2),
-        walks=walks,
     )
 
 

@@ -62,7 +62,8 @@ class _Limit:
         with self._lock:
             self._inside -= 1
             if self._inside == 0:
-                # Only the thread that set the limit, or any if none is known, may change it.
+                # By threadpoolctl, only the thread that set a limit may change it, or any if none
+                # is known.
                 OpenBLASController.clear_controlling_thread(force=True)
                 self._limited.restore_original_limits()
                 OpenBLASController.clear_controlling_thread(force=True)

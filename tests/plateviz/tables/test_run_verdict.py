@@ -67,6 +67,45 @@ def test_cause_that_many_orbits_name_is_that_of_the_run(good):
     assert cause.significance == pytest.approx(6.0 * np.sqrt(30))
 
 
+def test_orbit_that_names_a_cause_twice_counts_once(good):
+    several = causes(4)
+    again = several[several["orbit_id"] < 4].assign(significance=5.0, title="another")
+    doubled = pd.concat([again, several]).sort_values("orbit_id", kind="stable")
+    verdict = judged(good, orbit_causes=doubled, orbit_tests=orbit_tests(5.0))
+    (cause,) = (one for one in verdict.causes if one.name == "distortion-drifts")
+    assert "4 of 40 orbits name it (0, 1, 2, 3)" in cause.words
+    assert cause.significance == pytest.approx(6.0 * np.sqrt(4))
+    assert cause.title == "in many orbits, the distortion drifts"
+
+
+def test_two_causes_of_one_name_in_one_orbit_are_no_cause_of_the_run(good):
+    one = causes(1)
+    doubled = pd.concat([one, *[one[one["orbit_id"] == 0]] * 4]).sort_values("orbit_id")
+    verdict = judged(good, orbit_causes=doubled, orbit_tests=orbit_tests(5.0))
+    assert "distortion-drifts" not in [cause.name for cause in verdict.causes]
+
+
+def test_jump_is_said_at_its_orbit_though_orbits_lack_its_group(good):
+    table = calibrations()
+    later = (table["orbit_id"] >= 20) & (table["label"] == "A 1 1")
+    table.loc[later, "value"] += 20.0
+    others = table[table["orbit_id"] < 3].assign(group="another group")
+    # As where some orbits lack what others have.
+    verdict = judged(good, calibrations=pd.concat([others, table[table["orbit_id"] >= 3]]))
+    (cause,) = (one for one in verdict.causes if one.name == "calibration-jump")
+    assert "at orbit 20," in cause.words
+
+
+@pytest.mark.parametrize("of_references", [True, False], ids=["only references", "no motions"])
+def test_smooth_errors_are_named_without_motions_of_other_sources(good, of_references):
+    orbits, motions = good
+    known = motions[motions["is_reference"]] if of_references else motions.iloc[:0].astype(object)
+    verdict = run_verdict(orbits, known, tables(zonal=zonal(80.0)))
+    (cause,) = (one for one in verdict.causes if one.name == "zonal-errors")
+    assert "nan" not in cause.sentence()
+    assert cause.is_large == of_references
+
+
 def test_single_bad_orbit_is_named_but_no_flaw_of_the_run(good):
     verdict = judged(good, orbit_causes=causes(1))
     assert verdict.state == "good"

@@ -97,6 +97,27 @@ def test_exposures_that_each_scatter_are_no_move(small_orbit):
     assert "detector_moves" not in fit_orbit(data, small_orbit.instrument, MOVING).summary
 
 
+def test_exposures_of_the_same_time_are_not_divided(shifted, small_orbit):
+    _, place = shifted
+    exposures = small_orbit.data.exposures.copy()
+    exposures["obstime"] = exposures.groupby("field_id")["obstime"].transform("min")
+    data = replace(moved(small_orbit, 2, *place), exposures=exposures)
+    assert "detector_moves" not in fit_orbit(data, small_orbit.instrument, MOVING).summary
+
+
+def test_measurements_after_a_move_are_no_outliers(shifted, small_orbit):
+    _, place = shifted
+    data = moved(small_orbit, 2, *place)
+    rows = data.measurements.copy()
+    wild = rows.index[::70]
+    rows.loc[wild, "nx"] += np.resize([1.0, -2.0], len(wild))
+    data = replace(data, measurements=rows)
+    result = fit_orbit(data, small_orbit.instrument, MOVING.with_(robust=True))
+    assert places(result) == [place]
+    assert result.summary["n_outliers"] == len(wild)
+    assert result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.15)
+
+
 def test_a_what_if_keeps_the_moves(shifted):
     fitter, (field, plate) = shifted
     fitted = fitter.fit(MOVING)

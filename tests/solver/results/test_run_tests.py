@@ -210,8 +210,11 @@ def test_change_of_a_parameter_is_seen_and_named(kind, change, size):
     assert found[kind].change == pytest.approx(size, rel=0.25)
 
 
-def test_place_of_a_jump_is_its_first_orbit():
-    assert trends_of(calibrations(lambda time, _: 8.0 * (time > 0.2)))["jump"].at == 12
+def test_place_of_a_jump_is_the_id_of_its_first_orbit():
+    table = calibrations(lambda time, _: 8.0 * (time > 0.2))
+    assert trends_of(table)["jump"].orbit == 12
+    assert trends_of(table.assign(orbit_id=2 * table["orbit_id"] + 5))["jump"].orbit == 29
+    assert trends_of(table)["trend"].orbit is None
 
 
 def test_scatter_alone_is_no_trend():

@@ -52,14 +52,14 @@ class Trend(NamedTuple):
     test : of the group, `size_um` NaN
     label, unit : of the parameter
     change : from the first to the last orbit, at the jump, or between the seasons
-    at : orbit number (0, 1, ...) of the first orbit after a jump, or -1
+    orbit : orbit_id of the first orbit after a jump; None for the other tests
     """
 
     test: Test
     label: str
     unit: str
     change: float
-    at: int = -1
+    orbit: int | None = None
 
 
 def all_series(calibrations: pd.DataFrame) -> Iterator[Series]:
@@ -132,7 +132,8 @@ def _jump(series: Series, usable: Bool[np.ndarray, " parameter"], base: list) ->
     at, best = np.unravel_index(int(np.argmin(every)), every.shape)
     chance = of_many(float(every[at, best]), every.size)
     change = float(changes[int(at)][best])
-    return _told(series, usable, "jump", int(best), chance, change, int(order[places[int(at)]]))
+    orbit = series.orbits[int(order[places[int(at)]])]
+    return _told(series, usable, "jump", int(best), chance, change, orbit)
 
 
 def _chances(
@@ -163,9 +164,9 @@ def _told(
     best: int,
     chance: float,
     change: float,
-    at: int = -1,
+    orbit: int | None = None,
 ) -> Trend:
     number = int(np.flatnonzero(usable)[best])
     sigma = sigmas(chance)
     test = Test(f"{kind} of {series.group}", kind, (), sigma, 0.0, 1.0, chance, sigma)
-    return Trend(test, series.labels[number], series.units[number], change, at)
+    return Trend(test, series.labels[number], series.units[number], change, orbit)

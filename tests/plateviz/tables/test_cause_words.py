@@ -1,0 +1,23 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from plateviz.tables.cause_words import said_of
+from solver.results.diagnosis.table import Test
+
+
+@pytest.mark.parametrize(("step", "field"), [(0, 7), (1, 2)])
+def test_step_is_at_the_field_that_comes_first_in_time(step, field):
+    # In time, the fields are 5, 7 and 2.
+    exposures = pd.DataFrame({"field_id": [2, 5, 7], "obstime": [61_803.0, 61_801.0, 61_802.0]})
+    number = np.array([2, 0, 1])
+    patterns = SimpleNamespace(times=(number >= [[1], [2]]) - 0.5, n_steps=2)
+    test = Test("distortion between fields", "step", (2, step), 50.0, 6.0, 3.0, -20.0, 5.0, 0.1)
+    case = SimpleNamespace(
+        found=SimpleNamespace(test=test),
+        diagnosis=SimpleNamespace(patterns=patterns),
+        result=SimpleNamespace(exposures=exposures),
+    )
+    assert said_of(case).title == f"the distortion changes at field {field}"

@@ -76,7 +76,7 @@ ORBIT_TESTS = Table(
         Column("name", "str", "", "test of the orbit"),
         Column("sigma", "float64", "", "its chance as the distance of a normal value"),
     ),
-    key=("orbit_id", "name"),
+    key=("orbit_id", "name", "title"),
 )
 
 # The verdict of every orbit of a run with its causes, a row each; one row where there are none.
@@ -93,7 +93,7 @@ ORBIT_CAUSES = Table(
         Column("options", "str", "", "options of `plateviz fit` that do it, a line each"),
         Column("is_large", "bool", "", "whether the orbit should not be trusted because of it"),
     ),
-    key=("orbit_id", "name"),
+    key=("orbit_id", "name", "title"),
 )
 
 # The smooth errors of the catalogue as all orbits of a run see them; a row per field.

@@ -76,7 +76,7 @@ ORBIT_TESTS = Table(
         Column("name", "str", "", "test of the orbit"),
         Column("sigma", "float64", "", "its chance as the distance of a normal value"),
     ),
-    key=("orbit_id", "name", "title"),
+    key=("orbit_id", "name"),
 )
 
 # The verdict of every orbit of a run with its causes, a row each; one row where there are none.

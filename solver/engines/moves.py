@@ -137,7 +137,8 @@ def _gains(
     before, whole = _explained(gram, along), _explained(gram[:, -1:], along[:, -1:])
     after = _explained(gram[:, -1:] - gram, along[:, -1:] - along)
     each = _explained(sums.gram, sums.along).sum(axis=1, keepdims=True)
-    freedom = max(_FREEDOM * (sums.along.shape[1] - 2), 1.0)
+    n_measured = sums.gram.any(axis=(2, 3)).sum(axis=1, keepdims=True)
+    freedom = np.maximum(_FREEDOM * (n_measured - 2), 1.0)
     scatter = np.maximum((each - before - after) / freedom, 1.0)
     gain = ((before + after - whole) / scatter)[:, :-1]
     # The scatter is itself uncertain.

@@ -7,6 +7,7 @@ import pytest
 
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
+from solver.engines import moves
 from solver.fit import OrbitFitter, fit_orbit
 
 MOVING = FitSettings(detector_motion=True)
@@ -132,3 +133,15 @@ def test_a_what_if_keeps_the_moves(shifted):
     without = MOVING.with_(exclusions=Exclusions(exposures=frozenset({(field, plate)})))
     assert fitter.what_if(without) is None
     assert places(fitter.fit(without)) == [(field, plate + 1)]
+
+
+def test_exposures_in_which_a_detector_measures_nothing_change_no_chance():
+    rng = np.random.default_rng(3)
+    root = rng.normal(size=(2, 12, 3, 3))
+    gram, along = root @ root.swapaxes(2, 3), 3.0 * rng.normal(size=(2, 12, 3))
+    empty = np.zeros((2, 20, 3, 3)), np.zeros((2, 20, 3))
+    found = moves._gains(moves._Sums(gram, along))
+    parts = zip((gram, along), empty, strict=True)
+    both = moves._gains(moves._Sums(*(np.concatenate(pair, axis=1) for pair in parts)))
+    for one, other in zip(found, both, strict=True):
+        np.testing.assert_allclose(other[:, :11], one, rtol=1e-9)

@@ -26,6 +26,8 @@ from tests.benchmarks.page_client import PageClient, PageError
 _MANY = 1000
 _EXPOSURES, _PRIOR, _ORDER = "Exposures of the field", "source positions", "Distortion order"
 _AT_ONCE = "What-if at every change"
+# What comes of figures; one that has not been drawn yet is drawn with the answer.
+_FIGURES = frozenset({"data", "drawn"})
 _PATIENCE_OF_FIT = 600.0
 # Chromium's software renderer remarks on its own speed; that is no fault of the page.
 _HARMLESS = ("GL Driver Message", "GPU stall")
@@ -85,7 +87,7 @@ async def _exposure(client: PageClient, number: int, pace: Pace) -> float:
     first, last = (int(one) for one in client.value(_EXPOSURES) or (0, 0))
     at = number % 8
     at += (at, at) == (first, last)
-    return await client.answered([client.put(_EXPOSURES, [at, at])], {"data"})
+    return await client.answered([client.put(_EXPOSURES, [at, at])], _FIGURES)
 
 
 async def _detector(client: PageClient, number: int, pace: Pace) -> float:
@@ -108,14 +110,14 @@ async def _prior(client: PageClient, number: int, pace: Pace) -> float:
     if not client.has(_PRIOR):
         await client.send([client.put("Priors", False, "collapsed")])
         await client.until(lambda: client.has(_PRIOR))
-    return await client.answered([client.put(_PRIOR, pace.prior())], {"data"})
+    return await client.answered([client.put(_PRIOR, pace.prior())], _FIGURES)
 
 
 async def _order(client: PageClient, number: int, pace: Pace) -> float:
     del pace
     orders = [one for one in (2, 3, 4, 5) if one != client.value(_ORDER)]
     chosen = client.put(_ORDER, orders[number % len(orders)])
-    return await client.answered([chosen], {"data"})
+    return await client.answered([chosen], _FIGURES)
 
 
 async def _residuals(client: PageClient, number: int, pace: Pace) -> float:
@@ -133,13 +135,11 @@ async def _choose(client: PageClient, label: str, number: int) -> float:
     # Messages leave out the value of a control that has never been changed.
     now = client.value(label) or offered[0]
     others = [one for one in offered if one != now]
-    return await client.answered([client.put(label, others[number % len(others)])], {"data"})
+    return await client.answered([client.put(label, others[number % len(others)])], _FIGURES)
 
 
 async def _turn(client: PageClient, workspace: OrbitWorkspace) -> float:
-    return await client.answered(
-        [client.choose_among(title_of(workspace))], {"shown", "drawn", "data"}
-    )
+    return await client.answered([client.choose_among(title_of(workspace))], _FIGURES | {"shown"})
 
 
 Act = Callable[[PageClient, int, Pace], Awaitable[float]]
@@ -181,7 +181,7 @@ async def keep_fitting(client: PageClient, pace: Pace, record: Record) -> None:
         left = min(max(pace.end - time.monotonic(), 1.0), _PATIENCE_OF_FIT)
         try:
             await client.send([order])
-            await client.answered([client.click("Fit")], {"data"}, left)
+            await client.answered([client.click("Fit")], _FIGURES, left)
             record.fits += 1
         except PageError as error:
             if not pace.is_over:

@@ -66,6 +66,9 @@ class PointActions:
     def follow(self, drawn: BokehFigure) -> None:
         """Make the points of a figure act, those among them that are new."""
         self._selectable = []
+        # Frames that the figure no longer has are to be forgotten: their columns take memory.
+        plots = {frame.plot.id for frame in drawn.frames}
+        self._frames = {plot: tools for plot, tools in self._frames.items() if plot in plots}
         for frame in drawn.frames:
             selectable = [one for one in frame.glyphs() if selected_column(one) is not None]
             self._selectable.append(selectable)

@@ -1,6 +1,8 @@
 """FigureView: drawn once when near the screen, then followed in place; faded while out of date."""
 
+import gc
 import time
+import weakref
 
 import numpy as np
 import pandas as pd
@@ -11,7 +13,7 @@ from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.point_actions import PointActions
 from plateviz.figures import glyphs
-from plateviz.figures.figure import Axis, Ramp, framed
+from plateviz.figures.figure import Axis, Figure, Ramp, framed
 from plateviz.figures.glyphs import points
 from plateviz.plots.arrows import Field, arrows
 from plateviz.plots.diagnostic import Chosen
@@ -473,3 +475,21 @@ def test_zoom_is_told_and_a_reset_too():
     drawn._trigger_event(RangesUpdate(drawn, x0=None, x1=2.0, y0=0.5, y1=1.0))
     assert zooms == [((1.0, 2.0), (0.5, 1.0)), None, None]
     assert type(drawn.toolbar.active_scroll).__name__ == "WheelZoomTool"
+
+
+def test_frames_that_a_figure_no_longer_has_are_forgotten():
+    numbers = iter([1, 2, 1])
+
+    def draw():
+        (frame,) = figure_of(["7"])
+        return Figure((frame,) * next(numbers))
+
+    view = FigureView(diagnostics()[0], draw, actions=PointActions(select=lambda _: None))
+    come_near(view)
+    view.draw()
+    first = weakref.ref(plot(view))
+    for _ in range(2):
+        view.change("light")
+        view.draw()
+    gc.collect()
+    assert first() is None

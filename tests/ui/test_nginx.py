@@ -124,6 +124,8 @@ def test_dashboard_behind_nginx_opens_for_its_users_only(dashboard, browser):
     assert answer.status == 200
     assert "nonce-" in answer.headers["content-security-policy"]
     token = re.search(r'"token":"([^"]+)"', answer.text())[1]
+    script = re.search(r'src="([^"]+\.js[^"]*)"', answer.text())[1]
+    assert user.request.get(f"{dashboard}{script}").headers["content-encoding"] == "gzip"
     login = {"auth_username": USER, "auth_password": PASSWORD}
     assert websocket_status(dashboard, token) == 401
     assert websocket_status(dashboard, token, **login, origin="https://evil.example") == 403

@@ -237,13 +237,14 @@ class Navigation(param.Parameterized):
         except InputError as error:
             session.refuse(str(error))
             return
-        is_other = last is not None and last.settings != found.settings
-        if last is not None and last.is_what_if and is_other:
-            session.open(Request(orbit, last.settings, is_what_if=True), found)
-        elif isinstance(found, Request) or is_other:
+        if isinstance(found, Request):
             session.show_orbit(orbit)
-        else:
+        elif last is None or last.settings == found.settings:
             session.show_result(found)
+        elif last.is_what_if:
+            session.open(Request(orbit, last.settings, is_what_if=True), found)
+        else:
+            session.show_orbit(orbit)
 
     def _open(self, orbit: int | None) -> None:
         """Show the solution that the address names."""

@@ -68,6 +68,17 @@ def test_what_if_of_another_orbit_follows_the_solution_of_the_run(page, run, mon
     assert (session.other.run, session.choices.order) == ("default", 3)
 
 
+def test_what_if_of_an_orbit_that_the_run_lacks_is_fitted_without_another(page):
+    store = page.session.store
+    page.session.choices.order = 3
+    end_job(page)
+    before = len(store.requested)
+    page.choose_orbit(1)
+    end_job(page)
+    assert len(store.requested) == before + 1
+    assert (page.session.shown.orbit, page.session.shown.settings.order) == (1, 3)
+
+
 def test_what_if_on_the_screen_is_listed_and_stays_once_it_has_a_name(page):
     session = page.session
     session.choices.order = 3

@@ -99,8 +99,8 @@ def test_equations_and_leverage_are_those_of_the_dense_jacobian(small_orbit, mak
         step / sigma, np.linalg.solve(dense.hessian, dense.gradient) / sigma, atol=1e-6
     )
     covariance = covariances(reduced)
-    # What all exposures share with the walk is known from the priors only; there the normal equations
-    # leave three to four digits on some processors.
+    # What all exposures share with the walk is known from the priors only: there the normal
+    # equations leave three to four digits on some processors.
     np.testing.assert_allclose(np.sqrt(np.diag(covariance.theta)) / sigma[:n], 1.0, atol=1e-3)
     found = residuals(problem, theta, sources, covariance)
     jacobian = dense.jacobian.reshape(-1, 2, dense.jacobian.shape[1])

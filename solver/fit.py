@@ -19,7 +19,7 @@ from solver.engines.warm_starts import WarmStart, likely, nearest
 from solver.engines.what_if import linearised, solve_what_if
 from solver.errors import FitError, InputError
 from solver.linear.contribution import compiling
-from solver.linear.covariances import Covariances
+from solver.linear.covariances import Covariances, covariances
 from solver.linear.source_elimination import ReducedSystem
 from solver.problem.adjustments import Adjustments
 from solver.problem.problem import Problem, orders_held, rebuilt
@@ -63,14 +63,17 @@ def fit_orbit(
 
 
 class _LastFit(NamedTuple):
-    """State of the last fit, from which what-if solutions start."""
+    """State of the last fit, from which what-if solutions start.
+
+    `covariance` and `orders` are None where nothing has needed them.
+    """
 
     settings: FitSettings
     problem: Problem
     mode: Mode
-    covariance: Covariances
     adjustments: Adjustments
-    orders: pd.DataFrame | None
+    covariance: Covariances | None = None
+    orders: pd.DataFrame | None = None
 
 
 class OrbitFitter:
@@ -117,19 +120,39 @@ class OrbitFitter:
         fitted = time.perf_counter()
         orders = self._compare_orders(problem, settings, progress)
         if estimate.mode.status.is_solution:
-            self._last_fit = _LastFit(
-                settings,
-                problem,
-                estimate.mode,
-                found.solution.covariance,
-                adjustments,
-                orders,
+            covariance = found.solution.covariance
+            self._start_from(
+                _LastFit(settings, problem, estimate.mode, adjustments, covariance, orders)
             )
-            self._starts = [WarmStart(settings, problem, estimate.mode)]
-            self._attempted = [settings]
-            self._compiling = compiling(estimate.mode.equations, problem)
         result = with_adjustments(result, adjustments)
         return _with_orders(result, orders, time.perf_counter() - fitted)
+
+    def prepare_what_ifs(
+        self, settings: FitSettings, progress: Callable[[Iteration], None] = lambda _: None
+    ) -> None:
+        """Fit the orbit so that what-ifs can start from it, without the tables of a result.
+
+        Parameters and exceptions are those of `fit`; the engine is gauss-newton, and distortion
+        orders are not compared.
+
+        Raises
+        ------
+        FitError
+            If the fit did not converge; what-ifs start from the fit before, if there is one.
+        """
+        adjustments = find_adjustments(self._cache, self._instrument, settings, progress)
+        _, problem = self._cache.get(settings, adjustments)
+        mode = find_mode(problem, settings, progress)
+        if not mode.status.is_solution:
+            raise FitError(f"orbit {self._orbit_id}: {mode.status.value}")
+        self._start_from(_LastFit(settings, problem, mode, adjustments))
+
+    def _start_from(self, last: _LastFit) -> None:
+        """Let what-ifs start from a fit."""
+        self._last_fit = last
+        self._starts = [WarmStart(last.settings, last.problem, last.mode)]
+        self._attempted = [last.settings]
+        self._compiling = compiling(last.mode.equations, last.problem)
 
     @property
     def fitted_settings(self) -> FitSettings | None:
@@ -185,7 +208,8 @@ class OrbitFitter:
             If the last fit has no solution.
         """
         last, reduced = self._solved(result)
-        return history_table(last.problem, reduced, last.covariance, result)
+        covariance = last.covariance or covariances(reduced)
+        return history_table(last.problem, reduced, covariance, result)
 
     def sky_statistics(self, result: FitResult) -> dict[str, pd.DataFrame]:
         """Return what the last fit, whose result this is, says about errors of the catalogue.
@@ -237,6 +261,10 @@ class OrbitFitter:
         # Not `yield from`, with which it would end with this.
         for _ in self._compiling:
             yield
+
+    def forget_precomputed(self) -> None:
+        """Forget what `precompute` has kept; what-ifs start from the last fit again."""
+        self._starts, self._attempted = self._starts[:1], self._attempted[:1]
 
     def _warm_start(self, last: _LastFit, settings: FitSettings) -> list[WarmStart]:
         """Return a warm start for `settings`, in a list; an empty list if there is no solution."""

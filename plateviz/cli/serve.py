@@ -72,9 +72,10 @@ def serve(
 ) -> None:
     """Show a survey, or the files of one orbit, in the dashboard."""
     from plateviz.dashboard.server import check_origin, check_prefix
+    from plateviz.solving.capacity import usual_solvers
     from plateviz.solving.origin import OrbitFiles, SurveyFolder
     from plateviz.solving.solution_store import SolutionStore
-    from plateviz.solving.solver_pool import SolverPool, usual_solvers
+    from plateviz.solving.solver_pool import SolverPool
 
     origins = tuple(map(check_origin, allow_origin or []))
     endpoint = open_endpoint(port, address, password_file, no_password)

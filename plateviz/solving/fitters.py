@@ -1,14 +1,15 @@
-"""Fitters of the solver process: those of the last few orbits, and their preparation.
+"""Fitters of the solver process: those of the latest orbits, and their preparation.
 
 A request is the JSON object of `plateviz.solving.solver_process`.
 """
 
 import json
 import queue
+from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import lru_cache
 
+from plateviz.solving.capacity import ready_orbits
 from plateviz.solving.origin import origin_from_dict
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
@@ -17,17 +18,38 @@ from solver.errors import CancelledError, FitError, InputError
 from solver.fit import OrbitFitter
 
 Request = dict
+# Orbits of which lower distortion orders are precomputed: as large again as the rest of a fitter.
+_WITH_LOWER_ORDERS = 2
 
 
-def fitter_of(request: Request) -> OrbitFitter:
-    """Return the fitter of the orbit of a request; InputError if the orbit cannot be read."""
-    return _fitter(json.dumps(request["origin"], sort_keys=True), request["orbit"])
+class Fitters:
+    """The fitters of the latest orbits, as many as the machine has room for."""
 
+    def __init__(self, most: int | None = None) -> None:
+        """Begin without any; keep `most`, by default as many as there is room for."""
+        self._most = ready_orbits() if most is None else most
+        # The latest last.
+        self._kept: OrderedDict[str, OrbitFitter] = OrderedDict()
 
-@lru_cache(maxsize=4)
-def _fitter(origin_json: str, orbit: int | None) -> OrbitFitter:
-    origin = origin_from_dict(json.loads(origin_json))
-    return OrbitFitter(origin.read(orbit), origin.read_instrument())
+    def of(self, request: Request) -> OrbitFitter:
+        """Return the fitter of the orbit of a request; InputError if the orbit cannot be read."""
+        key = json.dumps([request["origin"], request["orbit"]], sort_keys=True)
+        if key in self._kept:
+            self._kept.move_to_end(key)
+        else:
+            # Forgotten first, so that the new one finds their memory.
+            self._forget(self._most - 1)
+            origin = origin_from_dict(request["origin"])
+            data = origin.read(request["orbit"])
+            self._kept[key] = OrbitFitter(data, origin.read_instrument())
+        for older in list(self._kept.values())[:-_WITH_LOWER_ORDERS]:
+            older.forget_precomputed()
+        return self._kept[key]
+
+    def _forget(self, most: int) -> None:
+        """Forget all but so many of the latest."""
+        while len(self._kept) > most:
+            self._kept.popitem(last=False)
 
 
 def base_settings(settings: FitSettings) -> FitSettings:
@@ -38,7 +60,9 @@ def base_settings(settings: FitSettings) -> FitSettings:
     return settings.with_(exclusions=Exclusions(), compare_orders=False)
 
 
-def prepare(request: Request, requests: queue.Queue[Request | None]) -> Iterator[None]:
+def prepare(
+    fitters: Fitters, request: Request, requests: queue.Queue[Request | None]
+) -> Iterator[None]:
     """Fit an orbit and precompute its likely what-ifs; give way to requests for anything else."""
 
     def give_way(_: Iteration) -> None:
@@ -49,10 +73,10 @@ def prepare(request: Request, requests: queue.Queue[Request | None]) -> Iterator
 
     # What is wrong with the orbit is said when something is asked of it.
     with suppress(CancelledError, InputError, FitError):
-        fitter = fitter_of(request)
+        fitter = fitters.of(request)
         settings = base_settings(FitSettings.from_dict(request["settings"]))
         if not _serves_what_ifs(fitter.fitted_settings, settings):
-            fitter.fit(settings, give_way)
+            fitter.prepare_what_ifs(settings, give_way)
         yield from fitter.precompute(settings.order)
 
 

@@ -5,25 +5,19 @@ the others, one after the other in each. A what-if goes to the process that has 
 since another one would have to fit it again.
 """
 
-import os
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Protocol
 
+from plateviz.solving.capacity import ready_orbits
 from plateviz.solving.forecast import JobTimes, is_long
 from plateviz.solving.job import Job
 from plateviz.solving.solver_queue import SolverQueue
-from solver.runtime.threads import count_cores
 
-# A process keeps as many orbits ready for what-ifs.
-_WARM = 4
 # How far the processes of long fits give way to that of what-ifs.
 _NICENESS = 5
-# Memory of the machine for each process from which a second one is worth its place.
-_BYTES_PER_SOLVER = 3 * 2**30
-_USUAL = 2
 # Quick jobs that wait for one process before another is started, which takes some seconds itself.
 _FEW = 3
 
@@ -70,6 +64,7 @@ class SolverPool:
         times = JobTimes()
         self._lock = threading.Lock()
         self._most = most
+        self._n_ready = most * ready_orbits()
         self._start = partial(start, times=times)
         self._queues = [self._start()]
         # The queue that has last fitted an orbit, the latest last.
@@ -81,7 +76,7 @@ class SolverPool:
             queue = self._queue_for(job.request)
             self._warm[_orbit(job.request)] = queue
             self._warm.move_to_end(_orbit(job.request))
-            while len(self._warm) > _WARM * self._most:
+            while len(self._warm) > self._n_ready:
                 self._warm.popitem(last=False)
             return queue.submit(job)
 
@@ -137,12 +132,6 @@ class SolverPool:
             return best
         self._queues.append(self._start(niceness=_NICENESS))
         return self._queues[-1]
-
-
-def usual_solvers() -> int:
-    """Return the number of solver processes that suits this machine: two where it has room."""
-    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return max(1, min(_USUAL, count_cores(), memory // _BYTES_PER_SOLVER))
 
 
 def _orbit(request: Mapping[str, Any]) -> str:

@@ -22,11 +22,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 from plateviz.cache import keep_compilations
 from plateviz.runs.scratch_result import write_eigenmodes, write_scratch_result, write_verdict
-from plateviz.solving.fitters import Request, base_settings, fitter_of, prepare
+from plateviz.solving.fitters import Fitters, Request, base_settings, prepare
 from plateviz.solving.put_off import PutOff
 from plateviz.tables.verdict import with_verdict
 from solver.data.result import FitResult
@@ -51,6 +51,13 @@ _NEXT_S = 0.4
 _IDLE_S = 1.0
 # Time in which the process removes what it has not finished, once its server has ended.
 _END_S = 3.0
+
+
+class _Kept(NamedTuple):
+    """What the process keeps between requests."""
+
+    fitters: Fitters
+    put_off: PutOff
 
 
 class _Cancellations:
@@ -87,16 +94,16 @@ def _serve_all() -> None:
     reader.start()
     send({"event": "ready"})
     speculative: Speculative = iter(())
-    put_off = PutOff()
-    while (request := _next_request(requests, speculative, put_off)) is not None:
+    kept = _Kept(Fitters(), PutOff())
+    while (request := _next_request(requests, speculative, kept.put_off)) is not None:
         if request["do"] == "hurry":
-            put_off.finish()
+            kept.put_off.finish()
         elif request["do"] == "prepare":
-            speculative = prepare(request, requests)
+            speculative = prepare(kept.fitters, request, requests)
         elif request["do"] == "rest":
             speculative = iter(())
         else:
-            speculative = _serve(request, send, cancellations, put_off)
+            speculative = _serve(request, send, cancellations, kept)
 
 
 def _next_request(
@@ -145,9 +152,7 @@ def _read(
     os._exit(EXIT_CODE)
 
 
-def _serve(
-    request: Request, send: Send, cancellations: _Cancellations, put_off: PutOff
-) -> Speculative:
+def _serve(request: Request, send: Send, cancellations: _Cancellations, kept: _Kept) -> Speculative:
     job = request["job"]
     work = {"fit": _fit, "simulate": _simulate, "survey": _survey}[request["do"]]
 
@@ -157,7 +162,7 @@ def _serve(
 
     try:
         cancellations.check(job)
-        speculative = work(request, progress, put_off)
+        speculative = work(request, progress, kept)
         send({"event": "done", "job": job})
         return speculative
     except CancelledError:
@@ -168,9 +173,9 @@ def _serve(
     return iter(())
 
 
-def _fit(request: Request, progress: Callable[..., None], put_off: PutOff) -> Speculative:
+def _fit(request: Request, progress: Callable[..., None], kept: _Kept) -> Speculative:
     progress(stage="reading the orbit")
-    fitter = fitter_of(request)
+    fitter, put_off = kept.fitters.of(request), kept.put_off
     settings = FitSettings.from_dict(request["settings"])
 
     def on_iteration(iteration: Iteration) -> None:
@@ -209,13 +214,13 @@ def _what_if(
         return found
     put_off.finish()
     try:
-        fitter.fit(base, progress)
+        fitter.prepare_what_ifs(base, progress)
     except FitError:
         return None
     return fitter.partial_what_if(settings)
 
 
-def _simulate(request: Request, progress: Callable[..., None], _: PutOff) -> Speculative:
+def _simulate(request: Request, progress: Callable[..., None], _: _Kept) -> Speculative:
     settings = SurveySettings.from_dict(request["settings"])
     catalogue = request.get("catalogue")
     simulate_survey(
@@ -227,7 +232,7 @@ def _simulate(request: Request, progress: Callable[..., None], _: PutOff) -> Spe
     return iter(())
 
 
-def _survey(request: Request, progress: Callable[..., None], _: PutOff) -> Speculative:
+def _survey(request: Request, progress: Callable[..., None], _: _Kept) -> Speculative:
     # Imported here since Dask takes half a second to import.
     from plateviz.runs.fit_survey import fit_survey
 

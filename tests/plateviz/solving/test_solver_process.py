@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from plateviz.solving import fitters, solver_process
-from plateviz.solving.fitters import fitter_of, prepare
+from plateviz.solving.fitters import Fitters, prepare
 from plateviz.solving.origin import SurveyFolder, origin_to_dict
 from plateviz.solving.put_off import PutOff
 from plateviz.solving.solver_process import _next_request
@@ -14,6 +14,7 @@ from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.errors import InputError
+from solver.fit import OrbitFitter
 
 
 @pytest.fixture
@@ -102,7 +103,7 @@ class Fitter:
     def __init__(self, fitted):
         self.fitted_settings = fitted
 
-    def fit(self, settings, progress):
+    def prepare_what_ifs(self, settings, progress):
         progress(None)
         self.fitted_settings = settings
 
@@ -119,9 +120,9 @@ def prepared_with(monkeypatch, requests):
     """Prepare an orbit that was fitted with some settings, or not; return the settings then."""
 
     def prepared(fitted=None):
-        fitter = Fitter(fitted)
-        monkeypatch.setattr(fitters, "fitter_of", lambda request: fitter)
-        steps = list(prepare(PREPARED, requests))
+        fitter, kept = Fitter(fitted), Fitters()
+        monkeypatch.setattr(kept, "of", lambda request: fitter)
+        steps = list(prepare(kept, PREPARED, requests))
         return fitter.fitted_settings, steps
 
     return prepared
@@ -177,15 +178,37 @@ def test_what_if_of_a_prepared_orbit_needs_no_fit(requests, small_survey):
     origin = origin_to_dict(SurveyFolder(str(small_survey)))
     request = {**PREPARED, "origin": origin, "settings": settings.to_dict()}
     later = settings.with_(prior_widths={"sources": 3.0})
-    assert fitter_of(request).what_if(later) is None
-    next(prepare(request, requests))
-    assert fitter_of(request).what_if(later).summary["reason"] == FitStatus.WHAT_IF.value
-    fitters._fitter.cache_clear()
+    kept = Fitters()
+    assert kept.of(request).what_if(later) is None
+    next(prepare(kept, request, requests))
+    assert kept.of(request).what_if(later).summary["reason"] == FitStatus.WHAT_IF.value
 
 
 def test_what_is_wrong_with_an_orbit_is_not_said_unasked(monkeypatch, requests):
     def unreadable(request):
         raise InputError("obs.fits: no such file")
 
-    monkeypatch.setattr(fitters, "fitter_of", unreadable)
-    assert list(prepare(PREPARED, requests)) == []
+    kept = Fitters()
+    monkeypatch.setattr(kept, "of", unreadable)
+    assert list(prepare(kept, PREPARED, requests)) == []
+
+
+def test_as_many_orbits_are_kept_as_there_is_room_for(small_survey):
+    origin = origin_to_dict(SurveyFolder(str(small_survey)))
+    requests = [{"origin": origin, "orbit": orbit} for orbit in (0, 1, 0)]
+    two, one = Fitters(most=2), Fitters(most=1)
+    first, _, again = map(two.of, requests)
+    assert again is first
+    first, _, again = map(one.of, requests)
+    assert again is not first
+
+
+def test_only_the_latest_orbits_keep_lower_orders(small_survey, monkeypatch):
+    """They take as much memory as all else that is kept of an orbit."""
+    forgetful = []
+    monkeypatch.setattr(OrbitFitter, "forget_precomputed", lambda one: forgetful.append(one))
+    monkeypatch.setattr(fitters, "_WITH_LOWER_ORDERS", 1)
+    origin = origin_to_dict(SurveyFolder(str(small_survey)))
+    kept = Fitters(most=2)
+    first, second, _ = (kept.of({"origin": origin, "orbit": orbit}) for orbit in (0, 1, 0))
+    assert forgetful == [first, second]

@@ -9,6 +9,7 @@ from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines import what_if
+from solver.errors import FitError
 from solver.fit import OrbitFitter, fit_orbit
 from solver.linear import normal_equations
 from solver.linear.normal_equations import accumulate
@@ -224,6 +225,32 @@ def test_lower_order_compiles_nothing(orbit, caplog):
     jax.clear_caches()
     assert any("derivatives" in name for name in compiled(5))
     assert compiled(3) == compiled(0) == []
+
+
+def test_what_ifs_start_from_a_fit_without_a_result(orbit, fitter):
+    prepared = OrbitFitter(orbit.data, orbit.instrument)
+    prepared.prepare_what_ifs(FitSettings(order=6))
+    settings = FitSettings(order=6, prior_widths={"sources": 3.0})
+    found, expected = prepared.what_if(settings), fitter.what_if(settings)
+    pd.testing.assert_frame_equal(found.sources, expected.sources)
+
+
+def test_fit_that_does_not_converge_is_no_start(orbit):
+    fitter = OrbitFitter(orbit.data, orbit.instrument)
+    with pytest.raises(FitError, match="orbit 7: the limit of iterations"):
+        fitter.prepare_what_ifs(FitSettings(max_iterations=1))
+    assert fitter.fitted_settings is None
+
+
+def test_precomputed_orders_are_forgotten(orbit):
+    """A what-if then starts from the fit itself, as before they were precomputed."""
+    fitter = fitted(OrbitFitter(orbit.data, orbit.instrument))
+    settings = FitSettings(order=5)
+    expected = fitter.what_if(settings)
+    list(fitter.precompute(6))
+    assert fitter.what_if(settings).summary["chi2"] != expected.summary["chi2"]
+    fitter.forget_precomputed()
+    pd.testing.assert_frame_equal(fitter.what_if(settings).sources, expected.sources)
 
 
 def test_unfitted_orbit_needs_a_fit(orbit):

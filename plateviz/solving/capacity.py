@@ -1,0 +1,30 @@
+"""What the machine has room for: solver processes, and orbits that each keeps ready for what-ifs.
+
+The web process sends a what-if where its orbit is ready, so it must know how many are.
+"""
+
+import os
+
+from solver.runtime.threads import count_cores
+
+_MOST_SOLVERS, _BYTES_PER_SOLVER = 2, 3 * 2**30
+# An orbit of 11,000 sources, with what a what-if starts from, takes 0.3 GB.
+_BYTES_PER_ORBIT = 0.3 * 2**30
+_LEAST_ORBITS, _MOST_ORBITS = 4, 16
+# Share of the memory for the orbits of one process.
+_SHARE = 1 / 8
+
+
+def usual_solvers() -> int:
+    """Return the number of solver processes that suits this machine: two where it has room."""
+    return max(1, min(_MOST_SOLVERS, count_cores(), _memory() // _BYTES_PER_SOLVER))
+
+
+def ready_orbits() -> int:
+    """Return the number of orbits that a solver process keeps ready for what-ifs."""
+    room = int(_SHARE * _memory() / _BYTES_PER_ORBIT)
+    return max(_LEAST_ORBITS, min(_MOST_ORBITS, room))
+
+
+def _memory() -> int:
+    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

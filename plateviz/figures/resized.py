@@ -282,7 +282,8 @@ def _legend_columns(frame: Frame, width: int) -> int:
     labels = _labels(frame)
     if not frame.legend_columns or not labels:
         return frame.legend_columns
-    return min(len(labels), max(1, int(width / _legend_entry(frame))))
+    # A label that is wider than this would be cut off.
+    return min(len(labels), int(width / _legend_entry(frame)))
 
 
 def _legend_entry(frame: Frame) -> float:

@@ -113,6 +113,7 @@ SURVEY_FIGURES = (
         _plot,
         is_wide=True,
         least_height=420,
+        narrow_height=860,
         equation="value − mean; the line is fitted with a step between the position angles",
     ),
 )

@@ -63,6 +63,7 @@ class Diagnostic:
     is_key : whether the Verdict workspace shows it, small
     equation : what is drawn, as text
     least_height : that it needs on the page, screen pixels; 0 where any card's height is enough
+    narrow_height : the same in a window narrower than 1536 pixels; 0 for `least_height`
     """
 
     name: str
@@ -79,6 +80,7 @@ class Diagnostic:
     is_key: bool = False
     equation: str = ""
     least_height: int = 0
+    narrow_height: int = 0
 
     @property
     def document(self) -> str:

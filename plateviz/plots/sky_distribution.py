@@ -165,5 +165,6 @@ SURVEY_FIGURES = (
         _plot,
         is_wide=True,
         equation="l, b: Galactic longitude and latitude",
+        narrow_height=520,
     ),
 )

@@ -29,6 +29,7 @@ class SurveyFigure:
     is_wide : whether it takes the whole width of its workspace, or of a report
     equation : what is drawn, as text
     least_height : that it needs on the page, screen pixels; 0 where any card's height is enough
+    narrow_height : the same in a window narrower than 1536 pixels; 0 for `least_height`
     """
 
     name: str
@@ -40,6 +41,7 @@ class SurveyFigure:
     is_wide: bool = False
     equation: str = ""
     least_height: int = 0
+    narrow_height: int = 0
 
     @property
     def document(self) -> str:
@@ -60,6 +62,7 @@ class SourceFigure:
     is_wide: bool = False
     equation: str = ""
     least_height: int = 0
+    narrow_height: int = 0
 
     @property
     def document(self) -> str:

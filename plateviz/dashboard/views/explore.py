@@ -56,6 +56,7 @@ class _Text(NamedTuple):
     is_wide: bool = True
     equation: str = ""
     least_height: int = 0
+    narrow_height: int = 0
 
 
 class _Drawn(NamedTuple):

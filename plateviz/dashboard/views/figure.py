@@ -101,7 +101,8 @@ class FigureView(pn.viewable.Viewer):
         choices = figure_choices(figure.name, self._on_screen, saved or Saved())
         self._save = SaveButton(figure.title, choices, place="corner")
         least = max(_LEAST_HEIGHT, figure.least_height)
-        self._card = _card(self.visibility, self._body, name=figure.name, least_height=least)
+        heights = least, max(least, figure.narrow_height)
+        self._card = _card(self.visibility, self._body, name=figure.name, least_heights=heights)
         if self.is_tall:
             self._card.styles = {**self._card.styles, "grid-row": "span 2"}
         self.change(theme)
@@ -259,7 +260,16 @@ def card(content: Part, name: str) -> pmui.Paper:
     return _card(pn.Column(content, styles=_BODY, margin=0), name=name)
 
 
-def _card(*contents: Part, name: str, least_height: int = _LEAST_HEIGHT) -> pmui.Paper:
+def _card(
+    *contents: Part, name: str, least_heights: tuple[int, int] = (_LEAST_HEIGHT, _LEAST_HEIGHT)
+) -> pmui.Paper:
+    """Return a card.
+
+    Parameters
+    ----------
+    least_heights : on a large screen, and in a narrow window, screen pixels
+    """
+    least, least_if_narrow = least_heights
     return pmui.Paper(
         OwnLayout(),
         *contents,
@@ -270,9 +280,13 @@ def _card(*contents: Part, name: str, least_height: int = _LEAST_HEIGHT) -> pmui
             "width": "100%",
             "min-width": "0",
             "height": "auto",
-            "min-height": f"{least_height}px",
         },
-        stylesheets=[".paper { height: 100%; }"],
+        stylesheets=[
+            ".paper { height: 100%; }",
+            f":host {{ min-height: {least}px; }}",
+            # Where `FigureGrid` has fewer columns.
+            f"@media (width < 1536px) {{ :host {{ min-height: {least_if_narrow}px; }} }}",
+        ],
         margin=0,
         sx={"height": "100%", "position": "relative", "zIndex": 0},
         elevation=0,

@@ -43,3 +43,8 @@ class FigureText(Protocol):
         A card that needs the height of two takes two rows.
         """
         ...
+
+    @property
+    def narrow_height(self) -> int:
+        """The same in a window narrower than 1536 pixels; 0 for `least_height`."""
+        ...

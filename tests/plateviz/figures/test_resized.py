@@ -67,6 +67,13 @@ def test_legend_has_as_many_columns_as_fit():
     assert sizes(narrow)[0][1] < sizes(wide)[0][1]
 
 
+def test_legend_that_would_be_cut_off_is_left_out():
+    label = "measured = predicted, along a line"
+    named = line([0, 1], [0, 1], name="l", color="mark", label=label)
+    wide, narrow = (resized(frame(glyphs=[named], legend_columns=1), w, 400) for w in (800, 200))
+    assert [wide[0].legend_columns, narrow[0].legend_columns] == [1, 0]
+
+
 def test_words_are_left_out_where_they_would_take_most_of_the_height():
     wordy = frame(subtitle="word " * 200)
     small, large = resized(wordy, 300, 300), resized(wordy, 1500, 900)

@@ -1,6 +1,7 @@
 """FigureView: drawn once when near the screen, then followed in place; faded while out of date."""
 
 import gc
+import re
 import time
 import weakref
 
@@ -17,7 +18,7 @@ from plateviz.figures.figure import Axis, Figure, Ramp, framed
 from plateviz.figures.glyphs import points
 from plateviz.plots.arrows import Field, arrows
 from plateviz.plots.diagnostic import Chosen
-from plateviz.plots.gallery import diagnostics
+from plateviz.plots.gallery import diagnostics, survey_figures
 
 
 def figure_of(ids):
@@ -67,12 +68,25 @@ def test_figure_is_due_only_near_the_screen(view):
     assert not view.is_due
 
 
-def test_card_is_as_high_as_its_figure_needs(view):
-    assert view.__panel__().styles["min-height"] == "290px"
-    (high,) = [one for one in diagnostics() if one.name == "eigenmode-groups"]
-    card = FigureView(high, lambda: None).__panel__()
-    assert card.styles["min-height"] == f"{high.least_height}px"
-    assert high.least_height > 290
+@pytest.mark.parametrize(
+    ("name", "heights"),
+    [("residual-map", (290, 290)), ("eigenmode-groups", (450, 450))],
+)
+def test_card_is_as_high_as_its_figure_needs(name, heights):
+    (figure,) = [one for one in diagnostics() if one.name == name]
+    assert least_heights(figure) == heights
+
+
+def test_card_of_many_frames_is_higher_in_a_narrow_window():
+    (figure,) = [one for one in survey_figures() if one.name == "calibration-trends"]
+    assert least_heights(figure) == (figure.least_height, figure.narrow_height)
+    assert figure.narrow_height > figure.least_height
+
+
+def least_heights(figure):
+    """Return the least heights of the card of a figure, on a large screen and in a narrow window."""
+    sheets = "".join(FigureView(figure, lambda: None).__panel__().stylesheets)
+    return tuple(int(height) for height in re.findall(r"min-height: (\d+)px", sheets))
 
 
 def test_grid_begins_with_the_rooms_that_an_earlier_page_had(view, monkeypatch):

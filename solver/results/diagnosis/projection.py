@@ -7,10 +7,11 @@ good solution make the products P'Wr normal, with mean zero and the covariance
 
 and a displacement by P times a adds V a to them: V^-1 P'Wr is what a fit with these patterns
 would find, and r'WP V^-1 P'Wr what it would take from chi2. J is built anew here, on the focal
-plane and for isotropic errors, so that a stored result can be tested. V takes a subset of the
+plane and for isotropic errors, so that a stored result can be tested. V takes a sample of the
 sources, scaled up; the products take all.
 """
 
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -26,11 +27,8 @@ from solver.results.diagnosis.fitted import (
 )
 from solver.results.diagnosis.patterns import Family, Patterns
 from solver.results.diagnosis.rows import Camera, Rows
+from solver.results.diagnosis.sample import sample_of
 
-# Measurements from which the covariance is computed, and exposures of each span.
-_MOST_ROWS, _LEAST_EXPOSURES = 12_000, 4
-# Of sums of weights, relative.
-_ROUNDING = 1e-9
 # Directions of which the fit leaves less than this share are not tested.
 _LEAST_LEFT = 0.02
 
@@ -101,66 +99,99 @@ def covariance_of_products(
     result: FitResult, camera: Camera, rows: Rows, patterns: Patterns
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return `total` and `left` of `Projection`, which the residuals do not change."""
-    some, ratio = _subset(rows, camera, len(result.sources))
-    shared = shared_columns(result, camera, some)
-    columns = columns_at(patterns, some).with_(shared, np.sqrt(some.weight))
-    ours = order_of(patterns, columns.scalar.shape[1])
-    others = np.setdiff1d(np.arange(columns.count), ours)
-    # All sums over the rows, less what the positions of the sources absorb.
-    gram, exposures = columns.gram(), with_exposures(result, camera, some, columns)
-    total = ratio * gram[np.ix_(ours, ours)]
-    of_columns, of_exposures = with_sources(result, camera, some, columns, exposures)
-    gram -= of_columns.T @ of_columns
-    between = exposures.with_columns - of_exposures.T @ of_columns
-    fitted = ratio * np.block(
-        [
-            [exposures.gram - of_exposures.T @ of_exposures, between[:, others]],
-            [between[:, others].T, gram[np.ix_(others, others)]],
-        ]
-    )
-    fitted += linalg.block_diag(exposures.precision, np.diag(precision_of(shared)))
-    # Shifts of all exposures against those of all detectors may have no prior.
-    fitted[np.diag_indices(len(fitted))] *= 1.0 + 1e-9
-    factor = linalg.cho_factor(fitted, lower=True, check_finite=False)
-    cross = ratio * np.concatenate([between[:, ours], gram[np.ix_(others, ours)]])
-    left = ratio * gram[np.ix_(ours, ours)]
-    left -= cross.T @ linalg.cho_solve(factor, cross, check_finite=False)
-    # In few exposures, a source takes too much of what changes from one exposure to the next.
-    fast = patterns.fast
-    number = ours[fast] - 2 * columns.scalar.shape[1]
-    kept = np.concatenate([columns.x[:, number], columns.y[:, number]])
-    left[np.ix_(fast, fast)] = ratio * kept.T @ (np.tile(some.left, 2)[:, None] * kept)
+    sample = sample_of(rows, camera, result.sources)
+    parts = [_sums(result, camera, part, patterns) for part in sample.parts]
+    total, left = reduce(_Sums.plus, parts).covariance(sample.weight)
+    if len(parts) > 1:
+        # Few sources leave less of the patterns than all would, because they decide what is fitted
+        # less well, and half of them are twice as far off: chi2 would be too large.
+        halves = np.mean([part.covariance(sample.weight)[1] for part in parts], axis=0)
+        left += (1.0 - sample.share) * (left - halves)
     if result.settings.pixel_phase:
-        left[fast] = left[:, fast] = 0.0
+        left[patterns.fast] = left[:, patterns.fast] = 0.0
     return total, left
 
 
-def _subset(rows: Rows, camera: Camera, n_sources: int) -> tuple[Rows, float]:
-    """Return a part of the rows that stands for all, and how many of its sources one stands for.
+class _Sums(NamedTuple):
+    """Sums over the rows of some sources, less what the positions of these absorb.
 
-    A source stays at one place of the focal plane while a field is exposed. So few exposures of
-    each field, or of each span of it, have nearly all that the data say, if each is given the
-    weight of those about it: the ones of most weight, since the noise may differ between exposures.
-    What counts are the sources: of these, as many are taken as there is time for.
+    Attributes
+    ----------
+    weight : of the rows
+    total : products of the patterns, before the positions absorb anything
+    gram : products of the patterns, and then of what all exposures share
+    between : products of the parameters of the exposures with these
+    exposures : products of the parameters of the exposures
+    fast : what the fit leaves of the patterns that change at random from exposure to exposure
+    precision : of the parameters of the exposures, and then of what is shared
+    columns : of the patterns that change at random
     """
-    each = max(int(_MOST_ROWS / max(rows.n, 1) * len(camera.time) / (camera.span.max() + 1)), 0)
-    of_exposure = np.bincount(rows.exposure, rows.weight, len(camera.time))
-    factor = np.zeros(len(camera.time))
-    for span in np.unique(camera.span):
-        of_span = np.flatnonzero(camera.span == span)
-        count = min(max(each, _LEAST_EXPOSURES), len(of_span))
-        for group in np.array_split(of_span, count):
-            # The first of equal ones: their sums differ by rounding, with the order of the rows.
-            is_heavy = of_exposure[group] >= (1.0 - _ROUNDING) * of_exposure[group].max()
-            heaviest = group[np.argmax(is_heavy)]
-            factor[heaviest] = of_exposure[group].sum() / max(of_exposure[heaviest], 1e-300)
-    some = rows.of(np.flatnonzero(factor[rows.exposure] > 0.0))
-    some = some._replace(weight=some.weight * factor[some.exposure])
-    if some.n <= _MOST_ROWS:
-        return some, 1.0
-    order = np.random.default_rng(0).permutation(n_sources)
-    counts = np.bincount(some.source, minlength=n_sources)[order]
-    chosen = np.zeros(n_sources, dtype=bool)
-    chosen[order[: int(np.searchsorted(np.cumsum(counts), _MOST_ROWS)) + 1]] = True
-    part = some.of(np.flatnonzero(chosen[some.source]))
-    return part, float(some.weight.sum() / part.weight.sum())
+
+    weight: float
+    total: np.ndarray
+    gram: np.ndarray
+    between: np.ndarray
+    exposures: np.ndarray
+    fast: np.ndarray
+    precision: np.ndarray
+    columns: np.ndarray
+
+    def plus(self, other: "_Sums") -> "_Sums":
+        """Return the sums over the rows of both, which have the same exposures."""
+        return self._replace(
+            weight=self.weight + other.weight,
+            total=self.total + other.total,
+            gram=self.gram + other.gram,
+            between=self.between + other.between,
+            exposures=self.exposures + other.exposures,
+            fast=self.fast + other.fast,
+        )
+
+    def covariance(self, weight: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return `total` and `left` of `Projection` if these rows stand for all.
+
+        Parameters
+        ----------
+        weight : of all rows
+        """
+        ratio, ours = weight / self.weight, slice(len(self.total))
+        shared = slice(len(self.total), None)
+        fitted = ratio * np.block(
+            [
+                [self.exposures, self.between[:, shared]],
+                [self.between[:, shared].T, self.gram[shared, shared]],
+            ]
+        )
+        fitted += self.precision
+        # Shifts of all exposures against those of all detectors may have no prior.
+        fitted[np.diag_indices(len(fitted))] *= 1.0 + 1e-9
+        factor = linalg.cho_factor(fitted, lower=True, check_finite=False)
+        cross = ratio * np.concatenate([self.between[:, ours], self.gram[shared, ours]])
+        left = ratio * self.gram[ours, ours]
+        left -= cross.T @ linalg.cho_solve(factor, cross, check_finite=False)
+        # In few exposures, a source takes too much of what changes from one exposure to the next.
+        left[np.ix_(self.columns, self.columns)] = ratio * self.fast
+        return ratio * self.total, left
+
+
+def _sums(result: FitResult, camera: Camera, rows: Rows, patterns: Patterns) -> _Sums:
+    shared = shared_columns(result, camera, rows)
+    columns = columns_at(patterns, rows).with_(shared, np.sqrt(rows.weight))
+    ours = order_of(patterns, columns.scalar.shape[1])
+    order = np.concatenate([ours, np.setdiff1d(np.arange(columns.count), ours)])
+    gram, exposures = columns.gram(), with_exposures(result, camera, rows, columns)
+    total = gram[np.ix_(ours, ours)]
+    of_columns, of_exposures = with_sources(result, camera, rows, columns, exposures)
+    gram -= of_columns.T @ of_columns
+    number = ours[patterns.fast] - 2 * columns.scalar.shape[1]
+    kept = np.concatenate([columns.x[:, number], columns.y[:, number]])
+    return _Sums(
+        float(rows.weight.sum()),
+        total,
+        gram[np.ix_(order, order)],
+        (exposures.with_columns - of_exposures.T @ of_columns)[:, order],
+        exposures.gram - of_exposures.T @ of_exposures,
+        kept.T @ (np.tile(rows.left, 2)[:, None] * kept),
+        linalg.block_diag(exposures.precision, np.diag(precision_of(shared))),
+        patterns.fast,
+    )

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from solver.data.instrument import MINI_MOCK
@@ -11,12 +12,14 @@ from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import find_mode
 from solver.fit import fit_orbit
 from solver.problem.problem import build_problem
+from solver.results.diagnosis import projection, sample
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.columns import columns_at, order_of
 from solver.results.diagnosis.patterns import Patterns
 from solver.results.diagnosis.projection import covariance_of_products
 from solver.results.diagnosis.rows import camera_rows, onto_focal_plane
-from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, diagnose
+from solver.results.diagnosis.sample import sample_of
+from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, diagnose, source_magnitudes
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.defects.stages import defective_catalogue
 from solver.simulate.measure import measure_orbit
@@ -117,6 +120,48 @@ def test_covariance_of_patterns_allows_for_modelled_causes(small_orbit, make_den
     found, exact = covariances_of_patterns(fit, problem, dense)
     np.testing.assert_allclose(found, exact, atol=0.1)
     assert np.diag(found).mean() == pytest.approx(np.diag(exact).mean(), abs=0.006)
+
+
+def test_sample_of_the_sources_stands_for_all(clean, monkeypatch):
+    """Few sources leave too little of the patterns, so that chi2 is too large; halves tell."""
+    camera, rows = camera_rows(clean)
+    patterns = Patterns(camera, ORDER, source_magnitudes(clean))
+    (above,) = [one for one in patterns.families if one.subject == "order"]
+
+    def left():
+        _, found = covariance_of_products(clean, camera, rows, patterns)
+        return found[np.ix_(above.columns, above.columns)]
+
+    monkeypatch.setattr(sample, "_MOST_ROWS", 5000)
+    of_all = left()
+    monkeypatch.setattr(sample, "_MOST_ROWS", 3000)
+    halves = sample_of(rows, camera, clean.sources)
+    assert 0.5 < halves.share < 0.8
+    assert len(halves.parts) == 2
+    sampled = np.isin(rows.source, np.concatenate([part.source for part in halves.parts]))
+    both = sample_of(rows.of(np.flatnonzero(sampled)), camera, clean.sources)
+    of_sample = left()
+    monkeypatch.setattr(projection, "sample_of", lambda *_: both._replace(weight=halves.weight))
+    rise, without = (
+        np.trace(np.linalg.solve(one, of_all)) / len(of_all) for one in (of_sample, left())
+    )
+    assert rise == pytest.approx(1.0, abs=0.1)
+    assert rise - 1.0 < 0.6 * (without - 1.0)
+
+
+def test_sources_of_a_sample_are_spread_over_the_sky():
+    """Also where right ascension passes zero; the reference sources are sampled by themselves."""
+    random = np.random.default_rng(0)
+    ra, dec = random.uniform(-0.5, 0.5, (2, 4000))
+    sources = pd.DataFrame({"ra": ra % 360.0, "dec": dec, "is_reference": ra < -0.4})
+    order = sample._along_the_sky(sources)
+    chosen = sources.iloc[order[::10]]
+    cells = (chosen["ra"] + 0.5) % 360.0 // 0.25 * 4 + (chosen["dec"] + 0.5) // 0.25
+    counts = np.bincount(cells.astype(int), minlength=16)
+    assert counts.sum() == 400
+    # Drawn at random, they would scatter by 5.
+    assert np.std(counts) < 3
+    assert chosen["is_reference"].mean() == pytest.approx(sources["is_reference"].mean(), abs=0.003)
 
 
 def test_good_solution_has_no_cause(clean):

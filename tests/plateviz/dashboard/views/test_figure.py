@@ -84,7 +84,7 @@ def test_card_of_many_frames_is_higher_in_a_narrow_window():
 
 
 def least_heights(figure):
-    """Return the least heights of the card of a figure, on a large screen and in a narrow window."""
+    """Return the least heights of a figure's card, on a large screen and in a narrow window."""
     sheets = "".join(FigureView(figure, lambda: None).__panel__().stylesheets)
     return tuple(int(height) for height in re.findall(r"min-height: (\d+)px", sheets))
 

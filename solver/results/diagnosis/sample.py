@@ -1,0 +1,101 @@
+"""Rows that stand for all: those from which the covariance of the patterns is computed."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from solver.results.diagnosis.rows import Camera, Rows
+
+# Measurements of a sample, and exposures of each span.
+_MOST_ROWS, _LEAST_EXPOSURES = 12_000, 4
+# Of sums of weights, relative.
+_ROUNDING = 1e-9
+# Bits of a coordinate in the order of the sources.
+_BITS = 10
+
+
+class Sample(NamedTuple):
+    """A part of the rows that stands for all.
+
+    Attributes
+    ----------
+    parts : all of the sample; if it does not have all sources, two halves of it
+    weight : of all rows, um^-2
+    share : of all sources that the sample has
+    """
+
+    parts: Sequence[Rows]
+    weight: float
+    share: float
+
+
+def sample_of(rows: Rows, camera: Camera, sources: pd.DataFrame) -> Sample:
+    """Return a sample.
+
+    A source stays at one place of the focal plane while a field is exposed. So few exposures of
+    each field, or of each span of it, have nearly all that the data say, if each is given the
+    weight of those about it: the ones of most weight, since the noise may differ between exposures.
+    What counts are the sources: of these, as many are taken as there is time for, evenly spread
+    over the sky.
+
+    Parameters
+    ----------
+    sources : of the result
+    """
+    some = _heaviest_exposures(rows, camera)
+    weight, counts = float(some.weight.sum()), np.bincount(some.source, minlength=len(sources))
+    if some.n <= _MOST_ROWS:
+        return Sample([some], weight, 1.0)
+    order = _along_the_sky(sources)
+    order = order[counts[order] > 0]
+    step = some.n / _MOST_ROWS
+    taken = order[np.arange(0.0, len(order), step).astype(np.intp)]
+    parts = [_of_sources(some, half, len(sources)) for half in (taken[::2], taken[1::2])]
+    exposures = [np.flatnonzero(np.diff(part.first)) for part in (some, *parts)]
+    if not all(np.array_equal(exposures[0], of_part) for of_part in exposures[1:]):
+        parts = [_of_sources(some, taken, len(sources))]
+    return Sample(parts, weight, 1.0 / step)
+
+
+def _heaviest_exposures(rows: Rows, camera: Camera) -> Rows:
+    """Return the rows of some exposures, each with the weight of those about it."""
+    each = max(int(_MOST_ROWS / max(rows.n, 1) * len(camera.time) / (camera.span.max() + 1)), 0)
+    of_exposure = np.bincount(rows.exposure, rows.weight, len(camera.time))
+    factor = np.zeros(len(camera.time))
+    for span in np.unique(camera.span):
+        of_span = np.flatnonzero(camera.span == span)
+        count = min(max(each, _LEAST_EXPOSURES), len(of_span))
+        for group in np.array_split(of_span, count):
+            # The first of equal ones: their sums differ by rounding, with the order of the rows.
+            is_heavy = of_exposure[group] >= (1.0 - _ROUNDING) * of_exposure[group].max()
+            heaviest = group[np.argmax(is_heavy)]
+            factor[heaviest] = of_exposure[group].sum() / max(of_exposure[heaviest], 1e-300)
+    some = rows.of(np.flatnonzero(factor[rows.exposure] > 0.0))
+    return some._replace(weight=some.weight * factor[some.exposure])
+
+
+def _of_sources(rows: Rows, sources: np.ndarray, n_sources: int) -> Rows:
+    chosen = np.zeros(n_sources, dtype=bool)
+    chosen[sources] = True
+    return rows.of(np.flatnonzero(chosen[rows.source]))
+
+
+def _along_the_sky(sources: pd.DataFrame) -> np.ndarray:
+    """Return the order of the sources along a curve that fills the sky, reference sources last.
+
+    Any few of them at equal steps are spread evenly. The curve is Morton's: the bits of both
+    coordinates in turn.
+    """
+    dec = sources["dec"].to_numpy(float)
+    # The range of right ascension may include zero.
+    along = (sources["ra"].to_numpy(float) - sources["ra"].iloc[0] + 180.0) % 360.0
+    sky = np.stack([along * np.cos(np.radians(dec.mean())), dec])
+    sky -= sky.min(axis=1, keepdims=True)
+    steps = (sky * ((2**_BITS - 1) / max(float(sky.max()), 1e-300))).astype(np.int64)
+    bits = 2 * np.arange(_BITS)
+    code = sum(
+        ((one[:, None] >> np.arange(_BITS)) & 1) @ (1 << (bits + n)) for n, one in enumerate(steps)
+    )
+    return np.lexsort((code, sources["is_reference"].to_numpy(bool)))

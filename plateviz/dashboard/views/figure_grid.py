@@ -1,4 +1,4 @@
-"""FigureGrid: the cards of a workspace, in rows of one height."""
+"""FigureGrid: the cards of a workspace, on a large screen in rows of one height."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ _SETTLING_SECONDS = 10.0
 
 
 class FigureGrid(pn.viewable.Viewer):
-    """Cards that fill the area they are given, in rows of one height without a hole."""
+    """Cards that fill the area they are given, in rows without a hole."""
 
     def __init__(
         self,
@@ -59,8 +59,8 @@ class FigureGrid(pn.viewable.Viewer):
                     "xl": f"repeat({columns_if_wide or columns}, minmax(0, 1fr))",
                 },
                 "gridAutoFlow": "dense",
-                # Each card says how high it is at least.
-                "gridAutoRows": "minmax(auto, 1fr)",
+                # Each card says how high it is at least. In a narrow window these heights differ.
+                "gridAutoRows": {"xs": "auto", "xl": "minmax(auto, 1fr)"},
             },
             styles={"align-self": "stretch", "height": "auto"},
             stylesheets=[".flex-box { height: 100%; }"],

@@ -104,11 +104,13 @@ def _moves(name: str, verb: str) -> Callable[[Case], Said]:
 
 
 def _cells(case: Case) -> Said:
+    order = int(case.result.summary["order"])
     return Said(
         "map",
         "the mean residuals over the detectors have a pattern",
         f"No other cause explains it: {_size(case)}; {_fall(case)}.",
-        "look at the map of the mean residuals",
+        "look at the map of the mean residuals; if it is smooth, raise the order",
+        (f"--order {min(order + 2, _HIGHEST_ORDER)}",),
     )
 
 

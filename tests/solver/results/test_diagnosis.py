@@ -217,6 +217,26 @@ def test_every_cause_is_named(defect, subject):
     assert find_causes(diagnose(fitted(defect))).found[0].test.subject == subject
 
 
+def test_pattern_without_a_cause_is_not_laid_to_a_weak_one(clean):
+    """Displaced cells, and a step that is significant, too, but explains little of chi2."""
+    diagnosis = diagnose(clean)
+    (step, *_) = [one for one in diagnosis.patterns.families if one.subject == "step"]
+    amplitude = np.zeros(len(diagnosis.patterns))
+    amplitude[step.columns[0]] = 0.05
+    with_step = displaced(diagnosis, amplitude)
+    assert find_causes(with_step).found[0].test.subject == "step"
+    cells = diagnosis.patterns.of_cells()
+    amplitude[cells] = np.random.default_rng(0).normal(scale=0.05, size=len(cells))
+    assert find_causes(displaced(diagnosis, amplitude)).found[0].test.subject == "map"
+
+
+def displaced(diagnosis, amplitude):
+    """Return the diagnosis if all measurements were displaced by patterns, each so much, um."""
+    projection = diagnosis.projection
+    products = projection.products + projection.left @ amplitude
+    return diagnosis._replace(projection=projection._replace(products=products))
+
+
 def test_outliers_are_found_and_left_out_of_the_patterns(clean):
     residuals = clean.residuals.copy()
     residuals.loc[[10, 500, 900], "residual_x"] += 40.0 * residuals["sx"].iloc[0]

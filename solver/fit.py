@@ -26,7 +26,7 @@ from solver.problem.problem import Problem, orders_held, rebuilt
 from solver.problem.problem_cache import ProblemCache
 from solver.results.catalogue_response import sky_statistics
 from solver.results.orbit_result import PartialResult, partial_result
-from solver.results.orders import compare_orders
+from solver.results.orders import compare_orders, with_orders
 from solver.results.source_history import history_table
 from solver.runtime.device import require_device
 
@@ -125,7 +125,7 @@ class OrbitFitter:
                 _LastFit(settings, problem, estimate.mode, adjustments, covariance, orders)
             )
         result = with_adjustments(result, adjustments)
-        return _with_orders(result, orders, time.perf_counter() - fitted)
+        return with_orders(result, orders, time.perf_counter() - fitted)
 
     def prepare_what_ifs(
         self, settings: FitSettings, progress: Callable[[Iteration], None] = lambda _: None
@@ -297,10 +297,3 @@ class OrbitFitter:
 
         is_same_fit = self._stopped is not None and self._stopped[0] == settings
         return Resumption(self._stopped[1] if is_same_fit and self._stopped else None, save)
-
-
-def _with_orders(result: FitResult, orders: pd.DataFrame | None, seconds: float) -> FitResult:
-    if orders is None:
-        return result
-    timings = {**dict(result.summary["seconds"]), "orders": seconds}
-    return replace(result, summary={**result.summary, "seconds": timings}, orders=orders)

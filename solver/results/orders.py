@@ -35,6 +35,7 @@ import pandas as pd
 from jaxtyping import Bool, Float, Int
 
 from solver.data.distortion_terms import terms
+from solver.data.result import FitResult
 from solver.data.schema import ORDERS
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, find_mode, objective
@@ -100,6 +101,14 @@ def compare_orders(
         rows[-1]["n_reserved"] = int(reserved.sum())
     table = pd.DataFrame(rows[::-1])
     return table[ORDERS.names].astype({column.name: column.dtype for column in ORDERS})
+
+
+def with_orders(result: FitResult, orders: pd.DataFrame | None, seconds: float) -> FitResult:
+    """Return a result with a comparison of orders, if there is one, and the time that it took."""
+    if orders is None:
+        return result
+    timings = {**dict(result.summary["seconds"]), "orders": seconds}
+    return replace(result, summary={**result.summary, "seconds": timings}, orders=orders)
 
 
 def at_order(problem: Problem, order: int) -> Problem:

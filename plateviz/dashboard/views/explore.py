@@ -194,12 +194,11 @@ class ExploreView(pn.viewable.Viewer):
         # Neither a zoom nor another colour changes how many rows there are.
         of_all = replace(chosen, limits=None, colour="", has_median=False, selects="")
         key = (request.key, of_all)
-        known = self._extent
-        if known is None or known[0] != key:
-            self._extent = known = (key, extent_of(table, chosen))
-        items = selected.by_kind().get(table.kind(chosen.selects), frozenset())
-        figure = explored_figure(table, chosen, selected=items, extent=known[1])
-        return _Drawn(figure, table, chosen, known[1])
+        if self._extent is None or self._extent[0] != key:
+            self._extent = (key, extent_of(table, chosen))
+        items, extent = selected.by_kind().get(table.kind(chosen.selects)), self._extent[1]
+        figure = explored_figure(table, chosen, selected=items or frozenset(), extent=extent)
+        return _Drawn(figure, table, chosen, extent)
 
     def _rows(self) -> dict[str, Table]:
         """Return the rows between the limits, with the columns that are drawn and those of keys."""

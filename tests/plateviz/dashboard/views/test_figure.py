@@ -1,7 +1,6 @@
 """FigureView: drawn once when near the screen, then followed in place; faded while out of date."""
 
 import gc
-import re
 import time
 import weakref
 
@@ -18,7 +17,7 @@ from plateviz.figures.figure import Axis, Figure, Ramp, framed
 from plateviz.figures.glyphs import points
 from plateviz.plots.arrows import Field, arrows
 from plateviz.plots.diagnostic import Chosen
-from plateviz.plots.gallery import diagnostics, survey_figures
+from plateviz.plots.gallery import diagnostics
 
 
 def figure_of(ids):
@@ -66,27 +65,6 @@ def test_figure_is_due_only_near_the_screen(view):
     assert view.is_due
     view.draw()
     assert not view.is_due
-
-
-@pytest.mark.parametrize(
-    ("name", "heights"),
-    [("residual-map", (290, 290)), ("eigenmode-groups", (450, 450))],
-)
-def test_card_is_as_high_as_its_figure_needs(name, heights):
-    (figure,) = [one for one in diagnostics() if one.name == name]
-    assert least_heights(figure) == heights
-
-
-def test_card_of_many_frames_is_higher_in_a_narrow_window():
-    (figure,) = [one for one in survey_figures() if one.name == "calibration-trends"]
-    assert least_heights(figure) == (figure.least_height, figure.narrow_height)
-    assert figure.narrow_height > figure.least_height
-
-
-def least_heights(figure):
-    """Return the least heights of a figure's card, on a large screen and in a narrow window."""
-    sheets = "".join(FigureView(figure, lambda: None).__panel__().stylesheets)
-    return tuple(int(height) for height in re.findall(r"min-height: (\d+)px", sheets))
 
 
 def test_grid_begins_with_the_rooms_that_an_earlier_page_had(view, monkeypatch):

@@ -8,7 +8,7 @@ import os
 from solver.runtime.threads import count_cores
 
 _MOST_SOLVERS, _BYTES_PER_SOLVER = 2, 3 * 2**30
-# An orbit of 11,000 sources, with what a what-if starts from, takes 0.3 GB.
+# An orbit of 8,000 sources, with what a what-if starts from, takes 0.2 to 0.3 GB.
 _BYTES_PER_ORBIT = 0.3 * 2**30
 _LEAST_ORBITS, _MOST_ORBITS = 4, 16
 # Share of the memory for the orbits of one process.

@@ -38,18 +38,14 @@ class Fitters:
             self._kept.move_to_end(key)
         else:
             # Forgotten first, so that the new one finds their memory.
-            self._forget(self._most - 1)
+            while len(self._kept) >= self._most:
+                self._kept.popitem(last=False)
             origin = origin_from_dict(request["origin"])
             data = origin.read(request["orbit"])
             self._kept[key] = OrbitFitter(data, origin.read_instrument())
         for older in list(self._kept.values())[:-_WITH_LOWER_ORDERS]:
             older.forget_precomputed()
         return self._kept[key]
-
-    def _forget(self, most: int) -> None:
-        """Forget all but so many of the latest."""
-        while len(self._kept) > most:
-            self._kept.popitem(last=False)
 
 
 def base_settings(settings: FitSettings) -> FitSettings:

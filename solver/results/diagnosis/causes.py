@@ -6,7 +6,6 @@ it were fitted, too, until nothing that is left is more than chance. What a caus
 is not noise.
 """
 
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +21,8 @@ from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test, pattern_t
 _MOST_PATTERNS = 4
 # A pattern after the first one is named if it explains this share of what the first one does.
 _LEAST_SHARE = 0.1
-# Patterns that name no cause: they are taken only where they explain so much more than any other.
+# Patterns that name no cause: one is taken first, and only if it explains so much more than any
+# other.
 _WITHOUT_CAUSE, _MUCH_MORE = ("cells", "map"), 4.0
 # Courses in time of the same terms: of these only the one that explains most is named.
 _COURSES = ("drift", "bend", "step", "velocity")
@@ -128,10 +128,11 @@ def _patterns(diagnosis: Diagnosis) -> tuple[list[Found], float]:
         tests = [(family, pattern_test(projection, family, scale)) for family in families]
         tests = [one for one in tests if one[1].log_chance < limit]
         named = [one for one in tests if one[1].subject not in _WITHOUT_CAUSE]
-        if not tests or (found and not named):
+        candidates = named if found else tests
+        if not candidates:
             break
-        gained = [(gains.of_pattern(projection, *one, scale), *one) for one in tests]
-        gain, family, test = max(gained, key=partial(_rank, is_first=not found))
+        gained = [(gains.of_pattern(projection, *one, scale), *one) for one in candidates]
+        gain, family, test = max(gained, key=_rank)
         fall = scale * test.statistic
         if found and fall < _LEAST_SHARE * explained:
             break
@@ -142,12 +143,12 @@ def _patterns(diagnosis: Diagnosis) -> tuple[list[Found], float]:
     return found, explained
 
 
-def _rank(gained: tuple[float, Family, Test], *, is_first: bool) -> float:
-    """Return the gain of a pattern, less for one that names no cause: it must be the first one."""
+def _rank(gained: tuple[float, Family, Test]) -> tuple[bool, float]:
+    """Return what patterns are ordered by: the gain, less for one that names no cause."""
     gain, _, test = gained
-    if test.subject not in _WITHOUT_CAUSE or gain < 0.0:
-        return gain
-    return gain / _MUCH_MORE if is_first else -np.inf
+    if test.subject in _WITHOUT_CAUSE:
+        return gain > 0.0, gain / _MUCH_MORE
+    return True, gain
 
 
 def _are_alternatives(one: Family, other: Family) -> bool:

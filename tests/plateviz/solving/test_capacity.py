@@ -1,0 +1,21 @@
+"""What a machine has room for."""
+
+import pytest
+
+from plateviz.solving import capacity
+from plateviz.solving.capacity import ready_orbits, usual_solvers
+
+
+@pytest.mark.parametrize(
+    ("gib", "solvers", "orbits"), [(2, 1, 4), (8, 2, 4), (24, 2, 10), (1024, 2, 16)]
+)
+def test_more_memory_has_room_for_more(gib, solvers, orbits, monkeypatch):
+    monkeypatch.setattr(capacity, "_memory", lambda: gib * 2**30)
+    monkeypatch.setattr(capacity, "count_cores", lambda: 8)
+    assert (usual_solvers(), ready_orbits()) == (solvers, orbits)
+
+
+def test_one_core_has_room_for_one_solver(monkeypatch):
+    monkeypatch.setattr(capacity, "_memory", lambda: 24 * 2**30)
+    monkeypatch.setattr(capacity, "count_cores", lambda: 1)
+    assert usual_solvers() == 1

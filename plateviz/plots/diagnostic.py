@@ -60,6 +60,7 @@ class Diagnostic:
     has_data : whether there is anything to draw, such as a truth or another solution
     is_of_simulation : whether the Orbit page shows it for a simulated survey only
     needs_verdict : whether it rests on the verdict, which may follow the solution
+    needs_eigenmodes : whether it shows the eigenmodes, which a what-if has once they are asked for
     is_key : whether the Verdict workspace shows it, small
     equation : what is drawn, as text
     least_height : that it needs on the page, screen pixels; 0 where any card's height is enough
@@ -77,6 +78,7 @@ class Diagnostic:
     has_data: Callable[[Chosen], bool] = _always
     is_of_simulation: bool = False
     needs_verdict: bool = False
+    needs_eigenmodes: bool = False
     is_key: bool = False
     equation: str = ""
     least_height: int = 0

@@ -120,6 +120,7 @@ DIAGNOSTICS = (
         84,
         _plot_groups,
         is_wide=True,
+        needs_eigenmodes=True,
         least_height=450,
         equation=(
             "move = v with vᵀ S v = 1, one sigma long; share = Σ (v / σ(conditional))² "

@@ -91,6 +91,7 @@ DIAGNOSTICS = (
         85,
         _plot,
         is_wide=True,
+        needs_eigenmodes=True,
         least_height=450,
         equation="shift of a source = J v, with the shift J per parameter, and vᵀ S v = 1",
     ),

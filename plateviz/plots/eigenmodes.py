@@ -208,6 +208,7 @@ DIAGNOSTICS = (
         82,
         _plot_spectrum,
         is_wide=True,
+        needs_eigenmodes=True,
         equation=(
             "S(data) v = λ S v, with the information S(data) of the measurements in the "
             "information S of all, the sources eliminated; left λ, right vᵀ S v / Σ v² "
@@ -225,6 +226,7 @@ DIAGNOSTICS = (
         83,
         _plot_deciders,
         is_wide=True,
+        needs_eigenmodes=True,
         least_height=450,
         equation=(
             "shares of vᵀ S v: of measurements, reference sources, other sources and "

@@ -5,7 +5,7 @@ No user interface and no JAX. A directory has an uncompressed Arrow file for eac
 and no other program reads it: nothing is flushed to the disk, and nothing has a checksum.
 `plateviz.runs.fitted_orbit` writes what is kept.
 
-The eigenmodes and the verdict may follow later. Who uses them waits for them.
+The verdict may follow later, and the eigenmodes if somebody asks for them. Who uses them waits.
 """
 
 import json
@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 import pyarrow as pa
@@ -34,7 +34,8 @@ _VERDICT = "verdict"
 _LATER = tuple(table.name for table in EIGENMODE_TABLES)
 # Windows removes no file that is read in place.
 _IS_IN_PLACE = sys.platform != "win32"
-_PATIENCE_SECONDS, _LOOK_SECONDS = 10.0, 0.005
+# A page may ask again and again for longer than a thread waits.
+_PATIENCE_SECONDS, _PATIENCE_OF_PAGE, _LOOK_SECONDS = 10.0, 60.0, 0.005
 
 
 def write_scratch_result(
@@ -44,7 +45,7 @@ def write_scratch_result(
 
     Parameters
     ----------
-    is_partial : whether `write_eigenmodes` follows
+    is_partial : whether `write_eigenmodes` follows, at the latest when somebody asks for them
     is_judged : False if `write_verdict` follows
 
     Raises
@@ -78,8 +79,8 @@ def write_scratch_result(
 def write_eigenmodes(directory: Path, tables: Mapping[str, pd.DataFrame]) -> None:
     """Add the eigenmodes to a result that was written without; errors as above."""
     with writing(directory, "to write the eigenmodes of a fit"):
-        for name, frame in tables.items():
-            _write_table(directory / f"{name}.part", frame)
+        for name in _LATER:
+            _write_table(directory / f"{name}.part", tables[name])
             (directory / f"{name}.part").rename(directory / f"{name}.arrow")
 
 
@@ -101,19 +102,30 @@ def is_judged_later(result: FitResult) -> bool:
     return isinstance(result.summary, _JudgedLater) and result.summary.is_to_come
 
 
+def are_eigenmodes_written(directory: Path) -> bool:
+    """Return whether the eigenmodes of a result are all there."""
+    return _last_of_eigenmodes(directory).is_file()
+
+
+def are_eigenmodes_to_come(result: FitResult) -> bool:
+    """Return whether the eigenmodes of a result are not there yet; ask for them then."""
+    awaited = vars(result)[_LATER[0]]
+    return isinstance(awaited, _Awaited) and awaited.is_to_come()
+
+
 def is_written(directory: Path) -> bool:
     """Return whether a directory has a result, which is whole from the first moment on."""
     return (directory / _HEAD).is_file()
 
 
 def read_scratch_result(
-    directory: Path, hurry: Callable[[], bool] = lambda: True
+    directory: Path, complete: Callable[[], bool] = lambda: True
 ) -> "ScratchResult":
     """Read a result; its tables stay in their files, and are loaded where they are used.
 
     Parameters
     ----------
-    hurry : called when something is used that has not been written yet; whether it will be
+    complete : called when something is used that has not been written yet; whether it will be
 
     Raises
     ------
@@ -122,16 +134,16 @@ def read_scratch_result(
     """
     with reading(str(directory), "the result of a fit"):
         head = json.loads((directory / _HEAD).read_text(encoding="utf-8"))
-        later = _LATER if head["is_partial"] else ()
+        eigenmodes = _Awaited(_last_of_eigenmodes(directory), complete)
         tables: dict[str, pd.DataFrame | _Awaited | None] = {
-            table.name: _Awaited(directory / f"{table.name}.arrow", hurry)
-            if table.name in later
+            table.name: eigenmodes
+            if head["is_partial"] and table.name in _LATER
             else _read_table(directory / f"{table.name}.arrow")
             for table in RESULT_TABLES
         }
         summary = head["summary"]
         if not head["is_judged"]:
-            summary = _JudgedLater(summary, _Awaited(directory / _JUDGEMENT, hurry))
+            summary = _JudgedLater(summary, _Awaited(directory / _JUDGEMENT, complete))
         return ScratchResult(
             **tables,  # type: ignore[arg-type]
             summary=summary,
@@ -140,31 +152,49 @@ def read_scratch_result(
         )
 
 
-class _Awaited(NamedTuple):
+class _Awaited:
     """A file that may not be there yet."""
 
-    path: Path
-    hurry: Callable[[], bool]
+    def __init__(self, path: Path, complete: Callable[[], bool]) -> None:
+        self.path, self._complete = path, complete
+        # When a page gives up, as `time.monotonic`; None until somebody has asked.
+        self._end: float | None = None
 
     @property
     def is_there(self) -> bool:
         return self.path.is_file()
 
+    def is_to_come(self) -> bool:
+        """Return whether it is not there yet, but will be; ask for it once."""
+        if self.is_there:
+            return False
+        if self._end is None:
+            self._end = time.monotonic() + _PATIENCE_OF_PAGE if self._complete() else -math.inf
+        if time.monotonic() < self._end:
+            return True
+        # Who uses it next asks anew.
+        self._end = None
+        return False
+
     def wait(self, end: float) -> bool:
         """Wait for it until some `time.monotonic`; return whether it is there."""
-        is_to_come = self.is_there or self.hurry()
-        while is_to_come and not self.is_there and time.monotonic() < end:
+        while self.is_to_come() and time.monotonic() < end:
             time.sleep(_LOOK_SECONDS)
         return self.is_there
 
-    def table(self) -> pd.DataFrame | None:
-        """Return the table in it once it is there."""
+    def table(self, name: str) -> pd.DataFrame | None:
+        """Return a table beside it once it is there."""
         if not self.wait(time.monotonic() + _PATIENCE_SECONDS):
             raise InputError(
                 f"{self.path}: expected the eigenmodes of the solution, found that the solver "
-                "ended before it wrote them; fit again"
+                "ended or had no time to write them; fit again"
             )
-        return _read_table(self.path)
+        return _read_table(self.path.with_name(f"{name}.arrow"))
+
+
+def _last_of_eigenmodes(directory: Path) -> Path:
+    """Return the file that is there once all eigenmodes are."""
+    return directory / f"{_LATER[-1]}.arrow"
 
 
 class _JudgedLater(Mapping[str, Any]):
@@ -208,7 +238,7 @@ class _Later:
             return None
         value = result.__dict__[self._name]
         if isinstance(value, _Awaited):
-            value = result.__dict__[self._name] = value.table()
+            value = result.__dict__[self._name] = value.table(self._name)
         return value
 
     def __set__(self, result: FitResult, value: object) -> None:

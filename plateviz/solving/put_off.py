@@ -13,39 +13,40 @@ Work = Callable[[], object]
 
 
 class PutOff:
-    """Work of the solver process that waits until no request does, such as the verdict.
+    """Work of the solver process that waits until no request does.
 
-    What a page waits for is done next; the rest, such as the eigenmodes, once the process is idle.
+    A page waits for the verdict, which is done next. Few pages show eigenmodes: they are done
+    once the process is idle, and not at all if it never is and nobody asks for them.
     """
 
     def __init__(self) -> None:
         """Begin without work."""
-        self._next: deque[Work] = deque()
-        self._waiting: deque[Work] = deque()
+        self._verdicts: deque[Work] = deque()
+        self._eigenmodes: deque[Work] = deque()
 
-    def add(self, work: Work, *, is_next: bool = False) -> None:
-        """Put work off.
+    def add_verdict(self, work: Work) -> None:
+        """Put the verdict on a result off."""
+        self._verdicts.append(work)
 
-        Parameters
-        ----------
-        is_next : whether a page waits for it
-        """
-        (self._next if is_next else self._waiting).append(work)
+    def add_eigenmodes(self, work: Work) -> None:
+        """Put the eigenmodes of a result off."""
+        self._eigenmodes.append(work)
 
     def limit(self) -> None:
-        """Do the oldest work of each kind until no more than `_MOST` of it waits."""
-        for waiting in (self._next, self._waiting):
-            while len(waiting) > _MOST:
-                _do(waiting.popleft())
+        """Let few results wait: do the oldest verdicts, and give up the oldest eigenmodes."""
+        while len(self._verdicts) > _MOST:
+            _do(self._verdicts.popleft())
+        while len(self._eigenmodes) > _MOST:
+            self._eigenmodes.popleft()
 
-    def finish_next(self) -> None:
-        """Do what a page waits for."""
-        _finish(self._next)
+    def finish_verdicts(self) -> None:
+        """Do all verdicts."""
+        _finish(self._verdicts)
 
     def finish(self) -> None:
         """Do all of it."""
-        self.finish_next()
-        _finish(self._waiting)
+        self.finish_verdicts()
+        _finish(self._eigenmodes)
 
 
 def _finish(waiting: deque[Work]) -> None:

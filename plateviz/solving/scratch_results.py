@@ -27,10 +27,18 @@ _LEAST, _MOST_READ = 16, 16
 class ScratchResults:
     """Results by directory, in the order in which they were used last."""
 
-    def __init__(self, hurry: Callable[[], bool], most_bytes: int = MOST_BYTES) -> None:
-        """Begin without any; `hurry` is that of `read_scratch_result`."""
+    def __init__(self, complete: Callable[[Path], bool], most_bytes: int = MOST_BYTES) -> None:
+        """Begin without any.
+
+        Parameters
+        ----------
+        complete : called with a directory when a part of its result is used that has not been
+            written yet; whether it will be
+        """
         self._most_bytes = most_bytes
-        self._read = lru_cache(_MOST_READ)(partial(read_scratch_result, hurry=hurry))
+        self._read = lru_cache(_MOST_READ)(
+            lambda directory: read_scratch_result(directory, partial(complete, directory))
+        )
         self._lock = Lock()
         # Directory -> size in bytes, 0 until it is known.
         self._sizes: OrderedDict[Path, int] = OrderedDict()

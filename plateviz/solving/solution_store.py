@@ -72,7 +72,7 @@ class SolutionStore:
         with writing(temporary, "to make a folder for the solutions"):
             self._folder = ScratchFolder(temporary, "plateviz")
         self._scratch = self._folder.path
-        self._results = ScratchResults(solver.hurry)
+        self._results = ScratchResults(self._complete)
         self._of_runs = OrbitCache()
         self.columns = ColumnCache()
         self.background = ThreadPoolExecutor(_READERS, thread_name_prefix="reader")
@@ -154,7 +154,7 @@ class SolutionStore:
     ) -> FitResult | None:
         """Return a solution that was requested before and is there, else None.
 
-        The eigenmodes of a what-if follow a moment later, and are waited for where they are used.
+        The eigenmodes of a what-if follow once the solver is idle or somebody asks for them.
         """
         return self._results.get(self._directory(orbit, settings, what_if))
 
@@ -180,6 +180,11 @@ class SolutionStore:
         self.background.shutdown(wait=False, cancel_futures=True)
         self._solver.close()
         self._folder.close()
+
+    def _complete(self, directory: Path) -> bool:
+        """Let the solver write what a result lacks; return whether it is at it."""
+        job = self._jobs.get(directory)
+        return job is not None and self._solver.complete(job.request)
 
     def _request(
         self, orbit: int | None, settings: FitSettings, what_if: bool, directory: Path

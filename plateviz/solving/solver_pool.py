@@ -37,8 +37,8 @@ class Solver(Protocol):
         """Let processes give up what they prepare."""
         ...
 
-    def hurry(self) -> bool:
-        """Let processes do at once what they have put off; return whether there is a process."""
+    def complete(self, request: Mapping[str, object]) -> bool:
+        """Let a process write what was put off of a job; return whether there is a process."""
         ...
 
     def cancel(self, job: Job) -> None:
@@ -94,11 +94,11 @@ class SolverPool:
         for queue in queues:
             queue.rest()
 
-    def hurry(self) -> bool:
-        """Let processes do at once what they have put off; return whether there is a process."""
+    def complete(self, request: Mapping[str, object]) -> bool:
+        """Let a process write what was put off of a job; return whether there is a process."""
         with self._lock:
-            queues = list(self._queues)
-        return any([queue.hurry() for queue in queues])
+            queue = self._warm.get(_orbit(request), self._queues[0])
+        return queue.complete(request)
 
     def cancel(self, job: Job) -> None:
         """Cancel a job that waits or runs."""

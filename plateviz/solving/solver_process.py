@@ -9,7 +9,8 @@ Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "direct
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
 "directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}, and without events
 {"do": "prepare", "origin", "orbit", "settings"}: fit while idle what a what-if starts from,
-{"do": "rest"}: give up what is being prepared, and {"do": "hurry"}: do at once what was put off.
+{"do": "rest"}: give up what is being prepared, and {"do": "complete"} with the rest of a "fit" that
+is done: write what was put off of its result.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -21,14 +22,21 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from plateviz.cache import keep_compilations
-from plateviz.runs.scratch_result import write_eigenmodes, write_scratch_result, write_verdict
+from plateviz.runs.scratch_result import (
+    are_eigenmodes_written,
+    write_eigenmodes,
+    write_scratch_result,
+    write_verdict,
+)
 from plateviz.solving.fitters import Fitters, Request, base_settings, prepare
 from plateviz.solving.put_off import PutOff
 from plateviz.tables.verdict import with_verdict
+from solver.data.eigenmode_schema import EIGENMODE_TABLES
 from solver.data.result import FitResult
 from solver.data.settings import COUNTED, FitSettings
 from solver.engines.gauss_newton import Iteration
@@ -96,8 +104,8 @@ def _serve_all() -> None:
     speculative: Speculative = iter(())
     kept = _Kept(Fitters(), PutOff())
     while (request := _next_request(requests, speculative, kept.put_off)) is not None:
-        if request["do"] == "hurry":
-            kept.put_off.finish()
+        if request["do"] == "complete":
+            _complete(request, kept)
         elif request["do"] == "prepare":
             speculative = prepare(kept.fitters, request, requests)
         elif request["do"] == "rest":
@@ -113,7 +121,7 @@ def _next_request(
     put_off.limit()
     # A request that waits is sent once the one before is done, and a page that has received a
     # solution may send one, too.
-    for seconds, work in ((_NEXT_S, put_off.finish_next), (_IDLE_S, put_off.finish)):
+    for seconds, work in ((_NEXT_S, put_off.finish_verdicts), (_IDLE_S, put_off.finish)):
         try:
             return requests.get(timeout=seconds)
         except queue.Empty:
@@ -185,15 +193,15 @@ def _fit(request: Request, progress: Callable[..., None], kept: _Kept) -> Specul
     progress(stage="linearising")
     found = _what_if(fitter, settings, on_iteration, put_off) if request["what_if"] else None
     if found is None:
-        # A fit may take long, and a page may need what was put off.
-        put_off.finish()
+        # A fit may take long, and a page waits for the verdict.
+        put_off.finish_verdicts()
     result = fitter.fit(settings, on_iteration) if found is None else found.result
     progress(stage="writing the result")
     directory = Path(request["directory"])
     write_scratch_result(directory, result, is_partial=found is not None, is_judged=False)
-    put_off.add(lambda: _judge(directory, result), is_next=True)
+    put_off.add_verdict(lambda: _judge(directory, result))
     if found is not None:
-        put_off.add(lambda: write_eigenmodes(directory, found.eigenmodes()))
+        put_off.add_eigenmodes(lambda: write_eigenmodes(directory, found.eigenmodes()))
     return fitter.precompute(settings.order)
 
 
@@ -212,12 +220,26 @@ def _what_if(
     found, base = fitter.partial_what_if(settings), base_settings(settings)
     if found is not None or not settings.exclusions or fitter.fitted_settings == base:
         return found
-    put_off.finish()
+    put_off.finish_verdicts()
     try:
         fitter.prepare_what_ifs(base, progress)
     except FitError:
         return None
     return fitter.partial_what_if(settings)
+
+
+def _complete(request: Request, kept: _Kept) -> None:
+    """Write what a result lacks, of which the eigenmodes may have been given up."""
+    kept.put_off.finish()
+    directory = Path(request["directory"])
+    # Nobody waits for an error: who waits for eigenmodes sees in the end that there are none.
+    with suppress(InputError, FitError):
+        if not are_eigenmodes_written(directory):
+            fitter, settings = kept.fitters.of(request), FitSettings.from_dict(request["settings"])
+            found = _what_if(fitter, settings, lambda _: None, kept.put_off)
+            result = fitter.fit(settings) if found is None else found.whole()
+            tables = {table.name: getattr(result, table.name) for table in EIGENMODE_TABLES}
+            write_eigenmodes(directory, tables)
 
 
 def _simulate(request: Request, progress: Callable[..., None], _: _Kept) -> Speculative:

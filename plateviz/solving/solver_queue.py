@@ -90,12 +90,12 @@ class SolverQueue:
             if self._process is not None:
                 self._send({"do": "rest"})
 
-    def hurry(self) -> bool:
-        """Let the process do at once what it has put off; return whether there is a process."""
+    def complete(self, request: Mapping[str, object]) -> bool:
+        """Let the process write what it has put off of a job; return whether there is a process."""
         with self._lock:
             if self._process is None:
                 return False
-            self._send({"do": "hurry"})
+            self._send({**request, "do": "complete"})
             return True
 
     def cancel(self, job: Job) -> None:

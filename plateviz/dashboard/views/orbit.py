@@ -32,6 +32,7 @@ from plateviz.figures.figure import Figure
 from plateviz.plots.both_solutions import BOTH, figure_of_both
 from plateviz.plots.diagnostic import Diagnostic
 from plateviz.plots.workspace import OrbitWorkspace
+from plateviz.runs.scratch_result import are_eigenmodes_to_come
 
 
 class OrbitPage(pn.viewable.Viewer):
@@ -157,6 +158,11 @@ class OrbitPage(pn.viewable.Viewer):
         of_both = self._compare.figure if diagnostic is BOTH and self._compare else None
         judging, needing = self._session.judging, of_both or diagnostic
         if needing.needs_verdict and (judging.is_any_pending if of_both else judging.is_pending):
+            return PENDING
+        drawn = [self._session.shown, self._session.other if of_both else None]
+        if needing.needs_eigenmodes and any(
+            [one is not None and are_eigenmodes_to_come(one.result) for one in drawn]
+        ):
             return PENDING
         chosen = chosen_of(self._session)
         if chosen is None:

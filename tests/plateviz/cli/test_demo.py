@@ -37,7 +37,7 @@ class NoSolver:
     def submit(self, job):
         pytest.fail(f"expected no request, found {job.request}")
 
-    def hurry(self):
+    def complete(self, request):
         pytest.fail("expected no request")
 
 

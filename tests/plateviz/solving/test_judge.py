@@ -50,7 +50,7 @@ def test_solution_of_the_solver_is_judged_there(fit_result, tmp_path):
     waiting = Waiting()
     judge, judged = Judge(waiting), with_verdict(fit_result)
     write_scratch_result(tmp_path / "result", fit_result, is_judged=False)
-    result = read_scratch_result(tmp_path / "result", hurry=lambda: pytest.fail("waited"))
+    result = read_scratch_result(tmp_path / "result", complete=lambda: pytest.fail("waited"))
     assert not judge.has_judged(result)
     write_verdict(tmp_path / "result", judged.summary["verdict"])
     assert judge.has_judged(result)

@@ -33,7 +33,7 @@ def test_what_was_used_longest_ago_is_removed(tmp_path, fit_result, few):
     (tmp_path / "first").mkdir()
     write_scratch_result(tmp_path / "first" / "0", fit_result)
     # Room for two beside the latest two.
-    results = ScratchResults(lambda: True, 2 * size(tmp_path / "first" / "0"))
+    results = ScratchResults(lambda _: True, 2 * size(tmp_path / "first" / "0"))
     folder = tmp_path / "scratch"
     folder.mkdir()
     assert written(results, folder, range(4), fit_result) == []
@@ -46,7 +46,7 @@ def test_what_was_used_longest_ago_is_removed(tmp_path, fit_result, few):
 
 
 def test_what_a_page_shows_and_the_latest_stay(tmp_path, fit_result, few):
-    results = ScratchResults(lambda: True, 1)
+    results = ScratchResults(lambda _: True, 1)
     written(results, tmp_path, range(2), fit_result)
     shown = results.get(tmp_path / "0")
     assert written(results, tmp_path, range(2, 6), fit_result) == ["1", "2", "3"]
@@ -58,14 +58,14 @@ def test_what_a_page_shows_and_the_latest_stay(tmp_path, fit_result, few):
 
 
 def test_what_is_being_computed_takes_no_room(tmp_path, fit_result, few):
-    results = ScratchResults(lambda: True, 1)
+    results = ScratchResults(lambda _: True, 1)
     assert [results.expect(tmp_path / str(number)) for number in range(5)] == [[]] * 5
     write_scratch_result(tmp_path / "0", replace(fit_result))
     assert results.expect(tmp_path / "5") == [tmp_path / "0"]
 
 
 def test_file_that_is_renamed_while_sizes_are_counted_is_no_error(tmp_path, fit_result, few):
-    results = ScratchResults(lambda: True, 1)
+    results = ScratchResults(lambda _: True, 1)
     written(results, tmp_path, [0], fit_result)
     # As one that is listed and then gone.
     (tmp_path / "0" / "modes.part").symlink_to("gone")

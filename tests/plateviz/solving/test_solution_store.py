@@ -3,10 +3,12 @@
 import json
 import signal
 import tempfile
+from functools import partial
 
 import pandas as pd
 import pytest
 
+from plateviz.runs.scratch_result import are_eigenmodes_to_come, read_scratch_result
 from plateviz.runs.worker_scratch import worker_scratch
 from plateviz.solving import scratch_results, solver_queue
 from plateviz.solving.job import Job, JobStatus
@@ -216,6 +218,22 @@ def test_what_if_is_a_step_from_the_last_fit(store):
     for name in ("modes", "mode_parameters", "mode_shifts"):
         assert len(getattr(result, name)) == len(getattr(expected, name))
     pd.testing.assert_frame_equal(result.modes[["mode", "name"]], expected.modes[["mode", "name"]])
+
+
+def test_eigenmodes_that_were_given_up_are_computed_when_asked_for(store):
+    assert store.request(0, FitSettings()).wait(LONG) is JobStatus.DONE
+    settings = FitSettings(prior_widths={"sources": 2.5})
+    assert store.request(0, settings, what_if=True).wait(LONG) is JobStatus.DONE
+    directory = store._directory(0, settings, what_if=True)
+    names = ("modes", "mode_parameters", "mode_shifts")
+    before = {name: getattr(store.result(0, settings, what_if=True), name) for name in names}
+    for name in names:
+        (directory / f"{name}.arrow").unlink()
+    again = read_scratch_result(directory, partial(store._complete, directory))
+    assert are_eigenmodes_to_come(again)
+    for name in names:
+        pd.testing.assert_frame_equal(getattr(again, name), before[name])
+    assert not are_eigenmodes_to_come(again)
 
 
 def test_what_if_without_sources_starts_from_all_measurements(store):

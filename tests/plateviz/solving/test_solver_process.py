@@ -26,7 +26,7 @@ def test_waiting_request_is_served_before_speculative_work(requests):
     done = []
     requests.put({"job": "1"})
     put_off = PutOff()
-    put_off.add(lambda: done.append("eigenmodes"))
+    put_off.add_eigenmodes(lambda: done.append("eigenmodes"))
     speculative = (done.append(step) for step in range(3))
     assert _next_request(requests, speculative, put_off) == {"job": "1"}
     assert done == []
@@ -43,7 +43,7 @@ def test_request_waits_for_one_step_at_most(requests):
             yield
 
     put_off = PutOff()
-    put_off.add(lambda: done.append("eigenmodes"))
+    put_off.add_eigenmodes(lambda: done.append("eigenmodes"))
     assert _next_request(requests, speculative(), put_off) == {"job": "2"}
     assert done == ["eigenmodes", 0, 1]
 
@@ -63,28 +63,30 @@ def test_speculative_work_is_finished_without_requests(requests):
 
 def test_verdict_is_next_and_eigenmodes_are_when_idle(requests, monkeypatch):
     done, put_off = [], PutOff()
-    put_off.add(lambda: done.append("eigenmodes"))
-    put_off.add(lambda: done.append("verdict"), is_next=True)
+    put_off.add_eigenmodes(lambda: done.append("eigenmodes"))
+    put_off.add_verdict(lambda: done.append("verdict"))
     # The server sends the next request once it has heard that the one before is done.
     monkeypatch.setattr(solver_process, "_NEXT_S", 20.0)
     threading.Timer(0.02, requests.put, [{"job": "1"}]).start()
     _next_request(requests, iter(()), put_off)
     assert done == []
     monkeypatch.setattr(solver_process, "_NEXT_S", 0.0)
-    put_off.add(lambda: requests.put({"job": "2"}), is_next=True)
+    put_off.add_verdict(lambda: requests.put({"job": "2"}))
     _next_request(requests, iter(()), put_off)
     assert done == ["verdict"]
 
 
-def test_few_results_wait_for_their_eigenmodes():
+def test_few_results_wait():
+    """The verdicts of the others are done, and their eigenmodes given up until somebody asks."""
     done, put_off = [], PutOff()
     for number in range(4):
-        put_off.add(lambda number=number: done.append(number))
+        put_off.add_verdict(lambda number=number: done.append(f"verdict {number}"))
+        put_off.add_eigenmodes(lambda number=number: done.append(f"eigenmodes {number}"))
     put_off.limit()
-    assert done == [0, 1]
+    assert done == ["verdict 0", "verdict 1"]
     put_off.finish()
     put_off.finish()
-    assert done == [0, 1, 2, 3]
+    assert done[2:] == ["verdict 2", "verdict 3", "eigenmodes 2", "eigenmodes 3"]
 
 
 def test_what_cannot_be_written_ends_nothing(requests):
@@ -92,8 +94,8 @@ def test_what_cannot_be_written_ends_nothing(requests):
         raise InputError("the disk is full")
 
     put_off = PutOff()
-    put_off.add(full, is_next=True)
-    put_off.add(lambda: requests.put({"job": "1"}))
+    put_off.add_verdict(full)
+    put_off.add_eigenmodes(lambda: requests.put({"job": "1"}))
     assert _next_request(requests, iter(()), put_off) == {"job": "1"}
 
 

@@ -16,6 +16,11 @@ from plateviz.dashboard.views.summary import HeadView, StripView
 from plateviz.dashboard.views.survey import SurveyPage
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
+from plateviz.runs.scratch_result import (
+    read_scratch_result,
+    write_eigenmodes,
+    write_scratch_result,
+)
 from plateviz.solving.run_reader import RunReader
 from solver.errors import InputError
 from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
@@ -136,6 +141,35 @@ def test_solution_is_shown_while_it_is_being_judged(fresh):
     assert "Verdict" in page._compare._table.object
     tests.draw()
     assert tests.is_drawn
+
+
+def test_only_what_shows_eigenmodes_waits_for_them(fresh, tmp_path):
+    session, asked = fresh.session, []
+    finish(session)
+    page = OrbitPage(fresh, wake)
+    whole = session.shown.result
+    tables = {name: getattr(whole, name) for name in ("modes", "mode_parameters", "mode_shifts")}
+    partial = replace(whole, **dict.fromkeys(tables))
+    write_scratch_result(tmp_path / "result", partial, is_partial=True)
+    what_if = read_scratch_result(tmp_path / "result", lambda: asked.append("eigenmodes") or True)
+    session.shown = session.shown._replace(result=what_if)
+    assert figure(page).is_drawn
+    assert not asked
+    fresh.turn_to_workspace(OrbitWorkspace.WEAK_DIRECTIONS)
+    spectrum = figure(page, "eigenmode-spectrum")
+    assert spectrum.is_pending
+    assert asked == ["eigenmodes"]
+    fresh.turn_to_workspace(OrbitWorkspace.ORDERS)
+    session.compare_with(session.shown._replace(result=whole, orbit=5))
+    session.figure_of_both = "eigenmode-spectrum"
+    both = figure(page, "both-solutions")
+    assert both.is_pending
+
+    write_eigenmodes(tmp_path / "result", tables)
+    for view in (spectrum, both):
+        view.draw()
+        assert view.is_drawn
+    assert asked == ["eigenmodes"]
 
 
 def test_first_solution_that_failed_says_what_to_do(fresh):

@@ -24,13 +24,12 @@ def notable_sentences(result: FitResult) -> list[str]:
 
 
 def _far_exposures(result: FitResult) -> list[str]:
-    table = exposure_chi2(result)
-    expected = result.exposures.reset_index(drop=True)
-    above = chdtrc(expected["dof"], expected["chi2"])
-    far = table[2.0 * np.minimum(above, 1.0 - above) < _BY_CHANCE / max(len(table), 1)]
-    far = far.sort_values("z", key=np.abs, ascending=False)
-    if far.empty:
+    dof, chi2 = (result.exposures[name].to_numpy(dtype=float) for name in ("dof", "chi2"))
+    above = chdtrc(dof, chi2)
+    is_far = 2.0 * np.minimum(above, 1.0 - above) < _BY_CHANCE / max(len(dof), 1)
+    if not is_far.any():
         return []
+    far = exposure_chi2(result)[is_far].sort_values("z", key=np.abs, ascending=False)
     named = "; ".join(
         f"{row.exposure} (χ²/dof {row.chi2_per_dof:.3f} ± {row.expected_sd:.3f})"
         for row in far.head(_MOST_NAMED).itertuples()
@@ -39,12 +38,12 @@ def _far_exposures(result: FitResult) -> list[str]:
 
 
 def _far_sources(result: FitResult) -> list[str]:
-    sources = result.sources[result.sources["dof"] > 0]
-    above = chdtrc(sources["dof"], sources["chi2"])
-    far = sources.assign(above=above)[above < _BY_CHANCE / max(len(sources), 1)]
-    far = far.sort_values("above")
-    if far.empty:
+    dof, chi2 = (result.sources[name].to_numpy(dtype=float) for name in ("dof", "chi2"))
+    above = np.where(dof > 0.0, chdtrc(dof, chi2), np.nan)
+    is_far = above < _BY_CHANCE / max(np.count_nonzero(dof > 0.0), 1)
+    if not is_far.any():
         return []
+    far = result.sources[is_far].assign(above=above[is_far]).sort_values("above")
     worst_ids = id_strings(far["source_id"].head(_MOST_NAMED))
     named = "; ".join(
         f"{name} (χ² {row.chi2:.0f}, expected {row.dof:.0f})"

@@ -109,7 +109,7 @@ class FitResult:
 
     def groups_on(self, axis: Axis) -> tuple[Group, ...]:
         """Return the parameter groups of the fit with one value per element of `axis`."""
-        known = set(self.calibration["group"])
+        known = set(self.calibration["group"].unique())
         return tuple(g for g in PARAMETERS if g.axis == axis and g.name in known)
 
     def values_on(self, axis: Axis, column: str = "value") -> pd.DataFrame:
@@ -118,20 +118,19 @@ class FitResult:
         Parameters
         ----------
         axis : an axis of the calibration, such as "exp", "det" or "coef"
-        column : a column of `schema.CALIBRATION`
+        column : a column of numbers of `schema.CALIBRATION`
 
         Returns
         -------
         One row per element of the axis, in order, and one column per group on the axis.
         """
         names = [group.name for group in self.groups_on(axis)]
-        groups, elements = (self.calibration[name].to_numpy() for name in ("group", "element"))
-        values, rows = self.calibration[column].to_numpy(), [groups == name for name in names]
-        wide = {
-            name: pd.Series(values[of], elements[of]) for name, of in zip(names, rows, strict=True)
-        }
-        return (
-            pd.DataFrame(wide, columns=names)
-            .sort_index()
-            .rename_axis(index="element", columns="group")
-        )
+        place = pd.Index(names).get_indexer(self.calibration["group"])
+        is_here = place >= 0
+        element, values = (self.calibration[one].to_numpy()[is_here] for one in ("element", column))
+        rows, row = np.unique(element, return_inverse=True)
+        # Filled in one go; to pivot, or to align series, would take several times as long.
+        wide = np.full((len(rows), len(names)), np.nan)
+        wide[row, place[is_here]] = values
+        frame = pd.DataFrame(wide, rows, names)
+        return frame.rename_axis(index="element", columns="group")

@@ -115,6 +115,15 @@ def small_survey(tmp_path_factory) -> Path:
     return directory
 
 
+@pytest.fixture
+def few_figures(monkeypatch):
+    """Leave out most figures of an orbit's report, where their number proves nothing."""
+    from plateviz.plots.gallery import diagnostics
+
+    some = [one for one in diagnostics() if one.name in ("footprint", "comparison")]
+    monkeypatch.setattr("plateviz.reports.orbit.diagnostics", lambda: some)
+
+
 @pytest.fixture(scope="session")
 def nbformat():
     """The package; importing it takes seconds, which only a process that needs it shall wait."""

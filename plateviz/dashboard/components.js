@@ -96,6 +96,10 @@ document.addEventListener("DOMContentLoaded", () => {
       ? words : Array.from(deserializer.decode(numbers), number => words[number])
   })
 
+  // After 0.3 s without a move, BokehJS takes a drag for a press, to which nothing here answers.
+  // A hand may rest before it drags, and a busy browser may be late. This is the longest timeout.
+  Bokeh.require("core/ui_gestures").UIGestures.press_threshold = 2 ** 31 - 1
+
   // A table that is not drawn yet takes what it shows when it is; Panel would change it before.
   const table = Bokeh.Models.get("panel.models.tabulator.DataTabulator").prototype.default_view
   const { connect_signals, render } = table.prototype

@@ -111,6 +111,7 @@ def test_page_says_why_a_block_is_not_run(page):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("few_figures")
 @pytest.mark.parametrize(
     "page",
     [page for page in PAGES if page != CONTRIBUTING and run_of(page, "sh")],

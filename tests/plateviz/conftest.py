@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 
 from plateviz.cli.main import main
-from plateviz.plots.gallery import diagnostics
 from solver.data import eigenmode_schema as eigenmode_schema
 from solver.data import schema
 from solver.data.instrument import MINI_MOCK
@@ -67,13 +66,6 @@ def run(monkeypatch, capsys):
         return ended.value.code or 0, printed.out, printed.err
 
     return call
-
-
-@pytest.fixture
-def few_figures(monkeypatch):
-    """Leave out most figures of an orbit's report, where their number proves nothing."""
-    some = [one for one in diagnostics() if one.name in ("footprint", "comparison")]
-    monkeypatch.setattr("plateviz.reports.orbit.diagnostics", lambda: some)
 
 
 @pytest.fixture

@@ -186,8 +186,11 @@ def metrics_of(page):
     return metric
 
 
-def drag(page, name, start, end):
-    """Drag across a figure, from one place to another in shares of its width and height."""
+def drag(page, name, start, end, rest=0):
+    """Drag across a figure, from one place to another in shares of its width and height.
+
+    The hand may rest before it drags, ms.
+    """
     canvas = page.locator(f".figure-{name}:visible canvas").first
     canvas.scroll_into_view_if_needed()
     box = _resting_box(page, canvas)
@@ -197,6 +200,7 @@ def drag(page, name, start, end):
     )
     page.mouse.move(x, y)
     page.mouse.down()
+    page.wait_for_timeout(rest)
     page.mouse.move(*last, steps=8)
     page.mouse.up()
 

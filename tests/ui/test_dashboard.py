@@ -404,7 +404,7 @@ def test_any_column_is_drawn_against_any_other_and_selects(page, open_page):
     turn_to_workspace(page, OrbitWorkspace.EXPLORE)
     until(page, lambda: explored(page) == "residual_x against focal_x")
     # More measurements than are drawn one by one: an area of the cells is selected.
-    drag(page, "explore", (0.3, 0.3), (0.4, 0.6))
+    drag(page, "explore", (0.3, 0.3), (0.4, 0.6), rest=500)
     expect(bar).to_be_visible()
     among_cells = bar.inner_text()
     choose(page, "Rows", "sources")

@@ -30,6 +30,10 @@ from solver.model.forward import (
 )
 from solver.problem.parameter_vector import local_groups
 
+# Traced once, and not again for each of the twenty derivatives.
+_ideal_position = jax.jit(ideal_position, inline=True)
+_image = jax.jit(image, inline=True)
+
 
 class Linearised(NamedTuple):
     """A chunk of tiles, linearised; all but `prediction` divided by sigma, x and y separately.
@@ -125,8 +129,8 @@ def linearise(
 
 @jax.jit
 def _imaged(turn: Turning, offsets: Offsets, geometry: Geometry, index: Index) -> Imaged:
-    ideal = ideal_position(turn.at, offsets, geometry, index)
-    along = _by_axes(lambda moved: image(moved, offsets, geometry, index).pixel, ideal)
+    ideal = _ideal_position(turn.at, offsets, geometry, index)
+    along = _by_axes(lambda moved: _image(moved, offsets, geometry, index).pixel, ideal)
     return Imaged(image(ideal, offsets, geometry, index), along)
 
 
@@ -152,7 +156,7 @@ def _derivatives(
         """Return the pixel derivative along a tangent of one field of the directions."""
 
         def moved(values: AnyArray) -> Pair:
-            return ideal_position(turn.at._replace(**{field: values}), offsets, geometry, index)
+            return _ideal_position(turn.at._replace(**{field: values}), offsets, geometry, index)
 
         return through_plane(jax.jvp(moved, (getattr(turn.at, field),), (tangent,))[1])
 
@@ -163,8 +167,8 @@ def _derivatives(
         on_plane, on_detector = (
             jax.jvp(stage, (values,), (one,))[1]
             for stage in (
-                lambda moved: ideal_position(turn.at, {**offsets, name: moved}, geometry, index),
-                lambda moved: image(ideal, {**offsets, name: moved}, geometry, index).pixel,
+                lambda moved: _ideal_position(turn.at, {**offsets, name: moved}, geometry, index),
+                lambda moved: _image(ideal, {**offsets, name: moved}, geometry, index).pixel,
             )
         )
         return whiten(*jax.tree.map(jnp.add, through_plane(on_plane), on_detector))
@@ -173,7 +177,7 @@ def _derivatives(
         return weight[0] * x, weight[1] * y
 
     def displaced(moved: Pair) -> Pair:
-        return image(ideal, offsets, geometry, index, moved).pixel
+        return _image(ideal, offsets, geometry, index, moved).pixel
 
     x, y = prediction.pixel
     residual = whiten(measured[0] - x, measured[1] - y)

@@ -93,11 +93,11 @@ def test_covariance_of_patterns_is_that_of_the_whole_problem(small_orbit, proble
 @pytest.mark.parametrize(
     "causes",
     [
-        {"drift": 3, "drift_in_time": 2, "focal_anisotropy": True},
         {"drift_walk": 2, "prior_widths": {"drift_walk_x": 0.3, "drift_walk_y": 0.1}},
         *(
             pytest.param(causes, marks=pytest.mark.full)
             for causes in (
+                {"drift": 3, "drift_in_time": 2, "focal_anisotropy": True},
                 {"breathing": 3, "detector_motion": True},
                 {"field_distortion": 2, "charge_transfer": True, "magnitude_shift": True},
                 {"detector_distortion": 3, "pixel_phase": True},

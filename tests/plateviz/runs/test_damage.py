@@ -149,7 +149,13 @@ def test_history_of_a_run_that_is_gone_is_refused_in_words(survey):
 
 
 @pytest.mark.parametrize(
-    "name", ["orbit=0001/sources.parquet", "orbit=0001/COMPLETE", "history.parquet", "COMPLETE"]
+    "name",
+    [
+        "orbit=0001/sources.parquet",
+        pytest.param("orbit=0001/COMPLETE", marks=pytest.mark.full),
+        "history.parquet",
+        "COMPLETE",
+    ],
 )
 def test_repaired_run_has_the_same_bytes(whole, survey, name):
     run = Run(survey, "default")

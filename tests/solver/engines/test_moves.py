@@ -72,6 +72,7 @@ def test_a_turn_within_a_field_is_found(small_orbit):
     assert places(fit_orbit(data, small_orbit.instrument, MOVING)) == [(field, plates[1])]
 
 
+@pytest.mark.full
 def test_two_moves_are_found(small_orbit):
     field, plates = exposures_of(small_orbit)
     data = moved(small_orbit, 0, field, plates[2])

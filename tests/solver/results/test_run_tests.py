@@ -161,12 +161,16 @@ def test_typical_field_is_seen_in_half_of_the_runs(frames):
     assert share_seen(2.0 * typical) > 0.9
 
 
-def random_field(seed, rms, length=0.4):
-    """Return a random field of an expected rms and a correlation length, deg, as a polynomial."""
+def random_field(seed, rms):
+    """Return a random field of an expected rms and waves of 1.5 to 3 deg, as a polynomial."""
     random, n_waves = np.random.default_rng([7, seed]), 60
     grid = np.stack(np.meshgrid(*2 * [np.linspace(-0.5, 0.5, 15)]), axis=-1).reshape(-1, 2)
     monomials = np.array([grid[:, 0] ** i * grid[:, 1] ** j for i, j in FIELD_DEGREES]).T
-    wave = random.standard_normal((2, n_waves, 2)) / length
+    angle, length = (
+        random.uniform(0.0, 2.0 * np.pi, (2, n_waves)),
+        random.uniform(1.5, 3.0, (2, n_waves)),
+    )
+    wave = 2.0 * np.pi * np.stack([np.cos(angle), np.sin(angle)], axis=-1) / length[..., None]
     phase = random.uniform(0.0, 2.0 * np.pi, (2, n_waves, 1))
     waves = np.cos(np.einsum("ckd,gd->ckg", wave, grid) + phase)
     values = rms * np.sqrt(2.0 / n_waves) * waves.sum(axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import scipy.linalg as sl
 from jaxtyping import Float, Int
-from scipy.special import chdtri
+from scipy.special import chdtri, j0
 
 from solver.data.run_schema import FIELD_DEGREES, ZONAL_FIELD
 from solver.results.diagnosis.rate import log_chance, sigmas
@@ -23,8 +23,8 @@ from solver.results.diagnosis.survey.sky_orbit import N_FIELDS, N_FRAME, SkyOrbi
 
 # With fewer orbits, a season has too few.
 LEAST_ORBITS = 8
-# Correlation length of the expected fields, deg: that of waves of 2 to 3 deg.
-_LENGTH_DEG = 0.4
+# Wavelengths of the expected fields, deg.
+_WAVELENGTHS_DEG = np.linspace(1.5, 3.0, 16)
 # Directions with less of the information than this share of the best are not tested.
 _LEAST_SHARE = 0.1
 _GRID = 15
@@ -90,7 +90,7 @@ def zonal_test(
     chi2, dof = float(deviates @ deviates), int(tested.sum())
     chance = log_chance(chi2, float(dof))
     square = max((chi2 - dof) / float(information.sum()), 0.0)
-    typical = _half_seen(dof) / float(information.sum())
+    typical = _half_seen(dof) / _median(information)
     # The most likely field, if one of this size, or one that could just be seen, is expected.
     size = max(square, typical)
     shrunk = size * np.sqrt(information) / (1.0 + size * information)
@@ -155,16 +155,28 @@ def _expected(half_width: Float[np.ndarray, " 2"]) -> Float[np.ndarray, "field f
     """Return the covariance of the polynomials that fit random fields of unit rms on the area."""
     grid = np.linspace(-1.0, 1.0, _GRID)
     at = np.stack(np.meshgrid(*(half * grid for half in half_width)), axis=-1).reshape(-1, 2)
-    square = np.sum((at[:, None] - at) ** 2, axis=-1)
+    distance = np.sqrt(np.sum((at[:, None] - at) ** 2, axis=-1))
+    # Of waves in all directions.
+    alike = np.mean([j0(2.0 * np.pi / one * distance) for one in _WAVELENGTHS_DEG], axis=0)
     monomials = np.array([at[:, 0] ** i * at[:, 1] ** j for i, j in FIELD_DEGREES]).T
     fitted = np.linalg.pinv(monomials)
-    covariance = fitted @ np.exp(-0.5 * square / _LENGTH_DEG**2) @ fitted.T
-    return np.kron(np.eye(2), covariance)
+    return np.kron(np.eye(2), fitted @ alike @ fitted.T)
 
 
 def _half_seen(dof: int) -> float:
     """Return by how much chi2 has to exceed its expectation to be seen."""
     return float(chdtri(dof, _SEEN)) - dof
+
+
+def _median(information: Float[np.ndarray, " direction"]) -> float:
+    """Return the median over random fields of unit rms of what they add to chi2.
+
+    It is a sum of squares of normal deviates with these weights, taken for a multiple of a chi2,
+    whose median is that of Wilson and Hilferty.
+    """
+    total = float(information.sum())
+    dof = total**2 / float(np.sum(information**2))
+    return total * (1.0 - 2.0 / (9.0 * dof)) ** 3
 
 
 def zonal_field(found: Zonal, centre: tuple[float, float]) -> pd.DataFrame:

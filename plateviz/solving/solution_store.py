@@ -184,7 +184,7 @@ class SolutionStore:
     def _complete(self, directory: Path) -> bool:
         """Let the solver write what a result lacks; return whether it is at it."""
         job = self._jobs.get(directory)
-        return job is not None and self._solver.complete(job.request)
+        return job is not None and self._solver.complete(job)
 
     def _request(
         self, orbit: int | None, settings: FitSettings, what_if: bool, directory: Path

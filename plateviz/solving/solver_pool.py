@@ -10,6 +10,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Protocol
+from weakref import WeakKeyDictionary
 
 from plateviz.solving.capacity import ready_orbits
 from plateviz.solving.forecast import JobTimes, is_long
@@ -37,8 +38,8 @@ class Solver(Protocol):
         """Let processes give up what they prepare."""
         ...
 
-    def complete(self, request: Mapping[str, object]) -> bool:
-        """Let a process write what was put off of a job; return whether there is a process."""
+    def complete(self, job: Job) -> bool:
+        """Let a process write what it has put off of a job; return whether there is a process."""
         ...
 
     def cancel(self, job: Job) -> None:
@@ -69,11 +70,13 @@ class SolverPool:
         self._queues = [self._start()]
         # The queue that has last fitted an orbit, the latest last.
         self._warm: OrderedDict[str, SolverQueue] = OrderedDict()
+        # The queue of each job that somebody still knows.
+        self._of_job: WeakKeyDictionary[Job, SolverQueue] = WeakKeyDictionary()
 
     def submit(self, job: Job) -> Job:
         """Put a job at the end of the queue that suits it best and return it."""
         with self._lock:
-            queue = self._queue_for(job.request)
+            queue = self._of_job[job] = self._queue_for(job.request)
             self._warm[_orbit(job.request)] = queue
             self._warm.move_to_end(_orbit(job.request))
             while len(self._warm) > self._n_ready:
@@ -94,11 +97,11 @@ class SolverPool:
         for queue in queues:
             queue.rest()
 
-    def complete(self, request: Mapping[str, object]) -> bool:
-        """Let a process write what was put off of a job; return whether there is a process."""
+    def complete(self, job: Job) -> bool:
+        """Let its process write what it has put off of a job; return whether there is a process."""
         with self._lock:
-            queue = self._warm.get(_orbit(request), self._queues[0])
-        return queue.complete(request)
+            queue = self._of_job.get(job)
+        return queue is not None and queue.complete(job)
 
     def cancel(self, job: Job) -> None:
         """Cancel a job that waits or runs."""

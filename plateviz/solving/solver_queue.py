@@ -90,12 +90,12 @@ class SolverQueue:
             if self._process is not None:
                 self._send({"do": "rest"})
 
-    def complete(self, request: Mapping[str, object]) -> bool:
+    def complete(self, job: Job) -> bool:
         """Let the process write what it has put off of a job; return whether there is a process."""
         with self._lock:
             if self._process is None:
                 return False
-            self._send({**request, "do": "complete"})
+            self._send({**job.request, "do": "complete"})
             return True
 
     def cancel(self, job: Job) -> None:

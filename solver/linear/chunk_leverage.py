@@ -104,7 +104,7 @@ def _of_displacement(
     if len(basis) > _MAX_UNROLLED:
         return _of_many_terms(jnp.stack(basis), source, shared)
     count = range(len(basis))
-    # Taken apart at once: an index of each element would take most of the time of tracing.
+    # Taken apart at once: an index of each element takes long to trace.
     terms = [[jnp.unstack(row) for row in jnp.unstack(of)] for of in shared.terms]
     own = [
         sum(basis[k] * sum(of[k][m] * basis[m] for m in count[k:]) for k in count) for of in terms

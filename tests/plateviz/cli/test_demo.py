@@ -37,7 +37,7 @@ class NoSolver:
     def submit(self, job):
         pytest.fail(f"expected no request, found {job.request}")
 
-    def complete(self, request):
+    def complete(self, job):
         pytest.fail("expected no request")
 
 

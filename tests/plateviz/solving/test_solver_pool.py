@@ -86,6 +86,17 @@ def test_preparations_go_where_the_what_ifs_will(pool, queues):
     assert pool.submit(fit(3, what_if=True)) in queues[0].jobs
 
 
+def test_what_was_put_off_is_asked_of_the_process_that_put_it_off(pool, queues):
+    what_if = pool.submit(fit(0, what_if=True))
+    pool.submit(fit(0, "svi"))
+    assert not pool.complete(what_if)
+    for queue in queues:
+        queue._process = object()
+    assert pool.complete(what_if)
+    assert (queues[0].sent[-1], queues[1].sent[-1]) == ("complete", "fit")
+    assert not pool.complete(fit(0, what_if=True))
+
+
 def test_one_process_does_everything_in_order(queues):
     pool = made_pool(queues, 1)
     jobs = [pool.submit(fit(0, "svi")), pool.submit(fit(0, what_if=True))]

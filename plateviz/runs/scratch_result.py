@@ -170,11 +170,7 @@ class _Awaited:
             return False
         if self._end is None:
             self._end = time.monotonic() + _PATIENCE_OF_PAGE if self._complete() else -math.inf
-        if time.monotonic() < self._end:
-            return True
-        # Who uses it next asks anew.
-        self._end = None
-        return False
+        return time.monotonic() < self._end
 
     def wait(self, end: float) -> bool:
         """Wait for it until some `time.monotonic`; return whether it is there."""
@@ -185,6 +181,8 @@ class _Awaited:
     def table(self, name: str) -> pd.DataFrame | None:
         """Return a table beside it once it is there."""
         if not self.wait(time.monotonic() + _PATIENCE_SECONDS):
+            # Who uses it next asks anew.
+            self._end = None
             raise InputError(
                 f"{self.path}: expected the eigenmodes of the solution, found that the solver "
                 "ended or had no time to write them; fit again"

@@ -10,6 +10,7 @@ import pytest
 from plateviz.runs import scratch_result
 from plateviz.runs.fitted_orbit import read_fitted_orbit, write_fitted_orbit
 from plateviz.runs.scratch_result import (
+    are_eigenmodes_to_come,
     is_judged_later,
     is_written,
     read_scratch_result,
@@ -130,6 +131,20 @@ def test_eigenmodes_that_never_come_are_an_error_at_once(partial):
         with pytest.raises(InputError, match="the solver ended or had no time to write them"):
             getattr(result, name)
     assert len(result.sources)
+
+
+def test_page_that_has_given_up_does_not_wait_again(partial, monkeypatch):
+    monkeypatch.setattr(scratch_result, "_PATIENCE_OF_PAGE", 0.0)
+    monkeypatch.setattr(scratch_result.time, "sleep", lambda _: pytest.fail("waited"))
+    asked = []
+    result = read_scratch_result(partial[0], complete=lambda: asked.append("modes") or True)
+    assert not are_eigenmodes_to_come(result)
+    with pytest.raises(InputError, match="had no time"):
+        result.modes.head()
+    assert asked == ["modes"]
+    monkeypatch.setattr(scratch_result, "_PATIENCE_OF_PAGE", 60.0)
+    assert are_eigenmodes_to_come(result)
+    assert asked == ["modes", "modes"]
 
 
 @pytest.fixture

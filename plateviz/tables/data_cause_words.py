@@ -33,6 +33,11 @@ def said_of_noise_of(name: str, words: str, action: str, *options: str) -> Calla
             f"χ² scatters by more than chance: {test.statistic:.3g}, expected "
             f"{test.expected:.3g} ± {test.scatter:.2g}."
         )
+        if test.subject == "magnitudes":
+            evidence = (
+                f"χ² over its expected value changes by {test.statistic:+.3f} per magnitude; "
+                f"chance makes ± {test.scatter:.2g}."
+            )
         return Said(name, words, evidence, action, options)
 
     return said
@@ -67,14 +72,18 @@ def said_of_swapped(case: Case) -> Said:
 
 def said_of_references(case: Case) -> Said:
     """Return what is said of reference stars whose errors are larger than stated."""
-    # The deviations are in units of the prior's sigmas, which the fit may have widened already.
-    factor = max(case.found.size, 1.1) * case.result.settings.width("sources")
+    settings = case.result.settings
+    action, option = "let the fit estimate how large the catalogue's errors are", "reference-scale"
+    if settings.reference_scale:
+        # The errors are in units of the prior's sigmas, which the fit may have widened already.
+        factor = max(case.found.size, 1.1) * settings.width("sources")
+        action, option = "widen the prior of the reference stars", f"prior sources={factor:.2f}"
     return Said(
         "reference-errors",
         "the reference stars are further from the catalogue than it states",
-        f"Typical deviations are {case.found.size:.2f} times what its uncertainties allow.",
-        "widen the prior of the reference stars",
-        (f"--prior sources={factor:.2f}",),
+        f"Its errors are about {case.found.size:.2f} times those stated.",
+        action,
+        (f"--{option}",),
     )
 
 

@@ -16,7 +16,8 @@ def unseen_sentences(result: FitResult) -> list[str]:
     sentences = [
         "No test of one orbit shows smooth errors of the reference catalogue. Those that shift, "
         "turn or stretch the field are taken for pointing, and move all positions by as much as "
-        "they are large."
+        "they are large. Nor does one show a time that is wrong in all exposures alike: it moves "
+        "all positions by the motion of the reference stars in that time."
     ]
     quadratic = quadratic_mas(result)
     if np.isfinite(quadratic):

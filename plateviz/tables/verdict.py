@@ -8,6 +8,7 @@ import pandas as pd
 from scipy.special import chdtrc
 
 from plateviz.tables.causes import Cause, causes_in_words
+from plateviz.tables.estimated_noise import noise_sentences
 from plateviz.tables.notable_in_orbit import notable_sentences
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
@@ -89,7 +90,10 @@ def _stored(result: FitResult) -> Mapping[str, Any] | None:
 
 
 def _from_plain(stored: Mapping[str, Any]) -> Verdict:
-    causes = [Cause(**{**one, "options": tuple(one["options"])}) for one in stored["causes"]]
+    causes = [
+        Cause(**{**one, "options": tuple(one["options"]), "items": tuple(one.get("items", ()))})
+        for one in stored["causes"]
+    ]
     tests = [TestInWords(**one) for one in stored["tests"]]
     return Verdict(**{**stored, "causes": causes, "tests": tests})
 
@@ -115,7 +119,7 @@ def _judge(result: FitResult) -> Verdict:
     items = summary_strip(result)
     reasons = [_converged(result), *(cause.sentence() for cause in causes)]
     reasons += [discoveries_in_words(diagnosis.tests, found), *map(_sentence, _judged(items))]
-    reasons += [_common_error(result), *unseen_sentences(result)]
+    reasons += [*noise_sentences(result), _common_error(result), *unseen_sentences(result)]
     faults = [] if converged else [_converged(result)]
     faults += [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
     if found and not causes:

@@ -15,6 +15,7 @@ from solver.results.diagnosis import gains
 from solver.results.diagnosis.patterns import Family
 from solver.results.diagnosis.projection import Projection
 from solver.results.diagnosis.rate import sigmas
+from solver.results.diagnosis.references import MEDIAN_CHI2
 from solver.results.diagnosis.scatter import Scatter, scatter_tests
 from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test, pattern_test
 
@@ -46,8 +47,8 @@ _OF_ITS_OWN = 0.5
 # Outliers are wrong identifications if these have this share of their chi2.
 _OF_OUTLIERS = 0.5
 _REFERENCE_LIMIT = 0.01
-# Median of a chi2 with two degrees of freedom, and how much larger it is if all stars are wrong.
-_MEDIAN_CHI2, _ALL_WRONG = 1.3863, 3.0
+# How much larger the median chi2 is if all stars are wrong.
+_ALL_WRONG = 3.0
 
 
 class Found(NamedTuple):
@@ -232,7 +233,7 @@ def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
 
 def _of_references(diagnosis: Diagnosis) -> list[Found]:
     """Return whether some, or all, of the reference stars are wrong."""
-    ids, chi2 = diagnosis.references
+    ids, chi2, factor = diagnosis.references
     if not len(chi2):
         return []
     limit = _limit(diagnosis)
@@ -241,11 +242,11 @@ def _of_references(diagnosis: Diagnosis) -> list[Found]:
     if worst.log_chance > limit:
         return []
     # Wrong stars pull the frame, and so all others; only those that are far beyond are wrong.
-    typical = max(float(np.median(chi2)) / _MEDIAN_CHI2, 1.0)
+    typical = max(float(np.median(chi2)) / MEDIAN_CHI2, 1.0)
     far = chi2 / typical > chdtri(2.0, -np.expm1(np.log1p(-_REFERENCE_LIMIT) / len(chi2)))
     if not far.any() or typical > _ALL_WRONG:
         gain = gains.of_scale(typical, 2.0 * len(chi2))
-        return [Found(worst._replace(subject="references"), gain, size=float(np.sqrt(typical)))]
+        return [Found(worst._replace(subject="references"), gain, size=factor)]
     order = np.argsort(-chi2[far])
     named = tuple(int(one) for one in ids[far][order])
     gain = float(np.sum(chi2[far] - 2.0 * gains.PER_PARAMETER))

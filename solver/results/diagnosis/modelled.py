@@ -193,15 +193,24 @@ def _faintness(result: FitResult) -> np.ndarray:
     return faintness(result.sources["magnitude"].to_numpy(dtype=float))
 
 
+def _has_found_noise(result: FitResult) -> bool:
+    """Return whether the search for the noise that fits has come to an end."""
+    noise = result.summary.get("noise")
+    return noise is not None and bool(noise["converged"])
+
+
 # What a fit adjusts until a test of the size of the residuals finds nothing.
 _ADJUSTED: dict[str, Callable[[FitResult], bool]] = {
     "noise": lambda result: (
-        result.settings.noise_scale
-        or result.settings.noise_by_exposure
-        or result.settings.noise_by_magnitude
+        (
+            result.settings.noise_scale
+            or result.settings.noise_by_exposure
+            or result.settings.noise_by_magnitude
+        )
+        and _has_found_noise(result)
     ),
-    "exposures": lambda result: result.settings.noise_by_exposure,
-    "magnitudes": lambda result: result.settings.noise_by_magnitude,
+    "exposures": lambda result: result.settings.noise_by_exposure and _has_found_noise(result),
+    "magnitudes": lambda result: result.settings.noise_by_magnitude and _has_found_noise(result),
     "stretch": has_anisotropy,
 }
 

@@ -9,12 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.optimize import brentq
 from scipy.special import chdtrc
 
 from solver.data.result import FitResult
 
 # Below this share of the catalogue's variance that the measurements remove, they say nothing.
 _LEAST_SHARE = 1e-6
+# Median of a chi2 with two degrees of freedom.
+MEDIAN_CHI2 = 1.3863
+_LARGEST_FACTOR = 1e6
 
 
 class ReferenceChi2(NamedTuple):
@@ -24,10 +28,13 @@ class ReferenceChi2(NamedTuple):
     ----------
     source_id : of the stars that the measurements determine, shape (n,)
     chi2 : with two degrees of freedom, shape (n,)
+    factor : by which the errors of the catalogue are larger than stated, at least 1, so that the
+        median chi2 is as expected
     """
 
     source_id: np.ndarray
     chi2: np.ndarray
+    factor: float
 
 
 def reference_chi2(sources: pd.DataFrame) -> ReferenceChi2:
@@ -45,9 +52,37 @@ def reference_chi2(sources: pd.DataFrame) -> ReferenceChi2:
     share = np.eye(2) - inverse_root @ marginal @ inverse_root.transpose(0, 2, 1)
     known = np.linalg.eigvalsh(share)[:, 0] > _LEAST_SHARE
     scaled = (inverse_root[known] @ offset[known, :, None])[:, :, 0]
-    solved = np.linalg.solve(share[known], scaled[:, :, None])[:, :, 0]
-    chi2 = np.einsum("ni,ni->n", scaled, solved)
-    return ReferenceChi2(rows["source_id"].to_numpy()[known], chi2)
+    shares, axes = np.linalg.eigh(share[known])
+    along = np.square(np.einsum("nik,ni->nk", axes, scaled))
+    return ReferenceChi2(
+        rows["source_id"].to_numpy()[known],
+        np.sum(along / shares, axis=1),
+        _error_factor(along, shares),
+    )
+
+
+def _error_factor(along: np.ndarray, shares: np.ndarray) -> float:
+    """Return the factor of the catalogue's errors for which the median chi2 is as expected.
+
+    With an error f times as large, the catalogue position minus the fit without it has the
+    covariance f^2 P + M, where P + M = P (P - C)^-1 P. In units of the catalogue's errors it is
+    1 / s + f^2 - 1 along an eigenvector of the share s of P that the measurements remove.
+
+    Parameters
+    ----------
+    along : squares of the deviations from the catalogue along the eigenvectors, shape (n, 2)
+    shares : s, shape (n, 2)
+    """
+
+    def excess(log_factor: float) -> float:
+        larger = np.expm1(2.0 * log_factor)
+        chi2 = np.sum(along / (shares + larger * shares**2), axis=1)
+        return float(np.median(chi2)) - MEDIAN_CHI2
+
+    if not len(along) or excess(0.0) <= 0.0:
+        return 1.0
+    most = float(np.log(_LARGEST_FACTOR))
+    return float(np.exp(brentq(excess, 0.0, most))) if excess(most) < 0.0 else _LARGEST_FACTOR
 
 
 def covariance(rows: pd.DataFrame, first: str, second: str, correlation: str) -> np.ndarray:

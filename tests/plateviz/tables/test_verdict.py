@@ -97,6 +97,24 @@ def test_swapped_measurements_are_listed_where_they_prevent_a_solution(fit_resul
     assert cause.options == ("--robust",)
     assert "In 1 pair, each is where the other should be" in cause.words
     assert str(residuals.loc[first, "source_id"]) in cause.words
+    ids = residuals.loc[sorted((first, second)), "source_id"].tolist()
+    field, exposure, detector = residuals.loc[0, key]
+    where = f"field {field}, exposure {exposure}, detector {detector}"
+    assert cause.items == (f"{ids[0]} and {ids[1]} in {where}",)
+    again = orbit_verdict(replace(with_verdict(stuck)))
+    assert again.causes[0] == cause
+
+
+def test_fit_that_does_not_converge_has_the_remedy_of_what_its_residuals_look_like(
+    monkeypatch, fit_result
+):
+    converged = with_chances(monkeypatch, fit_result, stretch=-40.0)
+    expected = orbit_verdict(converged).causes[0]
+    stuck = with_summary(converged, converged=False, reason="stuck")
+    [cause] = orbit_verdict(stuck).causes
+    assert cause.name == "not-converged"
+    assert f"look as if {expected.title}" in cause.words
+    assert cause.options == expected.options != ()
 
 
 def test_outliers_with_each_others_identification_are_counted(fit_result):

@@ -1,0 +1,182 @@
+"""What a cause spoils, by how much, and whether that is so much that nobody should trust it."""
+
+import numpy as np
+import pandas as pd
+
+from plateviz.tables.cause_case import Case
+from plateviz.tables.labels import id_strings
+from plateviz.tables.reference_influence import reference_influence
+from solver.data.result import FitResult
+
+# Sources with fewer measurements do not say how good a solution is.
+_MIN_OBS = 10
+# A pattern larger than this share of the positions' uncertainty makes it wrong by a tenth.
+_LARGE_SHARE = 0.5
+# Uncertainties wrong by more than this share.
+_LARGE_ERROR = 0.1
+# Outliers of so many of the sources, and so many of the exposures, are not few.
+_LARGE_PARTS = {"outliers": 0.02, "swapped": 0.02, "swing": 0.1}
+# Rms deviation of the reference stars over its expected value, beyond which the frame is wrong.
+_LARGE_DEVIATION = 1.2
+# Groups of sources of similar magnitudes.
+_MAGNITUDE_GROUPS = 8
+
+
+def harm(case: Case) -> tuple[str, bool]:
+    """Return what a cause spoils, in words, and whether that is much."""
+    found, subject = case.found, case.found.test.subject
+    of_parts = {
+        "outliers": len(case.result.sources),
+        "swapped": len(case.result.sources),
+        "swing": len(case.result.exposures),
+        "reference": len(case.diagnosis.references.chi2),
+    }
+    size = found.test.size_um if np.isfinite(found.test.size_um) else _rms(case)
+    if np.isfinite(size):
+        # On the sky, along one axis.
+        error = _on_sky(case, size)
+        typical = _typical_sigma(case.result)
+        spoils = (
+            f"It spoils the positions, by up to {error:.2g} mas rms where their uncertainty is "
+            f"{typical:.2g} mas, and the calibration."
+        )
+        return spoils, error > _LARGE_SHARE * typical
+    if subject in of_parts:
+        return _harm_of_parts(case, of_parts[subject])
+    if subject == "references":
+        spoils = (
+            "It spoils the error that all positions share, which is up to "
+            f"{found.size:.2g} times as large as stated."
+        )
+        return spoils, _references_off(case.result)
+    if subject == "noise":
+        error, extent = 0.5 * abs(found.test.statistic - 1.0), ""
+    else:
+        error, extent = _noise_error(case)
+    return (
+        f"It spoils the uncertainties, by about {100 * error:.0f} %{extent}, and the weights.",
+        bool(error > _LARGE_ERROR),
+    )
+
+
+def _harm_of_parts(case: Case, total: int) -> tuple[str, bool]:
+    """Return the same for a cause that concerns some sources or exposures."""
+    found, subject = case.found, case.found.test.subject
+    count = len(found.items) or int(found.size)
+    is_large = count > _LARGE_PARTS.get(subject, 0.0) * total
+    if subject == "reference":
+        both = [float(case.result.summary[f"mean_error_{axis}"]) for axis in ("ra", "dec")]
+        shared = float(np.linalg.norm(both))
+        return (
+            f"It spoils all positions alike, by about {_frame_shift(case):.2g} mas where the error "
+            f"that they share is {shared:.2g} mas: the frame follows the reference stars.",
+            _references_off(case.result),
+        )
+    if subject == "swing":
+        return (
+            "It spoils the positions of the sources in these exposures, by at most "
+            f"{_swing_size(case):.2g} mas rms.",
+            is_large,
+        )
+    return (
+        f"It spoils the positions of up to {count:,} sources, by at most "
+        f"{_largest_pull_of_one(case):.2g} mas, where a typical uncertainty is "
+        f"{_typical_sigma(case.result):.2g} mas.",
+        is_large,
+    )
+
+
+def _noise_error(case: Case) -> tuple[float, str]:
+    """Return the error of the uncertainties of groups, rms beyond chance, and how far it reaches.
+
+    The error is a share of the stated uncertainties.
+    """
+    rows, subject = case.diagnosis.rows, case.found.test.subject
+    groups = {
+        "exposures": rows.exposure,
+        "detectors": rows.detector,
+        "sources": rows.source,
+        "magnitudes": _magnitude_group(case)[rows.source],
+    }[subject]
+    used = ~rows.is_far & (groups >= 0) & ~np.isin(rows.exposure, case.diagnosis.swinging)
+    chi2 = np.bincount(groups[used], rows.chi2[used])
+    dof = np.bincount(groups[used], 2.0 * rows.left[used])
+    ratio, by_chance = chi2[dof > 0.0] / dof[dof > 0.0], 2.0 / dof[dof > 0.0]
+    error = 0.5 * float(np.sqrt(max(np.mean((ratio - 1.0) ** 2 - by_chance), 0.0)))
+    if subject == "sources":  # of which the most extreme are so by chance
+        return error, " rms"
+    low, high = (100.0 * (np.sqrt(one) - 1.0) for one in (float(ratio.min()), float(ratio.max())))
+    return error, f" rms, from {low:+.0f} to {high:+.0f} % between {subject}"
+
+
+def _magnitude_group(case: Case) -> np.ndarray:
+    """Return for each source the number of its group of similar magnitudes, -1 if unknown."""
+    magnitude = pd.Series(case.diagnosis.magnitude)
+    groups = pd.qcut(magnitude, _MAGNITUDE_GROUPS, labels=False, duplicates="drop")
+    return groups.fillna(-1).to_numpy(dtype=int)
+
+
+def _on_sky(case: Case, size_um: float) -> float:
+    """Return a displacement on the focal plane as that on the sky along one axis, mas."""
+    return size_um / case.diagnosis.camera.um_per_mas / float(np.sqrt(2.0))
+
+
+def _largest_pull_of_one(case: Case) -> float:
+    """Return how far a measurement that is far off moves its source at most, mas along one axis.
+
+    The residual is what is left of the error; the rest is what the fit has followed.
+    """
+    rows = case.diagnosis.rows
+    residual = np.sqrt(rows.chi2[rows.is_far] / rows.weight[rows.is_far])
+    left = np.maximum(rows.left[rows.is_far], 1e-3)
+    return _on_sky(case, float((residual * (1.0 - left) / left).max(initial=0.0)))
+
+
+def _swing_size(case: Case) -> float:
+    """Return the rms displacement in the exposures that swing, mas along one axis."""
+    found, rows, which = case.diagnosis.exposures, case.diagnosis.rows, list(case.found.items)
+    weight = np.bincount(rows.exposure, rows.weight, len(found.swing))
+    excess = np.maximum((found.swing * found.scale)[which], 0.0)
+    return _on_sky(case, float(np.sqrt((excess / weight[which]).max(initial=0.0))))
+
+
+def _frame_shift(case: Case) -> float:
+    """Return by how much reference stars that are wrong shift the mean of all, mas.
+
+    Each counts with the inverse variance of its catalogue position against the fit without it.
+    """
+    table = reference_influence(case.result).dropna()
+    wrong = table["id"].isin(id_strings(pd.Series(case.found.items, dtype=np.int64)))
+    shift = []
+    for axis in ("ra", "dec"):
+        residual = table[f"residual_{axis}"].to_numpy()
+        weight = (table[f"pull_{axis}"].to_numpy() / residual) ** 2
+        shift.append(float(np.nansum((weight * residual)[wrong]) / np.nansum(weight)))
+    return float(np.linalg.norm(shift))
+
+
+def _references_off(result: FitResult) -> bool:
+    """Return whether the reference stars deviate from the catalogue by much more than expected."""
+    summary = result.summary
+    return any(
+        float(summary[f"normalised_deviation_{axis}"])
+        > _LARGE_DEVIATION * float(summary[f"expected_normalised_deviation_{axis}"])
+        for axis in ("ra", "dec")
+    )
+
+
+def _rms(case: Case) -> float:
+    """Return the rms displacement of patterns that each exposure has of its own, um, or NaN."""
+    test = case.found.test
+    if test.subject not in ("stretch", "shear", "quadratic"):
+        return float("nan")
+    excess = max(test.statistic - test.expected, 0.0)
+    return float(np.sqrt(excess / case.diagnosis.rows.weight.sum()))
+
+
+def _typical_sigma(result: FitResult) -> float:
+    """Return the median marginal uncertainty of the positions, mas."""
+    sources = result.sources
+    many = ~sources["is_reference"] & (sources["n_obs"] >= _MIN_OBS)
+    rows = sources[many] if many.any() else sources
+    return float(np.median(rows[["sigma_ra_marginal", "sigma_dec_marginal"]]))

@@ -1,0 +1,77 @@
+"""What causes spoil, and by how much."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from plateviz.tables import cause_harm
+from plateviz.tables.cause_case import Case
+from plateviz.tables.cause_harm import harm
+from solver.results.diagnosis.causes import Found, find_causes
+from solver.results.diagnosis.table import diagnose
+
+
+def with_noise(result, factor):
+    """Return a result with the residuals of each measurement multiplied by a factor."""
+    residuals = result.residuals.copy()
+    for name in ("residual_x", "residual_y", "normalised_x", "normalised_y"):
+        if name in residuals:
+            residuals[name] = factor * residuals[name]
+    return replace(result, residuals=residuals)
+
+
+def harm_of(result, subject, *items):
+    """Return what a cause spoils in a result, and whether it is much, whatever the tests find."""
+    diagnosis = diagnose(result)
+    tests = {one.subject: one for one in diagnosis.tests}
+    test = tests.get(subject, tests["references"])._replace(subject=subject)
+    found = Found(test, 0.0, items, 1.0)
+    return harm(Case(found, find_causes(diagnosis), diagnosis, result))
+
+
+def number_after(words, before):
+    return float(words.partition(before)[2].split()[0])
+
+
+def test_noise_that_is_right_on_the_whole_spoils_the_uncertainties_of_exposures(fit_result):
+    # The mean square stays 1.
+    factor = np.where(fit_result.exposure_index % 2 == 0, 1.3, np.sqrt(2.0 - 1.3**2))
+    spoils, is_large = harm_of(with_noise(fit_result, factor), "exposures")
+    assert number_after(spoils, "by about ") == pytest.approx(34.0, abs=6.0)
+    assert spoils.endswith("% between exposures, and the weights.")
+    assert is_large
+    spoils, is_large = harm_of(fit_result, "exposures")
+    assert number_after(spoils, "by about ") < 6.0
+    assert not is_large
+
+
+@pytest.mark.parametrize(("factor", "is_much"), [(0.98, False), (1.3, True)])
+def test_noise_of_all_spoils_the_uncertainties_by_its_excess(fit_result, factor, is_much):
+    spoils, is_large = harm_of(with_noise(fit_result, factor), "noise")
+    assert number_after(spoils, "by about ") == pytest.approx(50 * abs(factor**2 - 1), abs=3.0)
+    assert is_large == is_much
+
+
+def test_an_outlier_moves_its_source_by_what_the_fit_has_followed(fit_result):
+    residuals = fit_result.residuals.copy()
+    row = residuals.index[10]
+    moved = []
+    for sigmas in (50.0, 100.0):
+        residuals.loc[row, "residual_x"] = sigmas * residuals.loc[row, "sx"]
+        spoils, _ = harm_of(replace(fit_result, residuals=residuals), "outliers")
+        assert "up to 1 sources, by at most" in spoils
+        moved.append(number_after(spoils, "by at most "))
+    assert moved[0] > 0.0
+    assert moved[1] == pytest.approx(2.0 * moved[0], rel=0.1)
+
+
+def test_wrong_reference_star_shifts_the_frame_by_its_share(fit_result, monkeypatch):
+    # The first one counts for a fifth of all.
+    influence = {"id": ["7", "8"], "residual_ra": [10.0, 1e-6], "pull_ra": [5.0, 1e-6]}
+    influence |= {"residual_dec": [1e-6, 1e-6], "pull_dec": [1e-6, 1e-6]}
+    table = pd.DataFrame(influence)
+    monkeypatch.setattr(cause_harm, "reference_influence", lambda _: table)
+    spoils, _ = harm_of(fit_result, "reference", 7)
+    assert number_after(spoils, "by about ") == pytest.approx(2.0)

@@ -1,0 +1,57 @@
+"""How large the errors of a catalogue are, from the reference stars of a solution."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from solver.results.diagnosis.references import reference_chi2
+
+STARS = 4000
+
+
+def solution(factor, measured, seed=1):
+    """Return reference stars whose catalogue errors are larger than stated by a factor.
+
+    Parameters
+    ----------
+    measured : uncertainty of the measurements over that of the catalogue
+    """
+    rng = np.random.default_rng(seed)
+    correlation = rng.uniform(-0.8, 0.8, STARS)
+    prior = 0.25**2 * np.array([[[1.0, rho], [rho, 1.0]] for rho in correlation])
+    noise = np.broadcast_to((0.25 * measured) ** 2 * np.diag([1.0, 0.5]), prior.shape)
+    posterior = np.linalg.inv(np.linalg.inv(prior) + np.linalg.inv(noise))
+    deviation = np.linalg.cholesky(factor**2 * prior + noise) @ rng.standard_normal((STARS, 2, 1))
+    offset = (prior @ np.linalg.solve(prior + noise, deviation))[:, :, 0]
+    columns = {"source_id": np.arange(STARS), "is_reference": True}
+    for i, axis in enumerate(("ra", "dec")):
+        columns[f"offset_{axis}"] = offset[:, i]
+        columns[f"prior_sigma_{axis}"] = np.sqrt(prior[:, i, i])
+        columns[f"sigma_{axis}_marginal"] = np.sqrt(posterior[:, i, i])
+    for name, matrices in (("prior_corr", prior), ("corr_marginal", posterior)):
+        sigmas = np.sqrt(matrices[:, 0, 0] * matrices[:, 1, 1])
+        columns[name] = matrices[:, 0, 1] / sigmas
+    return pd.DataFrame(columns)
+
+
+@pytest.mark.parametrize("measured", [0.1, 1.0, 3.0])
+@pytest.mark.parametrize("factor", [2.0, 15.0])
+def test_factor_on_the_errors_is_found_however_good_the_measurements_are(factor, measured):
+    assert reference_chi2(solution(factor, measured)).factor == pytest.approx(factor, rel=0.1)
+
+
+def test_good_catalogue_needs_no_factor():
+    found = reference_chi2(solution(1.0, 1.0))
+    assert found.factor == pytest.approx(1.0, abs=0.1)
+    assert np.mean(found.chi2) == pytest.approx(2.0, rel=0.05)
+
+
+def test_no_reference_star_needs_no_factor():
+    rows = solution(1.0, 1.0).assign(is_reference=False)
+    assert reference_chi2(rows).factor == 1.0
+
+
+def test_errors_beyond_all_measure_end_at_a_limit():
+    rows = solution(1.0, 1.0)
+    rows[["offset_ra", "offset_dec"]] *= 1e12
+    assert reference_chi2(rows).factor == 1e6

@@ -133,9 +133,31 @@ def test_page_has_the_shares_of_the_records(records):
     assert "| 2 | 1 of 2 | 1 of 2 | 0 of 2 |" in text
     assert f"| `{CASES[0].name}` | 0.085 um | - | - | 2, 1 of 2 | - | - |" in text
     assert f"| `{CASES[0].name}` | 1.100 | {CASES[0].causes[0]} 1, noise 1 |" in text
+    assert "| called not to be trusted | at most 0.5 % | 0 of 2: below 77.6 % with" in text
+    assert "| called with care | at most 5 % | 1 of 2: below 97.5 % with 95 %" in text
+    assert (
+        f"| `{CASES[0].name}` | × 1 | 1.100 | 2 of 2, 100 % | 1 of 2, 50 % | **missed** |" in text
+    )
+    assert "pulls of 0.97 to 1.03: 1 of 1 causes have them." in text
     assert f"| `{CASES[0].name}` | `drift=2` | 1 | 1 of 1 | 1.000 | 2.00 |" in text
     page = f"before {BEGIN} old {END} after"
     assert with_tables(page, records) == f"before {BEGIN}\n{text}\n{END} after"
+
+
+def test_trial_without_room_for_its_defect_counts_for_nothing(records):
+    at_one = 1000 * (1 + FACTORS.index(1.0))
+    records[at_one + 2] = {"state": "impossible", "causes": [], "failed": "no room"}
+    assert f"| `{CASES[0].name}` | 0.085 um | - | - | 2, 1 of 2 | - | - |" in tables(records)
+
+
+def test_demands_look_at_the_amplitude_whose_pulls_are_nearest(records):
+    low = 1000 * (1 + FACTORS.index(0.5))
+    at_one = 1000 * (1 + FACTORS.index(1.0))
+    records[low] = records[at_one] | {"pull": 1.12}
+    records[at_one] = records[at_one] | {"pull": 1.6}
+    assert f"| `{CASES[0].name}` | × 0.5 | 1.120 | 1 of 1, 100 % | 1 of 1, 100 % | met |" in tables(
+        records
+    )
 
 
 def test_figure_has_a_point_for_each_share(records):

@@ -1,18 +1,22 @@
 """The page of the documents on the measured verdict, from the records of its campaign."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from solver.simulate.defects.table import BY_NAME
+from tests.campaigns import verdict_demands as demands
 from tests.campaigns.trials import Record
 from tests.campaigns.verdict_cases import CASES, FACTORS, DefectCase, trial_of
 from tests.campaigns.verdict_chart import draw
+from tests.campaigns.verdict_demands import named, rms_pull, seen
 
 BEGIN, END = "<!-- verdicts:begin -->", "<!-- verdicts:end -->"
 _NO_CAUSE, _GOOD = "no cause", "good"
+# State of a trial whose defect the orbit has no room for.
+IMPOSSIBLE = "impossible"
 # Records of a defect: those at each factor, and those with the cause modelled.
 _Records = Mapping[float | str, list[Record]]
 _MODELLED = "modelled"
@@ -37,8 +41,8 @@ def figure(records: Mapping[int, Record]) -> str:
     of_cases = _by_case(records)
     panels = {
         case.name: {
-            "seen": [(f, _share(_seen(of_case[f]))) for f in FACTORS if of_case[f]],
-            "named rightly": [(f, _share(_named(case, of_case[f]))) for f in FACTORS if of_case[f]],
+            "seen": [(f, _share(seen(of_case[f]))) for f in FACTORS if of_case[f]],
+            "named rightly": [(f, _share(named(case, of_case[f]))) for f in FACTORS if of_case[f]],
         }
         for case, of_case in of_cases.items()
     }
@@ -52,7 +56,11 @@ def tables(records: Mapping[int, Record]) -> str:
     total = len(clean)
     lines = [
         f"The figures rest on {len(records):,} trials, {total} of them clean orbits.\n",
-        "Clean orbits:\n",
+        "What is asked, at the amplitude whose pulls are nearest to 1.1:\n",
+        *demands.of_clean(clean),
+        "",
+        *demands.of_defects(of_cases),
+        "\nClean orbits:\n",
         "| orbits | good | with care | not to be trusted |",
         "|---:|---:|---:|---:|",
         f"| {total} | {_of(states[_GOOD], total)} | {_of(states['warn'], total)} "
@@ -80,6 +88,8 @@ def tables(records: Mapping[int, Record]) -> str:
             for case, of_case in of_cases.items()
             if of_case[_MODELLED]
         ),
+        "",
+        *demands.of_modelled({case: of_case[_MODELLED] for case, of_case in of_cases.items()}),
     ]
     return "\n".join(lines)
 
@@ -90,7 +100,7 @@ def _by_case(records: Mapping[int, Record]) -> dict[DefectCase, _Records]:
     }
     for number, record in sorted(records.items()):
         trial = trial_of(number)
-        if trial.case:
+        if trial.case and record["state"] != IMPOSSIBLE:
             key = _MODELLED if trial.is_modelled else trial.factor
             found[trial.case.name][key].append(record)
     return {case: found[case.name] for case in CASES}
@@ -100,17 +110,9 @@ def _clean(records: Mapping[int, Record]) -> list[Record]:
     return [record for number, record in records.items() if trial_of(number).case is None]
 
 
-def _seen(records: Iterable[Record]) -> list[bool]:
-    return [record["state"] != _GOOD for record in records]
-
-
-def _named(case: DefectCase, records: Iterable[Record]) -> list[bool]:
-    return [bool(record["causes"]) and record["causes"][0] in case.causes for record in records]
-
-
 def _seen_row(case: DefectCase, of_case: _Records) -> str:
     cells = [
-        f"{sum(_seen(rows))}, {sum(_named(case, rows))} of {len(rows)}" if rows else "-"
+        f"{sum(seen(rows))}, {sum(named(case, rows))} of {len(rows)}" if rows else "-"
         for rows in (of_case[factor] for factor in FACTORS)
     ]
     amplitude = f"{case.amplitude:g} {BY_NAME[case.name].unit}".rstrip()
@@ -125,7 +127,7 @@ def _named_row(case: DefectCase, records: Sequence[Record]) -> str:
 
 def _modelled_row(case: DefectCase, records: Sequence[Record]) -> str:
     options = ", ".join(f"`{name}={value}`" for name, value in case.modelled.items())
-    trusted = _of(len(records) - sum(_seen(records)), len(records))
+    trusted = _of(len(records) - sum(seen(records)), len(records))
     squares = [(one["deviation"], one["parameters"]) for one in records if "deviation" in one]
     deviation = "-"
     if squares:
@@ -135,9 +137,8 @@ def _modelled_row(case: DefectCase, records: Sequence[Record]) -> str:
 
 
 def _pull(records: Sequence[Record]) -> str:
-    """Return the rms pull over the orbits that have one."""
-    pulls = [record["pull"] for record in records if record.get("converged")]
-    return f"{np.sqrt(np.mean(np.square(pulls))):.3f}" if pulls else "-"
+    pull = rms_pull(records)
+    return f"{pull:.3f}" if np.isfinite(pull) else "-"
 
 
 def _of(count: int, total: int) -> str:

@@ -10,6 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 _PARTS = (
     "solver/results/diagnosis/*.py",
     "plateviz/tables/causes.py",
+    "plateviz/tables/cause_harm.py",
     "plateviz/tables/*cause_words.py",
     "plateviz/tables/verdict.py",
     "solver/engines/moves.py",

@@ -37,7 +37,7 @@ from tests.campaigns.defects import SETTINGS, pulls, sparse_orbit
 from tests.campaigns.trials import Record, read_records, run_trials
 from tests.campaigns.true_causes import all_deviations
 from tests.campaigns.verdict_cases import Trial, numbers, trial_of
-from tests.campaigns.verdict_page import write_page
+from tests.campaigns.verdict_page import IMPOSSIBLE, write_page
 from tests.campaigns.verdict_version import verdict_version
 
 
@@ -75,7 +75,11 @@ def trial(number: int) -> Record:
     defects = (case.text(wanted.factor),) if case else ()
     settings = FitSettings(**case.modelled) if case and wanted.is_modelled else FitSettings()
     try:
-        result = fit_orbit(sparse_orbit(wanted.orbit, defects), settings=settings)
+        orbit = sparse_orbit(wanted.orbit, defects)
+    except InputError as error:
+        return {"state": IMPOSSIBLE, "causes": [], "failed": str(error)}
+    try:
+        result = fit_orbit(orbit, settings=settings)
     except (FitError, InputError) as error:
         return {"state": "none", "causes": [], "failed": str(error)}
     verdict = orbit_verdict(result)

@@ -22,6 +22,7 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.fit import fit_orbit
 from solver.io.survey import read_survey_orbit
+from solver.simulate.magnitudes import draw_magnitudes
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 
@@ -106,6 +107,18 @@ def _deforming(rows: pd.DataFrame, random: np.random.Generator) -> None:
         field += wave * np.array([np.cos(towards), np.sin(towards)])
     rows["nx"] += np.cos(angle) * field[0] - np.sin(angle) * field[1]
     rows["ny"] += np.sin(angle) * field[0] + np.cos(angle) * field[1]
+
+
+def _depending_on_phase(rows: pd.DataFrame, _: np.random.Generator) -> None:
+    """Displace measurements along x by a sine of their pixel phase, a tenth of their error."""
+    rows["nx"] += 0.001 * np.sin(2.0 * np.pi * rows["nx"])
+
+
+def _with_magnitudes(data: OrbitData) -> FitResult:
+    """Fit with magnitudes in the catalogue, which the simulated orbit has not."""
+    catalogue = data.catalogue
+    magnitude = draw_magnitudes(np.random.default_rng(3), len(catalogue))
+    return _fitted(replace(data, catalogue=catalogue.assign(magnitude=magnitude)))
 
 
 def _trailed(rows: pd.DataFrame, random: np.random.Generator) -> None:
@@ -220,6 +233,10 @@ ORBITS: Mapping[str, Pair] = {
     "residual-map": (
         lambda: _chosen(_good(), plates=_FIELDS),
         lambda: _chosen(_fitted(order=2), plates=_FIELDS),
+    ),
+    "binned-residuals": (
+        lambda: _chosen(_with_magnitudes(_orbit())),
+        lambda: _chosen(_with_magnitudes(_measured(_depending_on_phase))),
     ),
     "mean-residual-map": (_good_chosen, lambda: _chosen(_fitted(_measured(_displaced_columns)))),
     "solution-tests": (_good_chosen, lambda: _chosen(_fitted(_measured(_drifting_detector)))),

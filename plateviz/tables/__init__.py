@@ -5,6 +5,7 @@ the mean epoch of the orbit, without aberration), or None. A table that needs th
 if it is None.
 """
 
+from plateviz.tables.binned_residuals import BinStatistics, bin_statistics, binned_residuals
 from plateviz.tables.calibration import calibration_tables, distortion
 from plateviz.tables.calibration_trends import calibration_trends
 from plateviz.tables.comparison import comparison, difference_histogram
@@ -80,6 +81,7 @@ from solver.model.apparent_motion import julian_year
 
 __all__ = [
     "ARTIFICIAL",
+    "BinStatistics",
     "CLASSES",
     "CorrelationStatistics",
     "MapStatistics",
@@ -89,6 +91,8 @@ __all__ = [
     "ShiftStatistics",
     "SummaryItem",
     "TrackStatistics",
+    "bin_statistics",
+    "binned_residuals",
     "binned_vectors",
     "calibration_tables",
     "calibration_trends",

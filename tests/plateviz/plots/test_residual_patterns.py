@@ -1,4 +1,4 @@
-"""Contents of the mean residual map, of the shifts of detectors and of the correlation."""
+"""Contents of the binned residuals, the mean residual map, shifts and the correlation."""
 
 import numpy as np
 import pytest
@@ -10,12 +10,17 @@ from plateviz.plots.gallery import diagnostics
 from plateviz.plots.style import SERIES_COLOURS
 from tests.plateviz.plots.drawn import subtitle_of
 
-NAMES = ["mean-residual-map", "detector-shifts", "residual-correlation"]
+NAMES = ["binned-residuals", "mean-residual-map", "detector-shifts", "residual-correlation"]
 
 
 @pytest.fixture(scope="module")
 def means(fit_result, instrument):
     return tables.mean_residuals(fit_result, instrument)
+
+
+@pytest.fixture(scope="module")
+def binned(fit_result, instrument):
+    return tables.binned_residuals(fit_result, instrument)
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +63,40 @@ def test_map_states_what_chance_does(means, instrument):
     assert f"scatter {found.spread:.2f} times" in y
     assert "largest bin 7.0σ" in y
     assert f"chance exceeds {found.limit:.1f}σ in one of 100" in y
+
+
+def test_each_quantity_has_a_panel_with_means_and_scatter(binned):
+    frames = plots.plot_binned_residuals(binned)
+    for frame, (name, rows) in zip(frames, binned.groupby("quantity", sort=False), strict=True):
+        assert frame.title.lower().endswith(f"against {name}")
+        assert frame.x.label == f"{name} ({rows['unit'].iloc[0]})"
+        for series, pull in (("mean x", "pull_x"), ("mean y", "pull_y"), ("scatter", "pull_chi2")):
+            assert np.array_equal(frame[series].values("x"), rows["centre"])
+            assert np.array_equal(frame[series].values("y"), rows[pull], equal_nan=True)
+            assert np.array_equal(frame[f"line of {series}"].values("y"), rows[pull], True)
+
+
+def test_panels_have_one_height_that_shows_the_limit_and_the_largest(binned):
+    table = binned.copy()
+    table.loc[3, "pull_y"] = -9.0
+    limit = tables.bin_statistics(table).limit
+    frames = plots.plot_binned_residuals(table)
+    assert len({frame.y.limits for frame in frames}) == 1
+    assert frames[0].y.limits[0] < -9.0
+    for frame in frames:
+        assert frame["limit"].values("y") == pytest.approx([-limit, limit])
+        for k in (1, 2):
+            assert (frame[f"{k}σ"].values("y0"), frame[f"{k}σ"].values("y1")) == ([-k], [k])
+
+
+def test_panels_state_how_many_bins_are_beyond_two_sigma(binned):
+    table = binned.assign(pull_x=0.0, pull_y=0.0, pull_chi2=0.0)
+    table.loc[table.index[:3], "pull_chi2"] = 2.5
+    first, second = map(subtitle_of, plots.plot_binned_residuals(table).frames[:2])
+    values = 3 * (table["quantity"] == "time").sum()
+    assert f"3 of {values} beyond ± 2σ, {0.0455 * values:.1f} expected" in first
+    assert "largest 2.5σ, scatter" in first
+    assert second.startswith("0 of ")
 
 
 def test_shifts_have_the_band_of_chance_and_one_height(shifts):

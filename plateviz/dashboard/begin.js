@@ -3,5 +3,11 @@
   const is_dark = matchMedia("(prefers-color-scheme: dark)").matches
   const size = { width: innerWidth, height: innerHeight, is_dark }
   const body = JSON.stringify({ token: "TOKEN", window: size })
-  fetch("session", { method: "POST", body, keepalive: true }).catch(() => {})
+  // A page for which there is no room now, or that comes with too many others, asks again.
+  const look_again = answer => {
+    const is_empty = () => !window.Bokeh?.documents?.length
+    const milliseconds = 3000 + 4000 * Math.random()
+    if (answer.status === 429) setTimeout(() => is_empty() && location.reload(), milliseconds)
+  }
+  fetch("session", { method: "POST", body, keepalive: true }).then(look_again).catch(() => {})
 })()

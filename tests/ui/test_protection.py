@@ -130,3 +130,30 @@ def test_page_opens_with_the_password_only(survey, tmp_path, browser):
         with pytest.raises(HTTPClientError, match="403"):
             done(websocket(address, token))
         page.close()
+
+
+def test_page_that_comes_with_too_many_others_asks_again(address, browser):
+    refused = []
+
+    def refuse_first(route):
+        refused.append(route.request.url)
+        if len(refused) == 1:
+            route.fulfill(status=429)
+        else:
+            route.continue_()
+
+    def close_first(websocket):
+        if len(refused) == 1:
+            websocket.close()
+        else:
+            websocket.connect_to_server()
+
+    context = browser.new_context()
+    page = context.new_page()
+    page.set_default_timeout(90_000)
+    page.route("**/session", refuse_first)
+    page.route_web_socket("**/ws", close_first)
+    page.goto(address)
+    see(page, "residual-map")
+    assert len(refused) == 2
+    context.close()

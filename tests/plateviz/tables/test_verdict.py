@@ -8,7 +8,6 @@ import pytest
 from scipy.special import chdtri
 
 from plateviz.tables import verdict
-from plateviz.tables.outliers import swapped
 from plateviz.tables.verdict import (
     is_judged,
     orbit_verdict,
@@ -115,23 +114,6 @@ def test_fit_that_does_not_converge_has_the_remedy_of_what_its_residuals_look_li
     assert cause.name == "not-converged"
     assert f"look as if {expected.title}" in cause.words
     assert cause.options == expected.options != ()
-
-
-def test_outliers_with_each_others_identification_are_counted(fit_result):
-    rows = fit_result.residuals.head(4).assign(field_id=0, plate_id=0, detector_id=0)
-    at, places = rows[["model_x", "model_y"]].to_numpy(), [1, 0, 2, 3]
-    measured = at[places] + [[0.0, 0.0], [0.0, 0.0], [0.3, 0.0], [0.0, -0.4]]
-    residual = measured - at
-    outliers = rows.assign(
-        nx=measured[:, 0],
-        ny=measured[:, 1],
-        residual_x=residual[:, 0],
-        residual_y=residual[:, 1],
-        distance=np.hypot(*residual.T) / 0.01,
-    )
-    assert swapped(outliers).tolist() == [True, True, False, False]
-    notable = orbit_verdict(replace(fit_result, outliers=outliers)).notable
-    assert any("outliers: 4. 2 of them have each other's" in sentence for sentence in notable)
 
 
 def test_verdict_of_a_result_is_read_again(fit_result):

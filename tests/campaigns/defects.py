@@ -112,12 +112,17 @@ def mean_square(seed: int, defects: tuple[str, ...]) -> float:
 def sparse_orbit(seed: int, defects: tuple[str, ...] = ()) -> OrbitData:
     """Return the orbit of a survey whose number is the last two digits of the seed."""
     settings = replace(SETTINGS, seed=seed, defects=defects)
+    return defective_orbit(settings, seed % settings.orbits)[0]
+
+
+def defective_orbit(settings: SurveySettings, orbit_id: int) -> tuple[OrbitData, pd.DataFrame]:
+    """Return an orbit of a survey, and `AFFECTED` of its measurements."""
     truth = truth_catalogue(settings)
     catalogue, _ = defective_catalogue(reference_catalogue(truth, settings), truth, settings)
-    orbit = measure_orbit(seed % settings.orbits, truth, settings)
+    orbit = measure_orbit(orbit_id, truth, settings)
     measured = truth["source_id"].isin(orbit.measurements["source_id"])
     tables = (table[measured].reset_index(drop=True) for table in (catalogue, truth))
-    return OrbitData(orbit.measurements, orbit.exposures, *tables)
+    return OrbitData(orbit.measurements, orbit.exposures, *tables), orbit.affected
 
 
 def pulls(sources: pd.DataFrame, true_places: pd.DataFrame | None) -> np.ndarray:

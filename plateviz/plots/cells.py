@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plateviz.figures.figure import Axis, Glyphs, Ramp
+from plateviz.figures.figure import Axis, Glyphs, Ramp, Tooltips
 from plateviz.figures.glyphs import image
 
 # Columns and rows of cells; both are whole numbers of the bins of histograms and of medians.
@@ -195,10 +195,18 @@ def edges_of(axis: Axis, count: int) -> np.ndarray:
     return _at(axis, np.linspace(0.0, 1.0, count + 1))
 
 
-def cells(values: np.ndarray, x_axis: Axis, y_axis: Axis, *, name: str, ramp: Ramp) -> Glyphs:
+def cells(
+    values: np.ndarray,
+    x_axis: Axis,
+    y_axis: Axis,
+    *,
+    name: str,
+    ramp: Ramp,
+    hover: Tooltips = (),
+) -> Glyphs:
     """Return the values of cells as an image between the limits of the axes."""
     (x0, x1), (y0, y1) = sorted(x_axis.limits), sorted(y_axis.limits)
-    return image(values, (x0, x1), (y0, y1), name=name, ramp=ramp)
+    return image(values, (x0, x1), (y0, y1), name=name, ramp=ramp, hover=hover)
 
 
 def _at(axis: Axis, share: np.ndarray) -> np.ndarray:

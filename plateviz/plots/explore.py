@@ -194,15 +194,18 @@ def _span(values: np.ndarray) -> Limits:
 def _cells(
     table: ExplorableTable, chosen: Columns, counts: Counts, axes: tuple[Axis, Axis]
 ) -> Glyphs:
+    at = [(chosen.x, "$x{0.0000}"), (chosen.y, "$y{0.0000}")]
     if not chosen.colour:
         numbers = counts.image()
         most = max(float(np.nanmax(numbers, initial=2.0)), 2.0)
         label = f"{table.rows} per cell"
         ramp = Ramp("count", "count", (1.0, most), is_log=True, label=label)
-        return cells(numbers, *axes, name="cells by number", ramp=ramp)
-    means = counts.means()
-    ramp = Ramp("value", "count", _span(means.ravel()), label=f"mean {chosen.colour} per cell")
-    return cells(means, *axes, name="cells by value", ramp=ramp)
+        hover = [*at, (label, "@count{0,0}")]
+        return cells(numbers, *axes, name="cells by number", ramp=ramp, hover=hover)
+    means, label = counts.means(), f"mean {chosen.colour} per cell"
+    ramp = Ramp("value", "count", _span(means.ravel()), label=label)
+    hover = [*at, (label, "@value{0.0000}")]
+    return cells(means, *axes, name="cells by value", ramp=ramp, hover=hover)
 
 
 def _selected(

@@ -50,6 +50,7 @@ def test_many_rows_are_counted_in_cells(many):
     cells = frame["cells by number"].values("image")[0]
     assert np.nansum(cells) == many.size
     assert frame.subtitle == f"{many.size:,} stars"
+    assert ("stars per cell", "@count{0,0}") in frame["cells by number"].hover
 
 
 def test_zoom_counts_what_is_between_the_limits(many):

@@ -110,7 +110,7 @@ DIAGNOSTICS = (
         "outside ± 2σ. A wave is an effect of that quantity that the fit does not describe; a "
         "scatter that rises is a misstated uncertainty. Each mean is corrected for the share that "
         "the fit absorbs, which is most of it against time: see the shift of each detector.",
-        OrbitWorkspace.PATTERNS,
+        OrbitWorkspace.TRENDS,
         22,
         _plot,
         is_wide=True,

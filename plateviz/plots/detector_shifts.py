@@ -128,7 +128,7 @@ DIAGNOSTICS = (
         "lines about zero, one point in twenty outside the wider band. A slope or a step means "
         "that a detector moved, for which the fit has one place in the whole orbit; steps of all "
         "detectors from field to field mean distortion that the order does not describe.",
-        OrbitWorkspace.PATTERNS,
+        OrbitWorkspace.TRENDS,
         75,
         _plot,
         is_wide=True,

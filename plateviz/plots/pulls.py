@@ -137,7 +137,7 @@ DIAGNOSTICS = (
         "Chi2 of each exposure",
         "Chi2 of each exposure over its expected value. Good: points inside the band. A single "
         "exposure far above it was disturbed.",
-        OrbitWorkspace.PATTERNS,
+        OrbitWorkspace.TRENDS,
         70,
         _plot_chi2,
         is_key=True,

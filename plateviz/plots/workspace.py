@@ -16,6 +16,7 @@ class OrbitWorkspace(StrEnum):
     VERDICT = "verdict"
     RESIDUALS = "residuals"
     PATTERNS = "patterns"
+    TRENDS = "trends"
     SKY = "sky"
     CALIBRATION = "calibration"
     WEAK_DIRECTIONS = "weak-directions"

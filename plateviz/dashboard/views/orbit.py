@@ -128,13 +128,11 @@ class OrbitPage(pn.viewable.Viewer):
             above = [RemediesView(self._session), StripView(self._session)]
         # Six square cards fill a large screen in two rows.
         are_six = one is OrbitWorkspace.CALIBRATION and len(views) + len(others) == 6
-        # One card fills a row and one is two rows high: three rows fit a large screen, four do not.
-        has_three = are_six or one is OrbitWorkspace.PATTERNS
         grid = FigureGrid(
             list(views.values()),
             self._wake,
             columns=3 if is_first else 2,
-            columns_if_wide=3 if has_three else None,
+            columns_if_wide=3 if are_six else None,
             others=others,
         )
         self._grids[one] = grid

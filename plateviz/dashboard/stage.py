@@ -22,9 +22,6 @@ class Stage(Enum):
     FAILED = "the last request failed"
 
 
-_NO_POINTS = "There are no points in that area; nothing is selected"
-
-
 class RequestState(param.Parameterized):
     """State of what was asked for last.
 
@@ -49,10 +46,6 @@ class RequestState(param.Parameterized):
         """Take over how far a job is, with other changes of the state."""
         is_brief = bool(job.request.get("what_if")) and job.seconds < _BRIEF_SECONDS
         self.param.update(message=job.progress_text, is_brief=is_brief, **changes)
-
-    def note_area(self, has_points: bool) -> None:
-        """Say if there are no points in the area that a person has drawn to select some."""
-        self.remark = "" if has_points else _NO_POINTS
 
     def note(self, problems: Iterable[str]) -> None:
         """Add what of an address cannot be shown to the notice."""

@@ -51,6 +51,7 @@ class BokehGlyphs:
     Attributes
     ----------
     keys : columns by which rows are selected -> their values in the rows on the screen
+    at : property of Bokeh's glyph -> column that has its values
     """
 
     def __init__(self, glyphs: Glyphs, *, is_packed: bool = False) -> None:
@@ -65,6 +66,7 @@ class BokehGlyphs:
         self._models = _models_for(glyphs)
         self.source = models.ColumnDataSource()
         self.keys: Mapping[str, np.ndarray] = {}
+        self.at = glyphs.at
         self._glyph = _GLYPHS[glyphs.kind](**glyphs.at)
         if glyphs.kind == "texts":
             self._glyph.update(text_font=Value(FONT))
@@ -98,7 +100,7 @@ class BokehGlyphs:
 
     def follow(self, glyphs: Glyphs, theme: Theme) -> None:
         """Show other values of the same kind."""
-        columns = dict(glyphs.columns)
+        columns, self.at = dict(glyphs.columns), glyphs.at
         self.keys = {name: columns[name] for name in SELECTED_BY if name in columns}
         if self.kind == "segments":
             # They say nothing to a person, and are most of what would be sent.

@@ -21,7 +21,7 @@ from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import markup_pane, paragraph
-from plateviz.dashboard.views.point_actions import NO_LINKS, Links, PointActions
+from plateviz.dashboard.views.point_actions import NO_LINKS, Links, session_actions
 from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure, Limits
@@ -99,20 +99,11 @@ class ExploreView(pn.viewable.Viewer):
         self._extent: tuple[object, Extent] | None = None
         self._area: np.ndarray | None = None
         self._is_following = False
-        selection = session.selection
-        actions = PointActions(
-            links,
-            select=selection.select_sources,
-            select_area=self._take_area,
-            select_exposures=selection.select_exposures,
-            select_detectors=selection.select_detectors,
-            note_area=session.note_area,
-        )
         self._figure = FigureView(
             _Text(origin.caption, origin.document),
             self._plot,
             waiting=waiting,
-            actions=actions,
+            actions=session_actions(session, links, self._take_area),
             zoom=self._zoom,
             saved=Saved(origin.subject, self._rows),
             theme=session.theme,

@@ -18,7 +18,7 @@ from plateviz.dashboard.views.explore import ExploreView
 from plateviz.dashboard.views.figure import FigureView, Part, card
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import heading
-from plateviz.dashboard.views.point_actions import PointActions
+from plateviz.dashboard.views.point_actions import session_actions
 from plateviz.dashboard.views.refit import RefitView
 from plateviz.dashboard.views.remedies import RemediesView
 from plateviz.dashboard.views.save_choices import Saved
@@ -144,12 +144,7 @@ class OrbitPage(pn.viewable.Viewer):
             diagnostic,
             partial(self._plot, diagnostic),
             waiting=partial(missing_text, self._session),
-            actions=PointActions(
-                select=self._session.selection.select_sources,
-                select_exposures=self._session.selection.select_exposures,
-                select_detectors=self._session.selection.select_detectors,
-                note_area=self._session.note_area,
-            ),
+            actions=session_actions(self._session),
             saved=Saved(self._session.selection.subject),
             theme=self._session.theme,
         )

@@ -8,22 +8,23 @@ from typing import Any
 
 import numpy as np
 from bokeh import models
-from bokeh.events import Event, SelectionGeometry
+from bokeh.events import Event, PanStart, SelectionGeometry
 
+from plateviz.dashboard.drawn_area import DrawnArea
 from plateviz.dashboard.selected import NO_IDS, SelectedIds
+from plateviz.dashboard.session import Session
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.bokeh_frame import BokehFrame
 from plateviz.figures.bokeh_glyphs import SELECTED_BY, BokehGlyphs
 from plateviz.figures.figure import HANDLES
 from plateviz.tables.labels import labelled_exposure
+from plateviz.tables.polygon import Polygon
 
 Links = Mapping[str, Callable[[str], object]]
 """Column of a point's data -> function that is called with its value as text."""
 Select = Callable[[frozenset[Any]], object]
 """Called with what a person has selected: ids of sources or detectors, or pairs of exposures."""
 
-NoteArea = Callable[[bool], object]
-"""Called when a person has drawn an area among points: whether any of them is in it."""
 SelectArea = Callable[[np.ndarray], object]
 """Called with the corners, (n, 2), of an area where a person has drawn one and there are no points.
 """
@@ -47,10 +48,15 @@ class PointActions:
         *,
         select_exposures: Select | None = None,
         select_detectors: Select | None = None,
-        note_area: NoteArea | None = None,
+        area: DrawnArea | None = None,
     ) -> None:
-        """Begin without a figure; `select` is for points of sources."""
-        self._links, self._select_area, self._note_area = links, select_area, note_area
+        """Begin without a figure; `select` is for points of sources.
+
+        Parameters
+        ----------
+        area : told of each area that a person draws among points
+        """
+        self._links, self._select_area, self._area = links, select_area, area
         selects = zip(SELECTED_BY, (select, select_exposures, select_detectors), strict=True)
         self._selects = {column: one for column, one in selects if one is not None}
         self._followed: set[str] = set()
@@ -89,7 +95,9 @@ class PointActions:
         """Answer to the areas that a person draws."""
         if self._select_area is not None:
             self._tools_of(frame).select_anywhere()
-        if self._select_area is not None or self._note_area is not None:
+        if (area := self._area) is not None:
+            frame.plot.on_event(PanStart, lambda _: area.begin())
+        if self._select_area is not None or area is not None:
             take_area = partial(self._take_area, frame)
             frame.plot.on_event(SelectionGeometry, lambda event, take=take_area: take(event))
 
@@ -125,7 +133,7 @@ class PointActions:
                 self._show_rows(glyphs)
                 return
             chosen = frozenset(text for one in same for text in self._chosen(one))
-            if chosen == self._selected.get(column):
+            if chosen == self._selected.get(column, frozenset()):
                 # Nothing else will show the other rows of what is chosen again.
                 self.show(self._selected)
             items = (_item(column, text) for text in chosen)
@@ -164,10 +172,23 @@ class PointActions:
         selectable = [one for one in frame.glyphs() if selected_column(one) is not None]
         if any(one.kind == "points" and one.renderer.visible for one in selectable):
             # The points have answered before.
-            if self._note_area is not None:
-                self._note_area(any(True for one in selectable for _ in self._chosen(one)))
+            if self._area is not None:
+                has_points = self._has_points(selectable, corners)
+                self._area.end(has_points)
+                if not has_points:
+                    # Where the same is selected as before, nothing else will show it again.
+                    self.show(self._selected)
         elif self._select_area is not None:
             self._select_area(corners)
+
+    def _has_points(self, selectable: list[BokehGlyphs], corners: np.ndarray) -> bool:
+        """Return whether an area has selected points, or has deselected those in it."""
+        if any(True for one in selectable for _ in self._chosen(one)):
+            return True
+        polygon = Polygon(corners)
+        points = [one for one in selectable if one.kind == "points" and one.renderer.visible]
+        places = [[one.source.data[one.at[axis]] for axis in ("x", "y")] for one in points]
+        return any(polygon.contains(*map(np.asarray, place)).any() for place in places)
 
     def _open_on_tap(self, frame: BokehFrame, glyphs: BokehGlyphs, column: str) -> None:
         source = glyphs.source
@@ -183,6 +204,21 @@ class PointActions:
 
     def _tools_of(self, frame: BokehFrame) -> "_FrameTools":
         return self._frames.setdefault(frame.plot.id, _FrameTools(frame.plot))
+
+
+def session_actions(
+    session: Session, links: Links = NO_LINKS, select_area: SelectArea | None = None
+) -> PointActions:
+    """Return actions that select sources, exposures and detectors in a session."""
+    selection = session.selection
+    return PointActions(
+        links,
+        selection.select_sources,
+        select_area,
+        select_exposures=selection.select_exposures,
+        select_detectors=selection.select_detectors,
+        area=DrawnArea(session),
+    )
 
 
 class _FrameTools:

@@ -114,7 +114,7 @@ class SelectionBar(pn.viewable.Viewer):
             self._make()
         is_orbit, is_left_out = is_of_orbit(self._navigation), self._actions.is_left_out
         in_orbit = self._actions.in_orbit if is_orbit else None
-        self._words.object = words(selected, in_orbit)
+        self._words.object = session.remark or words(selected, in_orbit)
         is_source = selected.kinds == ["sources"] and len(selected.sources) == 1
         self._open.visible = is_source and self._navigation.run is not None
         self._leave_out.visible = is_orbit and not is_left_out

@@ -10,6 +10,7 @@ import panel_material_ui as pmui
 from astropy.table import Table
 
 from plateviz.dashboard.downloads import described
+from plateviz.dashboard.drawn_area import DrawnArea
 from plateviz.dashboard.latest_answer import PENDING, Pending
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.row_origins import RunRows
@@ -169,7 +170,7 @@ class SurveyPage(pn.viewable.Viewer):
             actions=PointActions(
                 {"orbit_id": self._open_orbit},
                 session.selection.select_sources,
-                note_area=session.note_area,
+                area=DrawnArea(session),
             ),
             saved=Saved(self._subject),
             theme=session.theme,

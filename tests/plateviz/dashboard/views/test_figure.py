@@ -175,24 +175,6 @@ def test_sources_are_selected_and_shown_as_selected_when_drawn_next():
     assert len(chosen) == 1
 
 
-def test_area_without_points_is_said():
-    said = []
-    actions = PointActions(select=lambda _: None, note_area=said.append)
-    view = FigureView(diagnostics()[0], lambda: figure_of(["7", "8"]), actions=actions)
-    come_near(view)
-    view.draw()
-    drawn = plot(view)
-    corner = {"type": "rect", "x0": 0.0, "x1": 0.1, "y0": 0.0, "y1": 0.1}
-    # The browser tells first which points are in the area.
-    drawn._trigger_event(area_of(drawn, **corner))
-    assert said == [False]
-    drawn.renderers[0].data_source.selected.indices = [0]
-    drawn._trigger_event(area_of(drawn, **corner))
-    assert said == [False, True]
-    drawn._trigger_event(area_of(drawn, type="point", x=1.0, y=1.0))
-    assert said == [False, True]
-
-
 def test_next_selection_in_a_map_of_arrows_replaces_the_first():
     table = pd.DataFrame({"x": [0.0, 1.0], "y": 0.0, "u": 0.1, "v": 0.1, "id": ["7", "8"]})
     field = Field((0.0, 9.0), (0.0, 9.0))

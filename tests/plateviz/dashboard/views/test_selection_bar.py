@@ -8,6 +8,7 @@ import pytest
 from bokeh.document import Document
 from panel.io.state import set_curdoc
 
+from plateviz.dashboard.drawn_area import DrawnArea
 from plateviz.dashboard.navigation import View
 from plateviz.dashboard.saved_view import view_text
 from plateviz.dashboard.selected import NOTHING, Selected
@@ -53,19 +54,36 @@ def shown(bar):
 
 
 def test_bar_says_that_an_area_was_empty_until_something_is_done(navigation, session):
-    bar = SelectionBar(navigation)
+    bar, area = SelectionBar(navigation), DrawnArea(session)
     for forget in (
         lambda: session.selection.select_sources(frozenset({1})),
         lambda: navigation.turn_to(View.SOURCE),
-        lambda: session.note_area(has_points=True),
+        lambda: area.end(has_points=True),
     ):
         session.selection.select_sources(frozenset())
         navigation.turn_to(View.ORBIT)
-        session.note_area(has_points=False)
+        area.end(has_points=False)
         (remark,) = bar.__panel__()
         assert remark.object == "There are no points in that area; nothing is selected"
         forget()
         assert remark not in list(bar.__panel__())
+
+
+def test_bar_says_that_an_empty_area_has_left_the_selection(navigation, session):
+    bar, area = SelectionBar(navigation), DrawnArea(session)
+    session.selection.select(MIXED)
+    area.begin()
+    # What the browser tells first.
+    session.selection.select_sources(frozenset())
+    area.end(has_points=False)
+    assert session.selection.selected == MIXED
+    told = "There are no points in that area; what was selected stays selected"
+    assert bar._words.object == told
+    assert "Clear" in shown(bar)
+    session.selection.select_detectors(frozenset({1}))
+    assert "detector 1 selected" in bar._words.object
+    bar._actions.clear()
+    assert not session.selection.selected
 
 
 def test_bar_offers_what_can_be_done(navigation, session):

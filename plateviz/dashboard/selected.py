@@ -1,5 +1,6 @@
 """Selected: the sources, exposures and detectors that a person has selected, and their words."""
 
+import hashlib
 import re
 import unicodedata
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -24,8 +25,10 @@ NO_IDS: SelectedIds = MappingProxyType({})
 
 # Maximum number of items of a kind in an address.
 FEW = 20
-MANY = "many"
-"""Stands for more selected items of a kind than an address has room for."""
+_MANY = "many:"
+"""Stands, before their key, for more selected items of a kind than an address has room for."""
+Find = Callable[[str, str], frozenset[Any] | None]
+"""Returns the items of a kind with a key, as of `Selected.keys`; None if they are not known."""
 # Runs of exposures and detectors that are named one by one.
 _FEW_NAMED = 3
 _LONGEST_NAME = 60
@@ -117,15 +120,23 @@ class Selected:
                 found = found | rows[column].isin(ids).to_numpy()
         return found
 
+    @cached_property
+    def keys(self) -> Mapping[str, str]:
+        """Kinds of which more are selected than an address has room for, and keys of the items.
+
+        The same items have the same key, in every session.
+        """
+        large = {kind: items for kind, items in self.by_kind().items() if len(items) > FEW}
+        return MappingProxyType({kind: _key(items) for kind, items in large.items()})
+
     def address(self) -> dict[str, str]:
-        """Return the selection as parts of an address; `parsed` reads few items of a kind back."""
-        texts = {
-            "sources": map(str, sorted(self.sources)),
-            "exposures": (f"{field}/{plate}" for field, plate in sorted(self.exposures)),
-            "detectors": map(str, sorted(self.detectors)),
-        }
+        """Return the selection as parts of an address, which `parsed` reads back.
+
+        Of a kind of which more than a few are selected, it has only their key.
+        """
+        keys = self.keys
         return {
-            kind: ",".join(texts[kind]) if len(items) <= FEW else MANY
+            kind: _MANY + keys[kind] if kind in keys else ",".join(map(_text, sorted(items)))
             for kind, items in self.by_kind().items()
             if items
         }
@@ -151,27 +162,28 @@ KINDS = tuple(field.name for field in fields(Selected))
 NOTHING = Selected()
 
 
-def parsed(address: Mapping[str, str], before: Selected = NOTHING) -> tuple[Selected, list[str]]:
+def parsed(address: Mapping[str, str], find: Find = lambda *_: None) -> tuple[Selected, list[str]]:
     """Return what an address selects, and the invalid parts in words; these select nothing.
 
     Parameters
     ----------
-    before : the selection so far; going back within a session keeps what is too large for an
-        address
+    find : looks for what is too large for an address, so that going back within a session finds it
     """
     found, problems = {}, []
     for kind, read in _READERS.items():
         text = address.get(kind)
-        if text == MANY and len(before.by_kind()[kind]) > FEW:
-            found[kind] = before.by_kind()[kind]
-        elif text == MANY:
-            problems.append(f"{kind}: an address has room for {FEW}, and more were selected")
-        elif text is not None:
+        if text is None:
+            continue
+        if text.startswith(_MANY):
+            items = find(kind, text.removeprefix(_MANY))
+            problem = f"{kind}: an address has room for {FEW}, and more were selected"
+        else:
             items = read(text) if text.count(",") < FEW else None
-            if items is None:
-                problems.append(f"{kind}: expected {FEW} ids or fewer, found {in_words(text)}")
-            else:
-                found[kind] = items
+            problem = f"{kind}: expected {FEW} ids or fewer, found {in_words(text)}"
+        if items is None:
+            problems.append(problem)
+        else:
+            found[kind] = items
     return Selected(**found), problems
 
 
@@ -191,6 +203,15 @@ def checked_name(text: str) -> str:
     if any(unicodedata.category(character).startswith("C") for character in name):
         raise InputError("name of a selection: expected characters that can be seen")
     return name
+
+
+def _key(items: Collection[Any]) -> str:
+    numbers = np.array(sorted(items), dtype=np.int64)
+    return hashlib.blake2b(numbers.tobytes(), digest_size=8).hexdigest()
+
+
+def _text(item: int | Exposure) -> str:
+    return "/".join(map(str, item)) if isinstance(item, tuple) else str(item)
 
 
 def _numbers(text: str) -> frozenset[int] | None:

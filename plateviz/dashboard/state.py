@@ -7,8 +7,9 @@ from typing import Any
 import param
 
 from plateviz.dashboard.address_parts import in_words
+from plateviz.dashboard.large_selections import LargeSelections
 from plateviz.dashboard.prior_widths import default_widths, width_texts, widths_of
-from plateviz.dashboard.selected import MANY, Selected, SelectedIds, checked_name, parsed
+from plateviz.dashboard.selected import KINDS, Selected, SelectedIds, checked_name, parsed
 from solver.data.result import FitResult
 from solver.data.setting_kinds import Change, Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
@@ -49,6 +50,8 @@ class Selection(param.Parameterized):
         """Start without options."""
         super().__init__(**values)
         self._requested, self._selected = dict[str, Any](), Selected()
+        self._large = LargeSelections()
+        self.param.watch(lambda *_: self._large.remember(self.selected), [*KINDS])
 
     def offer_orbits(self, orbits: Iterable[int | None]) -> None:
         """Let `orbits` be what can be selected; the first one is, at first."""
@@ -141,16 +144,12 @@ class Selection(param.Parameterized):
         return orbits[address["orbit"]]
 
     def address(self) -> dict[str, str]:
-        """Return the selection as the query of the page's address; `restore` reads it back.
-
-        Of a kind of which more than a few are selected, it says only that there are many.
-        """
+        """Return the selection as the query of the page's address; `restore` reads it back."""
         first, last = self.plates
         query = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
-        selected = self.selected.address()
-        if MANY not in selected.values() and (name := self.name_of_selected) is not None:
-            selected["selection"] = name
-        query |= selected
+        query |= self.selected.address()
+        if not self.selected.keys and (name := self.name_of_selected) is not None:
+            query["selection"] = name
         return query if self.orbit is None else {"orbit": str(self.orbit), **query}
 
     @property
@@ -187,7 +186,7 @@ class Selection(param.Parameterized):
         return next((name for name, kept in self.kept.items() if kept == self.selected), None)
 
     def _restore_selected(self, address: Mapping[str, str]) -> list[str]:
-        selected, problems = parsed(address, self.selected)
+        selected, problems = parsed(address, self._large.find)
         self.select(selected)
         if selected and "selection" in address and not problems:
             try:

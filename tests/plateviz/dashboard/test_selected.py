@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from plateviz.dashboard.large_selections import LargeSelections
 from plateviz.dashboard.selected import FEW, NOTHING, Selected, checked_name, parsed
 from plateviz.dashboard.state import Selection
 from solver.errors import InputError
@@ -49,15 +50,33 @@ def test_address_of_a_few_is_read_back(selected):
     assert parsed(selected.address()) == (selected, [])
 
 
-def test_address_says_of_which_kinds_many_are_selected():
+def test_address_has_a_key_of_the_kinds_of_which_many_are_selected():
     selected = of(range(FEW + 1), [(0, 1)], [1])
-    address = selected.address()
-    assert address == {"sources": "many", "exposures": "0/1", "detectors": "1"}
-    # Who goes back keeps them; who opens the address is told.
-    assert parsed(address, selected) == (selected, [])
+    address, key = selected.address(), selected.keys["sources"]
+    assert address == {"sources": f"many:{key}", "exposures": "0/1", "detectors": "1"}
+    assert key == of(range(FEW, -1, -1)).keys["sources"]
+    assert key != of(range(1, FEW + 2)).keys["sources"]
+    known = LargeSelections()
+    known.remember(selected)
+    assert parsed(address, known.find) == (selected, [])
     found, (told,) = parsed(address)
     assert found == of([], [(0, 1)], [1])
     assert "room for 20" in told
+
+
+def test_large_selections_are_remembered_up_to_a_number():
+    many = [of(range(n, n + 30), [(n, plate) for plate in range(30)]) for n in range(60)]
+    known = LargeSelections()
+    for selected in many:
+        known.remember(selected)
+    found = [parsed(selected.address(), known.find) for selected in many]
+    assert found[-10:] == [(selected, []) for selected in many[-10:]]
+    assert found[0][0] == NOTHING
+    largest = of(range(2_000_000))
+    known.remember(largest)
+    # It makes room for itself, and is there.
+    assert parsed(largest.address(), known.find) == (largest, [])
+    assert parsed(many[-5].address(), known.find)[0] == NOTHING
 
 
 @pytest.mark.parametrize("kind", ["sources", "exposures", "detectors"])
@@ -69,6 +88,15 @@ def test_invalid_address_selects_nothing(kind, text):
     found, (told,) = parsed({kind: text})
     assert found == NOTHING
     assert told.startswith(f"{kind}: expected {FEW} ids or fewer, found ")
+
+
+@pytest.mark.parametrize("text", ["many", "many:", "many:<b>", "many:" + "0" * 16])
+def test_key_that_is_not_known_selects_nothing_and_is_told(text):
+    selection = Selection()
+    selection.select(of(range(30)))
+    (told,) = selection.restore({"sources": text})
+    assert told.startswith("sources: ")
+    assert selection.selected == NOTHING
 
 
 def test_rows_of_any_selected_source_exposure_or_detector_are_chosen():

@@ -61,17 +61,22 @@ def test_address_has_a_few_selected_sources(count):
     assert second.sources == first.sources
 
 
-def test_address_says_that_many_sources_are_selected(fit_result):
+def test_back_and_forward_restore_the_very_selection(fit_result):
     first, second = Selection(), Selection()
-    first.sources = frozenset(range(21))
-    address = first.address()
-    assert address["sources"] == "many"
-    # Who goes back keeps them; who opens the address is told.
-    assert first.restore(address) == []
-    assert len(first.sources) == 21
-    assert "room for 20" in second.restore(address)[0]
-    assert first.restore({}) == []
-    assert first.sources == frozenset()
+    large = [frozenset(range(21)), frozenset(range(100, 140))]
+    addresses = []
+    for sources in large:
+        first.sources = sources
+        addresses.append(first.address())
+    for address, sources in [*zip(addresses, large, strict=True)] * 2:
+        assert first.restore({}) == []
+        assert first.sources == frozenset()
+        assert first.restore(address) == []
+        assert first.sources == sources
+    # Who opens the address elsewhere is told, also where many others are selected.
+    second.sources = large[1]
+    assert "room for 20" in second.restore(addresses[0])[0]
+    assert second.sources == frozenset()
 
 
 @pytest.mark.parametrize(

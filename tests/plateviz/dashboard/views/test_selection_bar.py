@@ -123,7 +123,7 @@ def test_250_000_sources_are_selected_listed_and_refused_where_they_are_too_many
     assert bar._words.object == f"250,000 sources selected, {len(measured)} sources in this orbit"
     # Every figure shares the names of what is selected.
     assert session.selection.ids is session.selection.ids
-    assert navigation.address()["sources"] == "many"
+    assert navigation.address()["sources"].startswith("many:")
     listed.open()
     assert len(listed._tables["sources"]._table.value) == len(measured)
     assert len(selected_tables(navigation)["sources"]) == len(measured)

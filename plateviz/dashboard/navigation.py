@@ -1,8 +1,6 @@
 """Navigation: view, run and source on the screen of one browser session, without Panel."""
 
 from collections.abc import Mapping
-from enum import StrEnum
-from types import MappingProxyType
 
 import param
 
@@ -11,35 +9,20 @@ from plateviz.dashboard.exploration import Exploration
 from plateviz.dashboard.found_source import FoundSource, find_source
 from plateviz.dashboard.growth import Growth, how_to_make_a_run
 from plateviz.dashboard.next_orbit import NextOrbit
+from plateviz.dashboard.selection_actions import SelectionActions
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Request, Solution
 from plateviz.dashboard.solution_address import find_solution, solution_query
 from plateviz.dashboard.units import NAMES, OWN
+from plateviz.dashboard.view import WORKSPACES, View
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.runs.queries import SurveyRun
 from plateviz.tables.explore import EXPLORABLE
 from solver.errors import InputError
 
-
-class View(StrEnum):
-    """The views of the page, from the widest to the narrowest."""
-
-    SURVEY = "survey"
-    ORBIT = "orbit"
-    SOURCE = "source"
-
-
 # Parts of an address that name solutions.
 _NAMED = ("solution", "against")
-# Each view keeps its own workspace while others are on the screen.
-WORKSPACES: Mapping[View, str] = MappingProxyType(
-    {
-        View.SURVEY: "survey_workspace",
-        View.ORBIT: "orbit_workspace",
-        View.SOURCE: "source_workspace",
-    }
-)
 
 
 class Navigation(param.Parameterized):
@@ -143,6 +126,9 @@ class Navigation(param.Parameterized):
         self.run_name = chosen("run", address, self._runs, self.run_name, problems)
         if "source" in address:
             self.find_source(address["source"])
+        if "selection" in address:
+            # Somebody else may have kept it.
+            SelectionActions(session).look()
         problems += session.selection.restore(address)
         try:
             orbit = session.selection.orbit_of(address)

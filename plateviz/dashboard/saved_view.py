@@ -67,7 +67,9 @@ def open_view(navigation: Navigation, text: str) -> None:
     """
     content = _read(text)
     address, selected = _address(content.get("address")), _selected(content)
-    address = {name: value for name, value in address.items() if name not in KINDS}
+    # The file has the selection itself, whatever is kept under its name by now.
+    without = {*KINDS, "selection"}
+    address = {name: value for name, value in address.items() if name not in without}
     settings, runs = content.get("settings"), [run.name for run in navigation.runs]
     if isinstance(settings, str) and settings and address.get("run") not in (None, *runs):
         address.setdefault("solution", settings)

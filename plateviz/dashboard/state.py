@@ -9,7 +9,8 @@ import param
 from plateviz.dashboard.address_parts import in_words
 from plateviz.dashboard.large_selections import LargeSelections
 from plateviz.dashboard.prior_widths import default_widths, width_texts, widths_of
-from plateviz.dashboard.selected import KINDS, Selected, SelectedIds, checked_name, parsed
+from plateviz.dashboard.selected import KINDS, Selected, SelectedIds
+from plateviz.dashboard.selection_address import restored
 from solver.data.result import FitResult
 from solver.data.setting_kinds import Change, Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
@@ -148,7 +149,7 @@ class Selection(param.Parameterized):
         first, last = self.plates
         query = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
         query |= self.selected.address()
-        if not self.selected.keys and (name := self.name_of_selected) is not None:
+        if (name := self.name_of_selected) is not None:
             query["selection"] = name
         return query if self.orbit is None else {"orbit": str(self.orbit), **query}
 
@@ -186,15 +187,11 @@ class Selection(param.Parameterized):
         return next((name for name, kept in self.kept.items() if kept == self.selected), None)
 
     def _restore_selected(self, address: Mapping[str, str]) -> list[str]:
-        selected, problems = parsed(address, self._large.find)
-        self.select(selected)
-        if selected and "selection" in address and not problems:
-            try:
-                name = checked_name(address["selection"])
-            except InputError as error:
-                return [str(error)]
-            self.kept = {**self.kept, name: selected}
-        return problems
+        found = restored(address, self._large.find, self.kept)
+        self.select(found.selected)
+        if found.name:
+            self.kept = {**self.kept, found.name: found.selected}
+        return found.problems
 
     @property
     def detector_id(self) -> int | None:

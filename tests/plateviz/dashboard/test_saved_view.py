@@ -42,6 +42,16 @@ def test_view_is_opened_with_its_whole_selection(page):
     assert opened.session.notice == ""
 
 
+def test_view_has_its_selection_whatever_is_kept_under_its_name(page):
+    selection = page.session.selection
+    selection.kept = {"all": selection.selected}
+    assert page.address()["selection"] == "all"
+    opened = another(page)
+    open_view(opened, view_text(page))
+    assert opened.session.selection.selected == selection.selected
+    assert opened.session.notice == ""
+
+
 def test_settings_that_are_too_long_for_an_address_are_in_a_view(page):
     left_out = Exclusions(sources=frozenset(range(10**15, 10**15 + 300)))
     page.session.choices.what_if_at_once = False

@@ -121,7 +121,7 @@ def test_name_is_text_that_can_be_seen():
             checked_name(text)
 
 
-def test_name_of_a_small_selection_is_in_the_address():
+def test_name_of_a_selection_is_in_the_address():
     first, second = Selection(), Selection()
     corner = of([5, 6], [(0, 1)])
     first.select(corner)
@@ -132,7 +132,47 @@ def test_name_of_a_small_selection_is_in_the_address():
     assert second.kept == first.kept
     first.select(of(range(FEW + 1), [(0, 1)]))
     first.kept = {"many": first.selected}
-    assert "selection" not in first.address()
+    assert first.address()["selection"] == "many"
+    second.kept = first.kept
+    assert second.restore(first.address()) == []
+    assert second.selected == first.selected
+    second.select(NOTHING)
+    # As a person may write it.
+    assert second.restore({"selection": "many"}) == []
+    assert second.selected == first.selected
+
+
+@pytest.mark.parametrize(
+    ("kept", "told"),
+    [
+        ({}, ["sources: an address has room", "selection: nothing is kept under 'corner'"]),
+        (
+            {"corner": of(range(1, FEW + 2), [(0, 1)])},
+            ["sources: an address has room", "selection: something else is kept under 'corner'"],
+        ),
+        ({"corner": of(range(FEW + 1))}, ["selection: something else is kept under 'corner'"]),
+    ],
+    ids=["gone", "other-ids", "fewer-kinds"],
+)
+def test_name_that_is_gone_or_means_another_selection_is_told(kept, told):
+    first, second = Selection(), Selection()
+    first.select(of(range(FEW + 1), [(0, 1)]))
+    first.kept = {"corner": first.selected}
+    second.kept = kept
+    problems = second.restore(first.address())
+    assert len(problems) == len(told)
+    assert all(text.startswith(words) for text, words in zip(problems, told, strict=True))
+    assert second.selected <= first.selected
+    assert second.exposures == first.exposures
+    assert second.kept == kept
+
+
+def test_small_selection_does_not_replace_what_is_kept_under_its_name():
+    selection, kept = Selection(), {"corner": of([9])}
+    selection.kept = kept
+    (told,) = selection.restore({"sources": "5", "selection": "corner"})
+    assert told == "selection: something else is kept under 'corner' by now"
+    assert (selection.sources, selection.kept) == (frozenset({5}), kept)
 
 
 @pytest.mark.parametrize("name", ["", "n" * 99, "a\u202eb"])

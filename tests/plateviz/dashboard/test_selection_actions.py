@@ -2,6 +2,7 @@
 
 import pytest
 
+from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.prior_widths import default_widths
 from plateviz.dashboard.selected import NOTHING, Selected
 from plateviz.dashboard.selection_actions import SelectionActions
@@ -10,6 +11,7 @@ from plateviz.dashboard.stage import Stage
 from plateviz.runs.kept_selections import KeptSelections
 from solver.data.settings import FitSettings
 from solver.errors import InputError
+from tests.plateviz.dashboard.test_navigation import SurveyStore
 from tests.plateviz.dashboard.test_session import FakeStore, finish
 
 
@@ -136,6 +138,27 @@ def test_kept_selection_is_there_for_others_and_after_a_reload(live, actions, fi
     }
     actions.forget("<b>corner</b>")
     assert KeptSelections(tmp_path / "solutions").all() == {}
+
+
+def test_address_of_a_large_kept_selection_is_opened_by_others(live, actions, fit_result, tmp_path):
+    live.store.selections = KeptSelections(tmp_path / "solutions")
+    corner = frozenset(range(100))
+    live.selection.select_sources(corner)
+    actions.keep("corner")
+    pages = [Navigation(Session(SurveyStore(fit_result, []))) for _ in range(3)]
+    for page in pages:
+        page.session.store.selections = KeptSelections(tmp_path / "solutions")
+    pages[0].begin(live.selection.address())
+    assert (pages[0].session.selection.sources, pages[0].session.notice) == (corner, "")
+    address = live.selection.address()
+    live.selection.select_sources(frozenset(range(30)))
+    actions.keep("corner")
+    pages[1].begin(address)
+    assert "something else is kept under 'corner'" in pages[1].session.notice
+    actions.forget("corner")
+    pages[2].begin(address)
+    assert "nothing is kept under 'corner'" in pages[2].session.notice
+    assert not any(page.session.selection.sources for page in pages[1:])
 
 
 def test_selection_that_cannot_be_written_is_kept_in_the_session(live, actions, tmp_path):

@@ -15,6 +15,7 @@ from plateviz.dashboard.solution import Request, Solution
 from plateviz.dashboard.solution_address import find_solution, solution_query
 from plateviz.dashboard.units import NAMES, OWN
 from plateviz.dashboard.view import WORKSPACES, View
+from plateviz.plots.both_solutions import comparable_figures
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.runs.queries import SurveyRun
@@ -123,6 +124,8 @@ class Navigation(param.Parameterized):
         problems += explored.restore(address)
         units = session.units
         units.unit = chosen("unit", address, NAMES.values(), units.unit, problems)
+        both, figures = session.figure_of_both, [one.name for one in comparable_figures()]
+        session.figure_of_both = chosen("both", address, figures, both, problems)
         self.run_name = chosen("run", address, self._runs, self.run_name, problems)
         if "source" in address:
             self.find_source(address["source"])
@@ -165,6 +168,8 @@ class Navigation(param.Parameterized):
             query["source"] = str(self.found.source_id)
         if self.session.units.unit != OWN:
             query["unit"] = self.session.units.unit
+        if self.workspace is OrbitWorkspace.ORDERS:
+            query["both"] = self.session.figure_of_both
         if self.workspace is OrbitWorkspace.EXPLORE:
             query |= self.exploration.address()
         if self.workspace is SurveyWorkspace.EXPLORE:

@@ -60,7 +60,7 @@ class AddressBar(pn.custom.JSComponent):
         navigation.param.watch(self._write, names)
         for exploration in (navigation.exploration, navigation.survey_exploration):
             exploration.param.watch(self._write, list(exploration.param.values()))
-        session.param.watch(self._write, ["shown", "other"])
+        session.param.watch(self._write, ["shown", "other", "figure_of_both"])
         session.units.param.watch(self._write, "unit")
         names = ["orbit", "field", "plates", "detector", *KINDS, "kept"]
         session.selection.param.watch(self._write, names)

@@ -45,7 +45,7 @@ class CompareView(pn.viewable.Viewer):
         figures = {one.title: name for name, one in self._figures.items()}
         chosen = self._session.figure_of_both
         self._figure = pmui.Select(label="Figure of both", options=figures, value=chosen, **wide)
-        self._figure.link(self._session, value="figure_of_both")
+        self._figure.link(self._session, value="figure_of_both", bidirectional=True)
         self._figure.param.watch(lambda _: change_figure(), "value")
         self._table = markup_pane()
         self._message = ""

@@ -52,6 +52,24 @@ def test_view_has_its_selection_whatever_is_kept_under_its_name(page):
     assert opened.session.notice == ""
 
 
+def test_figure_of_both_solutions_is_in_the_address_and_in_a_view(page):
+    page.turn_to_workspace(OrbitWorkspace.ORDERS)
+    page.session.figure_of_both = "exposure-tracks"
+    assert page.address()["both"] == "exposure-tracks"
+    opened = another(page)
+    open_view(opened, view_text(page))
+    assert opened.session.figure_of_both == "exposure-tracks"
+    # Back to another figure, and a file of before.
+    opened.begin(page.address() | {"both": "residual-map"})
+    assert opened.session.figure_of_both == "residual-map"
+    address = {name: value for name, value in page.address().items() if name != "both"}
+    open_view(opened, changed(page, address=address))
+    assert (opened.session.figure_of_both, opened.session.notice) == ("residual-map", "")
+    opened.begin(page.address() | {"both": "<b>"})
+    assert "both: expected footprint, " in opened.session.notice
+    assert opened.session.figure_of_both == "residual-map"
+
+
 def test_settings_that_are_too_long_for_an_address_are_in_a_view(page):
     left_out = Exclusions(sources=frozenset(range(10**15, 10**15 + 300)))
     page.session.choices.what_if_at_once = False

@@ -7,6 +7,7 @@ import pytest
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.stage import Stage
+from plateviz.dashboard.views.address_bar import AddressBar
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.orbit import OrbitPage
@@ -141,6 +142,20 @@ def test_solution_is_shown_while_it_is_being_judged(fresh):
     assert "Verdict" in page._compare._table.object
     tests.draw()
     assert tests.is_drawn
+
+
+def test_figure_of_both_solutions_follows_the_address(fresh):
+    finish(fresh.session)
+    page = OrbitPage(fresh, wake)
+    fresh.turn_to_workspace(OrbitWorkspace.ORDERS)
+    both = figure(page, "both-solutions")
+    bar = AddressBar(fresh)
+    assert "both=residual-map" in bar.query
+    bar._handle_msg(bar.query.replace("both=residual-map", "both=exposure-tracks"))
+    assert page._compare._figure.value == page._compare.figure.name == "exposure-tracks"
+    assert both.is_due
+    page._compare._figure.value = "residual-map"
+    assert "both=residual-map" in bar.query
 
 
 def test_only_what_shows_eigenmodes_waits_for_them(fresh, tmp_path):

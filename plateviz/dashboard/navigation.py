@@ -119,6 +119,8 @@ class Navigation(param.Parameterized):
         """
         session, problems = self.session, []
         session.notice = ""
+        # Half a character, which JSON can hold, is no part of an address.
+        address = {k: v.encode("utf-8", "replace").decode() for k, v in address.items()}
         is_survey = address.get("view") == View.SURVEY.value
         explored = self.survey_exploration if is_survey else self.exploration
         problems += explored.restore(address)
@@ -143,9 +145,7 @@ class Navigation(param.Parameterized):
         default = View.ORBIT if any(name in selectable for name in address) else self.view
         view = views[chosen("view", address, views, default.value, problems)]
         session.note(problems)
-        # Half a character, which JSON can hold, is no part of an address.
-        named = {name: address[name] for name in _NAMED if name in address}
-        self._named = {k: v.encode("utf-8", "replace").decode() for k, v in named.items()}
+        self._named = {name: address[name] for name in _NAMED if name in address}
         if view is View.ORBIT or session.shown is not None:
             self._open(orbit)
         else:

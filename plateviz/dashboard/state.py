@@ -1,6 +1,5 @@
 """Selection and settings of one browser session; their bounds are enforced on the server."""
 
-import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -11,6 +10,7 @@ from plateviz.dashboard.large_selections import LargeSelections
 from plateviz.dashboard.prior_widths import default_widths, width_texts, widths_of
 from plateviz.dashboard.selected import KINDS, Selected, SelectedIds
 from plateviz.dashboard.selection_address import restored
+from plateviz.dashboard.shown_address import SHOWN, read_shown, shown_parts
 from solver.data.result import FitResult
 from solver.data.setting_kinds import Change, Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
@@ -18,7 +18,6 @@ from solver.data.text_setting import PriorWidths, Texts
 from solver.errors import InputError
 
 ALL = "all"
-_PLATES = re.compile(r"(-?[0-9]{1,9})-(-?[0-9]{1,9})")
 
 
 class Selection(param.Parameterized):
@@ -53,6 +52,7 @@ class Selection(param.Parameterized):
         self._requested, self._selected = dict[str, Any](), Selected()
         self._large = LargeSelections()
         self.param.watch(lambda *_: self._large.remember(self.selected), [*KINDS])
+        self.param.watch(self._forget_requested, [*SHOWN])
 
     def offer_orbits(self, orbits: Iterable[int | None]) -> None:
         """Let `orbits` be what can be selected; the first one is, at first."""
@@ -74,16 +74,17 @@ class Selection(param.Parameterized):
         -------
         What of the last address is no option, in words.
         """
+        # Controls may answer to other options.
+        requested, self._requested = self._requested, {}
         exposures = result.exposures
         fields = [ALL, *(str(f) for f in sorted(exposures["field_id"].unique().tolist()))]
         plates = (int(exposures["plate_id"].min()), int(exposures["plate_id"].max()))
         numbers = [ALL, *(str(d) for d in detectors)]
-        is_first = self.param["field"].objects == [ALL]
+        is_first = not self._is_limited
         self.param["field"].objects = fields
         self.param["detector"].objects = numbers
         self.param["plates"].bounds = plates
-        requested, self._requested = self._requested, {}
-        selected: dict[str, Any] = self.address() | {"plates": self.plates}
+        selected: dict[str, Any] = {name: getattr(self, name) for name in SHOWN}
         if is_first:
             selected |= {"field": fields[1], "detector": numbers[1]}
         selected |= requested
@@ -116,16 +117,8 @@ class Selection(param.Parameterized):
         -------
         The invalid values, in words.
         """
-        problems = []
-        requested: dict[str, Any] = {k: address[k] for k in ("field", "detector") if k in address}
-        plates = _PLATES.fullmatch(address.get("plates", ""))
-        if plates:
-            requested["plates"] = tuple(sorted(int(number) for number in plates.groups()))
-        elif "plates" in address:
-            problems.append(f"plates: expected FIRST-LAST, found {in_words(address['plates'])}")
-        self._requested = requested
-        problems += self._restore_selected(address)
-        return problems
+        self._requested, problems = read_shown(address)
+        return problems + self._restore_selected(address)
 
     def orbit_of(self, address: Mapping[str, str]) -> int | None:
         """Return the orbit that an address names, by default the selected one.
@@ -145,13 +138,20 @@ class Selection(param.Parameterized):
         return orbits[address["orbit"]]
 
     def address(self) -> dict[str, str]:
-        """Return the selection as the query of the page's address; `restore` reads it back."""
-        first, last = self.plates
-        query = {"field": self.field, "plates": f"{first}-{last}", "detector": self.detector}
-        query |= self.selected.address()
+        """Return the selection as the query of the page's address; `restore` reads it back.
+
+        What is shown of an orbit is not decided before one is there, unless it was requested.
+        """
+        shown = {name: getattr(self, name) for name in SHOWN} if self._is_limited else {}
+        query = shown_parts(shown | self._requested) | self.selected.address()
         if (name := self.name_of_selected) is not None:
             query["selection"] = name
         return query if self.orbit is None else {"orbit": str(self.orbit), **query}
+
+    @property
+    def _is_limited(self) -> bool:
+        """Whether the options are those of a solution."""
+        return self.param["field"].objects != [ALL]
 
     @property
     def selected(self) -> Selected:
@@ -185,6 +185,11 @@ class Selection(param.Parameterized):
     def name_of_selected(self) -> str | None:
         """Name under which the selection is kept, None if it is not."""
         return next((name for name, kept in self.kept.items() if kept == self.selected), None)
+
+    def _forget_requested(self, *events: param.parameterized.Event) -> None:
+        """Let hold what a person chooses while an orbit is being loaded."""
+        for event in events:
+            self._requested.pop(event.name, None)
 
     def _restore_selected(self, address: Mapping[str, str]) -> list[str]:
         found = restored(address, self._large.find, self.kept)

@@ -162,7 +162,9 @@ def test_hostile_address_in_a_view_is_told_in_a_notice(page, address):
 
 
 def test_half_a_character_is_no_part_of_the_next_address(navigation):
-    text = changed(navigation, address={"view": "survey", "solution": "order=\ud800"})
+    text = changed(
+        navigation, address={"view": "survey", "solution": "order=\ud800", "field": "\ud800"}
+    )
     open_view(navigation, text)
     assert urlencode(navigation.address())
 

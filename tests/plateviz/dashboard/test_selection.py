@@ -45,6 +45,25 @@ def test_invalid_address_is_ignored_and_told(fit_result, address, told):
     assert selection.limit_to(fit_result, [1, 2]) == []
 
 
+def test_address_has_what_is_shown_once_an_orbit_is_there(fit_result):
+    untouched, requesting = Selection(), Selection()
+    assert untouched.address() == {}
+    wanted = {"field": "2", "plates": "1-1"}
+    requesting.restore(wanted)
+    assert requesting.address() == wanted
+    other = Selection()
+    for selection in (untouched, requesting, other):
+        assert selection.limit_to(fit_result, [1, 2]) == []
+    assert untouched.address() == {"field": "0", "plates": "0-0", "detector": "1"}
+    assert requesting.address() == wanted | {"detector": "1"}
+    # An address of before is requested again, until its orbit is there or somebody chooses.
+    other.restore(wanted)
+    assert other.address() == requesting.address()
+    other.field = "3"
+    other.limit_to(fit_result, [1, 2])
+    assert other.address() == requesting.address() | {"field": "3"}
+
+
 def test_address_names_an_orbit(fit_result):
     selection = Session(FakeStore(fit_result)).selection
     assert selection.orbit_of({"orbit": "1"}) == 1

@@ -1,0 +1,32 @@
+"""What is shown of an orbit, as parts of an address: its field, exposures and detector."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from plateviz.dashboard.address_parts import in_words
+
+SHOWN = ("field", "plates", "detector")
+_PLATES = re.compile(r"(-?[0-9]{1,9})-(-?[0-9]{1,9})")
+
+
+def shown_parts(shown: Mapping[str, Any]) -> dict[str, str]:
+    """Return what is shown as parts of an address, which `read_shown` reads back."""
+    return {
+        name: "{}-{}".format(*value) if name == "plates" else str(value)
+        for name, value in shown.items()
+    }
+
+
+def read_shown(address: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
+    """Return what an address asks for, and the invalid values in words.
+
+    Whether an orbit has such fields, exposures and detectors is not known here.
+    """
+    shown: dict[str, Any] = {k: address[k] for k in ("field", "detector") if k in address}
+    if "plates" not in address:
+        return shown, []
+    plates = _PLATES.fullmatch(address["plates"])
+    if not plates:
+        return shown, [f"plates: expected FIRST-LAST, found {in_words(address['plates'])}"]
+    return shown | {"plates": tuple(sorted(int(number) for number in plates.groups()))}, []

@@ -1,11 +1,16 @@
 """Parts of an address: their values, and what is said of invalid ones."""
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Collection, Iterable, Mapping
 from typing import TypeVar
 
 _Name = TypeVar("_Name")
 # Characters of an invalid value that a message repeats.
 _LONGEST = 40
+# Unknown parts that a message names.
+_MOST_NAMED = 3
+# Bokeh adds some where the page is a part of another one, and Panel reads its theme.
+_OF_OTHERS = re.compile("bokeh-.*|theme")
 
 
 def in_words(value: object) -> str:
@@ -29,3 +34,13 @@ def chosen(
         return value
     problems.append(f"{name}: expected {', '.join(options) or 'none'}, found {in_words(value)}")
     return default
+
+
+def unknown_parts(address: Mapping[str, str], known: Collection[str]) -> list[str]:
+    """Return that parts of an address are unknown, in words; nothing if all are known."""
+    names = [one for one in address if one not in known and not _OF_OTHERS.fullmatch(one)]
+    if not names:
+        return []
+    told = ", ".join(map(in_words, names[:_MOST_NAMED]))
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return [f"unknown parts, as of another version: {told}{more}"]

@@ -12,6 +12,8 @@ from plateviz.dashboard.selected import KINDS
 from plateviz.plots.explored_rows import Columns
 from plateviz.plots.explored_text import parts_of, read_parts
 
+PARTS = ("rows", "x", "y", "colour", "only", "between", "with", "selects", "zoom")
+"""Parts of an address."""
 # A control shows an empty value as if nothing were chosen.
 NONE = "none"
 _OPTIONAL = ("colour", "only")

@@ -4,13 +4,15 @@ from collections.abc import Mapping
 
 import param
 
-from plateviz.dashboard.address_parts import chosen
-from plateviz.dashboard.exploration import Exploration
+from plateviz.dashboard.address_parts import chosen, unknown_parts
+from plateviz.dashboard.exploration import PARTS, Exploration
 from plateviz.dashboard.found_source import FoundSource, find_source
 from plateviz.dashboard.growth import Growth, how_to_make_a_run
 from plateviz.dashboard.next_orbit import NextOrbit
+from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.selection_actions import SelectionActions
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.shown_address import SHOWN
 from plateviz.dashboard.solution import Request, Solution
 from plateviz.dashboard.solution_address import find_solution, solution_query
 from plateviz.dashboard.units import NAMES, OWN
@@ -24,6 +26,10 @@ from solver.errors import InputError
 
 # Parts of an address that name solutions.
 _NAMED = ("solution", "against")
+_KNOWN = (
+    *("view", "workspace", "orbit", "run", "source", "unit", "both", "selection"),
+    *(*SHOWN, *KINDS, *PARTS, *_NAMED),
+)
 
 
 class Navigation(param.Parameterized):
@@ -121,6 +127,7 @@ class Navigation(param.Parameterized):
         session.notice = ""
         # Half a character, which JSON can hold, is no part of an address.
         address = {k: v.encode("utf-8", "replace").decode() for k, v in address.items()}
+        problems += unknown_parts(address, _KNOWN)
         is_survey = address.get("view") == View.SURVEY.value
         explored = self.survey_exploration if is_survey else self.exploration
         problems += explored.restore(address)

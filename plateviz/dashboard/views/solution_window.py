@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from html import escape
+from pathlib import Path
+from typing import NamedTuple
 
 import panel as pn
 import panel_material_ui as pmui
@@ -14,6 +16,23 @@ from plateviz.runs.note import MOST_BYTES, Note, NoteChangedError, read_note, wr
 from plateviz.solving.made_solutions import MadeSolution
 from solver.errors import InputError
 
+_SAVED, _UNSAVED = "Note", "Note (not saved)"
+
+
+class _Draft(NamedTuple):
+    """A note that was written and is not saved.
+
+    Attributes
+    ----------
+    text : that was written
+    note : that saving it replaces
+    is_theirs_shown : whether somebody else has changed the note, which is shown beside the text
+    """
+
+    text: str
+    note: Note
+    is_theirs_shown: bool
+
 
 class SolutionWindow(pn.viewable.Viewer):
     """A window with the solutions of the session, the kept ones and those of the runs."""
@@ -24,11 +43,14 @@ class SolutionWindow(pn.viewable.Viewer):
         self._session = navigation.session
         self._list = SolutionList(navigation)
         self._note = Note("", "")
+        self._path: Path | None = None
+        self._drafts: dict[Path, _Draft] = {}
+        self._described: Entry | None = None
         wide = {"sizing_mode": "stretch_width", "size": "small"}
         self._choice = pmui.RadioBoxGroup(options={}, sizing_mode="stretch_width")
         self._name = pmui.TextInput(label="Name", max_length=60, **wide)
         self._text = pmui.TextAreaInput(
-            label="Note", max_length=MOST_BYTES, auto_grow=True, max_rows=12, **wide
+            label=_SAVED, max_length=MOST_BYTES, auto_grow=True, max_rows=12, **wide
         )
         self._rename = _button("Rename", self._give_name)
         self._keep = _button("Keep on disk", self._keep_on_disk)
@@ -51,6 +73,7 @@ class SolutionWindow(pn.viewable.Viewer):
             width="md",
         )
         self._choice.param.watch(self._choose, "value")
+        self._text.param.watch(self._take_draft, "value_input")
         self._session.journal.param.watch(self._follow, "made")
         self._session.param.watch(self._follow, "shown")
 
@@ -81,20 +104,49 @@ class SolutionWindow(pn.viewable.Viewer):
         self._choose()
 
     def _choose(self, *_: object) -> None:
-        entry = self._chosen
+        entry, before = self._chosen, self._described
+        self._described = entry
+        name, path = (entry.name, entry.note_path) if entry else ("", None)
+        is_same = entry is not None and before is not None and entry.what == before.what
+        if not is_same or before is None or name != before.name:
+            self._name.value = name
         is_made = entry is not None and isinstance(entry.what, MadeSolution)
-        self._name.param.update(value=entry.name if entry else "", disabled=not is_made)
-        self._rename.disabled = self._keep.disabled = not is_made
-        self._theirs.visible = False
+        self._rename.disabled = self._keep.disabled = self._name.disabled = not is_made
+        if is_same and path in self._drafts:
+            # The list is filled again while somebody writes.
+            return
         self._say("")
-        path = entry.note_path if entry else None
-        self._text.visible = self._save.visible = path is not None
+        self._path, self._theirs.visible = None, False
         if path is not None:
-            self._try(lambda: self._put_note(read_note(path)))
+            self._try(lambda: self._open_note(path))
+        self._text.visible = self._save.visible = self._path is not None
 
-    def _put_note(self, note: Note) -> None:
-        self._note = note
-        self._text.value = note.text
+    def _open_note(self, path: Path) -> None:
+        note = read_note(path)
+        self._path = path
+        self._put_note(note, self._drafts.get(path))
+
+    def _put_note(self, note: Note, draft: _Draft | None = None) -> None:
+        """Show a note, or what was written in place of it."""
+        self._note = note if draft is None else draft.note
+        text = note.text if draft is None else draft.text
+        self._text.param.update(value=text, value_input=text)
+        if draft is not None and draft.is_theirs_shown:
+            self._show_theirs(draft.note)
+        self._take_draft()
+
+    def _take_draft(self, *_: object) -> None:
+        """Remember what is written and not saved."""
+        text, path = self._text.value_input, self._path
+        is_saved = text == self._note.text
+        self._text.label = _SAVED if is_saved else _UNSAVED
+        if path is not None and not is_saved:
+            self._drafts[path] = _Draft(text, self._note, bool(self._theirs.visible))
+        elif path is not None:
+            self._drafts.pop(path, None)
+
+    def _show_theirs(self, note: Note) -> None:
+        self._theirs.param.update(value=note.text, visible=True)
 
     def _show(self) -> None:
         if (entry := self._chosen) is not None:
@@ -119,20 +171,22 @@ class SolutionWindow(pn.viewable.Viewer):
             self._try(lambda: self._list.keep(entry, self._name.value.strip()))
 
     def _save_note(self) -> None:
-        path = self._chosen.note_path if self._chosen else None
+        path = self._path
         if path is None:
             return
         try:
-            self._put_note(write_note(path, self._text.value, self._note.version))
+            saved = write_note(path, self._text.value_input, self._note.version)
         except NoteChangedError as error:
             # What was written here stays, beside what is there; saved again, it replaces that.
             self._note = error.note
-            self._theirs.param.update(value=error.note.text, visible=True)
+            self._show_theirs(error.note)
+            self._take_draft()
             self._say(f"{error}. Join the two texts and save again.")
         except InputError as error:
             self._say(str(error))
         else:
             self._theirs.visible = False
+            self._put_note(saved)
             self._say("The note is saved.", severity="success")
 
     def _try(self, act: Callable[[], object]) -> None:

@@ -7,8 +7,9 @@ import param
 
 from plateviz.dashboard.journal import Journal
 from plateviz.dashboard.judging import Judging
+from plateviz.dashboard.on_screen import OnScreen
 from plateviz.dashboard.solution import Request, Solution, what_if_settings
-from plateviz.dashboard.stage import RequestState, Stage
+from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices, Selection
 from plateviz.dashboard.units import Units
 from plateviz.solving.job import Job, JobStatus
@@ -17,17 +18,12 @@ from solver.data.settings import ENGINES, FitSettings
 from solver.errors import InputError
 
 
-class Session(RequestState):
+class Session(OnScreen):
     """State of one browser session.
 
-    `shown` is the solution on the screen, `other` the one that it is compared with; either may
-    be None. `journal` lists the solutions of the session, of all orbits.
+    `journal` lists the solutions of the session, of all orbits.
     """
 
-    shown = param.ClassSelector(class_=Solution, default=None, allow_None=True)
-    other = param.ClassSelector(class_=Solution, default=None, allow_None=True)
-    figure_of_both = param.String(default="residual-map", doc="name of what is drawn of both")
-    solutions = param.List(default=[], item_type=Solution)
     theme = param.Selector(default="light", objects=["light", "dark"])
 
     def __init__(self, store: SolutionStore) -> None:
@@ -47,9 +43,6 @@ class Session(RequestState):
         # What is put on the screen after the requested solution, one after the other.
         self._later: list[Solution | Request] = []
         self._is_opening = False
-        self._fitted: Solution | None = None
-        # What all solutions are compared with, in place of the one before each.
-        self.chosen: Solution | None = None
         self._unprepared: Solution | None = None
         self.choices.param.watch(
             lambda *_: self.ask_what_if(),
@@ -160,11 +153,6 @@ class Session(RequestState):
         else:
             self._request(Request(self.selection.orbit, settings, is_what_if=True))
 
-    @property
-    def fitted(self) -> Solution | None:
-        """The solution on the screen, or the one before the what-ifs on the screen."""
-        return self._fitted if self.shown is not None and self.shown.is_what_if else self.shown
-
     def list_what_if(self) -> None:
         """Add the what-if on the screen to the list, so that the next one does not replace it."""
         if self.shown is not None and self.shown.is_what_if:
@@ -220,17 +208,6 @@ class Session(RequestState):
         else:
             self.open(solution, self.fitted if is_here else None)
 
-    def compare_with(self, solution: Solution | None) -> None:
-        """Compare what is on the screen with a solution; None for the one before each.
-
-        Parameters
-        ----------
-        solution : may be of another run or orbit
-        """
-        self.chosen = solution
-        if self.shown is not None:
-            self.other = self._beside(self.shown, self.fitted)
-
     def exchange(self) -> None:
         """Exchange the solution on the screen with the one that it is compared with, if any."""
         shown, other = self.shown, self.other
@@ -244,18 +221,6 @@ class Session(RequestState):
             self.selection.orbit = other.orbit
         self.param.update(shown=other, other=shown)
         self.choices.load(other.settings)
-
-    def _beside(self, solution: Solution, before: Solution | None) -> Solution | None:
-        """Return what a solution is compared with, given the one before it of the same orbit."""
-        if self.chosen is not None:
-            return None if self.chosen.equals(solution) else self.chosen
-        return None if before is None or before.settings == solution.settings else before
-
-    def _return_to(self, solution: Solution) -> None:
-        """Return from a what-if to a listed solution, alone if the what-if was compared with it."""
-        if solution is not self.shown:
-            other = self._beside(solution, self.fitted)
-            self.param.update(shown=solution, other=other, stage=Stage.READY, message="")
 
     def _request(self, request: Request) -> None:
         self._requested = request

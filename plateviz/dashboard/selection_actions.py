@@ -5,7 +5,9 @@ from contextlib import suppress
 from plateviz.dashboard.selected import NOTHING, Selected, checked_name
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
+from plateviz.dashboard.without_what_if import what_to_do
 from plateviz.runs.kept_selections import TakenError
+from solver.data.settings import FitSettings
 from solver.errors import InputError
 
 # Selections that a session keeps.
@@ -19,6 +21,8 @@ class SelectionActions:
         """Act on `session`."""
         self._session, self._selection = session, session.selection
         self._known: tuple[Solution | None, Selected] = (None, NOTHING)
+        session.param.watch(self._forget_advice, "shown")
+        session.choices.param.watch(self._forget_advice, "exclusions")
 
     @property
     def in_orbit(self) -> Selected:
@@ -40,7 +44,7 @@ class SelectionActions:
         self._selection.select(self._measured.of_kinds(selected.kinds) - selected)
 
     def leave_out(self) -> None:
-        """Exclude the selection from the next fit, which shows a what-if."""
+        """Exclude the selection from the next fit, which shows a what-if, or say what to do."""
         if not self.in_orbit:
             self._session.refuse(
                 "The orbit on the screen has measured nothing of the selection. Open an orbit that "
@@ -50,7 +54,7 @@ class SelectionActions:
         self._exclude(self._left_out | self.in_orbit)
 
     def put_back(self) -> None:
-        """Include the selection in the next fit, which shows a what-if."""
+        """Include the selection in the next fit, which shows a what-if, or say what to do."""
         self._exclude(self._left_out - self._selection.selected)
 
     def look(self) -> None:
@@ -137,7 +141,22 @@ class SelectionActions:
             # Other settings than exclusions may be invalid; nothing is changed for them.
             self._session.refuse(str(error))
             return
-        choices.load(settings.with_(exclusions=left_out.exclusions))
+        settings = settings.with_(exclusions=left_out.exclusions)
+        choices.load(settings)
+        self._advise(settings)
+
+    def _advise(self, settings: FitSettings) -> None:
+        """Say what to do for the settings of the controls to take effect."""
+        session = self._session
+        is_shown = session.shown is not None and session.shown.settings == settings
+        needed = "" if is_shown and not session.is_fitting else what_to_do(session, settings.engine)
+        what = "What is left out of the fit has changed in its settings only"
+        session.advice = f"{what}; {needed}." if needed else ""
+
+    def _forget_advice(self, *_: object) -> None:
+        shown = self._session.shown
+        if shown is not None and Selected.of(shown.settings.exclusions) == self._left_out:
+            self._session.advice = ""
 
 
 def _measured(solution: Solution) -> Selected:

@@ -55,6 +55,11 @@ class Session(OnScreen):
         return self._job
 
     @property
+    def is_fitting(self) -> bool:
+        """Whether there is a job that is no what-if."""
+        return self._job is not None and not self._requested.is_what_if
+
+    @property
     def is_opening(self) -> bool:
         """Whether a solution that was asked for by `open` is not on the screen yet."""
         return self._job is not None and self._is_opening
@@ -224,7 +229,7 @@ class Session(OnScreen):
 
     def _request(self, request: Request) -> None:
         self._requested = request
-        self._job = self.store.request(*request)
+        self._job, self.advice = self.store.request(*request), ""
         self.follow(self._job, stage=Stage.STALE if self.shown else Stage.LOADING)
         self.poll()
 

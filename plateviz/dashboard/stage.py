@@ -27,8 +27,9 @@ class RequestState(param.Parameterized):
 
     `stage` and `message` are the state of the last request, and `is_brief` is whether it is a
     what-if that has only begun, of which nothing is said yet. `notice` says what of the last
-    address, or saved view, cannot be shown, `remark` why the last drag has selected nothing, and
-    `loss` that the run on the screen is gone.
+    address, or saved view, cannot be shown, `remark` why the last drag has selected nothing,
+    `advice` what to do for the last change of the settings to take effect, and `loss` that the run
+    on the screen is gone.
     """
 
     stage = param.ClassSelector(class_=Stage, default=Stage.LOADING)
@@ -36,6 +37,7 @@ class RequestState(param.Parameterized):
     is_brief = param.Boolean(default=False)
     notice = param.String(default="")
     remark = param.String(default="")
+    advice = param.String(default="")
     loss = param.String(default="")
 
     def refuse(self, message: str) -> None:

@@ -1,4 +1,4 @@
-"""NoticeView: what of an address or a saved view cannot be shown, and that the run is gone."""
+"""NoticeView: what cannot be shown, that the run is gone, and what is to be done, in words."""
 
 from html import escape
 
@@ -11,7 +11,8 @@ from plateviz.dashboard.session import Session
 class NoticeView(pn.viewable.Viewer):
     """Messages above the page; nothing while there is nothing to say.
 
-    That of an address stays until it is closed, that of a run until the run is there again.
+    That of an address stays until it is closed, that of a run until the run is there again, and
+    what is to be done until it is done.
     """
 
     def __init__(self, session: Session, **params: object) -> None:
@@ -19,7 +20,7 @@ class NoticeView(pn.viewable.Viewer):
         super().__init__(**params)
         self._session = session
         self._row = pmui.Column(margin=0, sizing_mode="stretch_width")
-        session.param.watch(self._show, ["notice", "loss"])
+        session.param.watch(self._show, ["notice", "loss", "advice"])
         self._show()
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -33,17 +34,19 @@ class NoticeView(pn.viewable.Viewer):
         if self._session.notice:
             alerts.append(_alert(self._session.notice, closeable=True))
             alerts[-1].param.watch(self._close, "closed")
+        if self._session.advice:
+            alerts.append(_alert(self._session.advice, severity="info"))
         self._row[:] = alerts
 
     def _close(self, *_: object) -> None:
         self._session.notice = ""
 
 
-def _alert(text: str, closeable: bool = False) -> pmui.Alert:
+def _alert(text: str, closeable: bool = False, severity: str = "warning") -> pmui.Alert:
     return pmui.Alert(
         # It is taken for Markdown, in which HTML would be kept.
         object=escape(text),
-        severity="warning",
+        severity=severity,
         closeable=closeable,
         margin=(6, 0),
         sizing_mode="stretch_width",

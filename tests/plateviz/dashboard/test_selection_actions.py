@@ -8,6 +8,7 @@ from plateviz.dashboard.selected import NOTHING, Selected
 from plateviz.dashboard.selection_actions import SelectionActions
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.stage import Stage
+from plateviz.dashboard.views.notice import NoticeView
 from plateviz.runs.kept_selections import KeptSelections
 from solver.data.settings import FitSettings
 from solver.errors import InputError
@@ -184,3 +185,51 @@ def test_nothing_and_too_much_is_not_kept(live, actions):
         actions.keep("one more")
     actions.keep("49")
     assert len(live.selection.kept) == 50
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"engine": "svi"}, "press Fit: a solution with the engine svi has no what-if"),
+        ({"what_if_at_once": False}, "press Fit, or switch on What-if at every change"),
+    ],
+    ids=["engine", "switch"],
+)
+def test_change_without_a_what_if_says_what_to_do_until_it_is_done(
+    live, actions, fit_result, change, words
+):
+    live.choices.param.update(**change)
+    notice, before = NoticeView(live).__panel__(), len(live.store.requested)
+    live.selection.select_sources(ids_of(fit_result, 1))
+    actions.leave_out()
+    assert (len(live.store.requested), live.stage) == (before, Stage.READY)
+    assert words in live.advice
+    assert (notice[0].object, notice[0].severity) == (live.advice, "info")
+    live.refit()
+    assert (live.advice, len(notice)) == ("", 0)
+    finish(live)
+    actions.put_back()
+    assert words in live.advice
+    # As the solution on the screen was fitted.
+    actions.leave_out()
+    assert live.advice == ""
+
+
+def test_change_during_a_fit_says_what_to_do(live, actions, fit_result):
+    live.choices.what_if_at_once = False
+    live.choices.order = 4
+    live.refit()
+    live.choices.what_if_at_once = True
+    live.selection.select_sources(ids_of(fit_result, 1))
+    actions.leave_out()
+    assert "press Fit, which begins anew" in live.advice
+    finish(live)
+    assert live.advice
+    live.refit()
+    assert live.advice == ""
+
+
+def test_change_with_a_what_if_says_nothing(live, actions, fit_result):
+    live.selection.select_sources(ids_of(fit_result, 1))
+    actions.leave_out()
+    assert (live.advice, live.is_fitting) == ("", False)

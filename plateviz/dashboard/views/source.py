@@ -10,6 +10,7 @@ from astropy.table import Table
 
 from plateviz.dashboard.downloads import described
 from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.source_in_orbit import open_source_in_orbit
 from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
@@ -54,6 +55,10 @@ _INVITATION = (
     "Survey or the Orbit view and open it."
 )
 _WHAT_TO_DO = "Reload the page once the run is there again."
+_MEASUREMENTS = (
+    "A click on an orbit opens it with this source selected, on the residual map of the exposure "
+    "and detector that measured it first. So does a tap on the point of an orbit in the figures."
+)
 _NO_SOURCES = "No orbit of this run is fitted yet. Its sources are listed here once one is."
 
 
@@ -75,6 +80,7 @@ class SourcePage(pn.viewable.Viewer):
         self._tables: SourceTables | None = None
         self._are_numbers_old = True
         self._head, self._strip, self._motion = markup_pane(), markup_pane(), markup_pane()
+        self._measurements = markup_pane()
         self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row, units=self._session.units)
         self._save = SaveButton(
             "Orbits and motion", table_choices(self._subject, self._source_tables)
@@ -128,6 +134,7 @@ class SourcePage(pn.viewable.Viewer):
             heading("Motion"),
             self._motion,
             heading("Orbits"),
+            self._measurements,
             self._orbits,
             self._save,
             sizing_mode="stretch_width",
@@ -217,13 +224,16 @@ class SourcePage(pn.viewable.Viewer):
         else:
             table = self._session.units.rows(motion_table(found.motion))
             self._motion.object = themed(numbers(in_words(table, MOTION)), theme)
+        self._measurements.object = paragraph(_MEASUREMENTS, "caption", theme)
         self._orbits.show(source_orbits(found.history), theme)
 
     def _open_row(self, row: pd.Series) -> None:
         self._open_orbit(str(row["orbit_id"]))
 
     def _open_orbit(self, orbit: str) -> None:
-        self._navigation.open_orbit(int(orbit))
+        found = self._navigation.found
+        if found is not None:
+            open_source_in_orbit(self._navigation, found.source_id, int(orbit))
 
     def _open_source(self, row: pd.Series) -> None:
         self._navigation.find_source(str(row["id"]))

@@ -47,6 +47,8 @@ _LOOK_FOR_RUN_SECONDS = 10.0
 # The solver prepares what-ifs once a page has been at rest for so long. Before, the browser draws
 # and a person may step on to the next orbit, for which a fit would take the cores.
 _REST_SECONDS = 3.0
+# Seconds that the controls of a refit wait for a fit; one that takes longer can be cancelled.
+_CONTROLS_SECONDS = 3.0
 _SIDEBAR_WIDTH = 264
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
@@ -279,7 +281,7 @@ class _Ticker:
             # Another thread is at work, and would wait for a page that asks without a pause.
             self._is_to_tick = True
             self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
-        elif is_pending or self._pages.is_due or self._pages.complete(is_fitting=job is not None):
+        elif is_pending or self._pages.is_due or self._pages.complete(_is_brief(job)):
             self.wake()
         elif job is None:
             if self._progress.running:
@@ -287,6 +289,10 @@ class _Ticker:
             self._navigation.expect_orbit()
             if self._rest is not None:
                 self._rest.begin()
+
+
+def _is_brief(job: Job | None) -> bool:
+    return job is not None and job.seconds < _CONTROLS_SECONDS
 
 
 def _set_theme(session: Session, is_dark: bool) -> None:

@@ -5,6 +5,7 @@ The last solution stays on the screen until the next one is complete; then both 
 
 import param
 
+from plateviz.dashboard.held_job import HeldJob
 from plateviz.dashboard.journal import Journal
 from plateviz.dashboard.judging import Judging
 from plateviz.dashboard.on_screen import OnScreen
@@ -37,7 +38,7 @@ class Session(OnScreen):
         self.judging = Judging(self, store.judge)
         self.selection.offer_orbits(store.orbits)
         self._detectors = store.instrument.detector_ids
-        self._job: Job | None = None
+        self._held = HeldJob(store, self.journal)
         self._requested = Request(store.orbits[0], FitSettings())
         self._next_what_if: FitSettings | None = None
         # What is put on the screen after the requested solution, one after the other.
@@ -48,21 +49,22 @@ class Session(OnScreen):
             lambda *_: self.ask_what_if(),
             [*ANSWERED_AT_ONCE, "what_if_at_once"],
         )
+        self.journal.param.watch(lambda *_: self._take_up(), "awaited")
 
     @property
     def job(self) -> Job | None:
         """The waiting or running job; None if there is none."""
-        return self._job
+        return self._held.job
 
     @property
     def is_fitting(self) -> bool:
         """Whether there is a job that is no what-if."""
-        return self._job is not None and not self._requested.is_what_if
+        return self.job is not None and not self._requested.is_what_if
 
     @property
     def is_opening(self) -> bool:
         """Whether a solution that was asked for by `open` is not on the screen yet."""
-        return self._job is not None and self._is_opening
+        return self.job is not None and self._is_opening
 
     def show_orbit(self, orbit: int | None, settings: FitSettings | None = None) -> None:
         """Request an orbit with some settings; by default with those of the last solution."""
@@ -88,7 +90,7 @@ class Session(OnScreen):
             self.compare_with(other)
         # Without a job, all of it is on the screen.
         self.choices.load(solution.settings)
-        if self._job is None and isinstance(solution, Solution):
+        if self.job is None and isinstance(solution, Solution):
             self._unprepared = solution
 
     def _begin(self, solutions: list[Solution | Request], is_opening: bool = False) -> None:
@@ -106,12 +108,35 @@ class Session(OnScreen):
 
     def _show_next(self) -> None:
         """Show what is to be shown next, up to what has to be computed."""
-        while self._later and self._job is None:
+        while self._later and self.job is None:
             first = self._later.pop(0)
             if isinstance(first, Request):
                 self._request(first)
             else:
                 self._put_on_screen(first)
+        self._take_up()
+
+    def _take_up(self) -> None:
+        """Follow what the page had asked for before it was loaded again, if it is of its orbit.
+
+        Until something is asked for, nothing is on the screen that it could follow.
+        """
+        awaited = self.journal.awaited
+        if awaited is None or (self.shown is None and self.job is None):
+            return
+        self.journal.awaited = None
+        request, status = Request(*awaited.made[:3]), awaited.job.status
+        is_asked_for = self.job is not None and self._requested == request
+        is_shown = self.shown is not None and self.shown[:2] == request[:2]
+        if request.orbit != self.selection.orbit or is_asked_for or is_shown:
+            return
+        if status is JobStatus.FAILED:
+            self.refuse(awaited.job.message)
+        elif status is not JobStatus.CANCELLED:
+            self._later.append(request)
+            self._show_next()
+            # What has been changed for it; without a what-if of its own.
+            self.choices.load(request.settings)
 
     def prepare_what_ifs(self) -> None:
         """Let the solver fit what the what-ifs of an existing result start from, once.
@@ -149,7 +174,7 @@ class Session(OnScreen):
         if settings.engine != ENGINES[0]:
             return
         known = next((s for s in self.solutions if s.settings == settings), None)
-        if self._job is not None:
+        if self.job is not None:
             self._next_what_if = settings if self._requested.is_what_if else None
         elif self.shown is not None and settings == self.shown.settings:
             return
@@ -168,34 +193,36 @@ class Session(OnScreen):
     def cancel(self) -> None:
         """Cancel the waiting or running job."""
         self._next_what_if, self._later = None, []
-        if self._job is not None and not self.store.cancel(self._job):
-            self._job = None
+        if not self._held.give_up():
+            self._held.leave()
             self.refuse("Another page waits for this fit, which goes on; the last solution stays.")
 
     def close(self) -> None:
-        """Leave the waiting or running job, if there is one, to other pages; it goes on."""
-        if self._job is not None:
-            self.store.abandon(self._job)
-        self._job = None
+        """Leave the waiting or running job, if there is one, to other pages; it goes on.
+
+        The page that is loaded again takes it up.
+        """
+        self._held.leave()
 
     def poll(self) -> None:
         """Update the state from the job; called periodically while there is one."""
-        if self._job is None:
+        if self.job is None:
             return
-        status = self._job.status
+        status = self.job.status
         if status is JobStatus.DONE:
-            self._job = None
+            self._held.end()
             self._show_finished(self._requested)
             self._show_next()
-            if self._next_what_if is not None and self._job is None:
+            if self._next_what_if is not None and self.job is None:
                 self._next_what_if = None
                 self.ask_what_if()
         elif status.is_over:
-            reason = self._job.message or "The fit was cancelled; the last solution stays."
-            self._job, self._later = None, []
+            reason = self.job.message or "The fit was cancelled; the last solution stays."
+            self._held.end()
+            self._later = []
             self.refuse(reason)
         else:
-            self.follow(self._job)
+            self.follow(self.job)
 
     def bring_up(self, solution: Solution) -> None:
         """Show an earlier solution; the fitted one on the screen becomes the other."""
@@ -229,14 +256,14 @@ class Session(OnScreen):
 
     def _request(self, request: Request) -> None:
         self._requested = request
-        self._job, self.advice = self.store.request(*request), ""
-        self.follow(self._job, stage=Stage.STALE if self.shown else Stage.LOADING)
+        self.advice = ""
+        self.follow(self._held.begin(request), stage=Stage.STALE if self.shown else Stage.LOADING)
         self.poll()
 
     def _cancel_job(self) -> None:
-        if self._job is not None:
-            self.store.cancel(self._job)
-        self._job, self._next_what_if, self._later = None, None, []
+        self._held.give_up()
+        self._held.leave()
+        self._next_what_if, self._later = None, []
         self._is_opening = False
 
     def _show_finished(self, request: Request) -> None:

@@ -79,7 +79,7 @@ class OrbitPage(pn.viewable.Viewer):
 
         Parameters
         ----------
-        is_fitting : whether a fit is at work, for which the controls of a refit wait
+        is_fitting : whether a fit has just begun, for which the controls of a refit wait
 
         Returns
         -------

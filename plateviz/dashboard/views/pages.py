@@ -125,7 +125,7 @@ class Pages(pn.viewable.Viewer):
 
         Parameters
         ----------
-        is_fitting : whether a fit is at work, for which some parts wait
+        is_fitting : whether a fit has just begun, for which some parts wait
         """
         page = self._page(self._navigation.view)
         return isinstance(page, OrbitPage) and page.complete(is_fitting)

@@ -84,6 +84,7 @@ class SolutionWindow(pn.viewable.Viewer):
     def open(self) -> None:
         """Open the window."""
         self._window.open = True
+        self._session.journal.look()
         self._fill()
 
     @property

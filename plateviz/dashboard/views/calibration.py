@@ -7,10 +7,14 @@ import pandas as pd
 import panel as pn
 import panel_material_ui as pmui
 import param
+from astropy.table import Table
 
+from plateviz.dashboard.calibration_files import calibration_files
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.markup import markup_pane, paragraph
+from plateviz.dashboard.views.save_button import SaveButton
+from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.dashboard.views.state_text import missing_text, outdated_text
 from plateviz.dashboard.views.table import TABLE_STYLE
 from plateviz.tables import calibration_tables, outlier_list
@@ -48,7 +52,11 @@ class CalibrationView(pn.viewable.Viewer):
         # be laid out, which uses one core.
         self._tabs = pmui.Tabs(dynamic=True, sizing_mode="stretch_width")
         self._words = markup_pane()
-        self._column = pmui.Column(self._words, self._tabs, margin=0, sizing_mode="stretch_width")
+        # Above the tabs: its menu would be cut off at the end of the card.
+        self._save = SaveButton("calibration", table_choices(self._subject, self._files))
+        self._column = pmui.Column(
+            self._words, self._save, self._tabs, margin=0, sizing_mode="stretch_width"
+        )
         session.param.watch(self._fill, "shown")
         session.param.watch(self._say, ["shown", "stage", "is_brief", "theme"])
         session.selection.param.watch(self._show_selected, [*KINDS])
@@ -65,7 +73,15 @@ class CalibrationView(pn.viewable.Viewer):
         text = missing_text(session) if is_missing else outdated_text(session)
         self._words.object = paragraph(text, "empty" if is_missing else "outdated", session.theme)
         self._words.visible = bool(text)
-        self._tabs.visible = not is_missing
+        self._tabs.visible = self._save.visible = not is_missing
+        self._save.theme = session.theme
+
+    def _subject(self) -> str:
+        return f"{self._session.selection.subject()}-calibration"
+
+    def _files(self) -> dict[str, Table]:
+        shown = self._session.shown
+        return {} if shown is None else calibration_files(shown.result)
 
     def _fill(self, *_: object) -> None:
         shown = self._session.shown

@@ -2,13 +2,17 @@
 
 from collections.abc import Callable
 
+import pandas as pd
 import panel as pn
 import panel_material_ui as pmui
+from astropy.table import Table
 
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.solution import Request
 from plateviz.dashboard.solution_list import Entry, SolutionList, by_label, label_of
 from plateviz.dashboard.views.markup import markup_pane, numbers, paragraph, themed
+from plateviz.dashboard.views.save_button import SaveButton
+from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.plots.both_solutions import comparable_figures
 from plateviz.plots.diagnostic import Diagnostic
 from plateviz.tables import solution_changes
@@ -47,10 +51,11 @@ class CompareView(pn.viewable.Viewer):
         self._figure = pmui.Select(label="Figure of both", options=figures, value=chosen, **wide)
         self._figure.link(self._session, value="figure_of_both", bidirectional=True)
         self._figure.param.watch(lambda _: change_figure(), "value")
-        self._table = markup_pane()
+        self._table, self._changes = markup_pane(), pd.DataFrame()
+        self._save = SaveButton("changes", table_choices(self._subject, self._files))
         self._message = ""
         self._column = pn.Column(
-            self._other, self._figure, self._table, sizing_mode="stretch_width"
+            self._other, self._figure, self._save, self._table, sizing_mode="stretch_width"
         )
         self._entries: dict[str, Entry] = {}
         self._is_offering = False
@@ -97,7 +102,19 @@ class CompareView(pn.viewable.Viewer):
             self._message = str(error)
         self._fill()
 
+    def _subject(self) -> str:
+        return f"{self._session.selection.subject()}-changes"
+
+    def _files(self) -> dict[str, Table]:
+        return {"changes": Table.from_pandas(self._changes)}
+
     def _fill(self, *_: object) -> None:
+        session, self._changes = self._session, pd.DataFrame()
+        self._save.theme = session.theme
+        self._show_changes()
+        self._save.visible = not self._changes.empty
+
+    def _show_changes(self) -> None:
         session = self._session
         shown, other = session.shown, session.other
         if self._message or shown is None or other is None:
@@ -109,5 +126,6 @@ class CompareView(pn.viewable.Viewer):
                 "The solutions are being judged.", "empty", session.theme
             )
             return
-        table = solution_changes(other.result, shown.result).rename(columns=_TITLES)
+        self._changes = solution_changes(other.result, shown.result)
+        table = self._changes.rename(columns=_TITLES)
         self._table.object = themed(numbers(table), session.theme)

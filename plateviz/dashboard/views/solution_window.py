@@ -7,10 +7,13 @@ from typing import NamedTuple
 
 import panel as pn
 import panel_material_ui as pmui
+from astropy.table import Table
 
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.solution import Request
 from plateviz.dashboard.solution_list import Entry, SolutionList, by_label
+from plateviz.dashboard.views.save_button import SaveButton
+from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.dashboard.views.window import window
 from plateviz.runs.note import MOST_BYTES, Note, NoteChangedError, read_note, write_note
 from plateviz.solving.made_solutions import MadeSolution
@@ -59,11 +62,15 @@ class SolutionWindow(pn.viewable.Viewer):
         self._theirs = pmui.TextAreaInput(
             label="The note as somebody else has left it", disabled=True, visible=False, **wide
         )
+        self._save_list = SaveButton("solutions", table_choices(lambda: "solutions", self._files))
         self._window = window(
             "Solutions",
             self._choice,
             pmui.Row(
-                _button("Show", self._show), _button("Compare with it", self._compare), margin=0
+                _button("Show", self._show),
+                _button("Compare with it", self._compare),
+                self._save_list,
+                margin=0,
             ),
             pmui.Row(self._name, self._rename, self._keep, sizing_mode="stretch_width", margin=0),
             self._text,
@@ -85,12 +92,21 @@ class SolutionWindow(pn.viewable.Viewer):
         """Open the window."""
         self._window.open = True
         self._session.journal.look()
+        self._save_list.theme = self._session.theme
         self._fill()
 
     @property
     def _chosen(self) -> Entry | None:
         found = self._choice.value
         return found if isinstance(found, Entry) else None
+
+    def _files(self) -> dict[str, Table]:
+        """Return the list as a table of texts: files of one orbit have no number of an orbit."""
+        entries = self._list.entries()
+        names = ("orbit", "name", "settings", "made")
+        texts = {name: [str(getattr(one, name) or "") for one in entries] for name in names}
+        texts["orbit"] = ["" if one.orbit is None else str(one.orbit) for one in entries]
+        return {"solutions": Table(texts)}
 
     def _follow(self, *_: object) -> None:
         if self._window.open:

@@ -48,7 +48,7 @@ def fresh(fit_result):
 
 def tables(view):
     """Words and tabs of the view of the calibration."""
-    return view.__panel__()[0], view.__panel__()[1]
+    return view.__panel__()[0], view.__panel__()[-1]
 
 
 def figure(page, name="residual-map"):

@@ -42,7 +42,7 @@ _PROGRESS_MILLISECONDS = 250
 _PENDING_MILLISECONDS = 50
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
-# Seconds between two looks whether the run is there at all.
+# Seconds between two looks whether the run is there at all, and whether others have begun.
 _LOOK_FOR_RUN_SECONDS = 10.0
 # The solver prepares what-ifs once a page has been at rest for so long. Before, the browser draws
 # and a person may step on to the next orbit, for which a fit would take the cores.

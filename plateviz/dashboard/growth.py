@@ -73,7 +73,7 @@ def how_to_make_a_run(origin: Origin) -> str:
         return (
             "This survey has not been fitted as a whole. "
             f"`plateviz survey {origin.directory}` fits all its orbits; "
-            "reload this page once it has begun."
+            "this page shows them once it has begun."
         )
     return (
         "These are the files of one orbit. For a survey directory, `plateviz survey DIR` "

@@ -1,10 +1,17 @@
-"""What to say when the run on the screen is removed while nobody does anything."""
+"""Runs that begin, and the run on the screen that is removed, while nobody does anything."""
 
 from plateviz.dashboard.navigation import Navigation
 
 
 def look_for_run(navigation: Navigation) -> None:
-    """Say on the page whether the run on the screen is gone; costs one look at a directory."""
+    """Offer runs that have begun, and say whether that on the screen is gone.
+
+    The first run of a survey is shown. It costs a look at two directories.
+    """
+    runs = navigation.known_runs
+    if runs.look() and runs.first is not None:
+        navigation.param["run_name"].objects = list(runs)
+        navigation.run_name = navigation.run_name or runs.first.name
     run = navigation.run
     navigation.session.loss = "" if run is None or run.is_there() else _words(run.name)
 

@@ -8,6 +8,7 @@ from plateviz.dashboard.address_parts import chosen, unknown_parts
 from plateviz.dashboard.exploration import PARTS, Exploration
 from plateviz.dashboard.found_source import FoundSource, find_source
 from plateviz.dashboard.growth import Growth, how_to_make_a_run
+from plateviz.dashboard.known_runs import KnownRuns
 from plateviz.dashboard.next_orbit import NextOrbit
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.selection_actions import SelectionActions
@@ -60,12 +61,11 @@ class Navigation(param.Parameterized):
         self._next_orbit = NextOrbit()
         self._named: dict[str, str] = {}
         self._growth: tuple[SurveyRun, Growth] | None = None
-        self._runs = {run.name: run for run in session.store.runs()}
-        if self._runs:
-            self.param["run_name"].objects = list(self._runs)
-            whole = [name for name, run in self._runs.items() if run.is_complete]
-            self.run_name = (whole or list(self._runs))[0]
-            if self._runs[self.run_name].is_gathered:
+        runs = self.known_runs = KnownRuns(session.store)
+        if runs.first is not None:
+            self.param["run_name"].objects = list(runs)
+            self.run_name = runs.first.name
+            if runs.first.is_gathered:
                 self.view = View.SURVEY
         self.look_again()
         self.param.watch(self._begin_run, "run_name")
@@ -83,12 +83,12 @@ class Navigation(param.Parameterized):
     @property
     def run(self) -> SurveyRun | None:
         """The run on the screen; None if there is none."""
-        return self._runs.get(self.run_name)
+        return self.known_runs.get(self.run_name)
 
     @property
     def runs(self) -> list[SurveyRun]:
         """The runs of the survey, by name."""
-        return list(self._runs.values())
+        return list(self.known_runs.values())
 
     @property
     def why_no_run(self) -> str:
@@ -135,7 +135,7 @@ class Navigation(param.Parameterized):
         units.unit = chosen("unit", address, NAMES.values(), units.unit, problems)
         both, figures = session.figure_of_both, [one.name for one in comparable_figures()]
         session.figure_of_both = chosen("both", address, figures, both, problems)
-        self.run_name = chosen("run", address, self._runs, self.run_name, problems)
+        self.run_name = chosen("run", address, self.known_runs, self.run_name, problems)
         if "source" in address:
             self.find_source(address["source"])
         if "selection" in address:
@@ -213,7 +213,7 @@ class Navigation(param.Parameterized):
         """Let the orbit of the run be read ahead that is likely to be asked for next."""
         # Of a what-if, the one that it changes.
         selection, shown = self.session.selection, self.session.fitted
-        run = self._runs.get(shown.run) if shown is not None else None
+        run = self.known_runs.get(shown.run) if shown is not None else None
         if run is not None:
             run.expect(self._next_orbit.after(selection.orbit, selection.param["orbit"].objects))
 
@@ -265,7 +265,7 @@ class Navigation(param.Parameterized):
 
     def _solution(self, text: str | None, orbit: int | None) -> Solution | Request:
         """Return the solution of a text, None for that of the run; InputError if unreadable."""
-        return find_solution(text, orbit, self.run, self._runs, self.session.store.kept)
+        return find_solution(text, orbit, self.run, self.known_runs, self.session.store.kept)
 
     def _find(self, name: str, orbit: int | None) -> Solution | Request | None:
         """Return a solution that the address names; a notice says why there is none."""

@@ -121,6 +121,7 @@ class SourcePage(pn.viewable.Viewer):
         navigation.param.watch(self._show_workspace, "source_workspace")
         self._session.param.watch(self._show, "theme")
         self._session.units.param.watch(self._show, "unit")
+        navigation.param.watch(self._allow_entry, "run_name")
         self._show_workspace()
         self._list_sources()
         self._show()
@@ -128,6 +129,9 @@ class SourcePage(pn.viewable.Viewer):
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the page without its sidebar."""
         return self._column
+
+    def _allow_entry(self, *_: object) -> None:
+        self._entry.disabled = self._navigation.run is None
 
     def _numbers(self) -> pn.viewable.Viewable:
         return pmui.Column(

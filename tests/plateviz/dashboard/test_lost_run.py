@@ -9,6 +9,9 @@ from plateviz.dashboard.lost_run import look_for_run
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.notice import NoticeView
+from plateviz.dashboard.views.run_selector import run_selector
+from plateviz.dashboard.views.source import SourcePage
+from plateviz.dashboard.views.survey import SurveyPage
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import survey_runs
 from solver.data.settings import FitSettings
@@ -49,3 +52,26 @@ def test_page_that_has_ended_is_neither_looked_at_nor_woken(fit_result):
     ticker._look_soon()
     ticker.wake()
     assert not ticker._is_to_tick
+
+
+def test_run_that_begins_is_offered_and_the_first_one_shown(fit_result, survey_folder):
+    store = SurveyStore(fit_result, [])
+    store.runs = lambda: survey_runs(survey_folder)
+    navigation = Navigation(Session(store))
+    page, source = SurveyPage(navigation, id), SourcePage(navigation, id)
+    (selector,) = run_selector(navigation)
+    assert (navigation.run, selector.visible, source._entry.disabled) == (None, False, True)
+    begin_run(survey_folder, "default", FitSettings())
+    look_for_run(navigation)
+    assert navigation.run_name == "default"
+    assert (selector.visible, selector.value, source._entry.disabled) == (True, "default", False)
+    assert "of 3 orbits" in navigation.growth
+    assert "0 of 3 orbits are done" in page._head.object
+    shown = navigation.run
+    begin_run(survey_folder, "another", FitSettings(order=4))
+    look_for_run(navigation)
+    assert list(selector.options) == ["another", "default"]
+    # The page stays where it is, with what it has read.
+    assert navigation.run is shown
+    selector.value = "another"
+    assert navigation.run.name == "another"

@@ -154,7 +154,7 @@ class SolutionWindow(pn.viewable.Viewer):
 
     def _take_draft(self, *_: object) -> None:
         """Remember what is written and not saved."""
-        text, path = str(self._text.value_input or ""), self._path
+        text, path = self._text.value_input or "", self._path
         is_saved = text == self._note.text
         self._text.label = _SAVED if is_saved else _UNSAVED
         if path is not None and not is_saved:
@@ -192,7 +192,7 @@ class SolutionWindow(pn.viewable.Viewer):
         if path is None:
             return
         try:
-            saved = write_note(path, str(self._text.value_input or ""), self._note.version)
+            saved = write_note(path, self._text.value_input or "", self._note.version)
         except NoteChangedError as error:
             # What was written here stays, beside what is there; saved again, it replaces that.
             self._note = error.note

@@ -47,8 +47,6 @@ _OF_ITS_OWN = 0.5
 # Outliers are wrong identifications if these have this share of their chi2.
 _OF_OUTLIERS = 0.5
 _REFERENCE_LIMIT = 0.01
-# How much larger the median chi2 is if all stars are wrong.
-_ALL_WRONG = 3.0
 
 
 class Found(NamedTuple):
@@ -233,7 +231,7 @@ def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
 
 def _of_references(diagnosis: Diagnosis) -> list[Found]:
     """Return whether some, or all, of the reference stars are wrong."""
-    ids, chi2, factor = diagnosis.references
+    ids, chi2, factor, rescaled = diagnosis.references
     if not len(chi2):
         return []
     limit = _limit(diagnosis)
@@ -242,9 +240,9 @@ def _of_references(diagnosis: Diagnosis) -> list[Found]:
     if worst.log_chance > limit:
         return []
     # Wrong stars pull the frame, and so all others; only those that are far beyond are wrong.
-    typical = max(float(np.median(chi2)) / MEDIAN_CHI2, 1.0)
-    far = chi2 / typical > chdtri(2.0, -np.expm1(np.log1p(-_REFERENCE_LIMIT) / len(chi2)))
-    if not far.any() or typical > _ALL_WRONG:
+    far = rescaled > chdtri(2.0, -np.expm1(np.log1p(-_REFERENCE_LIMIT) / len(chi2)))
+    if not far.any():
+        typical = max(float(np.median(chi2)) / MEDIAN_CHI2, 1.0)
         gain = gains.of_scale(typical, 2.0 * len(chi2))
         return [Found(worst._replace(subject="references"), gain, size=factor)]
     order = np.argsort(-chi2[far])

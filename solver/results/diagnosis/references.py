@@ -30,11 +30,13 @@ class ReferenceChi2(NamedTuple):
     chi2 : with two degrees of freedom, shape (n,)
     factor : by which the errors of the catalogue are larger than stated, at least 1, so that the
         median chi2 is as expected
+    rescaled : chi2 with errors of the catalogue that are so much larger, shape (n,)
     """
 
     source_id: np.ndarray
     chi2: np.ndarray
     factor: float
+    rescaled: np.ndarray
 
 
 def reference_chi2(sources: pd.DataFrame) -> ReferenceChi2:
@@ -54,15 +56,17 @@ def reference_chi2(sources: pd.DataFrame) -> ReferenceChi2:
     scaled = (inverse_root[known] @ offset[known, :, None])[:, :, 0]
     shares, axes = np.linalg.eigh(share[known])
     along = np.square(np.einsum("nik,ni->nk", axes, scaled))
+    factor = _error_factor(along, shares)
     return ReferenceChi2(
         rows["source_id"].to_numpy()[known],
-        np.sum(along / shares, axis=1),
-        _error_factor(along, shares),
+        _chi2(along, shares, 1.0),
+        factor,
+        _chi2(along, shares, factor),
     )
 
 
-def _error_factor(along: np.ndarray, shares: np.ndarray) -> float:
-    """Return the factor of the catalogue's errors for which the median chi2 is as expected.
+def _chi2(along: np.ndarray, shares: np.ndarray, factor: float) -> np.ndarray:
+    """Return the chi2 of each star with errors of the catalogue that are larger by a factor.
 
     With an error f times as large, the catalogue position minus the fit without it has the
     covariance f^2 P + M, where P + M = P (P - C)^-1 P. In units of the catalogue's errors it is
@@ -73,10 +77,14 @@ def _error_factor(along: np.ndarray, shares: np.ndarray) -> float:
     along : squares of the deviations from the catalogue along the eigenvectors, shape (n, 2)
     shares : s, shape (n, 2)
     """
+    return np.sum(along / (shares + (factor**2 - 1.0) * shares**2), axis=1)
+
+
+def _error_factor(along: np.ndarray, shares: np.ndarray) -> float:
+    """Return the factor on the catalogue's errors for which the median chi2 is as expected."""
 
     def excess(log_factor: float) -> float:
-        larger = np.expm1(2.0 * log_factor)
-        chi2 = np.sum(along / (shares + larger * shares**2), axis=1)
+        chi2 = _chi2(along, shares, float(np.exp(log_factor)))
         return float(np.median(chi2)) - MEDIAN_CHI2
 
     if not len(along) or excess(0.0) <= 0.0:

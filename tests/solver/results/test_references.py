@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.special import chdtri
 
 from solver.results.diagnosis.references import reference_chi2
 
@@ -55,3 +56,24 @@ def test_errors_beyond_all_measure_end_at_a_limit():
     rows = solution(1.0, 1.0)
     rows[["offset_ra", "offset_dec"]] *= 1e12
     assert reference_chi2(rows).factor == 1e6
+
+
+# What the largest of so many chi2 exceeds in one of a thousand cases.
+LIMIT = chdtri(2.0, 1e-3 / STARS)
+
+
+@pytest.mark.parametrize("measured", [0.3, 3.0])
+def test_no_star_stands_out_where_all_errors_are_larger(measured):
+    found = reference_chi2(solution(5.0, measured))
+    assert found.chi2.max() > LIMIT
+    assert found.rescaled.max() < LIMIT
+    assert np.mean(found.rescaled) == pytest.approx(2.0, rel=0.1)
+
+
+def test_wrong_stars_stand_out_though_they_make_the_errors_of_all_look_larger():
+    rows = solution(2.0, 1.0)
+    wrong = rows.index[::10]
+    rows.loc[wrong, "offset_ra"] += 40.0 * rows.loc[wrong, "prior_sigma_ra"]
+    far = reference_chi2(rows).rescaled > LIMIT
+    assert far[wrong].all()
+    assert far.sum() == len(wrong)

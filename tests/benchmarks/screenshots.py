@@ -87,7 +87,7 @@ def take_readme(page: Page, address: str, path: Path) -> None:
     """Write the picture of README.md: a solution with a flaw, its cause and the remedy."""
     page.set_viewport_size(_README_SIZE)
     page.goto(f"{address}?view=orbit&workspace=verdict&orbit=0")
-    page.get_by_role("button", name="Try it").wait_for(timeout=60_000)
+    page.get_by_role("button", name="Try it").wait_for(timeout=_PATIENCE_MS)
     take(page, path, "light")
     Image.open(path).convert("RGB").quantize().save(path, optimize=True)
 

@@ -31,8 +31,10 @@ def open_source_in_orbit(navigation: Navigation, source_id: int, orbit: int) -> 
         return
 
     def follow(event: Any) -> None:  # noqa: ANN401 an event of param
-        session.param.unwatch(watcher)
-        show(event.new)
+        # None while the orbit is on its way.
+        if event.new is not None:
+            session.param.unwatch(watcher)
+            show(event.new)
 
     watcher = session.param.watch(follow, "shown")
 

@@ -11,7 +11,7 @@ from plateviz.dashboard.growth import Growth, how_to_make_a_run
 from plateviz.dashboard.known_runs import KnownRuns
 from plateviz.dashboard.next_orbit import NextOrbit
 from plateviz.dashboard.selected import KINDS
-from plateviz.dashboard.selection_actions import SelectionActions
+from plateviz.dashboard.selection_actions import look_for_kept
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.shown_address import SHOWN
 from plateviz.dashboard.solution import Request, Solution
@@ -140,7 +140,7 @@ class Navigation(param.Parameterized):
             self.find_source(address["source"])
         if "selection" in address:
             # Somebody else may have kept it.
-            SelectionActions(session).look()
+            look_for_kept(session)
         problems += session.selection.restore(address)
         try:
             orbit = session.selection.orbit_of(address)

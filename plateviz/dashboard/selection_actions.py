@@ -57,22 +57,6 @@ class SelectionActions:
         """Include the selection in the next fit, which shows a what-if, or say what to do."""
         self._exclude(self._left_out - self._selection.selected)
 
-    def look(self) -> None:
-        """Take over what others have kept by now; a notice says where it cannot be read."""
-        try:
-            found = self._session.store.selections.all()
-        except InputError as error:
-            self._session.note([str(error)])
-            return
-        kept = {}
-        for name, items in found.items():
-            # They come from a file.
-            with suppress(InputError):
-                kept[checked_name(name)] = Selected.of(items)
-        merged = {**self._selection.kept, **kept}
-        if merged != self._selection.kept:
-            self._selection.kept = merged
-
     def keep(self, name: str) -> str:
         """Keep the selection under a name, in place of one that has that name.
 
@@ -157,6 +141,24 @@ class SelectionActions:
         shown = self._session.shown
         if shown is not None and Selected.of(shown.settings.exclusions) == self._left_out:
             self._session.advice = ""
+
+
+def look_for_kept(session: Session) -> None:
+    """Take over what others have kept by now; a notice says where it cannot be read."""
+    selection = session.selection
+    try:
+        found = session.store.selections.all()
+    except InputError as error:
+        session.note([str(error)])
+        return
+    kept = {}
+    for name, items in found.items():
+        # They come from a file.
+        with suppress(InputError):
+            kept[checked_name(name)] = Selected.of(items)
+    merged = {**selection.kept, **kept}
+    if merged != selection.kept:
+        selection.kept = merged
 
 
 def _measured(solution: Solution) -> Selected:

@@ -14,7 +14,7 @@ _ALL, _REFERENCES, _EXPOSURE = "all", "references", "exposure "
 
 def noise_sentences(result: FitResult) -> list[str]:
     """Return sentences on the noise that a fit has estimated; none if it had not to."""
-    if not _is_asked(result):
+    if not result.settings.has_noise_model:
         return []
     entry = result.summary.get("noise")
     if entry is None:
@@ -24,10 +24,6 @@ def noise_sentences(result: FitResult) -> list[str]:
     if not entry["converged"]:
         words += f" The estimate had not settled after {entry['rounds']} rounds."
     return [words]
-
-
-def _is_asked(result: FitResult) -> bool:
-    return result.settings.has_noise_model
 
 
 def _parts(entry: Mapping[str, Any]) -> list[str]:

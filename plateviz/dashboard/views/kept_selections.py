@@ -6,7 +6,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.selection_actions import SelectionActions
+from plateviz.dashboard.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.views.window import window
 from solver.errors import InputError
 
@@ -17,7 +17,7 @@ class KeptSelections(pn.viewable.Viewer):
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow the selection of the session of `navigation`."""
         super().__init__(**params)
-        self._selection = navigation.session.selection
+        self._session, self._selection = navigation.session, navigation.session.selection
         self._actions = SelectionActions(navigation.session)
         wide = {"sizing_mode": "stretch_width", "size": "small", "margin": (10, 10)}
         self._name = pmui.TextInput(label="Name", placeholder="such as: lower left corner", **wide)
@@ -41,7 +41,7 @@ class KeptSelections(pn.viewable.Viewer):
 
     def open(self) -> None:
         """Open the window."""
-        self._actions.look()
+        look_for_kept(self._session)
         self._name.value = self._selection.name_of_selected or ""
         self._show()
         self._window.open = True

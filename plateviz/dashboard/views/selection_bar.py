@@ -18,7 +18,7 @@ from plateviz.dashboard.selected_tables import (
     selected_tables,
     selection_name,
 )
-from plateviz.dashboard.selection_actions import SelectionActions
+from plateviz.dashboard.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.table_sender import TableSender
 from plateviz.dashboard.views.bar_style import IN_BAR
 from plateviz.dashboard.views.kept_selections import KeptSelections
@@ -44,7 +44,7 @@ class SelectionBar(pn.viewable.Viewer):
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
         self._actions = SelectionActions(navigation.session)
-        self._actions.look()
+        look_for_kept(self._session)
         self._row = pmui.Row(margin=0, sx={"alignItems": "center"})
         self.windows = pmui.Column(margin=0)
         self._parts: list[pn.viewable.Viewable] = []

@@ -5,7 +5,7 @@ import pytest
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.prior_widths import default_widths
 from plateviz.dashboard.selected import NOTHING, Selected
-from plateviz.dashboard.selection_actions import SelectionActions
+from plateviz.dashboard.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.stage import Stage
 from plateviz.dashboard.views.notice import NoticeView
@@ -121,7 +121,7 @@ def test_kept_selection_is_there_for_others_and_after_a_reload(live, actions, fi
     other = Session(FakeStore(fit_result))
     other.store.selections = KeptSelections(tmp_path / "solutions")
     others = SelectionActions(other)
-    others.look()
+    look_for_kept(other)
     assert other.selection.kept == {"<b>corner</b>": Selected(exposures=corner)}
     # The other one changes it; what the first has in mind under that name is another selection.
     other.selection.select_detectors(frozenset({2}))
@@ -129,7 +129,7 @@ def test_kept_selection_is_there_for_others_and_after_a_reload(live, actions, fi
     live.selection.select_sources(frozenset({5}))
     with pytest.raises(InputError, match="somebody else has kept another selection"):
         actions.keep("<b>corner</b>")
-    actions.look()
+    look_for_kept(live)
     assert live.selection.kept == other.selection.kept
     actions.keep("<b>corner</b>")
     # What somebody has changed in the meantime is not forgotten for all.
@@ -170,7 +170,7 @@ def test_selection_that_cannot_be_written_is_kept_in_the_session(live, actions, 
     (tmp_path / "solutions" / "selections.json").write_text("{", encoding="utf-8")
     live.selection.select_sources(frozenset({1}))
     assert "selections.json" in actions.keep("one")
-    actions.look()
+    look_for_kept(live)
     assert "selections.json" in live.notice
     assert list(live.selection.kept) == ["all", "one"]
 

@@ -35,3 +35,15 @@ def test_what_is_asked_for_stays_in_the_address_until_the_orbit_is_there(navigat
     page.turn_to(View.ORBIT)
     shown = page.session.selection
     assert (shown.field, shown.plates, shown.detector) == ("2", (2, 2), "0")
+
+
+def test_addresses_with_a_kept_selection_leave_nothing_behind(navigation):
+    def watchers():
+        found = navigation.session.param.watchers.get("shown", {}).get("value", [])
+        return len(found)
+
+    navigation.begin({"view": "survey", "selection": "corner", "sources": "5"})
+    before = watchers()
+    for _ in range(3):
+        navigation.begin({"view": "survey", "selection": "corner", "sources": "5"})
+    assert watchers() == before > 0

@@ -110,6 +110,8 @@ def test_page_says_why_a_block_is_not_run(page):
     assert page.read_text("utf-8").count("not run:") == len(reasons)
 
 
+# The first page waits for the files of all, and a page has several programs that are compiled.
+@pytest.mark.timeout(900)
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_figures")
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from plateviz.tables.cause_case import Case
 from plateviz.tables.labels import id_strings
 from plateviz.tables.reference_influence import reference_influence
 from solver.data.result import FitResult
+from solver.results.diagnosis.exposures import WAVES
 
 # Sources with fewer measurements do not say how good a solution is.
 _MIN_OBS = 10
@@ -49,6 +50,12 @@ def harm(case: Case) -> tuple[str, bool]:
             f"{found.size:.2g} times as large as stated."
         )
         return spoils, _references_off(case.result)
+    if subject == "kurtosis":
+        spoils = (
+            "It spoils no uncertainty as a root mean square, but a position that rests on few "
+            "measurements is more often far off, or less often, than its uncertainty says."
+        )
+        return spoils, False
     if subject == "noise":
         error, extent = 0.5 * abs(found.test.statistic - 1.0), ""
     else:
@@ -80,7 +87,7 @@ def _harm_of_parts(case: Case, total: int) -> tuple[str, bool]:
         )
     return (
         f"It spoils the positions of up to {count:,} sources, by at most "
-        f"{_largest_pull_of_one(case):.2g} mas, where a typical uncertainty is "
+        f"{_largest_shift_of_one(case):.2g} mas, where a typical uncertainty is "
         f"{_typical_sigma(case.result):.2g} mas.",
         is_large,
     )
@@ -121,7 +128,7 @@ def _on_sky(case: Case, size_um: float) -> float:
     return size_um / case.diagnosis.camera.um_per_mas / float(np.sqrt(2.0))
 
 
-def _largest_pull_of_one(case: Case) -> float:
+def _largest_shift_of_one(case: Case) -> float:
     """Return how far a measurement that is far off moves its source at most, mas along one axis.
 
     The residual is what is left of the error; the rest is what the fit has followed.
@@ -136,7 +143,7 @@ def _swing_size(case: Case) -> float:
     """Return the rms displacement in the exposures that swing, mas along one axis."""
     found, rows, which = case.diagnosis.exposures, case.diagnosis.rows, list(case.found.items)
     weight = np.bincount(rows.exposure, rows.weight, len(found.swing))
-    excess = np.maximum((found.swing * found.scale)[which], 0.0)
+    excess = np.maximum((found.swing * found.scale)[which] - 4.0 * WAVES, 0.0)
     return _on_sky(case, float(np.sqrt((excess / weight[which]).max(initial=0.0))))
 
 

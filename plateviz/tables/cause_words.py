@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from plateviz.tables.cause_case import Case, Said
 from plateviz.tables.data_cause_words import (
+    said_of_kurtosis,
     said_of_noise,
     said_of_noise_of,
     said_of_outliers,
@@ -210,6 +211,7 @@ _WORDS: dict[str, Callable[[Case], Said]] = {
         "some sources scatter by more than their noise",
         "look at the sources that scatter most; they may be double or wrongly identified",
     ),
+    "kurtosis": said_of_kurtosis,
     "outliers": said_of_outliers,
     "swapped": said_of_swapped,
     "stretch": _of_each(

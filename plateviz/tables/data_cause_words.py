@@ -43,6 +43,21 @@ def said_of_noise_of(name: str, words: str, action: str, *options: str) -> Calla
     return said
 
 
+def said_of_kurtosis(case: Case) -> Said:
+    """Return what is said of noise that is not normal."""
+    test = case.found.test
+    has_more = test.statistic > 0.0
+    return Said(
+        "tails",
+        f"the noise has {'more' if has_more else 'fewer'} large errors than a normal distribution",
+        f"The excess kurtosis of the residuals within six sigma is {test.statistic:+.3f}, that of "
+        f"normal ones 0 ± {test.scatter:.2g}, in all exposures and sources alike.",
+        "look at what the centring does to faint, blended or trailed images"
+        if has_more
+        else "check whether large errors were removed from the measurements, or others rounded",
+    )
+
+
 def said_of_outliers(case: Case) -> Said:
     """Return what is said of outliers."""
     return Said(

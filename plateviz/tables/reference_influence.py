@@ -19,6 +19,7 @@ import pandas as pd
 from plateviz.tables.chance import largest_chi2
 from plateviz.tables.labels import id_strings
 from solver.data.result import FitResult
+from solver.results.diagnosis.references import covariance
 
 _AXES = ("ra", "dec")
 # Below this share of the catalogue's variance that the measurements remove, they say nothing of
@@ -44,7 +45,8 @@ def reference_influence(result: FitResult) -> pd.DataFrame:
     measurements do not determine the position without its catalogue
     """
     rows = result.sources[result.sources["is_reference"]].sort_values("source_id")
-    prior, posterior = _covariance(rows, "prior"), _covariance(rows, "marginal")
+    prior = covariance(rows, "prior_sigma_ra", "prior_sigma_dec", "prior_corr")
+    posterior = covariance(rows, "sigma_ra_marginal", "sigma_dec_marginal", "corr_marginal")
     offset = rows[[f"offset_{axis}" for axis in _AXES]].to_numpy(dtype=float)
     # o' M^-1 in the unit of the prior, in which M has the measurements' shares as eigenvalues.
     root = np.linalg.cholesky(prior)
@@ -75,16 +77,6 @@ def reference_influence(result: FitResult) -> pd.DataFrame:
             "is_beyond": pull > level,
         }
     ).reset_index(drop=True)
-
-
-def _covariance(rows: pd.DataFrame, kind: str) -> np.ndarray:
-    """Return the covariances of ra cos(dec) and dec, mas^2, shape (n, 2, 2)."""
-    names = ("prior_sigma_ra", "prior_sigma_dec", "prior_corr")
-    if kind != "prior":
-        names = (f"sigma_ra_{kind}", f"sigma_dec_{kind}", f"corr_{kind}")
-    ra, dec, correlation = (rows[name].to_numpy(dtype=float) for name in names)
-    both = correlation * ra * dec
-    return np.stack([ra**2, both, both, dec**2], axis=-1).reshape(-1, 2, 2)
 
 
 def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:

@@ -219,6 +219,8 @@ def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
             found.append(Found(test, gain, size=float(np.sqrt(one.value) - 1.0)))
         elif one.name == "magnitudes":
             found.append(Found(test, gains.of_slope(noise, one)))
+        elif one.name == "kurtosis":
+            found.append(Found(test, gains.of_kurtosis(noise, one)))
         elif one.name in ("exposures", "detectors", "sources"):
             found.append(Found(test, gains.of_groups(noise, one)))
     if not found:

@@ -85,6 +85,16 @@ def of_slope(noise: Scatter, slope: Scatter) -> float:
     return of_scale(noise.value, noise.freedom) + squares - PER_PARAMETER
 
 
+def of_kurtosis(noise: Scatter, kurtosis: Scatter) -> float:
+    """Return the gain of a noise with other tails, which includes that of the noise as a whole.
+
+    It grows with the square of a small kurtosis, and slowly with a large one, which groups of
+    different noise make.
+    """
+    n, squares = kurtosis.freedom, (kurtosis.value / kurtosis.scatter) ** 2
+    return of_scale(noise.value, noise.freedom) + n * float(np.log1p(squares / n)) - PER_PARAMETER
+
+
 def of_outliers(rows: Rows) -> float:
     """Return the gain of leaving out the outliers."""
     return float(rows.chi2[rows.is_far].sum() - 2.0 * PER_PARAMETER * rows.is_far.sum())

@@ -94,7 +94,7 @@ def _error_factor(along: np.ndarray, shares: np.ndarray) -> float:
 
 
 def covariance(rows: pd.DataFrame, first: str, second: str, correlation: str) -> np.ndarray:
-    """Return covariances from the columns of two sigmas and a correlation, shape (n, 2, 2)."""
+    """Return covariances, mas^2, shape (n, 2, 2), from columns of sigmas and a correlation."""
     ra, dec, rho = (rows[name].to_numpy(dtype=float) for name in (first, second, correlation))
     return np.stack([ra**2, rho * ra * dec, rho * ra * dec, dec**2], axis=-1).reshape(-1, 2, 2)
 

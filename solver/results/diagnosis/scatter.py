@@ -1,4 +1,4 @@
-"""Tests of the size of the residuals: overall, by exposure, source and magnitude, and the tails."""
+"""Tests of the size of the residuals: overall, by exposure, source, magnitude; and their tails."""
 
 from typing import NamedTuple
 
@@ -11,6 +11,8 @@ from solver.results.diagnosis.rows import Rows
 _FAR_BY_CHANCE = 4.0e-9
 # Degrees of freedom below which a chi2 says nothing.
 _FEWEST = 2.0
+# Of a measurement; those of which the fit leaves less are rounding errors.
+_LEAST_DOF = 0.04
 
 
 class Scatter(NamedTuple):
@@ -63,7 +65,8 @@ def scatter_tests(
     count, expected = int(rows.is_far.sum()), _FAR_BY_CHANCE * rows.n
     chance = log_chance_poisson(count, expected)
     far = Scatter("outliers", count, expected, float(np.sqrt(expected)), chance)
-    return [*found, *([slope] if slope else []), far]
+    tails = _kurtosis(chi2[used], dof[used])
+    return [*found, *([slope] if slope else []), far, tails]
 
 
 def _normalised(chi2: np.ndarray, dof: np.ndarray) -> np.ndarray:
@@ -82,6 +85,22 @@ def _dispersion(name: str, group: np.ndarray, chi2: np.ndarray, dof: np.ndarray)
     log_p = log_chance(squares, freedom) if freedom else 0.0
     value = squares / freedom if freedom else 1.0
     return Scatter(name, value, 1.0, float(np.sqrt(2.0 / max(freedom, 1.0))), log_p, freedom)
+
+
+def _kurtosis(chi2: np.ndarray, dof: np.ndarray) -> Scatter:
+    """Return the excess kurtosis of a residual, whatever its scale: zero of a normal one.
+
+    Half of chi2 of both axes over its expected value is an exponential deviate, of which the
+    second Laguerre polynomial has a mean of zero and a variance of one; a scale common to all
+    changes it in second order only. The kurtosis is three times that mean (Mardia 1970).
+    """
+    half = chi2[dof > _LEAST_DOF] / dof[dof > _LEAST_DOF]
+    n, mean = max(len(half), 1), float(half.sum()) / max(len(half), 1)
+    half = half / max(mean, 1e-300)
+    value = 3.0 * float(np.sum(0.5 * half**2 - 2.0 * half + 1.0)) / n
+    scatter = 3.0 / float(np.sqrt(n))
+    chance = log_chance_normal(value / scatter)
+    return Scatter("kurtosis", value, 0.0, scatter, chance, float(n))
 
 
 def _slope(

@@ -75,3 +75,16 @@ def test_wrong_reference_star_shifts_the_frame_by_its_share(fit_result, monkeypa
     monkeypatch.setattr(cause_harm, "reference_influence", lambda _: table)
     spoils, _ = harm_of(fit_result, "reference", 7)
     assert number_after(spoils, "by about ") == pytest.approx(2.0)
+
+
+def test_noise_with_other_tails_spoils_no_uncertainty_as_a_whole(fit_result):
+    spoils, is_large = harm_of(fit_result, "kurtosis")
+    assert spoils.startswith("It spoils no uncertainty as a root mean square")
+    assert not is_large
+
+
+def test_exposure_that_does_not_swing_is_not_said_to_spoil_by_chance(fit_result):
+    diagnosis = diagnose(fit_result)
+    excess = (diagnosis.exposures.swing * diagnosis.exposures.scale).argsort()[:3]
+    spoils, _ = harm_of(fit_result, "swing", *map(int, excess))
+    assert number_after(spoils, "by at most ") == 0.0

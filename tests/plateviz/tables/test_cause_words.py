@@ -21,3 +21,11 @@ def test_step_is_at_the_field_that_comes_first_in_time(step, field):
         result=SimpleNamespace(exposures=exposures),
     )
     assert said_of(case).title == f"the distortion changes at field {field}"
+
+
+@pytest.mark.parametrize(("kurtosis", "title"), [(0.3, "more large errors"), (-0.3, "fewer large")])
+def test_noise_that_is_not_normal_has_more_or_fewer_large_errors(kurtosis, title):
+    test = Test("kurtosis", "kurtosis", (), kurtosis, 0.0, 0.01, -400.0, 30.0)
+    said = said_of(SimpleNamespace(found=SimpleNamespace(test=test)))
+    assert title in said.title
+    assert f"is {kurtosis:+.3f}" in said.words

@@ -294,3 +294,26 @@ def test_measurements_in_each_others_place_are_found(clean):
     assert cause.test.subject == "swapped"
     assert set(cause.items) == set(residuals.loc[[first, second], "source_id"])
     assert not len(diagnose(clean).swapped.rows)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "more"),
+    [
+        # Unit variance; the excess kurtosis of the first is 1, of the second -0.6.
+        (lambda random, shape: random.standard_t(10, shape) / np.sqrt(1.25), True),
+        (lambda random, shape: np.sqrt(1.5) * random.triangular(-2.0, 0.0, 2.0, shape), False),
+    ],
+    ids=["t", "triangular"],
+)
+def test_noise_that_is_not_normal_is_named(clean, drawn, more):
+    residuals = clean.residuals.copy()
+    noise = drawn(np.random.default_rng(1), (2, len(residuals)))
+    left = np.sqrt(1.0 - 0.5 * residuals["leverage"])
+    for axis, of_axis in zip("xy", noise, strict=True):
+        residuals[f"residual_{axis}"] = of_axis * left * residuals[f"s{axis}"]
+    first = find_causes(diagnose(replace(clean, residuals=residuals))).found[0]
+    assert first.test.subject == "kurtosis"
+    assert (first.test.statistic > 0.0) == more
+    # Both axes together have three quarters of the kurtosis of each if they are independent.
+    expected = (1.0 if more else -0.6) * 0.75
+    assert first.test.statistic == pytest.approx(expected, abs=5.0 * first.test.scatter)

@@ -22,20 +22,24 @@ from plateviz.tables.explore import (
     OF_MEASUREMENTS,
     CodedSources,
     ExplorableTable,
+    FittedColumn,
     explorable,
+    fitted_columns,
     numbers_of,
 )
 from plateviz.tables.exposures import minutes_since_first
+from plateviz.tables.labels import exposure_labels
 from plateviz.tables.sources import chi2_per_dof, class_names
 from solver.data.columns import Column, Table
-from solver.data.schema import EXPOSURES, RESIDUALS
+from solver.data.parameters import PARAMETERS
+from solver.data.schema import EXPOSURE_KEY, EXPOSURES, RESIDUALS
 from solver.data.survey_schema import HISTORY, MOTIONS, RUN_ORBITS
 from solver.io.parquet import count_rows, read_columns
 
 MOST_ROWS = 2**25
 """Of more residuals, those of one orbit in two or in more are shown."""
 
-_EXPOSURES = "exposures.parquet"
+_EXPOSURES, _CALIBRATION = "exposures.parquet", "calibration.parquet"
 _ADDED = {column.name: column for column in (*OF_MEASUREMENTS, *OF_DEVIATION)}
 
 
@@ -51,6 +55,17 @@ def _per_exposure(name: str) -> Callable[[Mapping[str, np.ndarray], Path], np.nd
         return of_key.reindex(wanted).to_numpy()
 
     return compute
+
+
+def _fitted(one: FittedColumn) -> Derived:
+    """Return the column of a parameter of the exposures, NaN where an orbit does not fit it."""
+
+    def compute(columns: Mapping[str, np.ndarray], folder: Path) -> np.ndarray:
+        rows = read_columns(folder / _CALIBRATION, ["group", "element", one.kind]).to_pandas()
+        rows = rows[rows["group"] == one.group].set_index("element")
+        return rows[one.kind].reindex(range(len(columns["plate_id"]))).to_numpy()
+
+    return Derived(one.column, ("plate_id",), compute)
 
 
 def _n_obs(columns: Mapping[str, np.ndarray], _: Path) -> np.ndarray:
@@ -94,10 +109,20 @@ _RESIDUALS = Kind(
     is_single=True,
     precise=("obstime",),
 )
+_CHI2_PER_DOF = Derived(CHI2_PER_DOF, ("chi2", "dof"), lambda c, _: chi2_per_dof(pd.DataFrame(c)))
+_EXPOSURE_ROWS = Kind(
+    EXPOSURES,
+    (
+        Derived(_ADDED["minutes"], ("obstime",), lambda c, _: minutes_since_first(pd.DataFrame(c))),
+        _CHI2_PER_DOF,
+        *map(_fitted, fitted_columns([one for one in PARAMETERS if one.axis == "exp"])),
+    ),
+    is_single=False,
+)
 _HISTORY = Kind(
     HISTORY,
     (
-        Derived(CHI2_PER_DOF, ("chi2", "dof"), lambda c, _: chi2_per_dof(pd.DataFrame(c))),
+        _CHI2_PER_DOF,
         *map(_deviation, ("ra", "dec")),
         *map(_pull, ("ra", "dec")),
     ),
@@ -113,6 +138,7 @@ def _columns(table: Table, added: tuple[Column, ...] = ()) -> Mapping[str, Colum
 COLUMNS_OF_RUN: Mapping[str, Mapping[str, Column]] = MappingProxyType(
     {
         "residuals": _columns(RESIDUALS, tuple(one.column for one in _RESIDUALS.derived)),
+        "exposures": _columns(EXPOSURES, tuple(one.column for one in _EXPOSURE_ROWS.derived)),
         "sources per orbit": _columns(HISTORY, tuple(one.column for one in _HISTORY.derived)),
         "motions": _columns(MOTIONS, (CHI2_PER_DOF,)),
         "orbits": _columns(RUN_ORBITS),
@@ -140,6 +166,8 @@ def explorable_of_run(run: SurveyRun, rows: str, kept: ColumnCache) -> Explorabl
         return explorable(rows, motions.assign(**added), MOTIONS, [CHI2_PER_DOF])
     if rows == "orbits":
         return _orbits(run)
+    if rows == "exposures":
+        return _exposures(run, kept)
     return _residuals(run, kept) if rows == "residuals" else _history(run, kept)
 
 
@@ -148,6 +176,28 @@ def _orbits(run: SurveyRun) -> ExplorableTable:
     names = frame["orbit_id"].astype(str).to_numpy()
     orbit = RUN_ORBITS["orbit_id"]
     return explorable("orbits", frame, RUN_ORBITS, [orbit], {"orbit_id": names.__getitem__})
+
+
+def _exposures(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
+    of_run = Run(run.survey, run.name)
+    files = [of_run.orbit_directory(orbit) / _EXPOSURES for orbit in of_run.complete_orbits()]
+    rows = FileRows(_EXPOSURE_ROWS, files, _state(files), kept)
+
+    def keys(numbers: np.ndarray) -> pd.DataFrame:
+        return pd.DataFrame({name: rows.read(name)[numbers].astype(int) for name in EXPOSURE_KEY})
+
+    return ExplorableTable(
+        "exposures",
+        rows.size,
+        COLUMNS_OF_RUN["exposures"],
+        rows.read,
+        has_sources=False,
+        has_classes=False,
+        words={
+            "orbit_id": lambda numbers: keys(numbers)["orbit_id"].astype(str).to_numpy(),
+            "exposure": lambda numbers: exposure_labels(keys(numbers)).to_numpy(),
+        },
+    )
 
 
 def _residuals(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:

@@ -1,6 +1,6 @@
 """Tables whose columns can be drawn against each other: sources, measurements and exposures."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ from plateviz.tables.labels import exposure_labels
 from plateviz.tables.sources import chi2_per_dof, deviation, ordered_by_class
 from solver.data import schema
 from solver.data.columns import Column, Table
+from solver.data.parameters import Group
 from solver.data.result import FitResult
 
 CHI2_PER_DOF = Column("chi2_per_dof", "float64", "", "chi2 over its expectation")
@@ -174,15 +175,43 @@ def explorable_exposures(result: FitResult) -> ExplorableTable:
         minutes=minutes_since_first(result.exposures), chi2_per_dof=chi2_per_dof(result.exposures)
     )
     added = [_TIME, CHI2_PER_DOF]
-    for kind, of_kind in (("offset", "estimate minus prior"), ("sigma_marginal", "marginal sigma")):
-        values = result.values_on("exp", kind)
-        for group in result.groups_on("exp"):
-            name = f"{group.name}_{kind}"
-            frame[name] = values[group.name].to_numpy()
-            added.append(Column(name, "float64", group.unit, f"{group.label}, {of_kind}"))
+    for one in fitted_columns(result.groups_on("exp")):
+        frame[one.column.name] = result.values_on("exp", one.kind)[one.group].to_numpy()
+        added.append(one.column)
     labels = exposure_labels(frame).to_numpy()
     words = {"exposure": labels.__getitem__}
     return explorable("exposures", frame, schema.EXPOSURES, added, words)
+
+
+class FittedColumn(NamedTuple):
+    """A column of the exposures that is a number of the calibration.
+
+    Attributes
+    ----------
+    column : its definition
+    group : name of the parameter group
+    kind : column of `schema.CALIBRATION`
+    """
+
+    column: Column
+    group: str
+    kind: str
+
+
+def fitted_columns(groups: Sequence[Group]) -> list[FittedColumn]:
+    """Return the columns that parameter groups with a value per exposure give these."""
+    return [
+        FittedColumn(
+            Column(f"{group.name}_{kind}", "float64", group.unit, f"{group.label}, {of_kind}"),
+            group.name,
+            kind,
+        )
+        for kind, of_kind in (
+            ("offset", "estimate minus prior"),
+            ("sigma_marginal", "marginal sigma"),
+        )
+        for group in groups
+    ]
 
 
 EXPLORABLE: Mapping[str, Callable[[FitResult], ExplorableTable]] = MappingProxyType(

@@ -14,7 +14,7 @@ from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun, gather_history
 from plateviz.runs.run import Run
-from plateviz.tables.explore import explorable_measurements
+from plateviz.tables.explore import EXPLORABLE, explorable_measurements
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import HISTORY
 from solver.errors import InputError
@@ -150,6 +150,21 @@ def test_orbits_and_motions_are_tables_of_the_run(run):
     assert motions.size == 0
     for table, name in ((orbits, "orbits"), (motions, "motions")):
         assert list(table.columns) == [*COLUMNS_OF_RUN[name]]
+
+
+def test_exposures_of_a_run_are_those_of_its_orbits(run, results):
+    table = explorable_of_run(run, "exposures", ColumnCache())
+    assert list(table.columns) == [*COLUMNS_OF_RUN["exposures"]]
+    alone = [EXPLORABLE["exposures"](result) for result in results.values()]
+    assert table.size == sum(one.size for one in alone)
+    for name in alone[0].columns:
+        expected = np.concatenate([one.numbers(name) for one in alone])
+        np.testing.assert_allclose(table.numbers(name), expected, err_msg=name)
+    # What the orbits do not fit has no values.
+    assert np.isnan(table.numbers("focal_anisotropy_offset")).all()
+    last = np.array([table.size - 1])
+    assert table.words["orbit_id"](last).tolist() == ["2"]
+    assert table.words["exposure"](last).tolist() == [alone[2].words["exposure"](-1)]
 
 
 def test_of_too_many_residuals_those_of_every_nth_orbit_are_shown(run, results, monkeypatch):

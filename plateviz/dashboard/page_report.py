@@ -6,9 +6,11 @@ from functools import partial
 
 from plateviz.dashboard.downloads import Download, Later, Progress, file_name
 from plateviz.dashboard.navigation import FoundSource, Navigation, View
-from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
+from plateviz.plots.explored_text import text_of
+from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.reports.facts import facts_of
+from plateviz.reports.more_figures import NO_MORE, MoreFigures
 from plateviz.reports.orbit import orbit_report
 from plateviz.reports.page import page_of
 from plateviz.reports.report import Facts, Report
@@ -29,19 +31,34 @@ def page_report(navigation: Navigation) -> Later:
         If the view shows nothing yet.
     """
     if navigation.view is View.ORBIT:
-        return _of_solution(navigation.session)
+        return _of_solution(navigation)
     run, turns = navigation.run, navigation.session.store.reports
     if run is None:
         raise InputError(navigation.why_no_run.rstrip("."))
     if navigation.view is View.SURVEY:
-        return _later(f"run-{run.name}", partial(_survey, run), turns)
+        return _later(f"run-{run.name}", partial(_survey, run, _on_screen(navigation)), turns)
     found = navigation.found
     if found is None:
         raise InputError("no source is shown yet; choose one first")
     return _later(f"source-{found.source_id}", partial(_source, run, found), turns)
 
 
-def _of_solution(session: Session) -> Later:
+def _on_screen(navigation: Navigation) -> MoreFigures:
+    """Return the figures on the screen that reports do not have by themselves."""
+    session, workspace = navigation.session, navigation.workspace
+    if workspace in (OrbitWorkspace.EXPLORE, SurveyWorkspace.EXPLORE):
+        is_of_orbit = workspace is OrbitWorkspace.EXPLORE
+        shown = navigation.exploration if is_of_orbit else navigation.survey_exploration
+        # It has no columns before it is drawn.
+        if shown.x is not None:
+            return MoreFigures(explored=[text_of(shown.table, shown.columns())])
+    if workspace is OrbitWorkspace.ORDERS and session.other is not None:
+        return MoreFigures(both=[session.figure_of_both])
+    return NO_MORE
+
+
+def _of_solution(navigation: Navigation) -> Later:
+    session = navigation.session
     shown, other = session.shown, session.other
     if shown is None:
         raise InputError("no solution is shown yet")
@@ -49,7 +66,7 @@ def _of_solution(session: Session) -> Later:
     facts["Report"]["Solution"] = shown.label
     if other is not None:
         facts["Report"]["Compared with solution"] = other.label
-    make = partial(_solution, shown, other, session.store, facts)
+    make = partial(_solution, shown, other, session.store, facts, _on_screen(navigation))
     stem = session.selection.subject() + ("-what-if" if shown.is_what_if else "")
     return _later(stem, make, session.store.reports)
 
@@ -63,7 +80,11 @@ def _later(stem: str, compose: Callable[[], Report], turns: Turns) -> Later:
 
 
 def _solution(
-    shown: Solution, other: Solution | None, store: SolutionStore, facts: Facts
+    shown: Solution,
+    other: Solution | None,
+    store: SolutionStore,
+    facts: Facts,
+    more: MoreFigures,
 ) -> Report:
     report = orbit_report(
         shown.result,
@@ -71,15 +92,16 @@ def _solution(
         facts,
         other.result if other else None,
         simulation=store.simulation,
+        more=more,
     )
     words = [report.subtitle, shown.label]
     words += [f"compared with {other.label}"] if other is not None else []
     return replace(report, subtitle="; ".join(words))
 
 
-def _survey(run: SurveyRun) -> Report:
+def _survey(run: SurveyRun, more: MoreFigures) -> Report:
     command = report_of_run(str(run.survey), run.name, "--survey")
-    return survey_report(run, facts_of(command, run.name))
+    return survey_report(run, facts_of(command, run.name), more)
 
 
 def _source(run: SurveyRun, found: FoundSource) -> Report:

@@ -7,6 +7,7 @@ import pytest
 from plateviz.dashboard.navigation import Navigation, View
 from plateviz.dashboard.page_report import page_report
 from plateviz.dashboard.session import Session
+from plateviz.plots.workspace import OrbitWorkspace
 from solver.errors import InputError
 from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
 
@@ -66,6 +67,29 @@ def test_report_of_a_what_if_is_named_and_compared(navigation):
     assert "--order 3" in page
 
 
+def test_report_has_what_explore_draws_while_it_is_on_the_screen(navigation):
+    drawn = navigation.exploration
+    drawn.table = "sources"
+    drawn.offer(["n_obs", "sigma_ra_marginal"])
+    _, page = made(page_report(navigation))
+    assert "sigma_ra_marginal against n_obs" not in page
+    navigation.turn_to_workspace(OrbitWorkspace.EXPLORE)
+    _, page = made(page_report(navigation))
+    assert "sigma_ra_marginal against n_obs" in page
+
+
+def test_report_has_the_figure_of_both_solutions_while_it_is_on_the_screen(navigation):
+    session = navigation.session
+    settings = session.shown.settings.with_(order=3)
+    other = session.shown._replace(settings=settings, result=session.store.result(0, settings))
+    session.param.update(other=other)
+    _, before = made(page_report(navigation))
+    navigation.turn_to_workspace(OrbitWorkspace.ORDERS)
+    _, page = made(page_report(navigation))
+    assert f"both-{session.figure_of_both}" in page
+    assert f"both-{session.figure_of_both}" not in before
+
+
 def test_report_of_a_source_is_that_of_its_run(navigation, survey):
     source = int(survey.history["source_id"].iloc[0])
     navigation.open_source(str(source))
@@ -90,7 +114,7 @@ def test_report_of_a_run_is_made_of_its_tables(navigation, survey, monkeypatch):
     seen = []
     monkeypatch.setattr(
         "plateviz.dashboard.page_report.survey_report",
-        lambda run, facts: seen.append((run.name, facts["Report"]["Command"])) or 1 / 0,
+        lambda run, facts, _: seen.append((run.name, facts["Report"]["Command"])) or 1 / 0,
     )
     navigation.turn_to(View.SURVEY)
     with pytest.raises(ZeroDivisionError):

@@ -88,7 +88,7 @@ def of_slope(noise: Scatter, slope: Scatter) -> float:
 def of_kurtosis(noise: Scatter, kurtosis: Scatter) -> float:
     """Return the gain of a noise with other tails, which includes that of the noise as a whole.
 
-    It grows with the square of a small kurtosis, and slowly with a large one, which groups of
+    It grows with the square of a small kurtosis, and slowly with a large one, which sources of
     different noise make.
     """
     n, squares = kurtosis.freedom, (kurtosis.value / kurtosis.scatter) ** 2

@@ -65,7 +65,7 @@ def scatter_tests(
     count, expected = int(rows.is_far.sum()), _FAR_BY_CHANCE * rows.n
     chance = log_chance_poisson(count, expected)
     far = Scatter("outliers", count, expected, float(np.sqrt(expected)), chance)
-    tails = _kurtosis(chi2[used], dof[used])
+    tails = _kurtosis(rows.exposure[used], chi2[used], dof[used])
     return [*found, *([slope] if slope else []), far, tails]
 
 
@@ -87,17 +87,22 @@ def _dispersion(name: str, group: np.ndarray, chi2: np.ndarray, dof: np.ndarray)
     return Scatter(name, value, 1.0, float(np.sqrt(2.0 / max(freedom, 1.0))), log_p, freedom)
 
 
-def _kurtosis(chi2: np.ndarray, dof: np.ndarray) -> Scatter:
-    """Return the excess kurtosis of a residual, whatever its scale: zero of a normal one.
+def _kurtosis(exposure: np.ndarray, chi2: np.ndarray, dof: np.ndarray) -> Scatter:
+    """Return the excess kurtosis of a residual, whatever the scale of its exposure; normal is 0.
 
     Half of chi2 of both axes over its expected value is an exponential deviate, of which the
-    second Laguerre polynomial has a mean of zero and a variance of one; a scale common to all
-    changes it in second order only. The kurtosis is three times that mean (Mardia 1970).
+    second Laguerre polynomial has a mean of zero and a variance of one. The kurtosis is three
+    times that mean (Mardia 1970). Exposures of different noise, together, would have one.
     """
-    half = chi2[dof > _LEAST_DOF] / dof[dof > _LEAST_DOF]
-    n, mean = max(len(half), 1), float(half.sum()) / max(len(half), 1)
-    half = half / max(mean, 1e-300)
-    value = 3.0 * float(np.sum(0.5 * half**2 - 2.0 * half + 1.0)) / n
+    known = dof > _LEAST_DOF
+    exposure, half = exposure[known], chi2[known] / dof[known]
+    counts = np.bincount(exposure)
+    mean = np.bincount(exposure, half) / np.maximum(counts, 1)
+    half = half / np.maximum(mean, 1e-300)[exposure]
+    # Squares of exponential deviates over the mean of n of them are 2 n / (n + 1) on average.
+    squares = half**2 * ((counts + 1.0) / np.maximum(counts, 1))[exposure]
+    n = max(len(half), 1)
+    value = 3.0 * float(np.sum(0.5 * squares - 2.0 * half + 1.0)) / n
     scatter = 3.0 / float(np.sqrt(n))
     chance = log_chance_normal(value / scatter)
     return Scatter("kurtosis", value, 0.0, scatter, chance, float(n))

@@ -5,12 +5,11 @@ from collections.abc import Mapping
 
 import pandas as pd
 
+from plateviz.tables.changes import COLUMNS, Row, merit, setting_changes
 from plateviz.tables.comparison import comparison
 from plateviz.tables.verdict import orbit_verdict
 from solver.data.result import FitResult
-from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 
-COLUMNS = ("what", "a", "b", "change")
 # Key of the summary -> label and number of decimals.
 _FIGURES: Mapping[str, tuple[str, int]] = {
     "n_measurements": ("Measurements", 0),
@@ -42,48 +41,35 @@ def solution_changes(result_a: FitResult, result_b: FitResult) -> pd.DataFrame:
     A row per setting that differs, and per figure of merit: `what`, `a`, `b`, and `change`, which
     is B minus A for numbers and empty for texts
     """
-    rows = [*_settings(result_a.settings, result_b.settings), *_merits(result_a, result_b)]
+    rows = [*setting_changes(result_a.settings, result_b.settings), *_merits(result_a, result_b)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _settings(a: FitSettings, b: FitSettings) -> list[tuple[str, str, str, str]]:
-    rows = []
-    for name, one in SETTINGS.items():
-        of_a, of_b = getattr(a, name), getattr(b, name)
-        if of_a != of_b:
-            a_text, b_text = (
-                ", ".join(one.described(value, DEFAULTS[name])) or "default"
-                for value in (of_a, of_b)
-            )
-            rows.append((one.label, a_text, b_text, ""))
-    return rows
-
-
-def _merits(a: FitResult, b: FitResult) -> list[tuple[str, str, str, str]]:
+def _merits(a: FitResult, b: FitResult) -> list[Row]:
     rows = [("Verdict", orbit_verdict(a).headline, orbit_verdict(b).headline, "")]
     # Older results lack it.
     orbits = tuple(str(one.summary.get("orbit", "")) for one in (a, b))
     if orbits[0] != orbits[1]:
         rows.insert(0, ("Orbit", orbits[0], orbits[1], ""))
     for key, (label, decimals) in _FIGURES.items():
-        rows.append(_row(label, a.summary.get(key), b.summary.get(key), decimals))
+        rows.append(merit(label, a.summary.get(key), b.summary.get(key), decimals))
     for column, symbol in _MARGINAL.items():
         of_a, of_b = (float(one.sources[column].median()) for one in (a, b))
-        rows.append(_row(f"Median marginal σ in {symbol} (mas)", of_a, of_b, 4))
+        rows.append(merit(f"Median marginal σ in {symbol} (mas)", of_a, of_b, 4))
     return [*rows, *_from_truth(a, b), *_positions(a, b)]
 
 
-def _from_truth(a: FitResult, b: FitResult) -> list[tuple[str, str, str, str]]:
+def _from_truth(a: FitResult, b: FitResult) -> list[Row]:
     of_a, of_b = (one.summary.get("truth", {}) for one in (a, b))
     return [
-        _row(f"Pulls against truth in {symbol}, {name}", of_a[name][key], of_b[name][key], 3)
+        merit(f"Pulls against truth in {symbol}, {name}", of_a[name][key], of_b[name][key], 3)
         for name in of_a
         if name in of_b
         for key, symbol in (("pull_sd_ra", "α"), ("pull_sd_dec", "δ"))
     ]
 
 
-def _positions(a: FitResult, b: FitResult) -> list[tuple[str, str, str, str]]:
+def _positions(a: FitResult, b: FitResult) -> list[Row]:
     """Return the rms difference of the positions of the sources that both have."""
     shared = comparison(a, b)
     if shared.empty:
@@ -93,14 +79,3 @@ def _positions(a: FitResult, b: FitResult) -> list[tuple[str, str, str, str]]:
         rms = math.sqrt(float((shared[column] ** 2).mean()))
         found.append((f"Rms difference of positions in {symbol} (mas)", "", "", f"{rms:.4f}"))
     return found
-
-
-def _row(label: str, a: object, b: object, decimals: int) -> tuple[str, str, str, str]:
-    numbers = [float(one) if isinstance(one, int | float) else math.nan for one in (a, b)]
-    change = numbers[1] - numbers[0]
-    difference = "" if math.isnan(change) else f"{change:+,.{decimals}f}"
-    return label, _number(numbers[0], decimals), _number(numbers[1], decimals), difference
-
-
-def _number(value: float, decimals: int) -> str:
-    return "" if math.isnan(value) else f"{value:,.{decimals}f}"

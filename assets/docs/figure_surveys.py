@@ -49,6 +49,11 @@ class Surveys:
         return _fitted(self.good.survey, "low", FitSettings(order=3))
 
     @cached_property
+    def high_order(self) -> SurveyRun:
+        """The same survey fitted with an order that is higher than needed."""
+        return _fitted(self.good.survey, "high", FitSettings(order=6))
+
+    @cached_property
     def ageing(self) -> SurveyRun:
         """The same survey with measurement errors that grow with time, but not as stated."""
         directory = self.folder / "ageing"
@@ -130,6 +135,10 @@ def _source(run: SurveyRun) -> SourceTables:
     return SourceTables(run.history(chosen), run.motion(chosen))
 
 
+def _compared(run: SurveyRun, other: SurveyRun) -> SurveyTables:
+    return replace(survey_tables(run), other=survey_tables(other))
+
+
 SurveyPair = tuple[Callable[[Surveys], SurveyTables], Callable[[Surveys], SurveyTables]]
 SourcePair = tuple[Callable[[Surveys], SourceTables], Callable[[Surveys], SourceTables]]
 _RUNS: SurveyPair = (lambda s: survey_tables(s.good), lambda s: survey_tables(s.low_order))
@@ -144,5 +153,9 @@ SURVEYS: Mapping[str, SurveyPair] = {
     "reference-scatter": _RUNS,
     "motion-pulls": _RUNS,
     "calibration-trends": (_RUNS[0], lambda s: survey_tables(s.trending)),
+    "motion-differences": (
+        lambda s: _compared(s.high_order, s.good),
+        lambda s: _compared(s.low_order, s.good),
+    ),
 }
 SOURCES: Mapping[str, SourcePair] = {"sky-track": _SOURCES, "time-series": _SOURCES}

@@ -79,3 +79,13 @@ def how_to_make_a_run(origin: Origin) -> str:
         "These are the files of one orbit. For a survey directory, `plateviz survey DIR` "
         "fits all orbits, and `plateviz serve DIR` shows them here."
     )
+
+
+def how_to_make_another_run(origin: Origin, run: str) -> str:
+    """Return how a survey with one run gets a second one to compare it with."""
+    directory = quote(origin.directory) if isinstance(origin, SurveyFolder) else "DIR"
+    return (
+        f"This survey has one run, {run}, and two are compared here. "
+        f"`plateviz survey {directory} --run other --order 3`, for example, makes a second one "
+        "with another order; this page shows it once it has begun."
+    )

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from plateviz.dashboard.exchanged_runs import exchange_runs
 from plateviz.dashboard.navigation import Navigation, View
 
 
@@ -46,6 +47,13 @@ def _turn_to_next_view(navigation: Navigation) -> None:
     navigation.turn_to(views[(views.index(navigation.view) + 1) % len(views)])
 
 
+def _blink(navigation: Navigation) -> None:
+    if navigation.view is View.ORBIT:
+        navigation.session.exchange()
+    elif navigation.view is View.SURVEY:
+        exchange_runs(navigation)
+
+
 def _step_orbit(navigation: Navigation, step: int) -> None:
     session = navigation.session
     orbits = session.selection.param["orbit"].objects
@@ -79,7 +87,7 @@ KEYS: Mapping[str, Key] = MappingProxyType(
         ",": Key("Previous exposure", lambda n: _step_exposures(n, -1), is_repeated=True),
         "d": Key("Next detector", lambda n: _step_detector(n, 1)),
         "D": Key("Previous detector", lambda n: _step_detector(n, -1)),
-        "b": Key("Blink: exchange the two solutions", lambda n: n.session.exchange()),
+        "b": Key("Blink: exchange the two solutions, or the two runs", _blink, is_of_orbit=False),
         "f": Key("Fit with the settings of the controls", lambda n: n.session.refit()),
         "k": Key("Add the what-if to the list of solutions", lambda n: n.session.list_what_if()),
     }

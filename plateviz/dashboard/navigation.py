@@ -10,6 +10,7 @@ from plateviz.dashboard.found_source import FoundSource, find_source
 from plateviz.dashboard.growth import Growth, how_to_make_a_run
 from plateviz.dashboard.known_runs import KnownRuns
 from plateviz.dashboard.next_orbit import NextOrbit
+from plateviz.dashboard.run_comparison import OF_RUNS
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.selection_actions import look_for_kept
 from plateviz.dashboard.session import Session
@@ -18,7 +19,6 @@ from plateviz.dashboard.solution import Request, Solution
 from plateviz.dashboard.solution_address import find_solution, solution_query
 from plateviz.dashboard.units import NAMES, OWN
 from plateviz.dashboard.view import WORKSPACES, View
-from plateviz.plots.both_solutions import comparable_figures
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.runs.queries import SurveyRun
@@ -29,7 +29,7 @@ from solver.errors import InputError
 _NAMED = ("solution", "against")
 _KNOWN = (
     *("view", "workspace", "orbit", "run", "source", "unit", "both", "selection"),
-    *(*SHOWN, *KINDS, *PARTS, *_NAMED),
+    *(*SHOWN, *KINDS, *PARTS, *_NAMED, *OF_RUNS),
 )
 
 
@@ -131,11 +131,11 @@ class Navigation(param.Parameterized):
         is_survey = address.get("view") == View.SURVEY.value
         explored = self.survey_exploration if is_survey else self.exploration
         problems += explored.restore(address)
+        problems += session.restore_both(address)
         units = session.units
         units.unit = chosen("unit", address, NAMES.values(), units.unit, problems)
-        both, figures = session.figure_of_both, [one.name for one in comparable_figures()]
-        session.figure_of_both = chosen("both", address, figures, both, problems)
         self.run_name = chosen("run", address, self.known_runs, self.run_name, problems)
+        problems += session.run_comparison.restore(address, self.run_name, self.known_runs)
         if "source" in address:
             self.find_source(address["source"])
         if "selection" in address:
@@ -148,8 +148,7 @@ class Navigation(param.Parameterized):
             problems.append(str(error))
             orbit = session.selection.orbit
         views = {view.value: view for view in View}
-        selectable = session.selection.param.values()
-        default = View.ORBIT if any(name in selectable for name in address) else self.view
+        default = View.ORBIT if {*address} & {*session.selection.param} else self.view
         view = views[chosen("view", address, views, default.value, problems)]
         session.note(problems)
         self._named = {name: address[name] for name in _NAMED if name in address}
@@ -181,6 +180,8 @@ class Navigation(param.Parameterized):
             query |= self.exploration.address()
         if self.workspace is SurveyWorkspace.EXPLORE:
             query |= self.survey_exploration.address()
+        if self.workspace is SurveyWorkspace.COMPARE:
+            query |= self.session.run_comparison.address(self.run_name, self.known_runs)
         return query | self._solution_query(is_whole)
 
     def _solution_query(self, is_whole: bool = False) -> dict[str, str]:
@@ -246,8 +247,7 @@ class Navigation(param.Parameterized):
 
     def _open(self, orbit: int | None) -> None:
         """Show the solution that the address names."""
-        session = self.session
-        shown = session.shown
+        session, shown = self.session, self.session.shown
         is_there = shown is not None and shown.orbit == session.selection.orbit == orbit
         if is_there and self._solution_query() == self._named:
             session.limit_selection()

@@ -1,16 +1,21 @@
 """OnScreen: the solution on the screen of a session, and the one that it is compared with."""
 
+from collections.abc import Mapping
+
 import param
 
+from plateviz.dashboard.address_parts import chosen
+from plateviz.dashboard.run_comparison import RunComparison
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.stage import RequestState, Stage
+from plateviz.plots.both_solutions import comparable_figures
 
 
 class OnScreen(RequestState):
     """The solutions on the screen of one browser session.
 
     `shown` is the solution on the screen, `other` the one that it is compared with; either may
-    be None. `solutions` are those of its orbit.
+    be None. `solutions` are those of its orbit. `run_comparison` is what is compared of two runs.
     """
 
     shown = param.ClassSelector(class_=Solution, default=None, allow_None=True)
@@ -24,11 +29,20 @@ class OnScreen(RequestState):
         self._fitted: Solution | None = None
         # What all solutions are compared with, in place of the one before each.
         self.chosen: Solution | None = None
+        self.run_comparison = RunComparison()
 
     @property
     def fitted(self) -> Solution | None:
         """The solution on the screen, or the one before the what-ifs on the screen."""
         return self._fitted if self.shown is not None and self.shown.is_what_if else self.shown
+
+    def restore_both(self, address: Mapping[str, str]) -> list[str]:
+        """Draw of both solutions what an address requests; return what is invalid, in words."""
+        problems: list[str] = []
+        names = [one.name for one in comparable_figures()]
+        both = chosen("both", address, names, self.figure_of_both, problems)
+        self.figure_of_both = both
+        return problems
 
     def compare_with(self, solution: Solution | None) -> None:
         """Compare what is on the screen with a solution; None for the one before each.

@@ -50,10 +50,19 @@ def figure_of_both(diagnostic: Diagnostic, chosen: Chosen) -> Figure:
         return message(_TITLE, "Fit with other settings, or choose what to compare with.")
     b = replace(chosen, other=None, beside=chosen.other)
     a = replace(chosen, result=chosen.other, other=None, beside=chosen.result)
-    figures = diagnostic.plot(a), diagnostic.plot(b)
-    for figure, title in zip(figures, _TITLES, strict=True):
+    return with_same_limits(diagnostic.title, diagnostic.plot(a), diagnostic.plot(b))
+
+
+def with_same_limits(title: str, a: Figure, b: Figure) -> Figure:
+    """Return two figures of one kind beside each other, or a message why that cannot be.
+
+    Parameters
+    ----------
+    title : of their kind
+    """
+    for figure, name in zip((a, b), _TITLES, strict=True):
         if figure.message is not None:
-            return message(f"{title} {diagnostic.title}", figure.message)
-    if len(figures[0]) != len(figures[1]):
-        return message(diagnostic.title, "The figures of these solutions have different parts.")
-    return beside(*figures, _TITLES)
+            return message(f"{name} {title}", figure.message)
+    if len(a) != len(b):
+        return message(title, "The figures of the two have different parts.")
+    return beside(a, b, _TITLES)

@@ -90,5 +90,6 @@ SURVEY_FIGURES = (
         _plot,
         is_wide=True,
         equation="separation = √((Δα cos δ)² + (Δδ)²), catalogue − truth at the epoch",
+        is_of_run=False,
     ),
 )

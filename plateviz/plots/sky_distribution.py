@@ -166,5 +166,6 @@ SURVEY_FIGURES = (
         is_wide=True,
         equation="l, b: Galactic longitude and latitude",
         narrow_height=520,
+        is_of_run=False,
     ),
 )

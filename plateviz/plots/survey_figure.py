@@ -14,6 +14,10 @@ from plateviz.tables.survey_tables import SourceTables, SurveyTables
 _DOCUMENT = "assets/docs/survey-diagnostics.md"
 
 
+def _always(_: SurveyTables) -> bool:
+    return True
+
+
 @dataclass(frozen=True)
 class SurveyFigure:
     """One figure of a fitted survey.
@@ -30,6 +34,8 @@ class SurveyFigure:
     equation : what is drawn, as text
     least_height : that it needs on the page, screen pixels; 0 where any card's height is enough
     narrow_height : the same in a window narrower than 1536 pixels; 0 for `least_height`
+    has_data : whether there is anything to draw, such as another run
+    is_of_run : whether it differs between the runs of a survey
     """
 
     name: str
@@ -42,6 +48,8 @@ class SurveyFigure:
     equation: str = ""
     least_height: int = 0
     narrow_height: int = 0
+    has_data: Callable[[SurveyTables], bool] = _always
+    is_of_run: bool = True
 
     @property
     def document(self) -> str:

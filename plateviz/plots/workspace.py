@@ -25,11 +25,15 @@ class OrbitWorkspace(StrEnum):
 
 
 class SurveyWorkspace(StrEnum):
-    """Workspaces of the Survey page; `EXPLORE` as in `OrbitWorkspace`."""
+    """Workspaces of the Survey page; `EXPLORE` as in `OrbitWorkspace`.
+
+    `COMPARE` shows two runs.
+    """
 
     VERDICT = "verdict"
     ACCURACY = "accuracy"
     CATALOGUE = "catalogue"
+    COMPARE = "compare-runs"
     EXPLORE = "explore"
 
 

@@ -55,7 +55,10 @@ def survey_report(run: SurveyRun, facts: Facts, more: MoreFigures = NO_MORE) -> 
         subtitle=f"Run {run.name} of {len(orbits):,} orbits",
         verdict=run_verdict(orbits, motions, tables.tests),
         items=run_strip(orbits, motions),
-        figures=[*(_figure(one, tables) for one in survey_figures()), *more_of_run(more, run)],
+        figures=[
+            *(_figure(one, tables) for one in survey_figures() if one.has_data(tables)),
+            *more_of_run(more, run),
+        ],
         tables={"Orbits": in_words(orbit_list(orbits), ORBITS_OF_RUN)},
         facts={**facts, **_of_run(run)},
     )

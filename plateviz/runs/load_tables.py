@@ -7,9 +7,12 @@ import pandas as pd
 
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run_tests import RunTables, read_run_tables
+from plateviz.tables.run_changes import ComparedRun
 from plateviz.tables.survey_tables import SurveyTables
+from plateviz.tables.verdict import Verdict
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.errors import InputError
+from solver.io.settings import parse_settings
 from solver.io.survey import (
     HEADER,
     REFERENCE,
@@ -45,6 +48,23 @@ def survey_tables(run: SurveyRun, read: RunTables | None = None) -> SurveyTables
         area=None if None in sides else sides,  # type: ignore[arg-type]
         target=_pair(run.survey, "target_deg"),
     )
+
+
+def compared_run(run: SurveyRun, read: RunTables, verdict: Verdict) -> ComparedRun:
+    """Return what of a run is compared with another one.
+
+    Parameters
+    ----------
+    read : tables of the run
+    verdict : on it
+
+    Raises
+    ------
+    InputError
+        If its settings cannot be read.
+    """
+    settings = parse_settings(run.header().get("settings"), f"run {run.name}")
+    return ComparedRun(run.name, settings, *read, verdict)
 
 
 def _pair(survey: Path, name: str) -> tuple[float, float] | None:

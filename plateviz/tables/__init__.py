@@ -27,6 +27,7 @@ from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.histogram import pull_bins
 from plateviz.tables.largest_residuals import largest_residuals
 from plateviz.tables.mean_residuals import MapStatistics, map_statistics, mean_residuals
+from plateviz.tables.motion_differences import motion_differences, shared_motions
 from plateviz.tables.motion_pulls import motion_pulls
 from plateviz.tables.orbit_counts import orbit_counts
 from plateviz.tables.orbit_health import orbit_health
@@ -50,6 +51,7 @@ from plateviz.tables.residuals import (
     residual_scatter,
     scatter_statistics,
 )
+from plateviz.tables.run_changes import ComparedRun, run_changes
 from plateviz.tables.run_health import orbit_list, orbit_states, run_strip
 from plateviz.tables.selected_exposures import selected_detectors, selected_exposures
 from plateviz.tables.selected_sources import selected_sources
@@ -83,6 +85,7 @@ __all__ = [
     "ARTIFICIAL",
     "BinStatistics",
     "CLASSES",
+    "ComparedRun",
     "CorrelationStatistics",
     "MapStatistics",
     "NON_REFERENCE",
@@ -119,6 +122,7 @@ __all__ = [
     "eigenmode_spectrum",
     "map_statistics",
     "mean_residuals",
+    "motion_differences",
     "motion_pulls",
     "motion_table",
     "orbit_counts",
@@ -139,12 +143,14 @@ __all__ = [
     "residual_correlation",
     "residual_map",
     "residual_scatter",
+    "run_changes",
     "run_strip",
     "scatter_cells",
     "scatter_statistics",
     "selected_detectors",
     "selected_exposures",
     "selected_sources",
+    "shared_motions",
     "shift_statistics",
     "sky_density",
     "sky_distribution",

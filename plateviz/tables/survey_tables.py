@@ -23,6 +23,7 @@ class SurveyTables:
     area : Galactic longitudes and latitudes between which the fields lie, deg, or None
     target : Galactic longitude and latitude, deg, or None
     tests : tables from which the run is tested
+    other : of the run that this one is compared with, or None
     """
 
     orbits: pd.DataFrame
@@ -33,6 +34,7 @@ class SurveyTables:
     area: tuple[tuple[float, float], tuple[float, float]] | None = None
     target: tuple[float, float] | None = None
     tests: RunTests = field(default_factory=no_tests)
+    other: "SurveyTables | None" = None
 
 
 @dataclass(frozen=True)

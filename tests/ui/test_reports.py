@@ -2,6 +2,7 @@
 
 import csv
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -37,6 +38,7 @@ def survey():
 def survey_page(survey, tmp_path_factory):
     """A report with every figure of a survey and of a source."""
     tables = SurveyTables(survey.orbits, survey.motions, survey.catalogue, survey.truth)
+    tables = replace(tables, other=tables)
     source = SourceTables(*survey.source("other"))
     drawn = [
         ReportFigure(f.name, f.title, f.caption, {"All": lambda f=f, t=t: f.plot(t)})

@@ -69,16 +69,9 @@ def simulated(tmp_path_factory, chromium_path):
 
 @pytest.fixture(scope="module")
 def served(simulated):
-    command = [
-        sys.executable,
-        "-m",
-        "plateviz.cli.main",
-        "survey",
-        str(simulated),
-        "--workers",
-        "1",
-    ]
-    subprocess.run(command, check=True, capture_output=True)
+    program = [sys.executable, "-m", "plateviz.cli.main", "survey", str(simulated)]
+    for more in ([], ["--run", "low", "--order", "3", "--accept"]):
+        subprocess.run([*program, "--workers", "1", *more], check=True, capture_output=True)
     with serving("serve", str(simulated), "--port", "0") as address:
         yield address
 
@@ -186,6 +179,29 @@ def open_the_worst_orbit(page):
     orbit = column("orbit_id")[0]
     row(page, 0).click()
     expect(heading(page, f"Solution of orbit {orbit}")).to_be_visible()
+
+
+def test_two_runs_are_compared_exchanged_and_carried_by_the_address(page, open_page):
+    turn_to_workspace(page, SurveyWorkspace.COMPARE)
+    changes = page.locator(".figure-run-changes")
+    order = changes.locator("tr", has_text="Distortion order")
+    expect(order).to_have_text("Distortion orderorder 3order 5–")
+    page.get_by_role("combobox", name="Figure of both").click()
+    page.locator(".MuiMenuItem-root").get_by_text("Orbits of each source", exact=True).click()
+    expect(page.locator(".MuiMenuItem-root")).to_have_count(0)
+    for name in ("both-runs", "motion-differences"):
+        page.locator(f".figure-{name}:visible canvas").first.wait_for(state="attached")
+    require_accessible(page)
+    page.locator(".solution").first.click()
+    page.keyboard.press("b")
+    expect(heading(page, "Run: low")).to_be_visible()
+    expect(order).to_have_text("Distortion orderorder 5order 3–")
+    page.wait_for_url("**run=low&other=default&figure=orbit-counts")
+    again = open_page(page.url)
+    expect(heading(again, "Run: low")).to_be_visible()
+    expect(again.locator(".figure-run-changes tr", has_text="Distortion order")).to_have_text(
+        "Distortion orderorder 5order 3–"
+    )
 
 
 def test_a_source_is_looked_for_and_carried_by_the_address(page, open_page, tmp_path):

@@ -128,4 +128,4 @@ class CompareView(pn.viewable.Viewer):
             return
         self._changes = solution_changes(other.result, shown.result)
         table = self._changes.rename(columns=_TITLES)
-        self._table.object = themed(numbers(table), session.theme)
+        self._table.object = themed(numbers(table, "changes"), session.theme)

@@ -128,6 +128,11 @@ class FigureView(pn.viewable.Viewer):
         """Take a whole row of the grid."""
         self._card.styles = {**self._card.styles, "grid-column": "1 / -1"}
 
+    def take_two_columns(self) -> None:
+        """Take two columns of the grid, where it has several."""
+        wide = "@media (width >= 1200px) { :host { grid-column: span 2; } }"
+        self._card.stylesheets = [*self._card.stylesheets, wide]
+
     def change(self, theme: str) -> None:
         """Mark the figure as changed, and set the theme for the next drawing."""
         self._theme, self._is_changed = theme, True

@@ -53,11 +53,17 @@ def heading(text: str) -> pmui.Typography:
     return pmui.Typography(text, variant="subtitle1", margin=(10, 10, 4, 10))
 
 
-def numbers(table: pd.DataFrame) -> str:
-    """Return an HTML table of texts from `tables.headings.in_words`; empty cells have a dash."""
+def numbers(table: pd.DataFrame, kind: str = "") -> str:
+    """Return an HTML table of texts from `tables.headings.in_words`; empty cells have a dash.
+
+    Parameters
+    ----------
+    kind : "changes" for a table of two things beside each other
+    """
     head = "".join(f"<th>{escape(title)}</th>" for title in table.columns)
     rows = "".join(
         f"<tr>{''.join(f'<td>{escape(text) or chr(0x2013)}</td>' for text in row)}</tr>"
         for row in table.itertuples(index=False)
     )
-    return f"<table class='numbers'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    classes = f"numbers {kind}".strip()
+    return f"<table class='{classes}'><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"

@@ -16,8 +16,9 @@ from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.row_origins import RunRows
 from plateviz.dashboard.selected import KINDS
 from plateviz.dashboard.views.code_window import code_button
+from plateviz.dashboard.views.compare_runs import CompareRunsView
 from plateviz.dashboard.views.explore import ExploreView
-from plateviz.dashboard.views.figure import FigureView
+from plateviz.dashboard.views.figure import FigureView, card
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import (
     heading,
@@ -37,6 +38,7 @@ from plateviz.dashboard.views.table import DataTable
 from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
 from plateviz.figures.figure import Figure
+from plateviz.plots.both_runs import BOTH_RUNS
 from plateviz.plots.gallery import survey_figures
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
@@ -49,6 +51,7 @@ from solver.errors import InputError
 
 # As high as the headline of a verdict, so that nothing moves when this comes.
 _BEING_READ = "<p class='verdict judging'>This run is being read and judged.</p>"
+_NO_OTHER = "No other run has been read."
 _WHAT_TO_DO = "What was read before stays. Reload the page once the run is there again."
 
 
@@ -75,6 +78,7 @@ class SurveyPage(pn.viewable.Viewer):
         self._shown: ReadRun | None = None
         self._being_read: Future[ReadRun] | None = None
         self._failure = ""
+        self._compare: CompareRunsView | None = None
         self._head, self._strip = markup_pane(), markup_pane()
         self._table = DataTable(ORBITS_OF_RUN, self._open_row, page_size=8)
         self._save = SaveButton(
@@ -111,20 +115,18 @@ class SurveyPage(pn.viewable.Viewer):
 
     @property
     def is_pending(self) -> bool:
-        """Whether another thread reads and judges the run."""
-        return self._being_read is not None
+        """Whether another thread reads and judges the run, or the one that it is compared with."""
+        is_other_read = self._compare is not None and self._compare.is_pending
+        return self._being_read is not None or is_other_read
 
     def look(self) -> None:
         """Show the run once it is read; called again and again until then."""
+        if self._compare is not None:
+            self._compare.look()
         read = self._being_read
-        if read is None or not read.done():
-            return
-        self._being_read = None
-        try:
-            self._shown = read.result()
-        except InputError as error:
-            self._failure = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
-        self._show()
+        if read is not None and read.done():
+            self._take(read)
+            self._show()
 
     def _workspace(self, one: SurveyWorkspace) -> pn.viewable.Viewable:
         if one is SurveyWorkspace.EXPLORE:
@@ -140,7 +142,10 @@ class SurveyPage(pn.viewable.Viewer):
             self._show_selected()
             return explore.__panel__()
         is_first = one is SurveyWorkspace.VERDICT
-        views = [self._figure_view(f) for f in survey_figures() if f.workspace is one]
+        figures = [f for f in survey_figures() if f.workspace is one]
+        if one is SurveyWorkspace.COMPARE:
+            return self._compare_runs(figures)
+        views = [self._figure_view(f) for f in figures]
         grid = FigureGrid(views, self._wake, columns=1 if is_first else 2)
         self._grids[one] = grid
         self._show_selected()
@@ -149,6 +154,25 @@ class SurveyPage(pn.viewable.Viewer):
         above = [self._strip, NotableSourceLink(self._navigation)]
         # The health of all orbits is seen at a glance, without scrolling; the table is long.
         return workspace(grid, *above, below=[self._table, self._save])
+
+    def _compare_runs(self, figures: list[SurveyFigure]) -> pn.viewable.Viewable:
+        views = [self._figure_view(one) for one in (BOTH_RUNS, *figures)]
+        compare = self._compare = CompareRunsView(self._navigation, self._change_compared)
+        others = [card(compare, "run-changes")]
+        grid = FigureGrid(views, self._wake, columns=3, others=others)
+        self._grids[SurveyWorkspace.COMPARE] = grid
+        views[0].take_row()
+        for view in views[1:]:
+            view.take_two_columns()
+        self._show_selected()
+        compare.follow(self._shown)
+        return compare.unless_alone(workspace(grid))
+
+    def _change_compared(self) -> None:
+        grid = self._grids.get(SurveyWorkspace.COMPARE)
+        if grid is not None:
+            grid.change(self._session.theme)
+            self._wake()
 
     def _subject(self) -> str:
         return f"run-{self._navigation.run_name}"
@@ -174,6 +198,7 @@ class SurveyPage(pn.viewable.Viewer):
             ),
             saved=Saved(self._subject),
             theme=session.theme,
+            waiting=_NO_OTHER if figure.workspace is SurveyWorkspace.COMPARE else "",
         )
 
     def _plot(self, figure: SurveyFigure) -> Figure | Pending | None:
@@ -185,10 +210,20 @@ class SurveyPage(pn.viewable.Viewer):
         tables = self._shown.whole(self._session.store.background)
         if not tables.done():
             return PENDING
+        if figure.workspace is SurveyWorkspace.COMPARE and self._compare is not None:
+            return self._compare.plot(figure, tables.result())
         return self._session.units.figure(figure.plot(tables.result()))
+
+    def _take(self, read: Future[ReadRun]) -> None:
+        self._being_read = None
+        try:
+            self._shown = read.result()
+        except InputError as error:
+            self._failure = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
 
     def _read(self, *_: object) -> None:
         run, store = self._navigation.run, self._session.store
+        before = self._shown, self._failure
         self._failure, self._being_read = "", None
         if run is not None:
             try:
@@ -198,8 +233,10 @@ class SurveyPage(pn.viewable.Viewer):
         if run is not None and self._shown is not None and self._shown.run.name != run.name:
             self._shown = None
         if self._being_read is not None and self._being_read.done():
-            self.look()
-        else:
+            self._take(self._being_read)
+        # A run that is turned to is asked for as often as what it has is looked at.
+        is_new = (self._shown, self._failure) != before or self._being_read is not None
+        if is_new or run is None:
             self._show()
 
     def _show(self, *_: object) -> None:
@@ -213,6 +250,8 @@ class SurveyPage(pn.viewable.Viewer):
             self._head.object = paragraph(words, "empty", theme)
             return
         self._show_head()
+        if self._compare is not None:
+            self._compare.follow(self._shown)
         if self._shown is None:
             self._strip.object = ""
         else:

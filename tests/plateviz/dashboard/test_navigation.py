@@ -266,7 +266,8 @@ def test_invalid_address_is_reported_in_one_notice_and_shows_the_rest(navigation
     told = "unknown parts, as of another version: 'who'; run: expected default,"
     assert notice.startswith(f"Not all that was asked for can be shown: {told}")
     assert "view: expected survey, orbit, source, found 'moon'" in notice
-    assert "workspace: expected verdict, accuracy, catalogue, explore, found 'sky'" in notice
+    known = "verdict, accuracy, catalogue, compare-runs, explore"
+    assert f"workspace: expected {known}, found 'sky'" in notice
     assert (navigation.view, navigation.run_name) == (View.SURVEY, "default")
     assert navigation.workspace is SurveyWorkspace.VERDICT
     assert navigation.found is None

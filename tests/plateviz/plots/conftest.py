@@ -136,6 +136,10 @@ def survey_drawings(survey, errors_by_count):
             tables.reference_scatter(survey.motions),
         ),
         "motion_pulls": (plots.plot_motion_pulls, tables.motion_pulls(survey.motions)),
+        "motion_differences": (
+            plots.plot_motion_differences,
+            tables.motion_differences(tables.shared_motions(survey.motions, survey.motions)),
+        ),
         "calibration_trends": (
             plots.plot_calibration_trends,
             calibration_trends(replace(no_tests(), calibrations=calibrations(0.2))),

@@ -233,6 +233,7 @@ def test_gallery_draws_every_figure_of_a_survey(survey, errors_by_count, theme):
     full = SurveyTables(
         survey.orbits, survey.motions, survey.catalogue, survey.truth, errors_by_count, tests=tests
     )
+    full = replace(full, other=full)
     bare = SurveyTables(survey.orbits, survey.motions.head(0), survey.catalogue)
     for figure in survey_figures():
         assert figure.plot(full).message is None

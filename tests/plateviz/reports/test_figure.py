@@ -4,6 +4,7 @@ import gzip
 import json
 import re
 from base64 import b64decode
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -24,6 +25,7 @@ def plotted(compared, instrument, survey):
     pairs = compared.exposures[["field_id", "plate_id"]].itertuples(index=False)
     whole = Chosen(compared, instrument, tuple(map(tuple, pairs)), other=compared)
     surveyed = SurveyTables(survey.orbits, survey.motions, survey.catalogue, survey.truth)
+    surveyed = replace(surveyed, other=surveyed)
     source = SourceTables(*survey.source("other"))
 
     def figure(name):

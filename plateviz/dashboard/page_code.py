@@ -28,6 +28,7 @@ from solver.errors import InputError
 
 _OTHER = f"{NAME}-other"
 _OF_WHAT_IF = "It is a what-if; a fit agrees with it to a thousandth of each uncertainty."
+_OF_ONE_RUN = "It is of this run alone; the Python compares both."
 _OF_OTHER_ORBIT = "The report does not compare with another orbit; the Python does."
 
 
@@ -60,14 +61,15 @@ def page_code(navigation: Navigation) -> PageCode:
     if run is None:
         raise InputError(navigation.why_no_run.rstrip("."))
     if navigation.view is View.SURVEY:
-        names = [one.name for one in survey_figures() if one.workspace is navigation.workspace]
-        return _of_run(navigation, run, names, "survey", "", "--survey")
+        return _of_survey(navigation, run)
     found = navigation.found
     if found is None:
         raise InputError("no source is shown yet; choose one first")
-    names = [one.name for one in source_figures() if one.workspace is navigation.workspace]
-    source = f".source({found.source_id})"
-    return _of_run(navigation, run, names, "source", source, "--source", str(found.source_id))
+    theme = _keywords(navigation.session, None)
+    workspace, number = navigation.workspace, found.source_id
+    calls = [(one.name, theme) for one in source_figures() if one.workspace is workspace]
+    source = f".source({number})"
+    return _of_run(navigation, run, calls, "source", source, "--source", str(number))
 
 
 def _of_solution(navigation: Navigation) -> PageCode:
@@ -107,15 +109,30 @@ def _of_solution(navigation: Navigation) -> PageCode:
     return PageCode(" ".join(words), "\n".join(commands), "\n".join(filter(None, python)))
 
 
+def _of_survey(navigation: Navigation, run: SurveyRun) -> PageCode:
+    workspace, theme = navigation.workspace, _keywords(navigation.session, None)
+    figures = [one for one in survey_figures() if one.workspace is workspace]
+    calls: list[FigureCall] = [(one.name, theme) for one in figures]
+    if workspace is not SurveyWorkspace.COMPARE:
+        return _of_run(navigation, run, calls, "survey", "", "--survey")
+    comparison = navigation.session.run_comparison
+    other = comparison.run(run.name, navigation.known_runs)
+    if other is None:
+        return _of_run(navigation, run, [], "survey", "", "--survey")
+    calls.insert(0, (comparison.figure, {"both": True, **theme}))
+    compared = f".compared_with({other.name!r})"
+    code = _of_run(navigation, run, calls, "survey", compared, "--survey")
+    return code._replace(about=f"{code.about} {_OF_ONE_RUN}")
+
+
 def _of_run(
     navigation: Navigation,
     run: SurveyRun,
-    names: Sequence[str],
+    calls: Sequence[FigureCall],
     variable: str,
     call: str,
     *options: str,
 ) -> PageCode:
-    calls: list[FigureCall] = [(one, _keywords(navigation.session, None)) for one in names]
     survey = str(run.survey)
     opened = f"{PREAMBLE}{variable} = plateviz.open({survey!r}, run={run.name!r}){call}"
     figures = figures_as_python(variable, calls)

@@ -106,3 +106,10 @@ def _annotation(one: Setting) -> object:
         return str | Iterable[str]
     kinds = {Switch: bool, Whole: int, Positive: float, Choice: str}
     return Mapping[str, object] if isinstance(one, Texts) else kinds.get(type(one), str)
+
+
+def check_numbers(name: str, numbers: object, least: int) -> None:
+    """Raise `InputError` unless `numbers` are whole numbers of at least `least`."""
+    is_list = isinstance(numbers, list | tuple | range)
+    if not is_list or not all(isinstance(n, int) and n >= least for n in numbers):  # type: ignore[union-attr]
+        raise InputError(f"{name}: expected whole numbers from {least}, found {numbers!r}")

@@ -1,7 +1,7 @@
 """OpenSurvey: a survey directory, with its orbits, the runs that fitted them, and its sources."""
 
 from collections.abc import Collection
-from functools import partial
+from copy import copy
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -12,14 +12,15 @@ from astropy.table import QTable
 from plateviz.notebook.card import card, summary_line
 from plateviz.notebook.dashboard import Dashboard
 from plateviz.notebook.exploring import Explores
-from plateviz.notebook.figures import FigureSpec, HasFigures, NotebookFigure, figure_collection
-from plateviz.notebook.keywords import settings_with, takes_settings
+from plateviz.notebook.figures import HasFigures, NotebookFigure, figure_collection
+from plateviz.notebook.keywords import check_numbers, settings_with, takes_settings
 from plateviz.notebook.lazy_collection import LazyCollection, unknown_name
 from plateviz.notebook.lazy_solver import HasSolver, LazySolver, run_job
 from plateviz.notebook.orbit import OpenOrbit
 from plateviz.notebook.report import write_report
+from plateviz.notebook.runs import changes_of, figures_of_both, figures_of_run
 from plateviz.notebook.source import OpenSource
-from plateviz.notebook.table import OpenTable
+from plateviz.notebook.table import OpenTable, input_table
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
@@ -30,12 +31,11 @@ from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import SummaryItem, run_strip, source_list
 from plateviz.tables.explore import ExplorableTable
 from plateviz.tables.verdict import Verdict
-from solver.data.columns import Table
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import MOTIONS, RUN_ORBITS
 from solver.errors import InputError
-from solver.io.survey import REFERENCE, TRUTH_FILE, read_survey_table
+from solver.io.survey import REFERENCE, TRUTH_FILE
 
 if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
@@ -48,6 +48,7 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
     ----------
     directory : the survey directory
     run_name : name of the run whose orbits, motions and sources are given; None if there is none
+    other_name : name of the run that it is compared with; None for none
     """
 
     def __init__(self, directory: Path, run: str | None = None) -> None:
@@ -69,6 +70,7 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
         self.run_name = (
             open_run(directory, run).name if run is not None else self._default_run_name()
         )
+        self.other_name: str | None = None
 
     @property
     def runs(self) -> list[str]:
@@ -107,8 +109,8 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
         readers = {
             "orbits": lambda: OpenTable(self._run().orbits(), list(RUN_ORBITS)),
             "motions": lambda: OpenTable(self.motions, list(MOTIONS)),
-            "catalogue": lambda: self._read(REFERENCE, CATALOGUE),
-            "truth": lambda: self._read(TRUTH_FILE, TRUTH),
+            "catalogue": lambda: input_table(self.directory / REFERENCE, CATALOGUE),
+            "truth": lambda: input_table(self.directory / TRUTH_FILE, TRUTH),
         }
         if name not in readers:
             raise InputError(unknown_name("table", name, readers))
@@ -167,8 +169,8 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
             If an argument is invalid, or the run has other settings.
         """
         chosen = settings_with(FitSettings(), settings)
-        _check_numbers("orbits", orbits or [], least=0)
-        _check_numbers("workers", [] if workers is None else [workers], least=1)
+        check_numbers("orbits", orbits or [], least=0)
+        check_numbers("workers", [] if workers is None else [workers], least=1)
         request = {
             "do": "survey",
             "directory": str(self.directory),
@@ -180,6 +182,46 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
         run_job(Job(request), f"survey {self.directory.name}, run {run}")
         self.run_name = run
         return self
+
+    def compared_with(self, run: str) -> Self:
+        """Return the survey with another run (A) to compare its run (B) with.
+
+        Its figures are those of the run, and `motion-differences`.
+
+        Raises
+        ------
+        InputError
+            If the survey has no such run, or it is the run itself.
+        """
+        other = open_run(self.directory, run).name
+        if other == self.run_name:
+            raise InputError(f"run: expected another run than {other!r} to compare with")
+        found = copy(self)
+        found.other_name = other
+        return found
+
+    @property
+    def changes(self) -> pd.DataFrame:
+        """Settings and figures of merit that differ between the two runs; see `compared_with`."""
+        return changes_of(self._other(), self._run())
+
+    def figure(self, name: str, *, both: bool = False, theme: str = "light") -> NotebookFigure:
+        """Return a figure that displays itself.
+
+        Parameters
+        ----------
+        name : one of `figures`
+        both : whether to draw it of the run compared with (A) and of the run (B)
+        theme : "light" or "dark"
+
+        Raises
+        ------
+        InputError
+            If there is no such figure, or no run to compare with.
+        """
+        if not both:
+            return super().figure(name, theme=theme)
+        return figure_collection(figures_of_both(self._other(), self._run()), theme)[name]
 
     @property
     def verdict(self) -> Verdict:
@@ -235,24 +277,14 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
             raise InputError(f"{self.directory}: expected a run, found none; .fit() makes one")
         return open_run(self.directory, self.run_name)
 
-    def _read(self, name: str, schema: Table) -> OpenTable:
-        path = self.directory / name
-        if not path.is_file():
-            raise InputError(f"{path}: expected a table of the survey, found none")
-        frame = read_survey_table(path, schema)
-        return OpenTable(frame, [column for column in schema if column.name in frame])
+    def _other(self) -> SurveyRun:
+        if self.other_name is None:
+            raise InputError("expected a run to compare with, found none; .compared_with(RUN)")
+        return open_run(self.directory, self.other_name)
 
     def _figures(self, theme: str) -> LazyCollection[NotebookFigure]:
-        # The plots take seconds to import.
-        from plateviz.plots.gallery import survey_figures
-        from plateviz.runs.load_tables import survey_tables
-
-        tables = survey_tables(self._run())
-        figures = [
-            FigureSpec(one.name, one.title, one.caption, partial(one.plot, tables))
-            for one in survey_figures()
-        ]
-        return figure_collection(figures, theme)
+        other = None if self.other_name is None else self._other()
+        return figure_collection(figures_of_run(other, self._run()), theme)
 
     def _explorable_rows(self) -> Collection[str]:
         return COLUMNS_OF_RUN
@@ -264,10 +296,3 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
         from plateviz.reports.survey import survey_report
 
         return survey_report(self._run(), facts)
-
-
-def _check_numbers(name: str, numbers: object, least: int) -> None:
-    """Raise `InputError` unless `numbers` are whole numbers of at least `least`."""
-    is_list = isinstance(numbers, list | tuple | range)
-    if not is_list or not all(isinstance(n, int) and n >= least for n in numbers):  # type: ignore[union-attr]
-        raise InputError(f"{name}: expected whole numbers from {least}, found {numbers!r}")

@@ -1,16 +1,19 @@
 """OpenTable: a pandas table that converts to an astropy table with units."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from astropy.table import QTable
 
-from solver.data.columns import Column
+from solver.data.columns import Column, Table
 from solver.data.parameters import Axis
 from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES
+from solver.errors import InputError
+from solver.io.survey import read_survey_table
 from solver.units import unit_named
 
 # Table of the fitted calibration -> axis with one row per element.
@@ -48,6 +51,20 @@ def result_tables(result: FitResult) -> dict[str, OpenTable]:
         if frame is not None:
             tables[schema.name] = OpenTable(frame, list(schema))
     return tables
+
+
+def input_table(path: Path, schema: Table) -> OpenTable:
+    """Return an input table of a survey, with the columns that it has.
+
+    Raises
+    ------
+    InputError
+        If the survey has no such table, or it is damaged.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: expected a table of the survey, found none")
+    frame = read_survey_table(path, schema)
+    return OpenTable(frame, [column for column in schema if column.name in frame])
 
 
 def _fitted(result: FitResult, axis: Axis) -> OpenTable:

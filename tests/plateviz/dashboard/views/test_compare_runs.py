@@ -7,6 +7,7 @@ import pytest
 from plateviz.dashboard.keys import press
 from plateviz.dashboard.lost_run import look_for_run
 from plateviz.dashboard.navigation import Navigation, View
+from plateviz.dashboard.page_code import page_code
 from plateviz.dashboard.saved_view import open_view, view_text
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.address_bar import AddressBar
@@ -103,6 +104,7 @@ def test_survey_with_one_run_says_how_to_make_another(navigation, runs):
     assert "other" not in navigation.address()
     press(navigation, "b")
     assert navigation.run_name == "default"
+    assert "compared_with" not in page_code(navigation).python
 
     # Somebody makes it while the page is open.
     navigation.session.store._runs = runs
@@ -280,3 +282,12 @@ def test_other_run_is_read_elsewhere(fit_result, navigation, runs):
     assert "Distortion order" in words(page)
     drawn(page)
     assert both.is_drawn
+
+
+def test_python_compares_both_runs(navigation, page):
+    code = page_code(navigation)
+    opened = "survey = plateviz.open('sky', run='default').compared_with('low')\n"
+    assert opened in code.python
+    assert "survey.figure('orbit-health', both=True)" in code.python
+    assert "survey.figure('motion-differences')" in code.python
+    assert "of this run alone" in code.about

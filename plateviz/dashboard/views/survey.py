@@ -265,7 +265,8 @@ class SurveyPage(pn.viewable.Viewer):
     def _show_head(self, *_: object) -> None:
         if self._navigation.run is None:
             return
-        title = titled("Run", self._navigation.run_name)
+        is_compared = self._navigation.survey_workspace is SurveyWorkspace.COMPARE
+        title = titled("(B) Run" if is_compared else "Run", self._navigation.run_name)
         verdict = _BEING_READ
         is_open = self._navigation.survey_workspace is SurveyWorkspace.VERDICT
         if self._shown is not None:

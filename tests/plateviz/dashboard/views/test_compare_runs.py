@@ -160,6 +160,7 @@ def test_b_exchanges_the_two_runs_and_back(navigation, page, runs):
     assert (navigation.run_name, page._compare._run.value) == ("low", "default")
     assert [(what, b, a) for what, a, b in before] == cells()
     assert navigation.address()["other"] == "default"
+    assert "(B) Run:</span> <b>low</b>" in page._head.object
     press(navigation, "b")
     assert (navigation.run_name, cells()) == ("default", before)
     # Each was read once.

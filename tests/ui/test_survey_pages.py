@@ -193,10 +193,12 @@ def test_two_runs_are_compared_exchanged_and_carried_by_the_address(page, open_p
         page.locator(f".figure-{name}:visible canvas").first.wait_for(state="attached")
     require_accessible(page)
     page.locator(".solution").first.click()
+    steps = page.evaluate("history.length")
     page.keyboard.press("b")
     expect(heading(page, "Run: low")).to_be_visible()
     expect(order).to_have_text("Distortion orderorder 5order 3–")
     page.wait_for_url("**run=low&other=default&figure=orbit-counts")
+    assert page.evaluate("history.length") == steps
     again = open_page(page.url)
     expect(heading(again, "Run: low")).to_be_visible()
     expect(again.locator(".figure-run-changes tr", has_text="Distortion order")).to_have_text(

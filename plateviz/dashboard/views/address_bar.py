@@ -21,6 +21,7 @@ class AddressBar(pn.custom.JSComponent):
 
     query = param.String(doc="of the address, without the question mark")
     steps = param.List(item_type=str, doc="parts whose change is a step of the history")
+    is_blink = param.Boolean(doc="whether the two runs were exchanged, which is no step")
 
     _esm = """
     export function render({ model }) {
@@ -32,7 +33,7 @@ class AddressBar(pn.custom.JSComponent):
       const write = () => {
         const search = `?${model.query}`
         if (!model.query || search === location.search) return
-        const isStep = !isFirst && places(search) !== places(location.search)
+        const isStep = !isFirst && !model.is_blink && places(search) !== places(location.search)
         isFirst = false
         const url = location.pathname + search + location.hash
         history[isStep ? "pushState" : "replaceState"](history.state, "", url)
@@ -56,6 +57,7 @@ class AddressBar(pn.custom.JSComponent):
         super().__init__(steps=list(_STEPS), margin=0, **params)
         self._navigation = navigation
         session = navigation.session
+        self._runs = navigation.run_name, session.run_comparison.other
         names = ["view", *WORKSPACES.values(), "run_name", "found"]
         navigation.param.watch(self._write, names)
         for exploration in (navigation.exploration, navigation.survey_exploration):
@@ -73,7 +75,15 @@ class AddressBar(pn.custom.JSComponent):
         is_there = navigation.view is not View.ORBIT or navigation.session.shown is not None
         if is_there and not self._is_following:
             # As a whole: what is no longer selected is not in it.
-            self.query = urlencode(navigation.address(), safe=",=/[]:")
+            query = urlencode(navigation.address(), safe=",=/[]:")
+            if query != self.query:
+                self.param.update(is_blink=self._is_blink(), query=query)
+
+    def _is_blink(self) -> bool:
+        """Return whether the run on the screen has become the other one since the last query."""
+        before, other = self._runs, self._navigation.session.run_comparison.other
+        self._runs = self._navigation.run_name, other
+        return other not in ("", before[1]) and other == before[0]
 
     def _handle_msg(self, data: object) -> None:
         """Show what the browser has gone back or forward to."""

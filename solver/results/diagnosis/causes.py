@@ -47,6 +47,7 @@ _OF_ITS_OWN = 0.5
 # Outliers are wrong identifications if these have this share of their chi2.
 _OF_OUTLIERS = 0.5
 _REFERENCE_LIMIT = 0.01
+_SCATTER = ("noise", "exposures", "sources", "detectors", "magnitudes")
 
 
 class Found(NamedTuple):
@@ -102,14 +103,24 @@ def _of_their_own(found: list[Found]) -> list[Found]:
     if not first:
         return []
     leads = first[0].test
+    others = [one for one in found[1:] if not _is_of_tails(one.test.subject, leads.subject)]
     return first + [
         one
-        for one in found[1:]
+        for one in others
         if one.test.sigma > _OF_ITS_OWN * leads.sigma
         and one.gain > _LEAST_SHARE * first[0].gain
         and not (one.test.subject in _PATTERNS and leads.subject in _MAKES_PATTERNS)
         or (one.test.subject in _PATTERNS and leads.subject in _PATTERNS)
     ]
+
+
+def _is_of_tails(subject: str, leads: str) -> bool:
+    """Return whether a cause is not to be named beside the first one because of tails.
+
+    Whatever spoils some residuals more than others gives all of them tails, and noise with tails
+    makes groups scatter.
+    """
+    return subject == "kurtosis" or (leads == "kurtosis" and subject in _SCATTER)
 
 
 def _limit(diagnosis: Diagnosis) -> float:
@@ -202,7 +213,10 @@ def _of_outliers(diagnosis: Diagnosis) -> list[Found]:
 
 
 def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
-    """Return the cause that changes the size of the residuals, after what patterns explain."""
+    """Return the cause that changes the size of the residuals, after what patterns explain.
+
+    The tails of their distribution are a cause of their own.
+    """
     limit, noise = _limit(diagnosis), scatter[0]
     tests = {one.subject: one for one in diagnosis.tests}
     found = []
@@ -223,12 +237,15 @@ def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
             found.append(Found(test, gains.of_kurtosis(noise, one)))
         elif one.name in ("exposures", "detectors", "sources"):
             found.append(Found(test, gains.of_groups(noise, one)))
-    if not found:
-        return []
-    best = max(found, key=lambda one: one.gain)
+    tails = [one for one in found if one.test.subject == "kurtosis"]
+    of_size = [one for one in found if one.test.subject != "kurtosis"]
+    if not of_size:
+        return tails
+    best = max(of_size, key=lambda one: one.gain)
     # The noise as a whole changes, too.
     chance = min(best.test.log_chance, noise.log_chance)
-    return [best._replace(test=best.test._replace(log_chance=chance, sigma=sigmas(chance)))]
+    best = best._replace(test=best.test._replace(log_chance=chance, sigma=sigmas(chance)))
+    return [best, *tails]
 
 
 def _of_references(diagnosis: Diagnosis) -> list[Found]:

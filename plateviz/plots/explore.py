@@ -69,8 +69,11 @@ def explored_figure(
         # All rows, if they are few, so that the frame can be moved without a new figure.
         limits = (x.limits, y.limits) if extent.n_shown > ROW_LIMIT else None
         drawn = [_points(_Data(table, chosen, rows_in_frame(table, chosen, limits)), chosen)]
+    if chosen.has_median:
+        drawn += _medians(counts)
+        words += _in_numbers(counts)
     return framed(
-        [*_histograms(counts, x, y), *drawn, *(_medians(counts) if chosen.has_median else ())],
+        [*_histograms(counts, x, y), *drawn],
         title=title,
         subtitle="; ".join(words),
         x=x,
@@ -237,8 +240,17 @@ def _medians(counts: Counts) -> list[Glyphs]:
     x, low, median, high = counts.medians()
     return [
         band(x, low, high, name="16 to 84 %", label="16 to 84 %"),
+        # Cells have all shades between the background and the colour of lines.
+        line(x, median, name="edge of the median", color="background", width=6.0),
         line(x, median, name="median", color="line", width=2.0, label="median"),
     ]
+
+
+def _in_numbers(counts: Counts) -> list[str]:
+    median = counts.medians().median
+    if not len(median):
+        return []
+    return [f"medians from {median.min():.3g} to {median.max():.3g}".replace("-", "−")]
 
 
 def _counted(table: ExplorableTable, extent: Extent, chosen: Columns) -> list[str]:

@@ -176,3 +176,15 @@ def test_median_and_its_range_follow_the_data():
     np.testing.assert_allclose(median.values("y"), 3.0 * median.values("x"), atol=0.6)
     half = 0.5 * (frame["16 to 84 %"].values("y2") - frame["16 to 84 %"].values("y1"))
     assert 0.4 < np.median(half) < 0.75
+
+
+def test_median_stands_out_from_cells_and_is_said_in_numbers(many):
+    (frame,) = explored_figure(many, Columns("x", "y", has_median=True))
+    names = [glyphs.name for glyphs in frame.glyphs]
+    assert names.index("cells by number") < names.index("edge of the median")
+    assert names[-2:] == ["edge of the median", "median"]
+    edge, median = (frame[name].looks["line_width"] for name in names[-2:])
+    assert edge > 2.0 * median
+    assert frame["edge of the median"].looks["line_color"] == "background"
+    low, high = frame["median"].values("y").min(), frame["median"].values("y").max()
+    assert f"medians from {low:.3g} to {high:.3g}" in frame.subtitle

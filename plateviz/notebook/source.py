@@ -68,7 +68,7 @@ class OpenSource(HasFigures):
 
     @property
     def motion(self) -> pd.DataFrame:
-        """Fitted position, parallax and proper motion, minus the catalogue's.
+        """Fitted position, parallax and proper motion, and what they are off the catalogue.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class OpenSource(HasFigures):
             raise InputError(
                 f"run {self._run.name!r}: expected a complete run, found orbits without a fit"
             )
-        return motion_table(self._motion)
+        return motion_table(self._history, self._motion)
 
     def table(self) -> QTable:
         """Return `history` as an astropy table with units."""

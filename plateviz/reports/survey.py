@@ -109,7 +109,7 @@ def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
     if history.empty:
         raise InputError(f"{run.directory}: expected a source {source_id}, found none of that id")
     found = SourceTables(history, motion)
-    tables = {} if motion is None else {"Motion": in_words(motion_table(motion), MOTION)}
+    tables = {} if motion is None else {"Motion": in_words(motion_table(history, motion), MOTION)}
     return Report(
         title=f"Source {source_id}",
         subtitle=f"{source_class(history).capitalize()} source in run {run.name}",

@@ -38,6 +38,7 @@ ORBITS_OF_RUN: Mapping[str, Heading] = {
 MOTION: Mapping[str, Heading] = {
     "parameter": Heading("parameter"),
     "unit": Heading("unit"),
+    "value": Heading("fitted", "0.000"),
     "fit": Heading("fitted − catalogue", "0.000"),
     "sigma_noise": Heading("σ noise", "0.000"),
     "sigma_catalogue": Heading("σ catalogue", "0.000"),

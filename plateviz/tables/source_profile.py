@@ -7,6 +7,7 @@ import pandas as pd
 
 from plateviz.tables.headings import ORBITS_OF_SOURCE, SOURCES_OF_RUN
 from plateviz.tables.labels import dates, id_strings
+from plateviz.tables.source_track import catalogue_motion
 from plateviz.tables.sources import ordered_by_class
 from plateviz.tables.summary import SummaryItem
 from solver.data.survey_schema import MOTION_PARAMETERS
@@ -40,6 +41,7 @@ def source_strip(history: pd.DataFrame, motion: pd.Series | None) -> list[Summar
     return [
         _plain("Orbits", f"{len(history):,} (in {motion['span']:.2f} yr)"),
         _plain("Measurements", measurements),
+        _parallax(history, motion),
         _separation(motion, "catalogue"),
         *([] if math.isnan(motion["rms_truth_2d"]) else [_separation(motion, "truth")]),
         *(_scatter(motion, axis, symbol) for axis, symbol in (("ra", "α"), ("dec", "δ"))),
@@ -49,6 +51,17 @@ def source_strip(history: pd.DataFrame, motion: pd.Series | None) -> list[Summar
 
 def _plain(label: str, value: str, hint: str = "of the source in this run") -> SummaryItem:
     return SummaryItem(label, value, hint, "neutral")
+
+
+def _parallax(history: pd.DataFrame, motion: pd.Series) -> SummaryItem:
+    value = catalogue_motion(history)[0] + motion["fit_parallax"]
+    hint = (
+        "Fitted parallax and its uncertainty, from the noise and from the errors of the "
+        "reference catalogue. The table Motion has its parts, and what it is off the catalogue."
+    )
+    if math.isnan(value):
+        return _plain("Parallax", "–", "Too few orbits, or too close in time, to determine it.")
+    return _plain("Parallax", f"{value:.3f} mas (± {motion['sigma_parallax']:.3f} mas)", hint)
 
 
 def _separation(motion: pd.Series, other: str) -> SummaryItem:
@@ -79,22 +92,26 @@ def _chi2(motion: pd.Series) -> SummaryItem:
     return _plain(label, f"{motion['chi2']:.1f} (dof {dof})", hint)
 
 
-def motion_table(motion: pd.Series) -> pd.DataFrame:
-    """Return the fitted motion of a source relative to its catalogue entry and its truth.
+def motion_table(history: pd.DataFrame, motion: pd.Series) -> pd.DataFrame:
+    """Return the fitted motion of a source, also relative to its catalogue entry and its truth.
 
     Parameters
     ----------
+    history : `survey_schema.HISTORY` of the source
     motion : a row of `survey_schema.MOTIONS`
 
     Returns
     -------
-    A row per parameter: `parameter`, `unit`, `fit`, `sigma_noise`, `sigma_catalogue`, `sigma`,
-    `true` and `pull`; `fit` and `true` are relative to the catalogue. NaN where there is none
+    A row per parameter: `parameter`, `unit`, `value` (of parallax and proper motion), `fit`,
+    `sigma_noise`, `sigma_catalogue`, `sigma`, `true` and `pull`; `fit` and `true` are relative
+    to the catalogue. NaN where there is none
     """
+    catalogue = (math.nan, math.nan, *catalogue_motion(history))
     rows = []
-    for name in MOTION_PARAMETERS:
+    for name, listed in zip(MOTION_PARAMETERS, catalogue, strict=True):
         label, unit = _NAMES[name]
         figures = {figure: float(motion[f"{figure}_{name}"]) for figure in _FIGURES}
+        figures = {"value": listed + figures["fit"], **figures}
         rows.append({"parameter": label.format(epoch=motion["epoch"]), "unit": unit, **figures})
     return pd.DataFrame(rows)
 

@@ -1,5 +1,6 @@
 """Tables of one source over the orbits: estimates, catalogue, truth and the fitted motion."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -109,6 +110,24 @@ def source_curves(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFra
         for k, axis in enumerate(_AXES):
             table[f"{name}_{axis}_mas"] = values[:, k]
     return table
+
+
+def catalogue_motion(history: pd.DataFrame) -> tuple[float, float, float]:
+    """Return parallax (mas) and proper motion (mas/yr) of the catalogue, from its positions.
+
+    Parameters
+    ----------
+    history : rows of `survey_schema.HISTORY` of the source, at least one
+
+    Returns
+    -------
+    NaN if the orbits are too few, or too close in time, to determine the motion
+    """
+    frame = _frame(history.reset_index(drop=True))
+    if not frame.is_determined:
+        return math.nan, math.nan, math.nan
+    _, _, parallax, pmra, pmdec = frame.catalogue.tolist()
+    return parallax, pmra, pmdec
 
 
 def _frame(rows: pd.DataFrame) -> _Frame:

@@ -226,7 +226,7 @@ class SourcePage(pn.viewable.Viewer):
             words = "Motions are fitted once all orbits of the run are fitted."
             self._motion.object = paragraph(words, "caption", theme)
         else:
-            table = self._session.units.rows(motion_table(found.motion))
+            table = self._session.units.rows(motion_table(found.history, found.motion))
             self._motion.object = themed(numbers(in_words(table, MOTION)), theme)
         self._measurements.object = paragraph(_MEASUREMENTS, "caption", theme)
         self._orbits.show(source_orbits(found.history), theme)

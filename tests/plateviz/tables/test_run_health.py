@@ -79,14 +79,30 @@ def test_run_strip_of_a_run_without_orbits_has_no_numbers(survey):
 
 
 def test_motion_table_has_fit_truth_and_uncertainties(survey):
-    _, motion = survey.source("reference")
-    table = motion_table(motion).set_index("parameter")
+    history, motion = survey.source("reference")
+    table = motion_table(history, motion).set_index("parameter")
     assert table.loc["parallax", "fit"] == motion["fit_parallax"]
     assert table.loc["proper motion in δ", "pull"] == motion["pull_pmdec"]
     assert table["unit"].tolist() == ["mas", "mas", "mas", "mas/yr", "mas/yr"]
     assert table["sigma"].to_numpy() == pytest.approx(
         np.hypot(table["sigma_noise"], table["sigma_catalogue"]), rel=1e-6
     )
+
+
+def test_parallax_and_proper_motion_have_values_of_their_own(survey):
+    history, motion = survey.source("reference")
+    listed = survey.catalogue.set_index("source_id").loc[history["source_id"].iloc[0]]
+    table = motion_table(history, motion)
+    expected = [listed[name] + motion[f"fit_{name}"] for name in ("parallax", "pmra", "pmdec")]
+    # A hundredth of a microarcsecond: the catalogue's motion is read off its positions.
+    np.testing.assert_allclose(table["value"], [np.nan, np.nan, *expected], atol=1e-5)
+    found = values(source_strip(history, motion))["Parallax"]
+    assert found == f"{expected[0]:.3f} mas (± {motion['sigma_parallax']:.3f} mas)"
+
+
+def test_a_source_of_one_orbit_has_no_parallax(survey):
+    history, motion = survey.source("reference")
+    assert values(source_strip(history.iloc[:1], motion))["Parallax"] == "–"
 
 
 def test_source_strip_shows_only_known_numbers(survey):

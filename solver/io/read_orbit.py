@@ -1,6 +1,7 @@
 """Read an orbit from an observation, a catalogue and optionally a truth, and check them."""
 
 from pathlib import Path
+from shlex import quote
 from typing import NamedTuple
 
 import pandas as pd
@@ -160,7 +161,18 @@ def _file_in(folder: Path, wanted: schema.Table, preferred_suffix: str = "") -> 
             return (same or candidates)[0]
     raise InputError(
         f"{folder}: expected a file called {wanted.name} (.fits, .ecsv, .csv, .parquet or .xml), "
-        f"found {', '.join(p.name for p in files) or 'no table file'}"
+        f"found {', '.join(p.name for p in files) or 'no table file'}{_if_of_survey(folder)}"
+    )
+
+
+def _if_of_survey(folder: Path) -> str:
+    """Return what to do with a survey directory, or its folder of measurements; else nothing."""
+    survey = next((p for p in (folder, folder.parent) if (p / "survey.toml").is_file()), None)
+    if survey is None:
+        return ""
+    return (
+        f"; {survey} is a survey, of which `plateviz survey {quote(str(survey))} --orbits N` "
+        "fits orbit N"
     )
 
 

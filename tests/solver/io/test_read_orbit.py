@@ -339,6 +339,18 @@ def test_files_swapped(tmp_path):
         read_orbit(ref, obs)
 
 
+def test_survey_is_no_orbit_and_says_how_to_fit_one_of_it(tmp_path):
+    survey = tmp_path / "my survey"
+    (survey / "measurements").mkdir(parents=True)
+    (survey / "survey.toml").touch()
+    ref = write_table(catalogue(), survey / "reference.csv")
+    obs = write_table(measurement(), survey / "measurements" / "m.csv")
+    told = r"is a survey, of which `plateviz survey '.*my survey' --orbits N` fits orbit N$"
+    for given in (survey, obs):
+        with pytest.raises(InputError, match=told):
+            read_orbit(given, ref)
+
+
 def test_missing_environment_file(tmp_path):
     obs = write_table(measurement(), tmp_path / "m.csv")
     ref = write_table(catalogue(), tmp_path / "r.csv")

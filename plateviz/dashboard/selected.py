@@ -176,7 +176,10 @@ def parsed(address: Mapping[str, str], find: Find = lambda *_: None) -> tuple[Se
             continue
         if text.startswith(_MANY):
             items = find(kind, text.removeprefix(_MANY))
-            problem = f"{kind}: an address has room for {FEW}, and more were selected"
+            problem = (
+                f"{kind}: an address has room for {FEW}, and more were selected; "
+                "Keep gives them a name for the address, and Save view has all"
+            )
         else:
             items = read(text) if text.count(",") < FEW else None
             problem = f"{kind}: expected {FEW} ids or fewer, found {in_words(text)}"

@@ -93,7 +93,10 @@ def _places_in_run(run: SurveyRun, selected: frozenset[int]) -> Table:
 
 def _with_ucds(table: Table) -> Table:
     if not len(table):
-        raise InputError("none of the selected sources is on the screen")
+        raise InputError(
+            "none of the selected sources is in the solution on the screen; "
+            "if they are left out of its fit, put them back"
+        )
     for name, ucd in _UCDS.items():
         table[name].meta["ucd"] = ucd
     return table

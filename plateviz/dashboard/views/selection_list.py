@@ -76,13 +76,21 @@ class SelectionList(pn.viewable.Viewer):
         parts = [
             part
             for kind, table in self._tables.items()
-            for part in (heading(_PARTS[kind].title), table)
+            for part in (heading(self._title(kind)), table)
         ]
         self._window[:] = parts or [heading(_NOTHING)]
 
+    def _title(self, kind: str) -> str:
+        title = _PARTS[kind].title
+        return f"{title} (a click opens the motion of one)" if self._opens(kind) else title
+
+    def _opens(self, kind: str) -> bool:
+        return kind == "sources" and self._navigation.run is not None
+
     def _table(self, kind: str) -> DataTable:
-        opens = kind == "sources" and self._navigation.run is not None
-        on_row: Callable[[pd.Series], object] | None = self._open_source if opens else None
+        on_row: Callable[[pd.Series], object] | None = (
+            self._open_source if self._opens(kind) else None
+        )
         units = self._navigation.session.units
         return DataTable(_PARTS[kind].headings, on_row, page_size=_PAGE_SIZE, units=units)
 

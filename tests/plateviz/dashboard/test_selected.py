@@ -62,6 +62,7 @@ def test_address_has_a_key_of_the_kinds_of_which_many_are_selected():
     found, (told,) = parsed(address)
     assert found == of([], [(0, 1)], [1])
     assert "room for 20" in told
+    assert "Keep gives them a name" in told
 
 
 def test_large_selections_are_remembered_up_to_a_number():

@@ -52,7 +52,7 @@ def test_places_of_a_run_are_those_of_the_catalogue(navigation, survey):
 def test_selection_without_a_place_is_refused(navigation, fit_result):
     navigation.turn_to(View.ORBIT)
     navigation.session.selection.select_sources(frozenset([17]))
-    with pytest.raises(InputError, match="none of the selected sources is on the screen"):
+    with pytest.raises(InputError, match="in the solution on the screen; if they are left out"):
         selected_places(navigation)()
     empty = Navigation(Session(SurveyStore(fit_result, [])))
     with pytest.raises(InputError, match="no solution and no run is on the screen"):

@@ -125,6 +125,7 @@ def test_250_000_sources_are_selected_listed_and_refused_where_they_are_too_many
     assert session.selection.ids is session.selection.ids
     assert navigation.address()["sources"].startswith("many:")
     listed.open()
+    assert listed._window[0].object.startswith("Sources (a click opens")
     assert len(listed._tables["sources"]._table.value) == len(measured)
     assert len(selected_tables(navigation)["sources"]) == len(measured)
     with pytest.raises(InputError, match="250,000 are selected: save these as a table"):
@@ -189,3 +190,13 @@ def test_request_of_a_session_tells_where_its_page_is_read(monkeypatch):
         document = SimpleNamespace(session_context=SimpleNamespace(request=request))
         monkeypatch.setattr(type(pn.state), "curdoc", document)
         assert is_read_here() is is_here
+
+
+def test_buttons_say_what_they_do(navigation, session):
+    bar = SelectionBar(navigation)
+    session.selection.select_sources(frozenset({1}))
+    hints = {part.label: part.description for part in bar.__panel__() if hasattr(part, "label")}
+    assert "in all its exposures" in hints["Leave out of the fit"]
+    assert "name" in hints["Keep"]
+    assert hints["List"]
+    assert hints["Invert"]

@@ -1,7 +1,7 @@
 """Growth of a run that is being fitted: how far it is, and when the rest will be done."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from shlex import quote
 
@@ -81,11 +81,18 @@ def how_to_make_a_run(origin: Origin) -> str:
     )
 
 
-def how_to_make_another_run(origin: Origin, run: str) -> str:
-    """Return how a survey with one run gets a second one to compare it with."""
+def how_to_make_another_run(origin: Origin, run: str, options: Sequence[str] = ()) -> str:
+    """Return how a survey with one run gets a second one to compare it with.
+
+    Parameters
+    ----------
+    options : of the command line that the verdict on the run suggests
+    """
     directory = quote(origin.directory) if isinstance(origin, SurveyFolder) else "DIR"
+    chosen = " ".join(options) or "--order 3"
+    what = "what the verdict suggests" if options else "another order, for example"
     return (
         f"This survey has one run, {run}, and two are compared here. "
-        f"`plateviz survey {directory} --run other --order 3`, for example, makes a second one "
-        "with another order; this page shows it once it has begun."
+        f"`plateviz survey {directory} --run other {chosen}` makes a second one with {what}; "
+        "this page shows it once it has begun."
     )

@@ -24,10 +24,12 @@ from plateviz.solving.as_code import (
     report_command,
     report_of_run,
 )
+from plateviz.solving.origin import SurveyFolder
 from solver.errors import InputError
 
 _OTHER = f"{NAME}-other"
 _OF_WHAT_IF = "It is a what-if; a fit agrees with it to a thousandth of each uncertainty."
+_OF_ONE_ORBIT = "Without --orbits, the command fits all orbits of the survey."
 _OF_ONE_RUN = "It is of this run alone; the Python compares both."
 _OF_OTHER_ORBIT = "The report does not compare with another orbit; the Python does."
 
@@ -105,6 +107,7 @@ def _of_solution(navigation: Navigation) -> PageCode:
     python.append(drawn)
     words = [_about(navigation, f"the solution ({shown.settings.describe()})", drawn)]
     words += [_OF_WHAT_IF] if _is_step(shown, other) else []
+    words += [_OF_ONE_ORBIT] if isinstance(origin, SurveyFolder) else []
     words += [_OF_OTHER_ORBIT] if other is not None and not compared else []
     return PageCode(" ".join(words), "\n".join(commands), "\n".join(filter(None, python)))
 

@@ -191,7 +191,9 @@ class CompareRunsView(pn.viewable.Viewer):
         words = ""
         if not self._run.options and navigation.run_name is not None:
             origin = session.store.origin
-            words = how_to_make_another_run(origin, navigation.run_name)
+            causes = () if self._shown is None else self._shown.verdict.causes
+            options = next((one.options for one in causes if one.options), ())
+            words = how_to_make_another_run(origin, navigation.run_name, options)
         self._alone.object = paragraph(words, "empty", session.theme) if words else ""
         self._alone.visible = bool(words)
         self._show_changes()

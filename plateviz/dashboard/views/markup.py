@@ -1,5 +1,6 @@
 """Small pieces of HTML in the project's style, readable in both themes."""
 
+import re
 from html import escape
 from pathlib import Path
 
@@ -19,8 +20,9 @@ def markup_pane() -> pn.pane.HTML:
 
 
 def paragraph(text: str, css_class: str, theme: str) -> str:
-    """Return a paragraph of plain text."""
-    return themed(f"<p class='{css_class}'>{escape(text)}</p>", theme)
+    """Return a paragraph of plain text, in which commands stand between backticks."""
+    words = re.sub("`([^`]+)`", r"<code>\1</code>", escape(text))
+    return themed(f"<p class='{css_class}'>{words}</p>", theme)
 
 
 def themed(markup: str, theme: str) -> str:

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from plateviz.dashboard.growth import Growth
+from plateviz.dashboard.growth import Growth, how_to_make_another_run
 from plateviz.runs.queries import Written
+from plateviz.solving.origin import SurveyFolder
 
 
 class Clock:
@@ -74,3 +75,11 @@ def test_run_of_a_watched_survey_waits_for_the_next_orbit(growth, clock):
     words = growth.look(done._replace(n_orbits=5))
     assert words.endswith("`plateviz watch 'a sky' --run default` continues it.")
     assert growth.look(done._replace(n_orbits=5, n_fitted=5, is_complete=True)) == ""
+
+
+def test_another_run_is_what_the_verdict_suggests():
+    origin = SurveyFolder("my survey")
+    words = how_to_make_another_run(origin, "default", ("--drift", "3"))
+    assert "`plateviz survey 'my survey' --run other --drift 3` makes" in words
+    assert "the verdict suggests" in words
+    assert "--order 3` makes" in how_to_make_another_run(origin, "default")

@@ -104,6 +104,7 @@ def test_compared_solution_is_made_too(solved, make_fit_result):
     both = {one.name: one for one in comparable_figures()}[session.figure_of_both]
     require_same(figures[both.name]._plot(), figure_of_both(both, chosen))
     assert "It is a what-if" in code.about
+    assert "Without --orbits" in code.about
     made, other, report = code.command.replace("\\\n", "").splitlines()
     assert "--run reproduced --orbits 0   --order 3" in made
     assert other.startswith("plateviz survey sky --run reproduced-other --orbits 0")

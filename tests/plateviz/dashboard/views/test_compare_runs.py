@@ -99,7 +99,7 @@ def test_survey_with_one_run_says_how_to_make_another(navigation, runs):
     navigation.turn_to_workspace(SurveyWorkspace.COMPARE)
     alone, cards = page._stack._made[SurveyWorkspace.COMPARE]
     assert "has one run, default" in alone.object
-    assert "`plateviz survey sky --run other --order 3`" in alone.object
+    assert "<code>plateviz survey sky --run other --order 3</code>" in alone.object
     assert (alone.visible, cards.visible) == (True, False)
     assert "other" not in navigation.address()
     press(navigation, "b")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from plateviz.dashboard.views.markup import judged
+from plateviz.dashboard.views.markup import judged, paragraph
 from plateviz.tables.verdict import Verdict
 
 VERDICT = Verdict("warn", "The headline.", ["A reason."], ["What stands out."])
@@ -18,6 +18,11 @@ def test_reasons_of_a_verdict_are_open_unless_it_is_good(state, is_open):
 
 def test_reasons_can_be_closed_at_first():
     assert judged(VERDICT, is_open=False).startswith("<details class='verdict warn'><summary>")
+
+
+def test_commands_of_a_paragraph_stand_out():
+    html = paragraph("Type `plateviz <b>`, then wait.", "empty", "light")
+    assert "Type <code>plateviz &lt;b&gt;</code>, then wait." in html
 
 
 def test_verdict_is_text():

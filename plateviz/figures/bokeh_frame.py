@@ -11,7 +11,7 @@ from plateviz.figures.bokeh_glyphs import BokehGlyphs
 from plateviz.figures.figure import Axis, Frame
 from plateviz.figures.theme import FONT, LABEL_SIZE, SMALL_SIZE, TITLE_SIZE, Theme
 from plateviz.figures.tick_count import columns_of_ticks, rows_of_ticks
-from plateviz.figures.words import Words
+from plateviz.figures.words import MENU, Words
 
 # Least room to the left of a frame, screen pixels.
 _LEFT = 5
@@ -66,7 +66,13 @@ class BokehFrame:
             y_scale=models.LogScale() if frame.y.is_log else models.LinearScale(),
             title=self._title,
             above=[self._subtitle],
-            toolbar=models.Toolbar(logo=None, autohide=True, active_drag=self._pan),
+            toolbar=models.Toolbar(
+                logo=None,
+                autohide=True,
+                active_drag=self._pan,
+                # A subtitle wider than the frame leaves it no width: its menu stands beside.
+                styles={"min-width": f"{MENU}px"},
+            ),
             toolbar_location="above",
             output_backend="canvas",
             # At a fraction of a pixel the edge keeps some of the colour of a former theme.

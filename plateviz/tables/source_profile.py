@@ -70,7 +70,7 @@ def _separation(motion: pd.Series, other: str) -> SummaryItem:
         f"Rms separation of the orbits' positions from the {other} at their epochs; "
         f"{ra:.3f} mas in α cos δ and {dec:.3f} mas in δ."
     )
-    return _plain(f"Rms from the {other}, 2-D", f"{motion[f'rms_{other}_2d']:.3f} mas", hint)
+    return _plain(f"Rms from the {other}", f"{motion[f'rms_{other}_2d']:.3f} mas", hint)
 
 
 def _scatter(motion: pd.Series, axis: str, symbol: str) -> SummaryItem:

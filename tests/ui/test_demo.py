@@ -52,7 +52,7 @@ def _see_demo(tmp_path, open_page, program, orbits):
         turn_to_workspace(page, SurveyWorkspace.VERDICT)
         page.get_by_role("button", name="Most significant motion").first.click()
         see(page, "time-series")
-        expect(page.locator(".strip").get_by_text("Rms from the truth, 2-D")).to_be_visible()
+        expect(page.locator(".strip").get_by_text("Rms from the truth")).to_be_visible()
         close(page)
 
     written = times_of(tmp_path)

@@ -17,6 +17,7 @@ from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import message
 from plateviz.figures.glyphs import points
 from plateviz.figures.theme import THEMES
+from plateviz.figures.words import MENU
 
 
 def renderers(drawn, number=0):
@@ -36,6 +37,11 @@ def test_every_kind_is_drawn_in_order(every_kind, theme):
     document.add_root(drawn.model)
     document.validate()
     assert json.dumps(document.to_json(deferred=False))
+
+
+def test_menu_of_the_tools_keeps_its_width_beside_a_wide_subtitle(every_kind):
+    for one in BokehFigure(every_kind, "light").frames:
+        assert one.plot.toolbar.styles["min-width"] == f"{MENU}px"
 
 
 def test_unknown_theme_is_refused(every_kind):

@@ -117,7 +117,7 @@ def simulate(
     as_json: Annotated[bool, _JSON] = False,
 ) -> None:
     """Simulate the paper's mini-mock survey; an interrupted simulation resumes."""
-    from plateviz.cli.output import print_json
+    from plateviz.cli.output import print_json, telling_if_interrupted
     from plateviz.solving.progress import reporting
     from solver.simulate.settings import SurveySettings
 
@@ -134,7 +134,8 @@ def simulate(
     )
     if stars is not None:
         settings = settings.scaled(stars)
-    with reporting("simulating") as reporter:
+    resumes = telling_if_interrupted("the same command continues with the orbits that are missing")
+    with resumes, reporting("simulating") as reporter:
         simulate_survey(directory, settings, catalogue=catalog, progress=reporter.step)
     seconds = time.perf_counter() - start
     if as_json:
@@ -176,13 +177,16 @@ def fit(
 ) -> None:
     """Solve one orbit and write the solution."""
     from plateviz.cli.fit import FitRequest, run_fit
+    from plateviz.cli.output import telling_if_interrupted
     from plateviz.solving.origin import OrbitFiles
 
     engines = ENGINES if settings["engine"] == "all" else (settings["engine"],)
     chosen = options.fit_settings({**settings, "engine": engines[0]})
     files = OrbitFiles(str(observations), str(reference), _text(truth), orbit, _text(instrument))
     request = FitRequest(files, orbit, chosen, engines, output, checkpoint, overwrite, accept)
-    run_fit(request, as_json)
+    begun = "an svi that has a --checkpoint resumes, another fit begins again"
+    with telling_if_interrupted(f"no solution is written; {begun}"):
+        run_fit(request, as_json)
 
 
 @app.command()
@@ -219,10 +223,12 @@ def survey(
     **settings: Any,  # noqa: ANN401 the options of the settings
 ) -> None:
     """Fit every orbit of a survey; an interrupted run resumes."""
+    from plateviz.cli.output import telling_if_interrupted
     from plateviz.cli.survey import parse_orbits, run_survey
 
     chosen, numbers = options.fit_settings(settings), parse_orbits(orbits)
-    run_survey(directory, run, chosen, numbers, workers, scheduler, repair, accept, as_json)
+    with telling_if_interrupted("the same command continues with the orbits that are missing"):
+        run_survey(directory, run, chosen, numbers, workers, scheduler, repair, accept, as_json)
 
 
 app.command()(watch)

@@ -1,7 +1,8 @@
 """What the command line prints: progress on standard error, results on standard output."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,16 @@ from solver.data.settings import COUNTED
 
 if TYPE_CHECKING:
     from solver.results.agreement import Comparison
+
+
+@contextmanager
+def telling_if_interrupted(words: str) -> Iterator[None]:
+    """Print what Ctrl-C in the block leaves behind, and what to do next."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.echo(f"plateviz: interrupted; {words}", err=True)
+        raise
 
 
 def print_json(value: object) -> None:

@@ -232,3 +232,26 @@ def test_fit_compares_orders(run, sample, tmp_path, compared, monkeypatch):
     assert best == [5]
     assert "Order 5 has the highest evidence" in summary["preferred_order"]
     assert read_result(output).orders.equals(compared.orders)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "called", "words"),
+    [
+        (("survey", "DIR"), "plateviz.cli.survey.run_survey", "the same command continues"),
+        (
+            ("simulate", "DIR"),
+            "solver.simulate.survey.simulate_survey",
+            "the same command continues",
+        ),
+        (("fit", "O", "R", "-o", "X"), "plateviz.cli.fit.run_fit", "no solution is written"),
+    ],
+    ids=["survey", "simulate", "fit"],
+)
+def test_interrupted_command_says_what_to_do_next(run, monkeypatch, arguments, called, words):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(called, interrupt)
+    code, _, err = run(*arguments)
+    assert code == 130
+    assert f"plateviz: interrupted; {words}" in err

@@ -166,7 +166,8 @@ def check_address(address: str, port: int) -> int:
             return int(probe.getsockname()[1])
     except (OSError, OverflowError) as error:
         raise InputError(
-            f"expected an address and a port that are free, found {address}:{port}: {error}"
+            f"expected an address and a port that are free, found {address}:{port}: {error}; "
+            "--port 0 selects a free port"
         ) from error
 
 

@@ -42,7 +42,8 @@ def _parsed(text: object) -> tuple[Defect, float]:
         raise InputError(f"expected a defect as text, NAME=AMPLITUDE, found {text!r}")
     name, found, value = (part.strip() for part in text.partition("="))
     if name not in BY_NAME:
-        raise InputError(f"expected a defect out of {', '.join(BY_NAME)}, found {name!r}")
+        known = ", ".join(f"{one.name}={one.example}" for one in BY_NAME.values())
+        raise InputError(f"expected a defect out of {known}, found {name!r}")
     defect = BY_NAME[name]
     match = _AMPLITUDE.fullmatch(value)
     # A number alone could be meant as a fraction or in another unit.

@@ -127,6 +127,7 @@ def test_serve_refuses_a_port_in_use(run, tmp_path):
         code, _, err = run("serve", tmp_path, "--port", taken.getsockname()[1], "--no-open")
     assert code == 2
     assert "expected an address and a port that are free" in err
+    assert "--port 0 selects a free port" in err
 
 
 SMALL = ("--orbits", "1", "--stars", "2000")
@@ -159,7 +160,7 @@ def test_simulate_puts_defects_in_and_inspect_names_them(run, tmp_path):
 def test_simulate_refuses_an_unknown_defect_and_makes_nothing(run, tmp_path):
     code, _, err = run("simulate", tmp_path / "survey", *SMALL, "--defect", "noize=10%")
     assert code == 2
-    assert "expected a defect out of distortion-drift, " in err
+    assert "expected a defect out of distortion-drift=0.1um, " in err
     assert not (tmp_path / "survey").exists()
 
 

@@ -112,8 +112,9 @@ SURVEY_FIGURES = (
         62,
         _plot,
         is_wide=True,
-        least_height=420,
-        narrow_height=860,
+        least_height=300,
+        narrow_height=440,
+        takes_row=True,
         equation="value − mean; the line is fitted with a step between the position angles",
     ),
 )

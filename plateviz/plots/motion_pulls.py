@@ -85,7 +85,8 @@ SURVEY_FIGURES = (
         60,
         _plot,
         is_wide=True,
-        least_height=420,
+        least_height=300,
+        takes_row=True,
         equation="(fitted − true) / σ, for position, parallax and proper motion",
     ),
 )

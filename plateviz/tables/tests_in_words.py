@@ -13,6 +13,7 @@ _MOST_NAMED = 3
 _DEGREES = ("drift", "bend", "step")
 _DETECTORS = ("shift", "turn", "cells")
 _AXES = ("phase", "magnitude")
+_ENDINGS = {1: "st", 2: "nd", 3: "rd"}
 
 
 class TestInWords(NamedTuple):
@@ -86,9 +87,16 @@ def _about(test: Test) -> str:
         degree, *steps = test.what
         return f", degree {degree}" + "".join(f", change {one + 1}" for one in steps)
     if test.subject in _DETECTORS:
-        return f", detector {test.what[0] + 1} of the instrument"
+        # A test knows the place of a detector, not its id, which may begin with 0.
+        return f", {_ordinal(test.what[0] + 1)} detector of the instrument"
     if test.subject in _AXES:
         return f", {'xy'[test.what[0]]}"
     if test.subject == "references":
         return f", {'αδ'[test.what[0]]}"
     return ""
+
+
+def _ordinal(number: int) -> str:
+    """Return 1st, 2nd, 3rd, 4th, ..., 11th, ..., 21st, ..."""
+    ending = "th" if number % 100 in (11, 12, 13) else _ENDINGS.get(number % 10, "th")
+    return f"{number}{ending}"

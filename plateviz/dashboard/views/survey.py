@@ -147,6 +147,9 @@ class SurveyPage(pn.viewable.Viewer):
             return self._compare_runs(figures)
         views = [self._figure_view(f) for f in figures]
         grid = FigureGrid(views, self._wake, columns=1 if is_first else 2)
+        for view, figure in zip(views, figures, strict=True):
+            if figure.takes_row:
+                view.take_row()
         self._grids[one] = grid
         self._show_selected()
         if not is_first:

@@ -29,9 +29,6 @@ from solver.errors import InputError
 
 _WORDS: Mapping[str, Any] = MappingProxyType({"variant": "body2", "margin": (0, 8), "sx": IN_BAR})
 
-_LEFT_OUT = "Solve the orbit without any measurement of what is selected, in all its exposures"
-_KEPT = "Give the selection a name, under which anyone can select it again"
-
 
 class SelectionBar(pn.viewable.Viewer):
     """A line of words and buttons; empty while nothing is selected and nothing kept.
@@ -70,8 +67,8 @@ class SelectionBar(pn.viewable.Viewer):
         actions = self._actions
         self._words = pmui.Typography("", **_WORDS)
         self._list, self._kept = SelectionList(self._navigation), KeptSelections(self._navigation)
-        self._open = self._button("Open", self._open_source, "The motion of the source")
-        self._leave_out = self._button("Leave out of the fit", actions.leave_out, _LEFT_OUT)
+        self._open = self._button("Open", self._open_source)
+        self._leave_out = self._button("Leave out of the fit", actions.leave_out)
         self._put_back = self._button("Put back into the fit", actions.put_back)
         choices = table_choices(
             partial(selection_name, self._navigation), partial(selected_tables, self._navigation)
@@ -84,11 +81,11 @@ class SelectionBar(pn.viewable.Viewer):
             text="Send",
             done="sent",
         )
-        self._invert = self._button("Invert", actions.invert, "Select all others of these kinds")
-        self._keep = self._button("Keep", self._kept.open, _KEPT)
+        self._invert = self._button("Invert", actions.invert)
+        self._keep = self._button("Keep", self._kept.open)
         self._parts = [
             self._words,
-            self._button("List", self._list.open, "What is selected, with its values"),
+            self._button("List", self._list.open),
             self._open,
             self._leave_out,
             self._put_back,
@@ -100,10 +97,8 @@ class SelectionBar(pn.viewable.Viewer):
         ]
         self.windows[:] = [self._list, self._kept]
 
-    def _button(self, label: str, act: Callable[[], None], hint: str = "") -> pmui.Button:
-        button = pmui.Button(
-            label=label, description=hint, variant="text", size="small", margin=(0, 2), sx=IN_BAR
-        )
+    def _button(self, label: str, act: Callable[[], None]) -> pmui.Button:
+        button = pmui.Button(label=label, variant="text", size="small", margin=(0, 2), sx=IN_BAR)
         button.on_click(lambda _: act())
         return button
 

@@ -190,13 +190,3 @@ def test_request_of_a_session_tells_where_its_page_is_read(monkeypatch):
         document = SimpleNamespace(session_context=SimpleNamespace(request=request))
         monkeypatch.setattr(type(pn.state), "curdoc", document)
         assert is_read_here() is is_here
-
-
-def test_buttons_say_what_they_do(navigation, session):
-    bar = SelectionBar(navigation)
-    session.selection.select_sources(frozenset({1}))
-    hints = {part.label: part.description for part in bar.__panel__() if hasattr(part, "label")}
-    assert "in all its exposures" in hints["Leave out of the fit"]
-    assert "name" in hints["Keep"]
-    assert hints["List"]
-    assert hints["Invert"]

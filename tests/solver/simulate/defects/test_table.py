@@ -52,7 +52,7 @@ def test_text_is_read_back(defect):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("noize=10%", "a defect out of distortion-drift, .* found 'noize'"),
+        ("noize=10%", "a defect out of distortion-drift=.*, binaries=.* found 'noize'"),
         ("", "a defect out of .* found ''"),
         ("noise", "such as noise=10%, found 'noise'"),
         ("noise=", "such as noise=10%"),

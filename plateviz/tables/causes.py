@@ -14,8 +14,8 @@ from solver.data.result import FitResult
 from solver.results.diagnosis.causes import Causes, wrong_identifications
 from solver.results.diagnosis.table import Diagnosis
 
-# Beyond this, chi2 per degree of freedom is not noise of any kind.
-_WILD_CHI2 = 30.0
+# Share of chi2 from which the measurements that are far off explain why a fit does not converge.
+_WILD_SHARE = 0.5
 
 
 class Cause(NamedTuple):
@@ -69,12 +69,13 @@ def _stuck(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> Cause:
         cause = _in_words(Case(swapped[0], causes, diagnosis, result))
         return cause._replace(spoils=spoils, is_large=True)
     looks_like = [_in_words(Case(one, causes, diagnosis, result)) for one in causes.found[:1]]
-    far, total = int(diagnosis.rows.is_far.sum()), diagnosis.rows.n
-    noise = diagnosis.tests[0]
-    is_wild = noise.statistic > _WILD_CHI2 and not result.settings.robust
+    rows, noise = diagnosis.rows, diagnosis.tests[0]
+    far, total = int(rows.is_far.sum()), rows.n
+    explains = rows.chi2[rows.is_far].sum() > _WILD_SHARE * rows.chi2.sum()
+    is_wild = explains and not result.settings.robust
     words = (
         f"{far:,} of {total:,} residuals are more than six times as large as is usual in their "
-        f"exposures, and χ² per degree of freedom is {noise.statistic:.3g}."
+        f"exposures; χ² per degree of freedom without them is {noise.statistic:.3g}."
     )
     if is_wild:
         title = "measurements that are far off keep the fit from converging"

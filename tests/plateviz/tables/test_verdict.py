@@ -67,16 +67,27 @@ def test_solution_with_a_flaw_names_its_cause_first(monkeypatch, fit_result):
     assert judged.faults[0].startswith(judged.causes[0].title)
 
 
+def stuck_with(result, rows, factor):
+    """Return a result that did not converge, with some residuals a factor larger."""
+    residuals = result.residuals.copy()
+    residuals.loc[residuals.index[rows], ["residual_x", "residual_y"]] *= factor
+    return replace(with_summary(result, converged=False, reason="stuck"), residuals=residuals)
+
+
 def test_fit_that_does_not_converge_says_what_helps(fit_result):
-    residuals = fit_result.residuals.copy()
-    residuals[["residual_x", "residual_y"]] *= 100.0
-    stuck = replace(with_summary(fit_result, converged=False, reason="stuck"), residuals=residuals)
+    stuck = stuck_with(fit_result, slice(None, None, 100), 1000.0)
     judged = orbit_verdict(stuck)
     assert judged.state == "bad"
     assert [cause.name for cause in judged.causes] == ["wild-measurements"]
     assert judged.causes[0].options == ("--robust",)
     robust = replace(stuck, settings=stuck.settings.with_(robust=True))
     assert [cause.name for cause in orbit_verdict(robust).causes] == ["not-converged"]
+
+
+def test_outliers_are_not_blamed_where_all_measurements_are_far_off(fit_result):
+    [cause] = orbit_verdict(stuck_with(fit_result, slice(None), 100.0)).causes
+    assert cause.name == "not-converged"
+    assert "--robust" not in cause.options
 
 
 def test_swapped_measurements_are_listed_where_they_prevent_a_solution(fit_result):

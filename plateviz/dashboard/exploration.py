@@ -10,7 +10,7 @@ import param
 from plateviz.dashboard.address_parts import chosen, in_words
 from plateviz.dashboard.selected import KINDS
 from plateviz.plots.explored_rows import Columns
-from plateviz.plots.explored_text import parts_of, read_parts
+from plateviz.plots.explored_text import parts_of, read_parts, text_of
 
 PARTS = ("rows", "x", "y", "colour", "only", "between", "with", "selects", "zoom")
 """Parts of an address."""
@@ -91,6 +91,11 @@ class Exploration(param.Parameterized):
         values: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(Columns)}
         values |= {name: "" for name in _OPTIONAL if values[name] == NONE}
         return Columns(**values)
+
+    def texts(self) -> list[str]:
+        """Return what is to be drawn as a text of a report's option; none before it is known."""
+        # It has no columns before it is drawn.
+        return [] if self.x is None else [text_of(self.table, self.columns())]
 
     def restore(self, address: Mapping[str, str]) -> list[str]:
         """Draw what a page's address requests, once its table is there.

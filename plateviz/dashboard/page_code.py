@@ -9,7 +9,6 @@ from plateviz.dashboard.orbit_figures import chosen_of, figures_of
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
 from plateviz.plots.diagnostic import Chosen
-from plateviz.plots.explored_text import text_of
 from plateviz.plots.gallery import source_figures, survey_figures
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace, title_of
 from plateviz.runs.queries import SurveyRun
@@ -150,9 +149,7 @@ def _of_run(
 
 def _explored(exploration: Exploration) -> list[str]:
     """Return the options of a report that draws what Explore draws; none before it does."""
-    if exploration.x is None:
-        return []
-    return ["--explore", text_of(exploration.table, exploration.columns())]
+    return [part for text in exploration.texts() for part in ("--explore", text)]
 
 
 def _explored_as_python(exploration: Exploration, variable: str, session: Session) -> str:

@@ -7,7 +7,6 @@ from functools import partial
 from plateviz.dashboard.downloads import Download, Later, Progress, file_name
 from plateviz.dashboard.navigation import FoundSource, Navigation, View
 from plateviz.dashboard.solution import Solution
-from plateviz.plots.explored_text import text_of
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.reports.facts import facts_of
 from plateviz.reports.more_figures import NO_MORE, MoreFigures
@@ -49,9 +48,7 @@ def _on_screen(navigation: Navigation) -> MoreFigures:
     if workspace in (OrbitWorkspace.EXPLORE, SurveyWorkspace.EXPLORE):
         is_of_orbit = workspace is OrbitWorkspace.EXPLORE
         shown = navigation.exploration if is_of_orbit else navigation.survey_exploration
-        # It has no columns before it is drawn.
-        if shown.x is not None:
-            return MoreFigures(explored=[text_of(shown.table, shown.columns())])
+        return MoreFigures(explored=shown.texts())
     if workspace is OrbitWorkspace.ORDERS and session.other is not None:
         return MoreFigures(both=[session.figure_of_both])
     return NO_MORE

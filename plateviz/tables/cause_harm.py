@@ -8,6 +8,7 @@ from plateviz.tables.labels import id_strings
 from plateviz.tables.reference_influence import reference_influence
 from solver.data.result import FitResult
 from solver.results.diagnosis.exposures import WAVES
+from solver.results.diagnosis.table import BAD_RATE
 
 # Sources with fewer measurements do not say how good a solution is.
 _MIN_OBS = 10
@@ -56,6 +57,8 @@ def harm(case: Case) -> tuple[str, bool]:
             "measurements is more often far off, or less often, than its uncertainty says."
         )
         return spoils, False
+    if subject == "prior":
+        return _harm_of_prior(case)
     if subject == "noise":
         error, extent = 0.5 * abs(found.test.statistic - 1.0), ""
     else:
@@ -63,6 +66,21 @@ def harm(case: Case) -> tuple[str, bool]:
     return (
         f"It spoils the uncertainties, by about {100 * error:.0f} %{extent}, and the weights.",
         bool(error > _LARGE_ERROR),
+    )
+
+
+def _harm_of_prior(case: Case) -> tuple[str, bool]:
+    """Return the same for a prior that contradicts the measurements."""
+    others = [one for one in case.diagnosis.found(BAD_RATE) if one.subject != "prior"]
+    if others:
+        return (
+            "It spoils the calibration, and the positions with it: the residuals show what it "
+            "keeps the fit from following.",
+            True,
+        )
+    return (
+        "It spoils little: the measurements decide the values, and the residuals show nothing.",
+        False,
     )
 
 

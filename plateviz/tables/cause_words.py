@@ -12,6 +12,7 @@ from plateviz.tables.data_cause_words import (
     said_of_references,
     said_of_swapped,
 )
+from plateviz.tables.prior_words import said_of_prior
 
 _NM_PER_UM = 1000.0
 _ORDINALS = {2: "second", 3: "third"}
@@ -225,4 +226,5 @@ _WORDS: dict[str, Callable[[Case], Said]] = {
     "swing": _swing,
     "references": said_of_references,
     "reference": said_of_reference,
+    "prior": said_of_prior,
 }

@@ -9,6 +9,7 @@ from plateviz.tables.cause_case import Case
 from plateviz.tables.cause_harm import harm
 from plateviz.tables.cause_words import said_of
 from plateviz.tables.labels import exposure_labels, id_strings
+from plateviz.tables.prior_words import narrowed_priors, usual_priors
 from plateviz.tables.remedy import remedied
 from solver.data.result import FitResult
 from solver.results.diagnosis.causes import Causes, wrong_identifications
@@ -89,7 +90,11 @@ def _stuck(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> Cause:
         title = "the fit came to no solution"
         action = "check the start values, and allow more iterations"
         options = ()
-        if looks_like and looks_like[0].options:
+        narrow = narrowed_priors(result.settings)
+        if narrow:
+            words += f" Priors that are narrower than usual: {', '.join(narrow)}."
+            action, options = "give priors their usual widths", usual_priors(narrow)
+        elif looks_like and looks_like[0].options:
             words += f" The residuals so far look as if {looks_like[0].title}."
             action, options = looks_like[0].action, looks_like[0].options
     name = "wild-measurements" if is_wild else "not-converged"

@@ -17,7 +17,13 @@ from solver.results.diagnosis.projection import Projection
 from solver.results.diagnosis.rate import sigmas
 from solver.results.diagnosis.references import MEDIAN_CHI2
 from solver.results.diagnosis.scatter import Scatter, scatter_tests
-from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test, pattern_test
+from solver.results.diagnosis.table import (
+    CARE_RATE,
+    Diagnosis,
+    Test,
+    pattern_test,
+    prior_test,
+)
 
 _MOST_PATTERNS = 4
 # A pattern after the first one is named if it explains this share of what the first one does.
@@ -40,6 +46,7 @@ _MAKES_PATTERNS = (
     "quadratic",
     "references",
     "reference",
+    "prior",
 )
 _OF_EXPOSURES = ("stretch", "shear", "quadratic")
 # A cause of another kind is named beside the first one from this share of its sigmas.
@@ -89,6 +96,7 @@ def find_causes(diagnosis: Diagnosis) -> Causes:
     )
     found = [*_swinging(diagnosis), *patterns, *of_exposures, *_of_outliers(diagnosis)]
     found += [*_of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
+    found += _of_priors(diagnosis)
     found.sort(key=lambda one: -one.gain)
     return Causes(tuple(_of_their_own(found)), scatter[0])
 
@@ -268,3 +276,18 @@ def _of_references(diagnosis: Diagnosis) -> list[Found]:
     named = tuple(int(one) for one in ids[far][order])
     gain = float(np.sum(chi2[far] - 2.0 * gains.PER_PARAMETER))
     return [Found(worst._replace(subject="reference"), gain, named, float(far.sum()))]
+
+
+def _of_priors(diagnosis: Diagnosis) -> list[Found]:
+    """Return the prior that contradicts the values of its parameters, as a cause.
+
+    One that was set for this fit is the first suspect: whatever it keeps the calibration from
+    following is left in the residuals, and looks like something else.
+    """
+    limit = _limit(diagnosis)
+    against = [one for one in diagnosis.priors if one.log_chance < limit]
+    if not against:
+        return []
+    worst = min(against, key=lambda one: (not one.is_set, one.log_chance))
+    gain = np.inf if worst.is_set else gains.of_scale(worst.rms**2, 1.0)
+    return [Found(prior_test(worst), gain, size=worst.rms)]

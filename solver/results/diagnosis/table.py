@@ -12,6 +12,7 @@ from solver.data.result import FitResult
 from solver.results.diagnosis.exposures import WAVES, ExposureChi2, exposure_chi2
 from solver.results.diagnosis.modelled import is_adjusted
 from solver.results.diagnosis.patterns import Family, Patterns
+from solver.results.diagnosis.priors import PriorChi2, prior_chi2
 from solver.results.diagnosis.products import products
 from solver.results.diagnosis.projection import Projection, covariance_of_products
 from solver.results.diagnosis.rate import discoveries, log_chance, of_many, sigmas
@@ -32,6 +33,8 @@ CARE_RATE, BAD_RATE = 0.02, 0.002
 _OF_EXPOSURES = np.log(1e-3)
 # If more of the exposures swing than this share, it is not the pointing of some.
 _MOST_SWINGING = 0.3
+# Of the size of a normal value.
+_PRIOR_SCATTER = float(np.sqrt(1.0 - 2.0 / np.pi))
 
 
 class Test(NamedTuple):
@@ -41,7 +44,7 @@ class Test(NamedTuple):
     ----------
     name : of the test
     subject : what it is about, the key of its meaning
-    what : degree, step, detector or axis
+    what : degree, step, detector, axis, or place of the group in `solver.data.parameters`
     statistic, expected, scatter : value, and what a good solution has
     log_chance : logarithm of the probability of a value as far by chance
     sigma : the same as the distance of a normal value
@@ -82,6 +85,7 @@ class Diagnosis(NamedTuple):
     swinging : indices of the exposures whose pointing changed while they were read
     references : chi2 of each reference star
     swapped : measurements with each other's identification
+    priors : chi2 of the values of each group of parameters against their prior
     """
 
     tests: tuple[Test, ...]
@@ -95,6 +99,7 @@ class Diagnosis(NamedTuple):
     swinging: np.ndarray
     references: ReferenceChi2
     swapped: Swapped
+    priors: list[PriorChi2]
 
     def found(self, rate: float) -> tuple[Test, ...]:
         """Return the tests that are discoveries at a rate of false alarms over all tests."""
@@ -124,6 +129,7 @@ def diagnose(result: FitResult) -> Diagnosis:
         references, pairs = reference_chi2(result.sources), swapped(result)
         along, weight = products(patterns, rows), float(rows.weight.sum())
         projection = Projection(along, *covariance.result(), weight)
+    priors = prior_chi2(result)
     tests = [
         *(Test(one.name, one.name, (), *one[1:5], sigmas(one.log_chance)) for one in scatter),
         _of_pairs(pairs),
@@ -131,6 +137,7 @@ def diagnose(result: FitResult) -> Diagnosis:
         *_of_exposures(exposures, swinging),
         swings,
         *_of_references(result, references),
+        *(prior_test(one) for one in sorted(priors, key=lambda one: one.log_chance)[:1]),
     ]
     # A test that the fit itself adjusts counts, but never alarms.
     tests = [
@@ -149,6 +156,7 @@ def diagnose(result: FitResult) -> Diagnosis:
         swinging,
         references,
         pairs,
+        priors,
     )
 
 
@@ -180,6 +188,16 @@ def pattern_test(projection: Projection, family: Family, scale: float) -> Test:
         sigmas(chance),
         found.size,
     )
+
+
+def prior_test(found: PriorChi2) -> Test:
+    """Return the test of a group of parameters against their prior, by the rms of the values.
+
+    It is that of the worst of all groups, and counts as one test.
+    """
+    name = f"values of {found.group} against their prior"
+    numbers = found.rms, 1.0, _PRIOR_SCATTER, found.log_chance, sigmas(found.log_chance)
+    return Test(name, "prior", (found.place,), *numbers)
 
 
 def _of_exposures(found: ExposureChi2, swinging: np.ndarray) -> list[Test]:

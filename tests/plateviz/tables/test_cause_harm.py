@@ -1,6 +1,7 @@
 """What causes spoil, and by how much."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ from plateviz.tables import cause_harm
 from plateviz.tables.cause_case import Case
 from plateviz.tables.cause_harm import harm
 from solver.results.diagnosis.causes import Found, find_causes
-from solver.results.diagnosis.table import diagnose
+from solver.results.diagnosis.table import Diagnosis, diagnose
 
 
 def with_noise(result, factor):
@@ -88,3 +89,10 @@ def test_exposure_that_does_not_swing_is_not_said_to_spoil_by_chance(fit_result)
     excess = (diagnosis.exposures.swing * diagnosis.exposures.scale).argsort()[:3]
     spoils, _ = harm_of(fit_result, "swing", *map(int, excess))
     assert number_after(spoils, "by at most ") == 0.0
+
+
+def test_prior_spoils_much_where_the_residuals_show_it(monkeypatch, fit_result):
+    prior, noise = SimpleNamespace(subject="prior"), SimpleNamespace(subject="noise")
+    for found, is_much in (((prior,), False), ((prior, noise), True)):
+        monkeypatch.setattr(Diagnosis, "found", lambda *_, found=found: found)
+        assert harm_of(fit_result, "prior")[1] == is_much

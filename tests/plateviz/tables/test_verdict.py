@@ -90,6 +90,16 @@ def test_outliers_are_not_blamed_where_all_measurements_are_far_off(fit_result):
     assert "--robust" not in cause.options
 
 
+def test_fit_that_does_not_converge_with_narrow_priors_is_to_have_the_usual_ones(fit_result):
+    narrow = fit_result.settings.with_(prior_widths={"distortion_x": 1e-9})
+    [cause] = orbit_verdict(
+        stuck_with(replace(fit_result, settings=narrow), slice(None), 9.0)
+    ).causes
+    assert cause.name == "not-converged"
+    assert "narrower than usual: distortion_x." in cause.words
+    assert cause.options == ("--prior distortion_x=1um",)
+
+
 def test_swapped_measurements_are_listed_where_they_prevent_a_solution(fit_result):
     residuals = fit_result.residuals.copy()
     at, residual = ["nx", "ny"], ["residual_x", "residual_y"]

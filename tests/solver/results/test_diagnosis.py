@@ -16,6 +16,7 @@ from solver.results.diagnosis import projection, sample
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.columns import columns_at, order_of
 from solver.results.diagnosis.patterns import Patterns
+from solver.results.diagnosis.priors import prior_chi2
 from solver.results.diagnosis.projection import covariance_of_products
 from solver.results.diagnosis.rows import camera_rows, onto_focal_plane
 from solver.results.diagnosis.sample import sample_of
@@ -329,3 +330,47 @@ def test_noise_that_differs_between_exposures_is_not_heavy_tailed(clean):
     (kurtosis,) = [one for one in diagnosis.tests if one.subject == "kurtosis"]
     assert abs(kurtosis.statistic) < 4.0 * kurtosis.scatter
     assert find_causes(diagnosis).found[0].test.subject == "exposures"
+
+
+def prior_causes(result):
+    diagnosis = diagnose(result)
+    (test,) = [one for one in diagnosis.tests if one.subject == "prior"]
+    found = [one for one in find_causes(diagnosis).found if one.test.subject == "prior"]
+    return test, found
+
+
+def test_values_agree_with_the_priors_that_they_were_drawn_from(clean):
+    test, found = prior_causes(clean)
+    assert test.statistic < 1.5
+    assert not found
+
+
+def test_prior_that_contradicts_the_measurements_is_named(clean):
+    rows = clean.calibration.copy()
+    rows.loc[rows["group"] == "pitch_x", "offset"] = 8.0 * rows["prior_sigma"]
+    contradicted = replace(clean, calibration=rows)
+    test, (found,) = prior_causes(contradicted)
+    assert test.name == "values of pitch_x against their prior"
+    assert test.statistic == found.size == pytest.approx(8.0)
+    # The mean square of all values counts as one value, of the worst of some ten groups.
+    assert test.sigma == pytest.approx(8.0, abs=0.5)
+
+
+def test_prior_that_was_set_is_the_first_suspect(clean):
+    rows = clean.calibration.copy()
+    rows.loc[rows["group"] == "pitch_x", "offset"] = 8.0 * rows["prior_sigma"]
+    residuals = clean.residuals.copy()
+    residuals[["residual_x", "residual_y"]] *= 2.0
+    flawed = replace(clean, calibration=rows, residuals=residuals)
+    assert find_causes(diagnose(flawed)).found[0].test.subject == "noise"
+    by_hand = flawed.settings.with_(prior_widths={"pitch_x": 1e-3})
+    found = find_causes(diagnose(replace(flawed, settings=by_hand))).found
+    assert [one.test.subject for one in found] == ["prior"]
+
+
+def test_walk_has_no_prior_of_its_values(clean):
+    walk = clean.calibration.iloc[:3].assign(group="drift_walk_x", offset=100.0, prior_sigma=0.01)
+    together = pd.concat([clean.calibration, walk], ignore_index=True)
+    assert "drift_walk_x" not in {
+        one.group for one in prior_chi2(replace(clean, calibration=together))
+    }

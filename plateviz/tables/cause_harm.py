@@ -71,8 +71,7 @@ def harm(case: Case) -> tuple[str, bool]:
 
 def _harm_of_prior(case: Case) -> tuple[str, bool]:
     """Return the same for a prior that contradicts the measurements."""
-    others = [one for one in case.diagnosis.found(BAD_RATE) if one.subject != "prior"]
-    if others:
+    if any(one.subject != "prior" for one in case.diagnosis.found(BAD_RATE)):
         return (
             "It spoils the calibration, and the positions with it: the residuals show what it "
             "keeps the fit from following.",
@@ -191,8 +190,14 @@ def _references_off(result: FitResult) -> bool:
 
 
 def _rms(case: Case) -> float:
-    """Return the rms displacement of patterns that each exposure has of its own, um, or NaN."""
+    """Return the rms displacement, um, of patterns that each exposure has of its own, or NaN.
+
+    Of a prior it is that of the largest pattern that the residuals have.
+    """
     test = case.found.test
+    if test.subject == "prior":
+        sizes = [one.size_um for one in case.diagnosis.found(BAD_RATE)]
+        return max(filter(np.isfinite, sizes), default=float("nan"))
     if test.subject not in ("stretch", "shear", "quadratic"):
         return float("nan")
     excess = max(test.statistic - test.expected, 0.0)

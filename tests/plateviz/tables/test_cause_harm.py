@@ -92,7 +92,17 @@ def test_exposure_that_does_not_swing_is_not_said_to_spoil_by_chance(fit_result)
 
 
 def test_prior_spoils_much_where_the_residuals_show_it(monkeypatch, fit_result):
-    prior, noise = SimpleNamespace(subject="prior"), SimpleNamespace(subject="noise")
-    for found, is_much in (((prior,), False), ((prior, noise), True)):
+    nothing = float("nan")
+    for others, is_much in (({}, False), ({"noise": nothing}, True), ({"drift": 1.0}, True)):
+        found = [
+            SimpleNamespace(subject=subject, size_um=size)
+            for subject, size in {"prior": nothing, **others}.items()
+        ]
         monkeypatch.setattr(Diagnosis, "found", lambda *_, found=found: found)
-        assert harm_of(fit_result, "prior")[1] == is_much
+        spoils, is_large = harm_of(fit_result, "prior")
+        assert is_large == is_much
+        assert ("mas rms" in spoils) == ("drift" in others)
+    # A pattern that is small beside the uncertainties, however certain.
+    found = [SimpleNamespace(subject="drift", size_um=1e-6)]
+    monkeypatch.setattr(Diagnosis, "found", lambda *_: found)
+    assert not harm_of(fit_result, "prior")[1]

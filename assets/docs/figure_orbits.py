@@ -90,6 +90,11 @@ def _drifting_detector(rows: pd.DataFrame, _: np.random.Generator) -> None:
     rows.loc[on, "nx"] += 0.02 * rows.loc[on, "plate_id"] / 23.0
 
 
+def _moved_in_field(rows: pd.DataFrame, _: np.random.Generator) -> None:
+    """Move detector 2 along x in field 3, by the measurement error."""
+    rows.loc[(rows["detector_id"] == 2) & (rows["field_id"] == 3), "nx"] += 0.01
+
+
 def _deforming(rows: pd.DataFrame, random: np.random.Generator) -> None:
     """Add gradients of waves of 12 mm to each exposure, of a quarter of the measurement error."""
     number = {d.detector_id: i for i, d in enumerate(MINI_MOCK.detectors)}
@@ -239,6 +244,7 @@ ORBITS: Mapping[str, Pair] = {
         lambda: _chosen(_with_magnitudes(_measured(_depending_on_phase))),
     ),
     "mean-residual-map": (_good_chosen, lambda: _chosen(_fitted(_measured(_displaced_columns)))),
+    "field-residuals": (_good_chosen, lambda: _chosen(_fitted(_measured(_moved_in_field)))),
     "solution-tests": (_good_chosen, lambda: _chosen(_fitted(_measured(_drifting_detector)))),
     "residual-scatter": (
         lambda: _chosen(_good(), detector=1),

@@ -80,7 +80,8 @@ DIAGNOSTICS = (
         _plot,
         needs_verdict=True,
         # A row of the card's height for the name of each test.
-        least_height=580,
+        least_height=430,
+        narrow_height=580,
         equation="σ of a normal value with the same probability by chance",
     ),
 )

@@ -23,6 +23,11 @@ from plateviz.tables.eigenmodes import (
     eigenmode_spectrum,
 )
 from plateviz.tables.exposure_tracks import exposure_tracks
+from plateviz.tables.field_residuals import (
+    FieldStatistics,
+    field_residuals,
+    field_statistics,
+)
 from plateviz.tables.footprint import footprint_fields, footprint_sources
 from plateviz.tables.histogram import pull_bins
 from plateviz.tables.largest_residuals import largest_residuals
@@ -87,6 +92,7 @@ __all__ = [
     "CLASSES",
     "ComparedRun",
     "CorrelationStatistics",
+    "FieldStatistics",
     "MapStatistics",
     "NON_REFERENCE",
     "REFERENCE",
@@ -111,6 +117,8 @@ __all__ = [
     "distortion_truth",
     "exposure_chi2",
     "exposure_tracks",
+    "field_residuals",
+    "field_statistics",
     "footprint_fields",
     "footprint_sources",
     "julian_year",

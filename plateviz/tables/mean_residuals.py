@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.chance import largest_by_chance
-from plateviz.tables.focal_residuals import focal_residuals
+from plateviz.tables.focal_residuals import FocalResiduals, focal_residuals
 from solver.data.instrument import Detector, Instrument
 from solver.data.result import FitResult
 
@@ -50,9 +50,7 @@ def mean_residuals(
     if bins is None:
         wanted = int(np.sqrt(len(found) / (_PER_BIN * len(instrument.detectors))))
         bins = min(max(wanted, _FEWEST_BINS), _MOST_BINS)
-    grids = [_grid(detector, bins) for detector in instrument.detectors]
-    table = pd.concat(grids, ignore_index=True)
-    cells = _cells(found.at, found.detector, grids)
+    table, cells = square_bins(found, instrument, bins)
     table["n"] = np.bincount(cells, minlength=len(table))
     kept, weighted = found.kept_by_sources(cells, len(table)), found.weight * found.vector
     own = [np.bincount(cells, of_axis, minlength=len(table)) for of_axis in found.weight.T]
@@ -108,6 +106,26 @@ def map_statistics(table: pd.DataFrame) -> MapStatistics:
         largest=float(np.abs(pulls).max()),
         limit=largest_by_chance(pulls.size),
     )
+
+
+def square_bins(
+    found: FocalResiduals, instrument: Instrument, bins: int
+) -> tuple[pd.DataFrame, np.ndarray]:
+    """Return the bins over the detectors, a row each, and the row of each measurement.
+
+    Parameters
+    ----------
+    found : residuals of n measurements
+    instrument : gives the outlines of the detectors
+    bins : number of bins along the longer side of a detector
+
+    Returns
+    -------
+    Table of `detector_id`, `left`, `right`, `bottom`, `top` (mm on the focal plane), and an array
+    of shape (n,)
+    """
+    grids = [_grid(detector, bins) for detector in instrument.detectors]
+    return pd.concat(grids, ignore_index=True), _cells(found.at, found.detector, grids)
 
 
 def _grid(detector: Detector, bins: int) -> pd.DataFrame:

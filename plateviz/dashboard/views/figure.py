@@ -83,8 +83,8 @@ class FigureView(pn.viewable.Viewer):
         theme : of the first drawing
         """
         super().__init__(**params)
-        self.is_wide, self.is_tall = figure.is_wide, figure.least_height >= 2 * _LEAST_HEIGHT
-        self.card_name, self._plot_figure = figure.name, plot_figure
+        self.is_wide, self.card_name = figure.is_wide, figure.name
+        self._plot_figure = plot_figure
         self._actions, self._zoom = actions or PointActions(), zoom
         self._selected = self._shown_selected = NO_IDS
         self._figure: Figure | None = None
@@ -103,8 +103,6 @@ class FigureView(pn.viewable.Viewer):
         least = max(_LEAST_HEIGHT, figure.least_height)
         heights = least, max(least, figure.narrow_height)
         self._card = _card(self.visibility, self._body, name=figure.name, least_heights=heights)
-        if self.is_tall:
-            self._card.styles = {**self._card.styles, "grid-row": "span 2"}
         self.change(theme)
         self._show_text("Being drawn.")
 

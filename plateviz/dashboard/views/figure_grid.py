@@ -44,7 +44,7 @@ class FigureGrid(pn.viewable.Viewer):
         self._views = list(views)
         for view in self._views:
             view.visibility.param.watch(wake, ["is_near", "room"])
-        n_places = len(self._views) + sum(view.is_tall for view in self._views) + len(others)
+        n_places = len(self._views) + len(others)
         if columns == 2 and n_places % 2:
             next((v for v in self._views if v.is_wide), self._views[-1]).take_row()
         self._box = pmui.FlexBox(

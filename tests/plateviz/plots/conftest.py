@@ -64,6 +64,10 @@ def orbit_drawings(fit_result, linear_fit, compared, make_fit_result, truth, ins
             lambda t, **o: plots.plot_mean_residual_map(t, instrument, **o),
             tables.mean_residuals(fit_result, instrument),
         ),
+        "field_residuals": (
+            lambda t, **o: plots.plot_field_residuals(t, detectors=instrument.detectors, **o),
+            tables.field_residuals(fit_result, instrument),
+        ),
         "binned_residuals": (
             plots.plot_binned_residuals,
             tables.binned_residuals(fit_result, instrument),

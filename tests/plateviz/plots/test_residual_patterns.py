@@ -10,7 +10,13 @@ from plateviz.plots.gallery import diagnostics
 from plateviz.plots.style import SERIES_COLOURS
 from tests.plateviz.plots.drawn import subtitle_of
 
-NAMES = ["binned-residuals", "mean-residual-map", "detector-shifts", "residual-correlation"]
+NAMES = [
+    "binned-residuals",
+    "mean-residual-map",
+    "field-residuals",
+    "detector-shifts",
+    "residual-correlation",
+]
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +69,16 @@ def test_map_states_what_chance_does(means, instrument):
     assert f"scatter {found.spread:.2f} times" in y
     assert "largest bin 7.0σ" in y
     assert f"chance exceeds {found.limit:.1f}σ in one of 100" in y
+
+
+def test_each_field_has_a_panel_with_its_chi2(fit_result, instrument):
+    table = tables.field_residuals(fit_result, instrument)
+    frames = plots.plot_field_residuals(table, detectors=instrument.detectors)
+    for frame, (field, rows) in zip(frames, table.groupby("field_id"), strict=True):
+        found = tables.field_statistics(rows)
+        assert frame.title.startswith(f"Field {field}")
+        assert f"χ²/dof {found.chi2 / found.dof:.2f} (1 ± " in subtitle_of(frame)
+        assert len(frame["tails"]) == len(rows)
 
 
 def test_each_quantity_has_a_panel_with_means_and_scatter(binned):

@@ -1,4 +1,4 @@
-"""A workspace: its cards have the row that fills the window, tall ones two of the grid's rows."""
+"""A workspace: its cards have the row that fills the window, and their grid has no hole."""
 
 import panel as pn
 import pytest
@@ -32,15 +32,14 @@ def test_hidden_parts_leave_the_cards_the_row_that_fills_the_window(view):
     assert box.sx["gridTemplateRows"] == "auto minmax(0, 1fr)"
 
 
-def test_card_that_needs_the_height_of_two_takes_two_rows():
+def test_first_wide_card_takes_a_row_of_a_grid_that_would_have_a_hole():
     named = {one.name: one for one in diagnostics()}
-    tall, low = (
-        FigureView(named[name], lambda: None) for name in ("solution-tests", "residual-map")
+    wide, second, third = (
+        FigureView(named[name], lambda: None)
+        for name in ("mean-residual-map", "solution-tests", "residual-map")
     )
-    wide = FigureView(named["mean-residual-map"], lambda: None)
-    assert tall.__panel__().styles["grid-row"] == "span 2"
-    assert "grid-row" not in low.__panel__().styles
-    FigureGrid([wide, tall, low], lambda *_: None)
+    FigureGrid([second, wide], lambda *_: None)
     assert "grid-column" not in wide.__panel__().styles
-    FigureGrid([wide, tall], lambda *_: None)
+    FigureGrid([second, wide, third], lambda *_: None)
     assert wide.__panel__().styles["grid-column"] == "1 / -1"
+    assert "grid-column" not in second.__panel__().styles

@@ -27,6 +27,7 @@ from solver.simulate.survey import simulate_survey
 _SKY = replace(
     SurveySettings(orbits=48, seed=5).scaled(5_000), n_artificial=60, pair_spread_deg=0.15
 )
+_WIDE = SurveySettings(orbits=24, seed=5).scaled(10_000)
 _WANDERING = replace(_SKY, pair_spread_deg=1.0)
 _FULL_SKY = SurveySettings(seed=5).scaled(30_000)
 _POSITION_ERRORS = ("ra_error", "dec_error", "pmra_error", "pmdec_error")
@@ -70,6 +71,17 @@ class Surveys:
         """The same survey with a distortion that changes from orbit to orbit."""
         settings = replace(_SKY, defects=("distortion-trend=0.3um",))
         return _fitted(self._simulated("trending", settings), "default", FitSettings())
+
+    @cached_property
+    def wide(self) -> SurveyRun:
+        """A survey whose fields move as far as the paper's."""
+        return _fitted(self._simulated("wide", _WIDE), "default", FitSettings())
+
+    @cached_property
+    def zonal(self) -> SurveyRun:
+        """The same survey with a catalogue whose errors neighbouring stars share."""
+        settings = replace(_WIDE, defects=("zonal-errors=1mas",))
+        return _fitted(self._simulated("zonal", settings), "default", FitSettings())
 
     def counted(self, settings: SurveySettings) -> SurveyTables:
         """Return a survey with the numbers of orbits of its sources, without a fit."""
@@ -148,6 +160,7 @@ SURVEYS: Mapping[str, SurveyPair] = {
     "orbit-health": (_RUNS[0], lambda s: survey_tables(s.ageing)),
     "sky-distribution": (lambda _: _sky(), lambda _: _sky(_half_the_references)),
     "prior-separation": (lambda _: _sky(), lambda _: _sky(_overconfident)),
+    "zonal-errors": (lambda s: survey_tables(s.wide), lambda s: survey_tables(s.zonal)),
     "orbit-counts": (_RUNS[0], lambda s: s.counted(_WANDERING)),
     "error-by-count": _RUNS,
     "reference-scatter": _RUNS,

@@ -84,6 +84,7 @@ from plateviz.tables.sources import (
 )
 from plateviz.tables.summary import SummaryItem, summary_strip
 from plateviz.tables.time_series import time_series
+from plateviz.tables.zonal_errors import ZonalStatistics, zonal_errors, zonal_statistics
 from solver.model.apparent_motion import julian_year
 
 __all__ = [
@@ -176,4 +177,7 @@ __all__ = [
     "track_statistics",
     "uncertainty",
     "uncertainty_by_count",
+    "ZonalStatistics",
+    "zonal_errors",
+    "zonal_statistics",
 ]

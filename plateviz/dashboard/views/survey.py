@@ -53,6 +53,7 @@ from solver.errors import InputError
 _BEING_READ = "<p class='verdict judging'>This run is being read and judged.</p>"
 _NO_OTHER = "No other run has been read."
 _WHAT_TO_DO = "What was read before stays. Reload the page once the run is there again."
+_COLUMNS = {SurveyWorkspace.VERDICT: 1, SurveyWorkspace.CATALOGUE: 3}
 
 
 class SurveyPage(pn.viewable.Viewer):
@@ -146,10 +147,12 @@ class SurveyPage(pn.viewable.Viewer):
         if one is SurveyWorkspace.COMPARE:
             return self._compare_runs(figures)
         views = [self._figure_view(f) for f in figures]
-        grid = FigureGrid(views, self._wake, columns=1 if is_first else 2)
+        grid = FigureGrid(views, self._wake, columns=_COLUMNS.get(one, 2))
         for view, figure in zip(views, figures, strict=True):
             if figure.takes_row:
                 view.take_row()
+            elif one is SurveyWorkspace.CATALOGUE and figure.is_wide:
+                view.take_two_columns()
         self._grids[one] = grid
         self._show_selected()
         if not is_first:

@@ -14,7 +14,7 @@ from plateviz.tables.run_diagnosis import no_tests
 from solver.simulate.settings import SurveySettings
 from solver.simulate.true_calibration import true_calibration
 from tests.plateviz.linear_stars import N_STARS, LinearStars
-from tests.plateviz.run_tables import calibrations
+from tests.plateviz.run_tables import calibrations, zonal
 
 
 @pytest.fixture(scope="module")
@@ -133,6 +133,7 @@ def survey_drawings(survey, errors_by_count):
             plots.plot_prior_separation,
             tables.prior_separation(survey.catalogue, survey.truth),
         ),
+        "zonal_errors": (plots.plot_zonal_errors, zonal(30.0)),
         "orbit_counts": (plots.plot_orbit_counts, tables.orbit_counts(survey.motions)),
         "error_by_count": (plots.plot_error_by_count, errors_by_count),
         "reference_scatter": (

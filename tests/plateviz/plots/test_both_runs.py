@@ -14,7 +14,7 @@ from plateviz.tables import motion_differences, shared_motions
 from plateviz.tables.run_diagnosis import no_tests
 from plateviz.tables.survey_tables import SurveyTables
 from tests.plateviz.plots.drawn import plots_of, subtitle_of
-from tests.plateviz.run_tables import calibrations
+from tests.plateviz.run_tables import calibrations, zonal
 
 (DIFFERENCES,) = (one for one in survey_figures() if one.name == "motion-differences")
 
@@ -22,7 +22,7 @@ from tests.plateviz.run_tables import calibrations
 @pytest.fixture(scope="module")
 def tables(survey, errors_by_count):
     """Two runs, of which the second has larger chi2 and other motions."""
-    tests = replace(no_tests(), calibrations=calibrations(0.2))
+    tests = replace(no_tests(), calibrations=calibrations(0.2), zonal=zonal(30.0))
     a = SurveyTables(
         survey.orbits, survey.motions, survey.catalogue, survey.truth, errors_by_count, tests=tests
     )

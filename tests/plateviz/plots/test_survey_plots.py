@@ -13,7 +13,7 @@ from plateviz.tables.labels import short_id
 from plateviz.tables.run_diagnosis import no_tests
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from tests.plateviz.plots.drawn import plots_of, subtitle_of
-from tests.plateviz.run_tables import calibrations
+from tests.plateviz.run_tables import calibrations, zonal
 
 
 @pytest.mark.parametrize("name", ["reference_scatter", "sky_track", "time_series"])
@@ -229,7 +229,7 @@ def test_source_of_few_orbits_is_drawn(survey, number):
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_gallery_draws_every_figure_of_a_survey(survey, errors_by_count, theme):
-    tests = replace(no_tests(), calibrations=calibrations(0.2))
+    tests = replace(no_tests(), calibrations=calibrations(0.2), zonal=zonal(30.0))
     full = SurveyTables(
         survey.orbits, survey.motions, survey.catalogue, survey.truth, errors_by_count, tests=tests
     )
@@ -267,3 +267,17 @@ def test_trends_are_in_units_that_suit_their_values(drawings, unit, factor, show
     assert max(frame.y.limits) == pytest.approx(limit, rel=0.3)
     assert f"{shown},\n" in frame.subtitle
     assert set(frame["angle of the first orbit"].columns["unit"]) == {shown}
+
+
+@pytest.mark.parametrize(("chi2", "words"), [(30.0, "12 ± 5: rms 400 µas"), (20.0, "as by chance")])
+def test_smooth_errors_have_a_size_if_chance_does_not_explain_them(chi2, words):
+    (frame,) = plots.plot_zonal_errors(zonal(chi2))
+    assert f"χ² {chi2:.0f}, expected 12 ± 5" in subtitle_of(frame)
+    assert words in subtitle_of(frame)
+    assert len(frame["tails"]) == len(tables.zonal_errors(zonal(chi2)))
+    assert frame.x.limits[0] > frame.x.limits[1]
+
+
+def test_smooth_errors_of_too_few_orbits_are_not_drawn():
+    figure = plots.plot_zonal_errors(zonal(30.0).head(0))
+    assert "too few orbits" in figure.message

@@ -108,6 +108,7 @@ def stages(
     if reduced is None:
         sys.exit("the simulated orbit has no solution")
     covariance = covariances(reduced)
+    walking = build_problem(data, MINI_MOCK, WALKING)
     return {
         "build_problem": lambda: build_problem(data, MINI_MOCK, settings),
         "rebuilt, for other settings": lambda: rebuilt(problem, MINI_MOCK, settings),
@@ -120,6 +121,7 @@ def stages(
         "from the catalogue to marginal sigmas": lambda: fit_with_sigmas(problem, settings),
         **{f"what if: {name}": what_if(data, *change) for name, change in changes(problem).items()},
         "svi, one step": svi_block(problem, settings, mode),
+        "to marginal sigmas, random walk 2": lambda: fit_with_sigmas(walking, WALKING),
         "fit_orbit, with all tables": lambda: fit_orbit(data, MINI_MOCK, settings),
         "fit_orbit, random walk 2": lambda: fit_orbit(data, MINI_MOCK, WALKING),
         # Of a copy, which keeps nothing of the time before.

@@ -28,7 +28,7 @@ pytestmark = [pytest.mark.ui, pytest.mark.slow]
 
 N_ORBITS = 3
 # They ask for more orbits, or for more of a source, than a small survey has.
-EMPTY = {"reference-scatter", "motion-pulls", "calibration-trends"}
+EMPTY = {"reference-scatter", "motion-pulls", "calibration-trends", "zonal-errors"}
 
 # Rows of the longest data source of a figure, words apart, in a list: empty until it is drawn.
 ROWS_OF = f"""name => {{ {VIEWS}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
 
 from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message, side_by_side
@@ -14,7 +15,7 @@ from plateviz.tables.field_residuals import field_residuals, field_statistics
 from solver.data.instrument import Detector
 
 _TITLE = "Residuals of each field against the others"
-_MARGIN, _MOST_COLUMNS = 1.25, 4
+_MARGIN, _MOST_COLUMNS = 1.07, 4
 _HOVER = [
     ("at", "@{x}{0.00}, @{y}{0.00} mm, detector @{detector_id}"),
     ("x", "@{difference_x_mpix}{0.00} ± @{sigma_x_mpix}{0.00} mpix"),
@@ -40,7 +41,9 @@ def plot_field_residuals(
         text = "No two fields with enough measurements to compare"
         return message(_TITLE, text, width=FRAME_WIDTH, xlabel=XLABEL, ylabel=YLABEL)
     vectors = table.assign(u=table["difference_x_mpix"], v=table["difference_y_mpix"])
-    area = field_about(table, _MARGIN)
+    # Bins may be large, and end far from their middle.
+    corners = [table[["x", "y"]], *(one.corners_um() / 1000.0 for one in detectors)]
+    area = field_about(pd.DataFrame(np.concatenate(corners), columns=["x", "y"]), _MARGIN)
     scale, rms = automatic_scale(vectors, area), rms_length(vectors)
     length = round_125(2.0 * rms)
     panels = [

@@ -34,7 +34,7 @@ def plot_zonal_errors(zonal: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figur
     width : of the frame, screen pixels
     """
     if zonal.empty:
-        text = "No test for smooth errors, because there are too few orbits"
+        text = "No test for smooth errors: it is made at the end of a run of eight or more orbits"
         return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     table, found = zonal_errors(zonal), zonal_statistics(zonal)
     vectors = table.assign(

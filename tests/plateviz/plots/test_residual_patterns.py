@@ -81,6 +81,15 @@ def test_each_field_has_a_panel_with_its_chi2(fit_result, instrument):
         assert len(frame["tails"]) == len(rows)
 
 
+def test_detectors_are_whole_however_large_the_bins_are(fit_result, instrument):
+    table = tables.field_residuals(fit_result, instrument, bins=2)
+    reach = max(abs(one.corners_um()).max() for one in instrument.detectors) / 1000.0
+    for frame in plots.plot_field_residuals(table, detectors=instrument.detectors):
+        assert frame.x.limits[0] < -reach
+        assert frame.x.limits[1] > reach
+        assert frame.y.limits[1] > reach
+
+
 def test_each_quantity_has_a_panel_with_means_and_scatter(binned):
     frames = plots.plot_binned_residuals(binned)
     for frame, (name, rows) in zip(frames, binned.groupby("quantity", sort=False), strict=True):

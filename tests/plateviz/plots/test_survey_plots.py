@@ -278,6 +278,6 @@ def test_smooth_errors_have_a_size_if_chance_does_not_explain_them(chi2, words):
     assert frame.x.limits[0] > frame.x.limits[1]
 
 
-def test_smooth_errors_of_too_few_orbits_are_not_drawn():
+def test_smooth_errors_that_are_not_tested_say_when_they_are():
     figure = plots.plot_zonal_errors(zonal(30.0).head(0))
-    assert "too few orbits" in figure.message
+    assert "eight or more orbits" in figure.message

@@ -46,8 +46,8 @@ def plot_zonal_errors(zonal: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figur
     half = _MARGIN * float(zonal[["half_ra", "half_dec"]].to_numpy().max())
     area = Field((half, -half), (-half, half))
     # To the scale of what can be seen: a field that is mere chance has short arrows.
-    scale = round_125(_TYPICAL_SHARE * area.width / max(found.typical_mas, found.rms_mas))
-    length = round_125(2.0 * max(found.typical_mas, found.rms_mas))
+    size = max(found.typical_mas, found.rms_mas)
+    scale, length = round_125(_TYPICAL_SHARE * area.width / size), round_125(2.0 * size)
     return framed(
         [
             *arrows(vectors, scale=scale, field=area, colour="mark", hover=_HOVER),

@@ -5,8 +5,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from solver.results.diagnosis.rate import log_chance, sigmas
-
 # Places along the longer side of the area.
 _PLACES = 9
 
@@ -53,7 +51,6 @@ class ZonalStatistics(NamedTuple):
     Attributes
     ----------
     chi2, dof, scatter : of the directions tested, and its mean and standard deviation by chance
-    sigma : distance at which a normal value has the same chance
     rms_mas : of the field along one axis, by the excess of chi2; 0 if there is none
     typical_mas : rms of a field that would be seen in half of all such runs
     """
@@ -61,7 +58,6 @@ class ZonalStatistics(NamedTuple):
     chi2: float
     dof: float
     scatter: float
-    sigma: float
     rms_mas: float
     typical_mas: float
 
@@ -71,5 +67,4 @@ def zonal_statistics(zonal: pd.DataFrame) -> ZonalStatistics:
     chi2, dof, rms, typical = (
         float(zonal[name].iloc[0]) for name in ("chi2", "dof", "rms", "typical")
     )
-    sigma = sigmas(log_chance(chi2, dof))
-    return ZonalStatistics(chi2, dof, float(np.sqrt(2.0 * dof)), float(sigma), rms, typical)
+    return ZonalStatistics(chi2, dof, float(np.sqrt(2.0 * dof)), rms, typical)

@@ -147,11 +147,12 @@ class SurveyPage(pn.viewable.Viewer):
         if one is SurveyWorkspace.COMPARE:
             return self._compare_runs(figures)
         views = [self._figure_view(f) for f in figures]
-        grid = FigureGrid(views, self._wake, columns=_COLUMNS.get(one, 2))
+        columns = _COLUMNS.get(one, 2)
+        grid = FigureGrid(views, self._wake, columns=columns)
         for view, figure in zip(views, figures, strict=True):
             if figure.takes_row:
                 view.take_row()
-            elif one is SurveyWorkspace.CATALOGUE and figure.is_wide:
+            elif columns > 2 and figure.is_wide:
                 view.take_two_columns()
         self._grids[one] = grid
         self._show_selected()

@@ -35,8 +35,10 @@ WINDOW = "window"
 _FULL = Path(__file__).with_name("full.html")
 _BEGIN = Path(__file__).with_name("begin.js")
 _COMPONENTS = Path(__file__).with_name("components.js")
-# The script that loads components.
-_LOADER = re.compile(r"<script[^>]*/es-module-shims[^>]*></script>")
+# The scripts with which Panel loads components in old browsers; `components.js` has another way.
+_LOADER = re.compile(
+    r'<script type="esms-options">.*?</script>|<script[^>]*/es-module-shims[^>]*></script>'
+)
 # Id of the element that the page is put into.
 _PLACE = "page"
 _MOST_BYTES = 2**16
@@ -176,11 +178,9 @@ class EmptyPage:
         )
         begin = _BEGIN.read_text(encoding="utf-8").replace('"TOKEN"', json.dumps(token))
         of_components = _COMPONENTS.read_text(encoding="utf-8")
-        scripts = f"<script>{begin}</script>\n<script>{of_components}</script>"
-        link = f'<link rel="preload" as="fetch" crossorigin href="{components}">'
-        html = html.replace("</title>", f"</title>\n{link}\n{scripts}", 1)
-        load = f"window.importShim?.({json.dumps(components)}).catch(() => {{}})"
-        html = _LOADER.sub(lambda found: f"{found[0]}\n<script>{load}</script>", html, count=1)
+        load = f"importShim({json.dumps(components)}).catch(() => {{}})"
+        scripts = "\n".join(f"<script>{one}</script>" for one in (begin, of_components, load))
+        html = _LOADER.sub("", html).replace("</title>", f"</title>\n{scripts}", 1)
         # A page straight in the body would be taken for a part of another page, and leave the
         # body without the colours of its theme.
         html = html.replace("<body>", f'<body>\n<div id="{_PLACE}"></div>', 1)

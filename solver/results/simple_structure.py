@@ -5,10 +5,10 @@ further matrices as diagonal as possible are well defined and can be named (join
 diagonalisation by plane rotations, after Cardoso and Souloumiac 1996).
 """
 
-from itertools import combinations
+from collections.abc import Iterator
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 _MIN_ANGLE = 1e-9
 _MAX_SWEEPS = 60
@@ -23,24 +23,55 @@ def joint_axes(
     ----------
     matrices : symmetric matrices
     """
-    rotated, axes = matrices.copy(), np.eye(matrices.shape[-1])
+    axes = np.eye(matrices.shape[-1])
+    rounds = list(_rounds(len(axes)))
     for _ in range(_MAX_SWEEPS):
-        angles = [_rotate(rotated, axes, a, b) for a, b in combinations(range(len(axes)), 2)]
-        if max(map(abs, angles), default=0.0) < _MIN_ANGLE:
+        largest = 0.0
+        for a, b in rounds:
+            angles = _angles(matrices, a, b)
+            rotation = _rotation(angles, a, b, len(axes))
+            matrices = rotation.T @ matrices @ rotation
+            axes = axes @ rotation
+            largest = max(largest, float(np.abs(angles).max(initial=0.0)))
+        if largest < _MIN_ANGLE:
             break
     return axes
 
 
-def _rotate(
-    matrices: Float[np.ndarray, "matrix n n"], axes: Float[np.ndarray, "n n"], a: int, b: int
-) -> float:
-    """Rotate axes a and b in their plane, in place, and return the angle."""
+def _rounds(n: int) -> Iterator[tuple[Int[np.ndarray, " pair"], Int[np.ndarray, " pair"]]]:
+    """Yield every pair of n axes once, in rounds of disjoint pairs, which rotate at once.
+
+    As in a tournament of n players: one stays, the others move on by one place after each round.
+    """
+    places = np.arange(n + n % 2)
+    for _ in range(len(places) - 1):
+        a, b = places[: len(places) // 2], places[len(places) // 2 :][::-1]
+        # With an odd number, one axis has none to be paired with.
+        is_pair = np.maximum(a, b) < n
+        yield a[is_pair], b[is_pair]
+        places = np.concatenate([places[:1], np.roll(places[1:], 1)])
+
+
+def _angles(
+    matrices: Float[np.ndarray, "matrix n n"],
+    a: Int[np.ndarray, " pair"],
+    b: Int[np.ndarray, " pair"],
+) -> Float[np.ndarray, " pair"]:
+    """Return the angles by which to rotate axes a and b, each in the plane of its pair."""
     difference, mixed = matrices[:, a, a] - matrices[:, b, b], 2.0 * matrices[:, a, b]
-    gain, loss = 2.0 * (difference @ mixed), difference @ difference - mixed @ mixed
-    angle = 0.25 * float(np.arctan2(gain, loss))
-    plane, c, s = [a, b], np.cos(angle), np.sin(angle)
-    rotation = np.array([(c, -s), (s, c)])
-    axes[:, plane] = axes[:, plane] @ rotation
-    matrices[:, :, plane] = matrices[:, :, plane] @ rotation
-    matrices[:, plane, :] = rotation.T @ matrices[:, plane, :]
-    return angle
+    gain = 2.0 * (difference * mixed).sum(axis=0)
+    loss = (difference**2 - mixed**2).sum(axis=0)
+    return 0.25 * np.arctan2(gain, loss)
+
+
+def _rotation(
+    angles: Float[np.ndarray, " pair"],
+    a: Int[np.ndarray, " pair"],
+    b: Int[np.ndarray, " pair"],
+    n: int,
+) -> Float[np.ndarray, "n n"]:
+    rotation = np.eye(n)
+    rotation[a, a] = rotation[b, b] = np.cos(angles)
+    rotation[b, a] = np.sin(angles)
+    rotation[a, b] = -rotation[b, a]
+    return rotation

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from plateviz.reports.more_figures import MoreFigures
     from plateviz.reports.report import Facts, Report
     from plateviz.runs.kept_solutions import KeptSolution
+    from plateviz.runs.queries import SurveyRun
     from solver.data.result import FitResult
 
 
@@ -60,7 +61,8 @@ def report(
     other: Annotated[
         str | None,
         typer.Option(
-            help="Solution to compare the orbit with: the name of a run, or a result file."
+            help="What to compare with: the name of another run of the survey, or, of an orbit, a "
+            "result file."
         ),
     ] = None,
     instrument: Annotated[
@@ -70,7 +72,8 @@ def report(
     both: Annotated[
         list[str] | None,
         typer.Option(
-            help="Also draw this figure of both solutions, such as residual-map; may be repeated.",
+            help="Also draw this figure of both solutions, such as residual-map, or of both runs, "
+            "such as orbit-health; may be repeated.",
             metavar="FIGURE",
         ),
     ] = None,
@@ -168,12 +171,10 @@ def _compose(request: ReportRequest) -> "Report":
         raise InputError(
             "--instrument: expected with a result of `plateviz fit` only, found a survey"
         )
-    if request.other is not None and request.orbit is None:
-        raise InputError(
-            "--other: expected with --orbit or a result of `plateviz fit` only, found neither"
-        )
+    if request.other is not None and request.source is not None:
+        raise InputError("--other: expected with an orbit or a survey, found --source")
     if request.both and request.other is None:
-        raise InputError("--both: expected with --other, found no solution to compare with")
+        raise InputError("--both: expected with --other, found nothing to compare with")
     if request.explore and request.source is not None:
         raise InputError("--explore: expected with an orbit or a survey, found --source")
     from plateviz.reports.survey import source_report, survey_orbit_report, survey_report
@@ -183,7 +184,7 @@ def _compose(request: ReportRequest) -> "Report":
     if request.source is not None:
         return source_report(run, request.source, facts)
     if request.orbit is None:
-        return survey_report(run, facts, request.more)
+        return survey_report(run, facts, _other_run(request), request.more)
     other = _other_solution(request, request.orbit)
     return survey_orbit_report(run, request.orbit, facts, other, more=request.more)
 
@@ -236,6 +237,16 @@ def _other_solution(request: ReportRequest, orbit: int) -> "FitResult | None":
     return (
         read_result(path) if path.is_file() else open_run(request.path, request.other).result(orbit)
     )
+
+
+def _other_run(request: ReportRequest) -> "SurveyRun | None":
+    if request.other is None:
+        return None
+    if request.other == request.run:
+        raise InputError(f"--other: expected another run than {request.run!r}, found the same")
+    from plateviz.runs.queries import open_run
+
+    return open_run(request.path, request.other)
 
 
 def _facts(run: str | None = None) -> "Facts":

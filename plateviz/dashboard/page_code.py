@@ -29,7 +29,6 @@ from solver.errors import InputError
 _OTHER = f"{NAME}-other"
 _OF_WHAT_IF = "It is a what-if; a fit agrees with it to a thousandth of each uncertainty."
 _OF_ONE_ORBIT = "Without --orbits, the command fits all orbits of the survey."
-_OF_ONE_RUN = "It is of this run alone; the Python compares both."
 _OF_OTHER_ORBIT = "The report does not compare with another orbit; the Python does."
 
 
@@ -123,8 +122,8 @@ def _of_survey(navigation: Navigation, run: SurveyRun) -> PageCode:
         return _of_run(navigation, run, [], "survey", "", "--survey")
     calls.insert(0, (comparison.figure, {"both": True, **theme}))
     compared = f".compared_with({other.name!r})"
-    code = _of_run(navigation, run, calls, "survey", compared, "--survey")
-    return code._replace(about=f"{code.about} {_OF_ONE_RUN}")
+    options = ("--survey", "--other", other.name, "--both", comparison.figure)
+    return _of_run(navigation, run, calls, "survey", compared, *options)
 
 
 def _of_run(

@@ -35,7 +35,8 @@ def page_report(navigation: Navigation) -> Later:
     if run is None:
         raise InputError(navigation.why_no_run.rstrip("."))
     if navigation.view is View.SURVEY:
-        return _later(f"run-{run.name}", partial(_survey, run, _on_screen(navigation)), turns)
+        make = partial(_survey, run, _other_run(navigation), _on_screen(navigation))
+        return _later(f"run-{run.name}", make, turns)
     found = navigation.found
     if found is None:
         raise InputError("no source is shown yet; choose one first")
@@ -51,7 +52,16 @@ def _on_screen(navigation: Navigation) -> MoreFigures:
         return MoreFigures(explored=shown.texts())
     if workspace is OrbitWorkspace.ORDERS and session.other is not None:
         return MoreFigures(both=[session.figure_of_both])
+    if _other_run(navigation) is not None:
+        return MoreFigures(both=[session.run_comparison.figure])
     return NO_MORE
+
+
+def _other_run(navigation: Navigation) -> SurveyRun | None:
+    """Return the run that is compared with, if it is on the screen."""
+    if navigation.workspace is not SurveyWorkspace.COMPARE:
+        return None
+    return navigation.session.run_comparison.run(navigation.run_name, navigation.known_runs)
 
 
 def _of_solution(navigation: Navigation) -> Later:
@@ -96,9 +106,11 @@ def _solution(
     return replace(report, subtitle="; ".join(words))
 
 
-def _survey(run: SurveyRun, more: MoreFigures) -> Report:
-    command = report_of_run(str(run.survey), run.name, "--survey")
-    return survey_report(run, facts_of(command, run.name), more)
+def _survey(run: SurveyRun, other: SurveyRun | None, more: MoreFigures) -> Report:
+    compared = () if other is None else ("--other", other.name)
+    both = (word for name in more.both for word in ("--both", name))
+    command = report_of_run(str(run.survey), run.name, "--survey", *compared, *both)
+    return survey_report(run, facts_of(command, run.name), other, more)
 
 
 def _source(run: SurveyRun, found: FoundSource) -> Report:

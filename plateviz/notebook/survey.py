@@ -295,4 +295,5 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
     def _report(self, facts: "Facts") -> "Report":
         from plateviz.reports.survey import survey_report
 
-        return survey_report(self._run(), facts)
+        other = None if self.other_name is None else self._other()
+        return survey_report(self._run(), facts, other)

@@ -1,18 +1,21 @@
 """Figures that a report has on request: of both solutions that it compares, and of *Explore*."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
+from plateviz.plots.both_runs import comparable_survey_figures, of_both_runs
 from plateviz.plots.both_solutions import comparable_figures, of_both
-from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.explored import explored
 from plateviz.plots.explored_text import parse_explored
+from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.reports.report import ReportFigure
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.queries import SurveyRun
 from plateviz.tables.explore import EXPLORABLE, ExplorableTable
+from plateviz.tables.survey_tables import SurveyTables
 from solver.errors import InputError
 
 
@@ -21,7 +24,7 @@ class MoreFigures(NamedTuple):
 
     Attributes
     ----------
-    both : names of figures that are drawn of both solutions
+    both : names of figures that are drawn of both solutions, or of both runs
     explored : as from `plateviz.plots.explored_text.text_of`
     """
 
@@ -38,30 +41,46 @@ def more_of_orbit(more: MoreFigures, chosen: Chosen) -> list[ReportFigure]:
     def table(rows: str) -> ExplorableTable:
         return EXPLORABLE[rows](chosen.result)
 
-    return [*_of_both(more.both, chosen), *_explored(more.explored, EXPLORABLE, table)]
+    known = {one.name: of_both(one) for one in comparable_figures()}
+    both = _of_both(more.both, known, chosen)
+    return [*both, *_explored(more.explored, EXPLORABLE, table)]
 
 
-def more_of_run(more: MoreFigures, run: SurveyRun) -> list[ReportFigure]:
-    """Return the figures of a run; InputError if one cannot be drawn."""
+def more_of_run(more: MoreFigures, run: SurveyRun, tables: SurveyTables) -> list[ReportFigure]:
+    """Return the figures of a run; InputError if one cannot be drawn.
+
+    Parameters
+    ----------
+    tables : of the run, with those of the other run if there is one
+    """
     columns = ColumnCache()
-    return _explored(
+    known = {one.name: one for one in comparable_survey_figures()}
+    both = _of_both(more.both, {name: of_both_runs(one) for name, one in known.items()}, tables)
+    explored = _explored(
         more.explored, COLUMNS_OF_RUN, lambda rows: explorable_of_run(run, rows, columns)
     )
+    return [*both, *explored]
 
 
-def _of_both(names: Sequence[str], chosen: Chosen) -> list[ReportFigure]:
-    known = {one.name: one for one in comparable_figures()}
+def _of_both(
+    names: Sequence[str],
+    known: Mapping[str, Diagnostic] | Mapping[str, SurveyFigure],
+    shown: Chosen | SurveyTables,
+) -> list[ReportFigure]:
     unknown = [name for name in names if name not in known]
     if unknown:
         raise InputError(f"both: expected a figure out of {', '.join(known)}, found {unknown[0]!r}")
-    if names and chosen.other is None:
-        raise InputError("both: expected a solution to compare with, found none")
-    figures = [of_both(known[name]) for name in names]
+    if names and shown.other is None:
+        raise InputError("both: expected something to compare with, found none")
     return [
         ReportFigure(
-            f"both-{one.name}", one.title, one.caption, {"All": partial(one.plot, chosen)}, True
+            f"both-{name}",
+            known[name].title,
+            known[name].caption,
+            {"All": partial(known[name].plot, shown)},  # type: ignore[arg-type]
+            is_wide=True,
         )
-        for one in figures
+        for name in names
     ]
 
 

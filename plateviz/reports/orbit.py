@@ -10,7 +10,14 @@ from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
 from plateviz.reports.more_figures import NO_MORE, MoreFigures, more_of_orbit
 from plateviz.reports.report import Facts, Report, ReportFigure, plain
-from plateviz.tables import calibration_tables, exposure_chi2, outlier_list, summary_strip
+from plateviz.tables import (
+    calibration_tables,
+    exposure_chi2,
+    outlier_list,
+    solution_changes,
+    summary_strip,
+)
+from plateviz.tables.headings import CHANGES, in_words
 from plateviz.tables.labels import dates
 from plateviz.tables.verdict import Verdict, orbit_verdict
 from solver.data.instrument import Instrument
@@ -53,6 +60,9 @@ def orbit_report(
     exposures = _exposures(result.exposures)
     whole = Chosen(result, instrument, exposures, other=other, simulation=simulation)
     tables = calibration_tables(result)
+    if other is not None:
+        title = "What differs between the other solution (A) and this one (B)"
+        tables = {title: in_words(solution_changes(other, result), CHANGES), **tables}
     outliers = outlier_list(result)
     if outliers is not None:
         tables[f"Outliers ({len(outliers):,})"] = outliers

@@ -1,5 +1,6 @@
 """The reports of a fitted survey, of one of its orbits, and of one of its sources."""
 
+from dataclasses import replace
 from functools import partial
 
 from plateviz.plots.gallery import source_figures, survey_figures
@@ -7,18 +8,21 @@ from plateviz.plots.survey_figure import SourceFigure, SurveyFigure
 from plateviz.reports.more_figures import NO_MORE, MoreFigures, more_of_run
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.report import SOLVED, Facts, Report, ReportFigure, plain
-from plateviz.runs.load_tables import survey_tables
+from plateviz.runs.load_tables import compared_run, survey_tables
 from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run_tests import RunTables
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import (
     motion_table,
     orbit_list,
+    run_changes,
     run_strip,
     source_class,
     source_orbits,
     source_strip,
 )
-from plateviz.tables.headings import MOTION, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in_words
+from plateviz.tables.headings import CHANGES, MOTION, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in_words
+from plateviz.tables.run_changes import ComparedRun
 from plateviz.tables.run_health import MISSING
 from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
@@ -28,28 +32,31 @@ from solver.errors import InputError
 from solver.io.survey import section
 
 
-def survey_report(run: SurveyRun, facts: Facts, more: MoreFigures = NO_MORE) -> Report:
+def survey_report(
+    run: SurveyRun, facts: Facts, other: SurveyRun | None = None, more: MoreFigures = NO_MORE
+) -> Report:
     """Return the report of a run of a survey.
 
     Parameters
     ----------
     facts : provenance of the report
+    other : run of the same survey to compare with
     more : figures after those of every report
 
     Raises
     ------
     InputError
-        If orbits of the run are missing, or one of `more` cannot be drawn; orbits that failed are
+        If orbits of a run are missing, or one of `more` cannot be drawn; orbits that failed are
         reported.
     """
-    tables = survey_tables(run)
+    tables, changes = _whole(run), {}
     orbits, motions = tables.orbits, tables.motions
-    missing = int((orbits["status"] == MISSING).sum())
-    if missing:
-        raise InputError(
-            f"{run.directory}: expected a whole run, found {missing} of {len(orbits)} orbits "
-            "missing; `plateviz survey` continues with them"
-        )
+    if other is not None:
+        of_other = _whole(other)
+        both = _compared(other, of_other), _compared(run, tables)
+        tables = replace(tables, other=of_other)
+        title = f"What differs between run {other.name} (A) and run {run.name} (B)"
+        changes[title] = in_words(run_changes(*both), CHANGES)
     return Report(
         title=f"Survey {run.survey.resolve().name}",
         subtitle=f"Run {run.name} of {len(orbits):,} orbits",
@@ -57,9 +64,9 @@ def survey_report(run: SurveyRun, facts: Facts, more: MoreFigures = NO_MORE) -> 
         items=run_strip(orbits, motions),
         figures=[
             *(_figure(one, tables) for one in survey_figures() if one.has_data(tables)),
-            *more_of_run(more, run),
+            *more_of_run(more, run, tables),
         ],
-        tables={"Orbits": in_words(orbit_list(orbits), ORBITS_OF_RUN)},
+        tables=changes | {"Orbits": in_words(orbit_list(orbits), ORBITS_OF_RUN)},
         facts={**facts, **_of_run(run)},
     )
 
@@ -119,6 +126,23 @@ def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
         tables=tables | {"Orbits": in_words(source_orbits(history), ORBITS_OF_SOURCE)},
         facts={**facts, **_of_run(run)},
     )
+
+
+def _whole(run: SurveyRun) -> SurveyTables:
+    """Return the tables of a run; InputError if orbits are missing."""
+    tables = survey_tables(run)
+    missing = int((tables.orbits["status"] == MISSING).sum())
+    if missing:
+        raise InputError(
+            f"{run.directory}: expected a whole run, found {missing} of {len(tables.orbits)} "
+            "orbits missing; `plateviz survey` continues with them"
+        )
+    return tables
+
+
+def _compared(run: SurveyRun, tables: SurveyTables) -> ComparedRun:
+    read = RunTables(tables.orbits, tables.motions, tables.tests)
+    return compared_run(run, read, run_verdict(*read))
 
 
 def _of_run(run: SurveyRun) -> Facts:

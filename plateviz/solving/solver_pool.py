@@ -18,7 +18,7 @@ from plateviz.solving.job import Job
 from plateviz.solving.solver_queue import SolverQueue
 
 # How far the processes of long fits give way to that of what-ifs.
-_NICENESS = 5
+_NICENESS = 10
 # Quick jobs that wait for one process before another is started, which takes some seconds itself.
 _FEW = 3
 

@@ -13,6 +13,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Mapping
+from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
@@ -142,9 +143,8 @@ class SolverQueue:
             # Ctrl-C, or a notebook's interrupt, must reach only the process that waits for a job.
             start_new_session=True,
         )
-        if self._niceness and hasattr(os, "setpriority"):
-            niceness = os.getpriority(os.PRIO_PROCESS, 0) + self._niceness
-            os.setpriority(os.PRIO_PROCESS, process.pid, niceness)
+        if self._niceness:
+            _give_way(process.pid, self._niceness)
         self._process = process
         threading.Thread(target=self._listen, args=(process, errors), daemon=True).start()
         return process
@@ -198,6 +198,15 @@ class SolverQueue:
             if self._jobs and self._jobs[0] is job and self._process is not None:
                 job.cancel()
                 self._process.kill()
+
+
+def _give_way(process: int, niceness: int) -> None:
+    """Let a process, and all that it starts, give way to others."""
+    if hasattr(os, "setpriority"):
+        os.setpriority(os.PRIO_PROCESS, process, os.getpriority(os.PRIO_PROCESS, 0) + niceness)
+    # Linux may divide the cores among sessions first, and the process has a session of its own.
+    with contextlib.suppress(OSError):
+        Path(f"/proc/{process}/autogroup").write_text(str(niceness), encoding="ascii")
 
 
 def _kill_workers(ended: subprocess.Popen[str]) -> None:

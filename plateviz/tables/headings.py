@@ -84,6 +84,12 @@ SELECTED_DETECTORS: Mapping[str, Heading] = {
     "rms_x": Heading("x", "0.000", _STANDARDISED),
     "rms_y": Heading("y", "0.000", _STANDARDISED),
 }
+CHANGES: Mapping[str, Heading] = {
+    "what": Heading(""),
+    "a": Heading("A"),
+    "b": Heading("B"),
+    "change": Heading("B minus A"),
+}
 SOURCES_OF_RUN: Mapping[str, Heading] = {
     "id": Heading("source"),
     "source_class": Heading("class"),

@@ -16,10 +16,10 @@ from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.plots.both_solutions import comparable_figures
 from plateviz.plots.diagnostic import Diagnostic
 from plateviz.tables import solution_changes
+from plateviz.tables.headings import CHANGES, in_words
 from solver.errors import InputError
 
 _BEFORE = "the solution before it"
-_TITLES = {"what": "", "a": "A", "b": "B", "change": "B minus A"}
 
 
 class CompareView(pn.viewable.Viewer):
@@ -127,5 +127,5 @@ class CompareView(pn.viewable.Viewer):
             )
             return
         self._changes = solution_changes(other.result, shown.result)
-        table = self._changes.rename(columns=_TITLES)
+        table = in_words(self._changes, CHANGES)
         self._table.object = themed(numbers(table, "changes"), session.theme)

@@ -22,11 +22,11 @@ from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.runs.load_tables import compared_run
 from plateviz.solving.run_reader import ReadRun
 from plateviz.tables import run_changes
+from plateviz.tables.headings import CHANGES, in_words
 from plateviz.tables.run_health import COMPLETE
 from plateviz.tables.survey_tables import SurveyTables
 from solver.errors import InputError
 
-_TITLES = {"what": "", "a": "A", "b": "B", "change": "B minus A"}
 _BEING_READ = "The other run is being read."
 
 
@@ -211,7 +211,7 @@ class CompareRunsView(pn.viewable.Viewer):
         if self._changes.empty:
             self._table.object = paragraph(words, "empty", theme)
             return
-        table = themed(numbers(self._changes.rename(columns=_TITLES), "changes"), theme)
+        table = themed(numbers(in_words(self._changes, CHANGES), "changes"), theme)
         self._table.object = (paragraph(words, "caption", theme) if words else "") + table
 
     def _compare(self, a: ReadRun, b: ReadRun) -> str:

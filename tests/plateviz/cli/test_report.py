@@ -51,6 +51,7 @@ def test_two_results_are_compared(run, fit_result, tmp_path):
     code, _, _ = run("report", tmp_path / "a.fits", *arguments, *more)
     assert code == 0
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "What differs between the other solution (A) and this one (B)" in page
     for name in ("comparison", "both-residual-map", "explore-0"):
         assert f'id="figure-{name}"' in page
 
@@ -68,7 +69,9 @@ def test_two_results_are_compared(run, fit_result, tmp_path):
         (["--orbit", "0", "--survey"], "expected one of --orbit, --source and --survey"),
         (["--run", "other"], "expected a run 'other', found default"),
         (["--survey"], "found 1 of 3 orbits missing"),
-        (["--other", "b"], "--other: expected with --orbit"),
+        (["--source", "5", "--other", "b"], "--other: expected with an orbit or a survey"),
+        (["--other", "b"], "expected a run 'b', found default"),
+        (["--other", "default"], "--other: expected another run than 'default', found the same"),
         (["--orbit", "0", "--instrument", "i.toml"], "--instrument: expected with a result of"),
     ],
 )
@@ -131,6 +134,23 @@ def whole_run(run_dir, fit_result):
     """A run in which two orbits are fitted and one has failed."""
     write_fitted_orbit(Run(run_dir, "default").orbit_directory(2), fit_result)
     return run_dir
+
+
+def test_two_runs_are_compared(run, whole_run, fit_result, tmp_path):
+    other = begin_run(whole_run, "low", FitSettings(order=3))
+    for orbit in range(3):
+        write_fitted_orbit(other.orbit_directory(orbit), fit_result)
+    arguments = ["--other", "low", "--both", "orbit-health", "-o", tmp_path / "r.html"]
+    code, _, _ = run("report", whole_run, *arguments)
+    assert code == 0
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "What differs between run low (A) and run default (B)" in page
+    assert "<td>order 3</td><td>order 5</td>" in page
+    for name in ("motion-differences", "both-orbit-health"):
+        assert f'id="figure-{name}"' in page
+    code, _, err = run("report", whole_run, *arguments, "--both", "footprint", "--overwrite")
+    assert code == 2
+    assert "both: expected a figure out of orbit-health" in err
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import pytest
 from plateviz.dashboard.navigation import Navigation, View
 from plateviz.dashboard.page_report import page_report
 from plateviz.dashboard.session import Session
-from plateviz.plots.workspace import OrbitWorkspace
+from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from solver.errors import InputError
 from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
 
@@ -114,9 +114,26 @@ def test_report_of_a_run_is_made_of_its_tables(navigation, survey, monkeypatch):
     seen = []
     monkeypatch.setattr(
         "plateviz.dashboard.page_report.survey_report",
-        lambda run, facts, _: seen.append((run.name, facts["Report"]["Command"])) or 1 / 0,
+        lambda run, facts, *_: seen.append((run.name, facts["Report"]["Command"])) or 1 / 0,
     )
     navigation.turn_to(View.SURVEY)
     with pytest.raises(ZeroDivisionError):
         page_report(navigation).make(print)
     assert seen == [("default", "plateviz report sky --run default --survey -o REPORT.html")]
+
+
+def test_report_compares_the_runs_that_are_on_the_screen(navigation, survey, monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        "plateviz.dashboard.page_report.survey_report",
+        lambda run, facts, other, more: seen.append((other and other.name, more.both)) or 1 / 0,
+    )
+    other = FakeRun("low", survey, navigation.session.shown.result)
+    store = SurveyStore(navigation.session.shown.result, [navigation.run, other])
+    navigation = Navigation(Session(store))
+    navigation.turn_to(View.SURVEY)
+    for workspace in (SurveyWorkspace.COMPARE, SurveyWorkspace.VERDICT):
+        navigation.turn_to_workspace(workspace)
+        with pytest.raises(ZeroDivisionError):
+            page_report(navigation).make(print)
+    assert seen == [("low", ["orbit-health"]), (None, ())]

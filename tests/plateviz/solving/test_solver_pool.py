@@ -1,11 +1,16 @@
 """Several solver processes: which of them runs a job, and what a waiting job is told."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 from plateviz.solving.forecast import JobTimes, about, is_long
 from plateviz.solving.job import Job
 from plateviz.solving.solver_pool import SolverPool
-from plateviz.solving.solver_queue import SolverQueue
+from plateviz.solving.solver_queue import SolverQueue, _give_way
 from solver.data.settings import FitSettings
 
 
@@ -150,3 +155,15 @@ def test_survey_and_slow_engines_are_long():
         True,
         True,
     ]
+
+
+@pytest.mark.skipif(not Path("/proc/self/autogroup").is_file(), reason="needs groups of sessions")
+def test_process_of_long_fits_gives_way_to_those_of_other_sessions():
+    program = [sys.executable, "-c", "input()"]
+    with subprocess.Popen(program, stdin=subprocess.PIPE, start_new_session=True) as process:
+        _give_way(process.pid, 10)
+        own = os.getpriority(os.PRIO_PROCESS, 0)
+        assert os.getpriority(os.PRIO_PROCESS, process.pid) == min(own + 10, 19)
+        group = Path(f"/proc/{process.pid}/autogroup").read_text(encoding="ascii")
+        assert group.split()[1:] == ["nice", "10"]
+        process.communicate(b"\n")

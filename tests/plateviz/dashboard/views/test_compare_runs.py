@@ -285,10 +285,11 @@ def test_other_run_is_read_elsewhere(fit_result, navigation, runs):
     assert both.is_drawn
 
 
-def test_python_compares_both_runs(navigation, page):
+def test_command_and_python_compare_both_runs(navigation, page):
     code = page_code(navigation)
     opened = "survey = plateviz.open('sky', run='default').compared_with('low')\n"
     assert opened in code.python
     assert "survey.figure('orbit-health', both=True)" in code.python
     assert "survey.figure('motion-differences')" in code.python
-    assert "of this run alone" in code.about
+    report = "plateviz report sky --run default --survey --other low --both orbit-health"
+    assert code.command.startswith(report)

@@ -15,9 +15,9 @@ from solver.engines.adjust import find_adjustments, with_adjustments
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, find_mode
 from solver.engines.run_engine import Resumption, run_engine
-from solver.engines.warm_starts import WarmStart, likely, nearest
-from solver.engines.what_if import linearised, solve_what_if
-from solver.errors import FitError, InputError
+from solver.engines.start_tables import StartTables
+from solver.engines.warm_starts import WarmStart, WarmStarts
+from solver.errors import FitError
 from solver.linear.contribution import compiling
 from solver.linear.covariances import Covariances, covariances
 from solver.linear.source_elimination import ReducedSystem
@@ -92,8 +92,7 @@ class OrbitFitter:
         self._orbit_id = data.orbit_id
         self._instrument = instrument
         self._last_fit: _LastFit | None = None
-        self._starts: list[WarmStart] = []
-        self._attempted: list[FitSettings] = []
+        self._starts: WarmStarts | None = None
         self._compiling: Iterator[None] = iter(())
         self._stopped: tuple[FitSettings, object] | None = None
 
@@ -128,12 +127,15 @@ class OrbitFitter:
         return with_orders(result, orders, time.perf_counter() - fitted)
 
     def prepare_what_ifs(
-        self, settings: FitSettings, progress: Callable[[Iteration], None] = lambda _: None
+        self,
+        settings: FitSettings,
+        progress: Callable[[Iteration], None] = lambda _: None,
+        solution: StartTables | None = None,
     ) -> None:
         """Fit the orbit so that what-ifs can start from it, without the tables of a result.
 
         Parameters and exceptions are those of `fit`; the engine is gauss-newton, and distortion
-        orders are not compared.
+        orders are not compared. A fit that starts from its `solution` takes a single step.
 
         Raises
         ------
@@ -142,7 +144,8 @@ class OrbitFitter:
         """
         adjustments = find_adjustments(self._cache, self._instrument, settings, progress)
         _, problem = self._cache.get(settings, adjustments)
-        mode = find_mode(problem, settings, progress)
+        start = None if solution is None else solution.point(problem)
+        mode = find_mode(problem, settings, progress, start)
         if not mode.status.is_solution:
             raise FitError(f"orbit {self._orbit_id}: {mode.status.value}")
         self._start_from(_LastFit(settings, problem, mode, adjustments))
@@ -150,8 +153,8 @@ class OrbitFitter:
     def _start_from(self, last: _LastFit) -> None:
         """Let what-ifs start from a fit."""
         self._last_fit = last
-        self._starts = [WarmStart(last.settings, last.problem, last.mode)]
-        self._attempted = [last.settings]
+        fit = WarmStart(last.settings, last.problem, last.mode)
+        self._starts = WarmStarts(fit, lambda other: self._cache.get(other, last.adjustments)[1])
         self._compiling = compiling(last.mode.equations, last.problem)
 
     @property
@@ -168,7 +171,7 @@ class OrbitFitter:
         Returns
         -------
         The result; None if there is no fit to start from, or if a refit is needed (see
-        `solver.engines.what_if.solve_what_if`).
+        `solver.engines.warm_starts.WarmStarts.step`).
         """
         found = self.partial_what_if(settings)
         return None if found is None else found.whole()
@@ -181,8 +184,7 @@ class OrbitFitter:
         start = time.perf_counter()
         data, problem = self._cache.get(settings, last.adjustments)
         prepared = time.perf_counter()
-        base = nearest(self._starts, settings)
-        mode = base and solve_what_if(base.mode, base.problem, problem, settings)
+        mode = self._starts and self._starts.step(problem, settings)
         if mode is None:
             return None
         estimate = Estimate(mode)
@@ -196,11 +198,7 @@ class OrbitFitter:
         return found._replace(result=result)
 
     def history(self, result: FitResult) -> pd.DataFrame:
-        """Return the rows that the last fit, whose result this is, adds to its sources' history.
-
-        Returns
-        -------
-        See `solver.results.source_history.history_table`.
+        """Return what the last fit, whose result this is, adds to its sources' `history_table`.
 
         Raises
         ------
@@ -212,9 +210,7 @@ class OrbitFitter:
         return history_table(last.problem, reduced, covariance, result)
 
     def sky_statistics(self, result: FitResult) -> dict[str, pd.DataFrame]:
-        """Return what the last fit, whose result this is, says about errors of the catalogue.
-
-        The tables are those of `solver.results.catalogue_response.sky_statistics`.
+        """Return the `sky_statistics` of the last fit, whose result this is.
 
         Raises
         ------
@@ -234,9 +230,8 @@ class OrbitFitter:
     def precompute(self, order: int) -> Iterator[None]:
         """Precompute warm starts for the what-if solutions that are likely to come next.
 
-        These are lower orders (`solver.engines.warm_starts.likely`); with a warm start they
-        take no longer than a change of priors. What those with fewer measurements need is
-        compiled.
+        These are lower orders (`WarmStarts.likely`); with a warm start they take no longer than a
+        change of priors. What those with fewer measurements need is compiled.
 
         Parameters
         ----------
@@ -246,17 +241,13 @@ class OrbitFitter:
         ------
         None, about once a second, so that the caller can handle a request in between.
         """
-        last = self._last_fit
-        if last is None:
+        if self._starts is None:
             return
-        wanted = likely(self._starts[0], order)
+        wanted = self._starts.likely(order)
         # Memory is limited: drop the warm starts that are no longer likely to be used.
-        self._attempted = [last.settings, *(item for item in self._attempted if item in wanted)]
-        self._starts = [start for start in self._starts if start.settings in self._attempted]
-        for settings in wanted:
-            if settings not in self._attempted:
-                self._attempted.append(settings)
-                self._starts += self._warm_start(last, settings)
+        self._starts.keep(wanted)
+        for lower in wanted:
+            if self._starts.add(lower):
                 yield
         # Not `yield from`, with which it would end with this.
         for _ in self._compiling:
@@ -264,20 +255,8 @@ class OrbitFitter:
 
     def forget_precomputed(self) -> None:
         """Forget what `precompute` has kept; what-ifs start from the last fit again."""
-        self._starts, self._attempted = self._starts[:1], self._attempted[:1]
-
-    def _warm_start(self, last: _LastFit, settings: FitSettings) -> list[WarmStart]:
-        """Return a warm start for `settings`, in a list; an empty list if there is no solution."""
-        try:
-            _, problem = self._cache.get(settings, last.adjustments)
-        except InputError:
-            # A prior is shifted for a term that the lower order lacks, or too few data remain.
-            return []
-        mode = solve_what_if(last.mode, last.problem, problem, settings)
-        # The sources may move beyond the range of the linear model; then a fit is needed.
-        mode = mode or find_mode(problem, settings)
-        is_solved = mode.status.is_solution
-        return [WarmStart(settings, problem, linearised(problem, mode))] if is_solved else []
+        if self._starts is not None:
+            self._starts.keep([])
 
     def _compare_orders(
         self,

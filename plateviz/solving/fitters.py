@@ -8,16 +8,23 @@ import queue
 from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
 
 from plateviz.solving.capacity import ready_orbits
 from plateviz.solving.origin import origin_from_dict
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration
+from solver.engines.start_tables import StartTables
 from solver.errors import CancelledError, FitError, InputError
 from solver.fit import OrbitFitter
+from solver.io.parquet import read_frame
 
 Request = dict
+# Columns of a solution's tables from which a fit starts.
+_OF_CALIBRATION = ("group", "offset")
+_OF_SOURCES = ("source_id", "offset_ra", "offset_dec")
 # Orbits of which lower distortion orders are precomputed: as large again as the rest of a fitter.
 _WITH_LOWER_ORDERS = 2
 
@@ -48,6 +55,34 @@ class Fitters:
         return self._kept[key]
 
 
+class Base(NamedTuple):
+    """A fit from which what-ifs can start, by another process.
+
+    Attributes
+    ----------
+    settings : of the fit
+    solution : None if it cannot be read
+    """
+
+    settings: FitSettings
+    solution: StartTables | None
+
+
+def base_of(request: Request) -> Base | None:
+    """Return the fit from which the what-ifs of a request can start, if it names one."""
+    base = request.get("base")
+    if base is None:
+        return None
+    directory, tables = Path(base["directory"]), None
+    # Without it, the fit takes more steps.
+    with suppress(InputError):
+        tables = StartTables(
+            read_frame(directory / "calibration.parquet", list(_OF_CALIBRATION)),
+            read_frame(directory / "sources.parquet", list(_OF_SOURCES)),
+        )
+    return Base(base_settings(FitSettings.from_dict(base["settings"])), tables)
+
+
 def base_settings(settings: FitSettings) -> FitSettings:
     """Return the settings of the fit that the what-ifs of `settings` start from.
 
@@ -71,8 +106,11 @@ def prepare(
     with suppress(CancelledError, InputError, FitError):
         fitter = fitters.of(request)
         settings = base_settings(FitSettings.from_dict(request["settings"]))
-        if not _serves_what_ifs(fitter.fitted_settings, settings):
-            fitter.prepare_what_ifs(settings, give_way)
+        fitted = fitter.fitted_settings
+        if fitted is None or not fitted.serves(settings):
+            base = base_of(request)
+            is_same = base is not None and base.settings == settings
+            fitter.prepare_what_ifs(settings, give_way, base.solution if base and is_same else None)
         yield from fitter.precompute(settings.order)
 
 
@@ -82,14 +120,4 @@ def _starts_from(prepared: Request, later: Request | None) -> bool:
         later is not None
         and bool(later.get("what_if"))
         and all(later[key] == prepared[key] for key in ("origin", "orbit"))
-    )
-
-
-def _serves_what_ifs(fitted: FitSettings | None, settings: FitSettings) -> bool:
-    """Return whether what-ifs of `settings` can start from the last fit of their orbit."""
-    return (
-        fitted is not None
-        and not fitted.exclusions
-        and fitted.order >= settings.order
-        and fitted.what_if_holds(settings)
     )

@@ -13,10 +13,12 @@ from contextlib import suppress
 from pathlib import Path
 
 from plateviz.runs.column_cache import ColumnCache
+from plateviz.runs.fitted_orbit import is_complete
 from plateviz.runs.kept_selections import KeptSelections
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.queries import SurveyRun, survey_runs
+from plateviz.runs.run import runs_of
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.judge import Judge
 from plateviz.solving.made_solutions import MadeSolution, MadeSolutions
@@ -193,8 +195,22 @@ class SolutionStore:
         return {"do": "fit", **fit, "what_if": what_if, "directory": str(directory)}
 
     def _fit_of(self, orbit: int | None, settings: FitSettings) -> dict[str, object]:
-        origin = origin_to_dict(self.origin)
-        return {"origin": origin, "orbit": orbit, "settings": settings.to_dict()}
+        base = None if orbit is None else self._base(orbit, settings)
+        fit = {"origin": origin_to_dict(self.origin), "orbit": orbit, "base": base}
+        return {**fit, "settings": settings.to_dict()}
+
+    def _base(self, orbit: int, settings: FitSettings) -> dict[str, object] | None:
+        """Return the solution of a run from which a what-if can start, for `base_of`."""
+        if not isinstance(self.origin, SurveyFolder):
+            return None
+        for run in runs_of(Path(self.origin.directory)):
+            directory = run.orbit_directory(orbit)
+            # Whoever looks at a damaged run is told so.
+            with suppress(InputError):
+                fitted = run.settings()
+                if fitted.serves(settings) and is_complete(directory):
+                    return {"settings": fitted.to_dict(), "directory": str(directory)}
+        return None
 
     def _directory(self, orbit: int | None, settings: FitSettings, what_if: bool) -> Path:
         request = json.dumps([orbit, settings.to_dict(), what_if], sort_keys=True)

@@ -5,12 +5,13 @@ that imports JAX. It keeps its compilations between fits, and ends when its stan
 by SIGTERM; what it has not finished is removed. An unexpected exception ends it with a traceback
 on standard error; `plateviz.solving.solver_queue` reports that and starts another process.
 
-Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory"},
+Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory", "base"},
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
 "directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}, and without events
-{"do": "prepare", "origin", "orbit", "settings"}: fit while idle what a what-if starts from,
+{"do": "prepare", "origin", "orbit", "settings", "base"}: fit while idle what a what-if starts from,
 {"do": "rest"}: give up what is being prepared, and {"do": "complete"} with the rest of a "fit" that
-is done: write what was put off of its result.
+is done: write what was put off of its result. "base" is the solution of a run from which the
+what-ifs of the orbit can start, {"settings", "directory"}, or None.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -33,7 +34,7 @@ from plateviz.runs.scratch_result import (
     write_scratch_result,
     write_verdict,
 )
-from plateviz.solving.fitters import Fitters, Request, base_settings, prepare
+from plateviz.solving.fitters import Base, Fitters, Request, base_of, base_settings, prepare
 from plateviz.solving.put_off import PutOff
 from plateviz.tables.verdict import with_verdict
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
@@ -191,7 +192,7 @@ def _fit(request: Request, progress: Callable[..., None], kept: _Kept) -> Specul
         progress(stage=stage, **iteration._asdict())
 
     progress(stage="linearising")
-    found = _what_if(fitter, settings, on_iteration, put_off) if request["what_if"] else None
+    found = _what_if(fitter, request, on_iteration, put_off) if request["what_if"] else None
     if found is None:
         # A fit may take long, and a page waits for the verdict.
         put_off.finish_verdicts()
@@ -212,17 +213,26 @@ def _judge(directory: Path, result: FitResult) -> None:
 
 def _what_if(
     fitter: OrbitFitter,
-    settings: FitSettings,
+    request: Request,
     progress: Callable[[Iteration], None],
     put_off: PutOff,
 ) -> PartialResult | None:
-    """Return a solution by a step from a fit, or None if it needs a fit of its own."""
-    found, base = fitter.partial_what_if(settings), base_settings(settings)
-    if found is not None or not settings.exclusions or fitter.fitted_settings == base:
+    """Return a solution by a step from a fit, or None if it needs a fit of its own.
+
+    A fit from which it and those that follow can start takes no longer than its own.
+    """
+    settings = FitSettings.from_dict(request["settings"])
+    found = fitter.partial_what_if(settings)
+    if found is not None:
         return found
+    base = base_of(request)
+    if base is None and settings.exclusions:
+        base = Base(base_settings(settings), None)
+    if base is None or fitter.fitted_settings == base.settings:
+        return None
     put_off.finish_verdicts()
     try:
-        fitter.prepare_what_ifs(base, progress)
+        fitter.prepare_what_ifs(base.settings, progress, base.solution)
     except FitError:
         return None
     return fitter.partial_what_if(settings)
@@ -236,7 +246,7 @@ def _complete(request: Request, kept: _Kept) -> None:
     with suppress(InputError, FitError):
         if not are_eigenmodes_written(directory):
             fitter, settings = kept.fitters.of(request), FitSettings.from_dict(request["settings"])
-            found = _what_if(fitter, settings, lambda _: None, kept.put_off)
+            found = _what_if(fitter, request, lambda _: None, kept.put_off)
             result = fitter.fit(settings) if found is None else found.whole()
             tables = {table.name: getattr(result, table.name) for table in EIGENMODE_TABLES}
             write_eigenmodes(directory, tables)

@@ -216,6 +216,11 @@ class FitSettings(ModelSettings):
         refit = [name for name, one in SETTINGS.items() if one.change is Change.REFIT]
         return all(getattr(self, name) == getattr(other, name) for name in refit)
 
+    def serves(self, other: "FitSettings") -> bool:
+        """Return whether what-ifs with `other`, and those that follow it, can start from a fit."""
+        is_whole = not self.exclusions and self.order >= other.order
+        return is_whole and self.what_if_holds(other)
+
     def describe(self) -> str:
         """Return a short description: the order, and every setting that is not its default."""
         phrases = (

@@ -72,6 +72,13 @@ class Mode(NamedTuple):
     equations: NormalEquations
 
 
+class StartingPoint(NamedTuple):
+    """Offsets from the origins at which a fit starts."""
+
+    theta: Float[np.ndarray, " calib"]
+    sources: Float[np.ndarray, "src 2"]
+
+
 class _Point(NamedTuple):
     theta: Float[np.ndarray, " calib"]
     sources: Float[np.ndarray, "src 2"]
@@ -84,7 +91,7 @@ def find_mode(
     problem: Problem,
     settings: FitSettings,
     progress: Callable[[Iteration], None] = lambda _: None,
-    start: Mode | None = None,
+    start: Mode | StartingPoint | None = None,
 ) -> Mode:
     """Find the posterior mode, starting at the origins of all parameters.
 

@@ -1,10 +1,12 @@
 """Warm starts: linearised solutions from which changed settings are solved quickly."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from solver.data.settings import FitSettings
-from solver.engines.gauss_newton import Mode
+from solver.engines.gauss_newton import Mode, find_mode
+from solver.engines.what_if import linearised, solve_what_if
+from solver.errors import InputError
 from solver.problem.problem import Problem
 
 # Memory for precomputed warm starts, bytes.
@@ -19,24 +21,77 @@ class WarmStart(NamedTuple):
     mode: Mode
 
 
-def nearest(starts: Iterable[WarmStart], settings: FitSettings) -> WarmStart | None:
-    """Return the warm start of the lowest sufficient distortion order, or None."""
-    sufficient = [start for start in starts if start.settings.order >= settings.order]
-    return min(sufficient, key=lambda start: start.settings.order, default=None)
+class WarmStarts:
+    """A fit, and the solutions of lower distortion orders that were made from it."""
 
+    def __init__(self, fit: WarmStart, problem_of: Callable[[FitSettings], Problem]) -> None:
+        """Begin with a fit alone.
 
-def likely(start: WarmStart, order: int) -> list[FitSettings]:
-    """Return the settings of likely what-ifs that need Jacobians of their own: lower orders.
+        Parameters
+        ----------
+        problem_of : returns the problem of other settings, with what the fit adjusted
+        """
+        self._fit, self._problem_of = fit, problem_of
+        self._lower: dict[int, WarmStart | None] = {}
 
-    Parameters
-    ----------
-    order : the one on the screen; the next lower order is the likeliest
+    def step(self, problem: Problem, settings: FitSettings) -> Mode | None:
+        """Return the mode of a changed problem by a step, or None if it needs a fit.
 
-    Returns
-    -------
-    Settings of lower orders, likeliest first, as many as fit in memory
-    """
-    # Order 0 is omitted: like order 1 it has no terms.
-    below = sorted(range(1, start.settings.order), key=lambda lower: abs(lower - (order - 1)))
-    count = _MAX_BYTES // start.mode.equations.cross.nbytes
-    return [start.settings.with_(order=lower) for lower in below[:count]]
+        A lower order that is too far for a step is solved for this what-if and those that follow.
+        """
+        mode = self._step(problem, settings)
+        if mode is None and self.add(settings.order):
+            mode = self._step(problem, settings)
+        return mode
+
+    def add(self, order: int) -> bool:
+        """Solve a lower order than that of the fit, once; return whether it was not tried before.
+
+        It may have no solution.
+        """
+        if order >= self._fit.settings.order or order in self._lower:
+            return False
+        self._lower[order] = self._solved(self._fit.settings.with_(order=order))
+        return True
+
+    def likely(self, order: int) -> list[int]:
+        """Return the orders of likely what-ifs that need Jacobians of their own: lower ones.
+
+        Parameters
+        ----------
+        order : the one on the screen; the next lower order is the likeliest
+
+        Returns
+        -------
+        The likeliest first, as many as fit in memory
+        """
+        # Order 0 is omitted: like order 1 it has no terms.
+        orders = range(1, self._fit.settings.order)
+        below = sorted(orders, key=lambda lower: abs(lower - (order - 1)))
+        return below[: _MAX_BYTES // self._fit.mode.equations.cross.nbytes]
+
+    def keep(self, orders: Iterable[int]) -> None:
+        """Forget the solutions of all lower orders but these."""
+        kept = set(orders)
+        self._lower = {order: one for order, one in self._lower.items() if order in kept}
+
+    def _step(self, problem: Problem, settings: FitSettings) -> Mode | None:
+        """Start from the lowest order that suffices."""
+        orders = [n for n, one in self._lower.items() if one is not None and n >= settings.order]
+        base = (self._lower[min(orders)] if orders else None) or self._fit
+        if base.settings.order < settings.order:
+            return None
+        return solve_what_if(base.mode, base.problem, problem, settings)
+
+    def _solved(self, settings: FitSettings) -> WarmStart | None:
+        try:
+            problem = self._problem_of(settings)
+        except InputError:
+            # A prior is shifted for a term that the lower order lacks, or too few data remain.
+            return None
+        mode = solve_what_if(self._fit.mode, self._fit.problem, problem, settings)
+        # The sources may move beyond the range of the linear model; then a fit is needed.
+        mode = mode or find_mode(problem, settings)
+        if not mode.status.is_solution:
+            return None
+        return WarmStart(settings, problem, linearised(problem, mode))

@@ -1,6 +1,7 @@
 """The solution store with a real solver process, which fits, cancels, dies and restarts."""
 
 import json
+import shutil
 import signal
 import tempfile
 from functools import partial
@@ -8,6 +9,8 @@ from functools import partial
 import pandas as pd
 import pytest
 
+from plateviz.runs.fitted_orbit import write_fitted_orbit
+from plateviz.runs.new_run import begin_run
 from plateviz.runs.scratch_result import are_eigenmodes_to_come, read_scratch_result
 from plateviz.runs.worker_scratch import worker_scratch
 from plateviz.solving import scratch_results, solver_queue
@@ -246,6 +249,33 @@ def test_what_if_without_sources_starts_from_all_measurements(store):
         result = store.result(1, settings, what_if=True)
         assert result.summary["reason"] == FitStatus.WHAT_IF.value
         assert not result.sources["source_id"].isin(excluded).any()
+
+
+@pytest.mark.parametrize("damaged", [(), ("calibration", "sources")], ids=["whole", "damaged"])
+def test_what_if_of_an_orbit_of_a_run_starts_from_its_solution(small_survey, tmp_path, damaged):
+    survey = tmp_path / "survey"
+    shutil.copytree(small_survey, survey)
+    fitted, settings = FitSettings(), FitSettings(order=3, prior_widths={"sources": 2.0})
+    origin = SurveyFolder(str(survey))
+    run = begin_run(survey, "default", fitted)
+    write_fitted_orbit(run.orbit_directory(0), OrbitFitter(origin.read(0)).fit(fitted))
+    for name in damaged:
+        (run.orbit_directory(0) / f"{name}.parquet").write_bytes(b"PAR1")
+    store = SolutionStore(origin, SolverQueue())
+    try:
+        job = store.request(0, settings, what_if=True)
+        assert job.wait(LONG) is JobStatus.DONE, job.message
+        # A fit of its own has more stages, and another reason.
+        steps = [report["stage"] for report in job.progress if "iteration" in report["stage"]]
+        assert (len(steps) > 2) == bool(damaged)
+        result = store.result(0, settings, what_if=True)
+        assert result.summary["reason"] == FitStatus.WHAT_IF.value
+        # The next ones need no fit either, of whatever order.
+        later = settings.with_(order=5)
+        assert store.request(0, later, what_if=True).wait(LONG) is JobStatus.DONE
+        assert store.result(0, later, what_if=True).summary["reason"] == FitStatus.WHAT_IF.value
+    finally:
+        store.close()
 
 
 def test_what_if_beyond_a_step_is_fitted(store):

@@ -105,8 +105,9 @@ class Fitter:
     def __init__(self, fitted):
         self.fitted_settings = fitted
 
-    def prepare_what_ifs(self, settings, progress):
+    def prepare_what_ifs(self, settings, progress, solution):
         progress(None)
+        self.started_from = solution
         self.fitted_settings = settings
 
     def precompute(self, order):

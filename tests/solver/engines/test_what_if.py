@@ -8,7 +8,7 @@ import pytest
 from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
-from solver.engines import what_if
+from solver.engines import warm_starts, what_if
 from solver.errors import FitError
 from solver.fit import OrbitFitter, fit_orbit
 from solver.linear import normal_equations
@@ -202,10 +202,9 @@ def test_lower_order_without_a_shifted_term_is_not_precomputed(orbit):
 
 
 @pytest.mark.slow
-def test_every_lower_order_is_precomputed(sample_orbit, sample_fitter, prepared_fitter):
-    """This includes an order that otherwise needs a refit."""
+def test_every_lower_order_is_precomputed(sample_orbit, prepared_fitter):
+    """This includes an order that no step from the fit reaches."""
     variants = [FitSettings(order=order) for order in (4, 1)]
-    assert sample_fitter.what_if(variants[-1]) is None
     for settings in variants:
         found = prepared_fitter.what_if(settings)
         expected = fit_orbit(sample_orbit, settings=settings)
@@ -257,9 +256,27 @@ def test_unfitted_orbit_needs_a_fit(orbit):
     assert OrbitFitter(orbit.data, orbit.instrument).what_if(FitSettings()) is None
 
 
-def test_change_too_large_for_a_linear_model_needs_a_refit(orbit, fitter):
+def test_order_too_low_for_a_step_is_solved_once(orbit, monkeypatch):
     """Dropping the fifth order of the distortion moves the sources too far."""
-    assert fitter.what_if(FitSettings(order=4)) is None
+    fitter, n_fits = fitted(OrbitFitter(orbit.data, orbit.instrument)), []
+    counted = warm_starts.find_mode
+    monkeypatch.setattr(warm_starts, "find_mode", lambda *a: n_fits.append(a) or counted(*a))
+    for width in (1.0, 1.1):
+        settings = FitSettings(order=4, prior_widths={"sources": width})
+        found = fitter.what_if(settings)
+        expected = fit_orbit(orbit.data, orbit.instrument, settings)
+        moved = found.sources["offset_ra"] - expected.sources["offset_ra"]
+        assert (moved.abs() < AGREEMENT * expected.sources["sigma_ra_marginal"]).all()
+        assert found.summary["reason"] == FitStatus.WHAT_IF.value
+    assert len(n_fits) == 1
+    # The fit is still there, for what-ifs of its own order.
+    assert fitter.fitted_settings.order == 6
+    assert fitter.what_if(FitSettings(order=6, prior_widths={"sources": 2.0})) is not None
+
+
+def test_change_too_large_for_a_linear_model_needs_a_refit(fitter, monkeypatch):
+    monkeypatch.setattr(warm_starts, "solve_what_if", lambda *_: None)
+    assert fitter.what_if(FitSettings(order=6, prior_widths={"sources": 2.0})) is None
 
 
 @pytest.mark.parametrize(

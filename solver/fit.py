@@ -254,9 +254,9 @@ class OrbitFitter:
             yield
 
     def forget_precomputed(self) -> None:
-        """Forget what `precompute` has kept; what-ifs start from the last fit again."""
+        """Forget what `precompute` has kept, but for the order of the latest what-if."""
         if self._starts is not None:
-            self._starts.keep([])
+            self._starts.forget()
 
     def _compare_orders(
         self,

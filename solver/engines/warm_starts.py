@@ -33,6 +33,7 @@ class WarmStarts:
         """
         self._fit, self._problem_of = fit, problem_of
         self._lower: dict[int, WarmStart | None] = {}
+        self._latest = fit.settings.order
 
     def step(self, problem: Problem, settings: FitSettings) -> Mode | None:
         """Return the mode of a changed problem by a step, or None if it needs a fit.
@@ -40,7 +41,8 @@ class WarmStarts:
         A lower order that is too far for a step is solved for this what-if and those that follow.
         """
         mode = self._step(problem, settings)
-        if mode is None and self.add(settings.order):
+        if mode is None and self._is_new(settings.order):
+            self._lower[settings.order] = self._fitted(settings.order)
             mode = self._step(problem, settings)
         return mode
 
@@ -49,9 +51,9 @@ class WarmStarts:
 
         It may have no solution.
         """
-        if order >= self._fit.settings.order or order in self._lower:
+        if not self._is_new(order):
             return False
-        self._lower[order] = self._solved(self._fit.settings.with_(order=order))
+        self._lower[order] = self._stepped(order) or self._fitted(order)
         return True
 
     def likely(self, order: int) -> list[int]:
@@ -75,23 +77,38 @@ class WarmStarts:
         kept = set(orders)
         self._lower = {order: one for order, one in self._lower.items() if order in kept}
 
+    def forget(self) -> None:
+        """Forget the solutions of all lower orders but that of the latest what-if."""
+        self.keep([self._latest])
+
+    def _is_new(self, order: int) -> bool:
+        return order < self._fit.settings.order and order not in self._lower
+
     def _step(self, problem: Problem, settings: FitSettings) -> Mode | None:
         """Start from the lowest order that suffices."""
         orders = [n for n, one in self._lower.items() if one is not None and n >= settings.order]
         base = (self._lower[min(orders)] if orders else None) or self._fit
+        self._latest = base.settings.order
         if base.settings.order < settings.order:
             return None
         return solve_what_if(base.mode, base.problem, problem, settings)
 
-    def _solved(self, settings: FitSettings) -> WarmStart | None:
+    def _stepped(self, order: int) -> WarmStart | None:
+        """Solve a lower order by a step from the fit; None if it is too far for one."""
+        found = self._problem(order)
+        mode = found and solve_what_if(self._fit.mode, self._fit.problem, found[1], found[0])
+        return WarmStart(*found, linearised(found[1], mode)) if found and mode else None
+
+    def _fitted(self, order: int) -> WarmStart | None:
+        """Fit a lower order; None if it has no solution."""
+        found = self._problem(order)
+        mode = found and find_mode(found[1], found[0])
+        return WarmStart(*found, mode) if found and mode and mode.status.is_solution else None
+
+    def _problem(self, order: int) -> tuple[FitSettings, Problem] | None:
+        settings = self._fit.settings.with_(order=order)
         try:
-            problem = self._problem_of(settings)
+            return settings, self._problem_of(settings)
         except InputError:
             # A prior is shifted for a term that the lower order lacks, or too few data remain.
             return None
-        mode = solve_what_if(self._fit.mode, self._fit.problem, problem, settings)
-        # The sources may move beyond the range of the linear model; then a fit is needed.
-        mode = mode or find_mode(problem, settings)
-        if not mode.status.is_solution:
-            return None
-        return WarmStart(settings, problem, linearised(problem, mode))

@@ -6,9 +6,11 @@ command imports the slow modules that it needs, so that `--help` and error messa
 SIGTERM ends a command as Ctrl-C does, with exit code 143.
 """
 
+import errno
+import os
 import sys
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -241,15 +243,29 @@ def main() -> None:
     """Run the command line; what goes wrong ends with one message and an exit code."""
     try:
         with ending_on_sigterm():
-            app()
+            try:
+                app()
+            finally:
+                # Python would do it after all that tells of errors.
+                sys.stdout.flush()
     except (InputError, FitError) as error:
         _fail(error)
     except OSError as error:
         # Such as standard output redirected to a full disk; any other one is a defect.
         told = disk_error(error, Path(error.filename or "standard output"))
+        _drop_output()
+        if error.errno == errno.EPIPE:
+            # Whoever read it has read enough, as `head` does.
+            sys.exit(1)
         if told is None or error.errno not in FULL:
             raise
         _fail(told)
+
+
+def _drop_output() -> None:
+    """Drop what is left to be printed: Python would try again, and end with its own exit code."""
+    with suppress(OSError, ValueError), open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def _fail(error: InputError | FitError) -> NoReturn:

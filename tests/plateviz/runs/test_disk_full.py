@@ -291,10 +291,30 @@ def test_compilations_that_a_full_disk_does_not_keep_are_not_reported(disk, tmp_
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no such device on this system")
-def test_result_that_is_printed_to_a_full_disk_is_told(sample_orbit_dir):
+@pytest.mark.parametrize("unbuffered", ["", "1"], ids=["at-the-end", "at-once"])
+def test_result_that_is_printed_to_a_full_disk_is_told(sample_orbit_dir, unbuffered):
     command = [sys.executable, "-m", "plateviz.cli.main", "inspect", str(sample_orbit_dir)]
     with open("/dev/full", "w") as full:
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run(
+            command,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+        )
     assert done.returncode == 2
     assert "standard output: expected to write the file, found a full disk" in done.stderr
-    assert "Traceback" not in done.stderr
+    assert done.stderr.strip().count("\n") == 0
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"], ids=["at-the-end", "at-once"])
+def test_reader_that_has_read_enough_is_no_error(sample_orbit_dir, unbuffered):
+    command = [sys.executable, "-m", "plateviz.cli.main", "inspect", str(sample_orbit_dir)]
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+        assert process.wait(60) == 1

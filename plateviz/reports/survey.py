@@ -51,7 +51,9 @@ def survey_report(
     """
     tables, changes = _whole(run), {}
     orbits, motions = tables.orbits, tables.motions
+    subtitle = f"Run {run.name} of {len(orbits):,} orbits"
     if other is not None:
+        subtitle += f", compared with run {other.name}"
         of_other = _whole(other)
         both = _compared(other, of_other), _compared(run, tables)
         tables = replace(tables, other=of_other)
@@ -59,7 +61,7 @@ def survey_report(
         changes[title] = in_words(run_changes(*both), CHANGES)
     return Report(
         title=f"Survey {run.survey.resolve().name}",
-        subtitle=f"Run {run.name} of {len(orbits):,} orbits",
+        subtitle=subtitle,
         verdict=run_verdict(orbits, motions, tables.tests),
         items=run_strip(orbits, motions),
         figures=[

@@ -144,6 +144,7 @@ def test_two_runs_are_compared(run, whole_run, fit_result, tmp_path):
     code, _, _ = run("report", whole_run, *arguments)
     assert code == 0
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "Run default of 3 orbits, compared with run low" in page
     assert "What differs between run low (A) and run default (B)" in page
     assert "<td>order 3</td><td>order 5</td>" in page
     for name in ("motion-differences", "both-orbit-health"):

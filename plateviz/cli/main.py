@@ -6,7 +6,6 @@ command imports the slow modules that it needs, so that `--help` and error messa
 SIGTERM ends a command as Ctrl-C does, with exit code 143.
 """
 
-import errno
 import os
 import sys
 import time
@@ -253,12 +252,9 @@ def main() -> None:
     except OSError as error:
         # Such as standard output redirected to a full disk; any other one is a defect.
         told = disk_error(error, Path(error.filename or "standard output"))
-        _drop_output()
-        if error.errno == errno.EPIPE:
-            # Whoever read it has read enough, as `head` does.
-            sys.exit(1)
         if told is None or error.errno not in FULL:
             raise
+        _drop_output()
         _fail(told)
 
 

@@ -146,6 +146,9 @@ class OrbitFitter:
         _, problem = self._cache.get(settings, adjustments)
         start = None if solution is None else solution.point(problem)
         mode = find_mode(problem, settings, progress, start)
+        if start is not None and not mode.status.is_solution:
+            # It was no solution of this orbit.
+            mode = find_mode(problem, settings, progress)
         if not mode.status.is_solution:
             raise FitError(f"orbit {self._orbit_id}: {mode.status.value}")
         self._start_from(_LastFit(settings, problem, mode, adjustments))

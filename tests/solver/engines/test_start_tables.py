@@ -52,6 +52,13 @@ def test_what_ifs_are_those_after_a_fit_from_the_priors(small_orbit, tables, mon
         assert (np.abs(sources[name] - expected[name]) < 1e-3 * sigma).all()
 
 
+def test_tables_of_something_else_do_no_harm(small_orbit, tables):
+    far = tables.calibration.assign(offset=lambda rows: 1000.0 * rows["offset"])
+    fitter = OrbitFitter(small_orbit.data)
+    fitter.prepare_what_ifs(FitSettings(), solution=tables._replace(calibration=far))
+    assert fitter.fitted_settings == FitSettings()
+
+
 @pytest.mark.parametrize(
     "change",
     [

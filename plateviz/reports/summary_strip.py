@@ -30,8 +30,8 @@ def _cell(item: SummaryItem, other: SummaryItem | None) -> str:
     return (
         f"<div class='cell {item.state}' title='{escape(item.hint, quote=True)}'>"
         f"<span class='name'>{escape(item.label)}</span>"
-        f"<span class='value'>{escape(value)}"
-        f"<span class='beside'>{escape(bracket + beside)}</span></span>{_other(item, other)}</div>"
+        f"<span class='values'><span class='value'>{escape(value)}</span>"
+        f"<span class='beside'>{escape(bracket + beside)}</span>{_other(item, other)}</span></div>"
     )
 
 
@@ -39,7 +39,7 @@ def _other(item: SummaryItem, other: SummaryItem | None) -> str:
     if other is None:
         return ""
     if other.value == item.value:
-        # As high as in the other tiles, whose values are on one line.
+        # As high as in the other tiles, where it stands below the value.
         return "" if item.is_count else "<span class='other'>&nbsp;</span>"
     value = other.value.partition(" (")[0]
     return f"<span class='other {other.state}'>(A) {escape(value)}</span>"

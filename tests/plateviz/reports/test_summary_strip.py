@@ -12,7 +12,7 @@ def test_numbers_are_tiles_and_counts_a_line():
     html = strip([CHI2, COUNT, DEVIATION])
     tiles, line = html.split("<div class='counts'>")
     assert tiles.count("class='cell ") == 2
-    assert "<span class='name'>Sources</span><span class='value'>12" in line
+    assert "<span class='name'>Sources</span><span class='values'><span class='value'>12" in line
     assert "A &#x27;hint&#x27;." in tiles
     assert "counts" not in strip([CHI2])
 
@@ -21,8 +21,8 @@ def test_values_that_differ_stand_beside_each_other():
     others = [CHI2._replace(value="1.5 (<b>)", state="bad"), DEVIATION]
     html = strip([CHI2, DEVIATION, COUNT], others)
     assert html.count("(A)") == 1
-    assert "<span class='other bad'>(A) 1.5</span></div>" in html
-    # The others leave its line free, so that all values are on one line; a count needs none.
+    assert "<span class='other bad'>(A) 1.5</span></span></div>" in html
+    # Below the values the others leave its line free; a count needs none.
     assert html.count("<span class='other'>&nbsp;</span>") == 1
     assert strip([COUNT], [COUNT]) == strip([COUNT])
     assert "<b>" not in html

@@ -179,8 +179,8 @@ class BokehGlyphs:
             mapper = self._categories.setdefault(name, models.CategoricalMarkerMapper())
             mapper.update(factors=texts, markers=list(by.looks.values()))
             return Field(by.column, transform=mapper)
-        looks = [by.looks.get(text) for text in columns[by.column]]
-        is_text = any(isinstance(look, str) for look in looks)
+        looks = list(map(by.looks.get, columns[by.column]))
+        is_text = any(isinstance(look, str) for look in by.looks.values())
         columns[f"{name}_by"] = np.asarray(looks, dtype=object if is_text else float)
         return Field(f"{name}_by")
 

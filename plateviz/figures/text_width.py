@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from functools import lru_cache
 
 # Width of characters over the size of the font in DejaVu Sans, the widest of the common fonts that
 # `theme.FONT` stands for: it is shown where there is neither Helvetica nor Arial.
@@ -20,6 +21,8 @@ _WIDEST = 1.0
 _BOLD = 1.13
 # Between a hyphen and what follows it.
 _HYPHEN = re.compile(r"(?<=.-)")
+# Texts whose widths are remembered: those of a figure are needed at each of its changes.
+_REMEMBERED = 4096
 # Of the width, to which lines are narrowed so that the last one has more than a word.
 _SHARES = (0.92, 0.84, 0.76, 0.68)
 
@@ -31,8 +34,7 @@ def text_width(text: str, size: int, *, is_bold: bool = False) -> float:
     ----------
     size : of the font, screen pixels
     """
-    letters = sum(_WIDTHS.get(character, _WIDEST) for character in text)
-    return size * letters * (_BOLD if is_bold else 1.0)
+    return size * _letters(text) * (_BOLD if is_bold else 1.0)
 
 
 def wrapped(text: str, width: float, size: int, *, is_bold: bool = False) -> list[str]:
@@ -53,10 +55,23 @@ def wrapped(text: str, width: float, size: int, *, is_bold: bool = False) -> lis
 
 def has_room_for_words(text: str, width: float, size: int, *, is_bold: bool = False) -> bool:
     """Return whether no word has to be broken, except after a hyphen; parameters as `wrapped`."""
+    return size * _widest_part(text) * (_BOLD if is_bold else 1.0) <= width
+
+
+@lru_cache(_REMEMBERED)
+def _letters(text: str) -> float:
+    """Return how wide a line of text is at most, in sizes of the font."""
+    return sum(_WIDTHS.get(character, _WIDEST) for character in text)
+
+
+@lru_cache(_REMEMBERED)
+def _widest_part(text: str) -> float:
+    """Return the width of the widest word, or part of one with hyphens, in sizes of the font."""
     parts = (part for word in text.split() for part in _HYPHEN.split(word))
-    return all(text_width(part, size, is_bold=is_bold) <= width for part in parts)
+    return max(map(_letters, parts), default=0.0)
 
 
+@lru_cache(_REMEMBERED)
 def _balanced(paragraph: str, width: float, size: int, is_bold: bool) -> list[str]:
     lines = _lines(paragraph, width, size, is_bold)
     if len(lines) > 1 and " " not in lines[-1]:

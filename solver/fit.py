@@ -3,8 +3,10 @@
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from solver.data.instrument import MINI_MOCK, Instrument
@@ -18,7 +20,7 @@ from solver.engines.run_engine import Resumption, run_engine
 from solver.engines.start_tables import StartTables
 from solver.engines.warm_starts import WarmStart, WarmStarts
 from solver.errors import FitError
-from solver.linear.contribution import compiling
+from solver.linear.contribution import contribution_of, typical_removals
 from solver.linear.covariances import Covariances, covariances
 from solver.linear.source_elimination import ReducedSystem
 from solver.problem.adjustments import Adjustments
@@ -29,6 +31,7 @@ from solver.results.orbit_result import PartialResult, partial_result
 from solver.results.orders import compare_orders, with_orders
 from solver.results.source_history import history_table
 from solver.runtime.device import require_device
+from solver.runtime.interruption import attempts
 
 
 def fit_orbit(
@@ -93,7 +96,8 @@ class OrbitFitter:
         self._instrument = instrument
         self._last_fit: _LastFit | None = None
         self._starts: WarmStarts | None = None
-        self._compiling: Iterator[None] = iter(())
+        # Measurements of the last fit without which nothing has been compiled yet.
+        self._to_compile: list[np.ndarray] = []
         self._stopped: tuple[FitSettings, object] | None = None
 
     def fit(
@@ -158,7 +162,7 @@ class OrbitFitter:
         self._last_fit = last
         fit = WarmStart(last.settings, last.problem, last.mode)
         self._starts = WarmStarts(fit, lambda other: self._cache.get(other, last.adjustments)[1])
-        self._compiling = compiling(last.mode.equations, last.problem)
+        self._to_compile = typical_removals(last.problem)
 
     @property
     def fitted_settings(self) -> FitSettings | None:
@@ -242,7 +246,8 @@ class OrbitFitter:
 
         Yields
         ------
-        None, about once a second, so that the caller can handle a request in between.
+        None after each step of up to a second, and where one was interrupted and is begun anew, so
+        that the caller can handle a request in between.
         """
         if self._starts is None:
             return
@@ -250,11 +255,15 @@ class OrbitFitter:
         # Memory is limited: drop the warm starts that are no longer likely to be used.
         self._starts.keep(wanted)
         for lower in wanted:
-            if self._starts.add(lower):
-                yield
-        # Not `yield from`, with which it would end with this.
-        for _ in self._compiling:
-            yield
+            yield from attempts(partial(self._starts.add, lower))
+        while self._to_compile:
+            yield from attempts(self._compile)
+
+    def _compile(self) -> None:
+        if self._last_fit is not None:
+            _, problem, mode, *_ = self._last_fit
+            contribution_of(mode.equations, problem, self._to_compile[0])
+        self._to_compile.pop(0)
 
     def forget_precomputed(self) -> None:
         """Forget what `precompute` has kept, but for the order of the latest what-if."""

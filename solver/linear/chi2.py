@@ -22,6 +22,7 @@ from solver.model.forward import (
 )
 from solver.problem.parameter_vector import local_groups, walk_groups
 from solver.problem.problem import Problem
+from solver.runtime.interruption import give_way
 
 
 class Gradient(NamedTuple):
@@ -45,6 +46,7 @@ def gradient(
     sky = _directions(offsets, geometry)
     n_chunks, pending, total = len(problem.measurements.tiles.measured), deque(), None
     for i in range(n_chunks + _MAX_PENDING):
+        give_way()
         if i < n_chunks:
             pending.append(
                 _value_and_gradient(sky, offsets, geometry, *problem.measurements.tiles.chunk(i))

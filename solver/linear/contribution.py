@@ -4,7 +4,7 @@ Normal equations are sums over the measurements, so removing measurements subtra
 contribution. It is already summed for whole detectors; other subsets are linearised again.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -62,24 +62,18 @@ def contribution_of(
     )
 
 
-def compiling(equations: NormalEquations, problem: Problem) -> Iterator[None]:
-    """Compile what `contribution_of` needs for few measurements, before anybody waits for it.
+def typical_removals(problem: Problem) -> list[Bool[np.ndarray, " obs"]]:
+    """Return some measurements of a problem, of each kind for which `contribution_of` compiles.
 
     Tiles of few measurements have other shapes than those of an orbit, and JAX compiles once for
-    each: for a source, for sources that lie in many tiles, and for an exposure.
-
-    Yields
-    ------
-    None after each shape, whose compilation takes seconds.
+    each, for seconds: for a source, for sources that lie in many tiles, and for an exposure.
     """
     index = problem.measurements.index
-    for removed in (
+    return [
         index.source == index.source[0],
         index.source % _APART == 0,
         index.exposure == index.exposure[0],
-    ):
-        contribution_of(equations, problem, removed)
-        yield
+    ]
 
 
 def _detectors_contribution(

@@ -36,6 +36,7 @@ from solver.model.forward import (
     image,
 )
 from solver.problem.problem import Problem, pad
+from solver.runtime.interruption import give_way
 
 # Chunks computed at once: a single one does not keep all cores busy.
 _MAX_PENDING = 3
@@ -83,6 +84,7 @@ def residuals(
     pending, n_chunks = deque(), len(tiles.measured)
     values = np.empty((_N_COLUMNS, *tiles.index.source.shape))
     for i in range(n_chunks + _MAX_PENDING):
+        give_way()
         if i < n_chunks:
             pending.append(launch(i))
         if i >= _MAX_PENDING and pending:

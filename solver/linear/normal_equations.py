@@ -26,6 +26,7 @@ from solver.problem.parameter_vector import VectorLayout
 from solver.problem.problem import Problem
 from solver.problem.source_blocks import SourceBlocks
 from solver.problem.tiles import Gathering
+from solver.runtime.interruption import give_way
 from solver.runtime.threads import one_blas_thread
 
 
@@ -87,6 +88,7 @@ def chunks(
 
     ahead = launch(0)
     for i in range(n_chunks):
+        give_way()
         current = ahead
         if i + 1 < n_chunks:
             ahead = launch(i + 1)

@@ -23,6 +23,7 @@ from solver.linear.triangular import upper_transposed_times
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.priors import Priors
 from solver.results.simple_structure import joint_axes
+from solver.runtime.interruption import give_way
 
 WEAK = 0.5
 """Share of the measurements below which an eigenmode is weak."""
@@ -113,6 +114,7 @@ def _prior_terms(
     weight, is_reference = _prior_root(reduced, priors)[order], is_reference[order]
     grams = [np.zeros(reduced.factor.shape) for _ in range(2)]
     for block, matrix in zip(reduced.source_blocks.blocks, reduced.whitened, strict=True):
+        give_way()
         weighted, of_block = _weighted(matrix, weight[block.places]), is_reference[block.places]
         for gram, members in zip(grams, (of_block, ~of_block), strict=True):
             gram[np.ix_(block.columns, block.columns)] += _gram(weighted[:, :, members])

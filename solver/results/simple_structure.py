@@ -10,6 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float, Int
 
+from solver.runtime.interruption import give_way
+
 _MIN_ANGLE = 1e-9
 _MAX_SWEEPS = 60
 
@@ -26,6 +28,7 @@ def joint_axes(
     axes = np.eye(matrices.shape[-1])
     rounds = list(_rounds(len(axes)))
     for _ in range(_MAX_SWEEPS):
+        give_way()
         largest = 0.0
         for a, b in rounds:
             angles = _angles(matrices, a, b)

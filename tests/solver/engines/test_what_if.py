@@ -9,12 +9,13 @@ from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines import warm_starts, what_if
-from solver.errors import FitError
+from solver.errors import CancelledError, FitError
 from solver.fit import OrbitFitter, fit_orbit
 from solver.linear import normal_equations
 from solver.linear.normal_equations import accumulate
 from solver.linear.update import update_equations
 from solver.problem.problem import build_problem
+from solver.runtime.interruption import interruptible
 from tests.solver.small_orbit import make_orbit
 
 # Required agreement with a refit, in sigmas.
@@ -165,6 +166,26 @@ def test_interrupted_precomputation_resumes_and_runs_once(orbit):
     rest = len(list(prepared.precompute(6)))
     assert rest > 0
     assert list(prepared.precompute(6)) == []
+
+
+def test_request_need_not_wait_for_a_step_of_the_precomputation(orbit):
+    """The step is interrupted between two chunks of measurements, and done later."""
+    prepared, checks = fitted(OrbitFitter(orbit.data, orbit.instrument)), []
+
+    def refuse():
+        checks.append(1)
+        raise CancelledError("a request waits")
+
+    steps = prepared.precompute(6)
+    with interruptible(refuse):
+        for _ in range(3):
+            next(steps)
+    assert len(checks) == 3
+    whole = fitted(OrbitFitter(orbit.data, orbit.instrument))
+    assert len(list(steps)) == len(list(whole.precompute(6)))
+    settings = FitSettings(order=5, prior_widths={"sources": 3.0})
+    found, expected = prepared.what_if(settings), whole.what_if(settings)
+    pd.testing.assert_frame_equal(found.sources, expected.sources)
 
 
 def test_what_ifs_with_fewer_measurements_have_nothing_to_compile(sample_orbit, monkeypatch):

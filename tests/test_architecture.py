@@ -65,6 +65,7 @@ WITHOUT_JAX = ("solver.data", "solver.io", "plateviz")
 # The process that fits, and what `plateviz survey` imports once it fits.
 WITH_JAX = (
     "plateviz.solving.fitters",
+    "plateviz.solving.preparation",
     "plateviz.solving.solver_process",
     "plateviz.runs.fit_survey",
     "plateviz.runs.watch",

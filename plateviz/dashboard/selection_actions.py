@@ -53,6 +53,11 @@ class SelectionActions:
             return
         self._exclude(self._left_out | self.in_orbit)
 
+    def without_selected(self, settings: FitSettings) -> FitSettings:
+        """Return settings with which the selection is left out, too."""
+        left_out = Selected.of(settings.exclusions) | self.in_orbit
+        return settings.with_(exclusions=left_out.exclusions)
+
     def put_back(self) -> None:
         """Include the selection in the next fit, which shows a what-if, or say what to do."""
         self._exclude(self._left_out - self._selection.selected)

@@ -44,7 +44,6 @@ class Session(OnScreen):
         # What is put on the screen after the requested solution, one after the other.
         self._later: list[Solution | Request] = []
         self._is_opening = False
-        self._unprepared: Solution | None = None
         self.choices.param.watch(
             lambda *_: self.ask_what_if(),
             [*ANSWERED_AT_ONCE, "what_if_at_once"],
@@ -88,10 +87,7 @@ class Session(OnScreen):
         self._begin([*before, solution], is_opening=True)
         if isinstance(other, Solution) and not before:
             self.compare_with(other)
-        # Without a job, all of it is on the screen.
         self.choices.load(solution.settings)
-        if self.job is None and isinstance(solution, Solution):
-            self._unprepared = solution
 
     def _begin(self, solutions: list[Solution | Request], is_opening: bool = False) -> None:
         self._cancel_job()
@@ -137,15 +133,6 @@ class Session(OnScreen):
             self._show_next()
             # What has been changed for it; without a what-if of its own.
             self.choices.load(request.settings)
-
-    def prepare_what_ifs(self) -> None:
-        """Let the solver fit what the what-ifs of an existing result start from, once.
-
-        The page asks for it when it has nothing left to draw.
-        """
-        solution, self._unprepared = self._unprepared, None
-        if solution is not None and self.shown is solution and self.choices.what_if_at_once:
-            self.store.prepare(solution.orbit, solution.settings)
 
     def refit(self) -> None:
         """Request a fit with the settings of the controls; report an invalid one at once."""
@@ -257,7 +244,9 @@ class Session(OnScreen):
     def _request(self, request: Request) -> None:
         self._requested = request
         self.advice = ""
-        self.follow(self._held.begin(request), stage=Stage.STALE if self.shown else Stage.LOADING)
+        job = self._held.begin(request)
+        if not job.status.is_over:
+            self.follow(job, stage=Stage.STALE if self.shown else Stage.LOADING)
         self.poll()
 
     def _cancel_job(self) -> None:

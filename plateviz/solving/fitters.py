@@ -1,12 +1,10 @@
-"""Fitters of the solver process: those of the latest orbits, and their preparation.
+"""Fitters of the solver process: those of the latest orbits, and what their what-ifs start from.
 
 A request is the JSON object of `plateviz.solving.solver_process`.
 """
 
 import json
-import queue
 from collections import OrderedDict
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -15,9 +13,8 @@ from plateviz.solving.capacity import ready_orbits
 from plateviz.solving.origin import origin_from_dict
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
-from solver.engines.gauss_newton import Iteration
 from solver.engines.start_tables import StartTables
-from solver.errors import CancelledError, FitError, InputError
+from solver.errors import InputError
 from solver.fit import OrbitFitter
 from solver.io.parquet import read_frame
 
@@ -89,35 +86,3 @@ def base_settings(settings: FitSettings) -> FitSettings:
     A fit without some measurements is no start for a what-if without others; one of all is.
     """
     return settings.with_(exclusions=Exclusions(), compare_orders=False)
-
-
-def prepare(
-    fitters: Fitters, request: Request, requests: queue.Queue[Request | None]
-) -> Iterator[None]:
-    """Fit an orbit and precompute its likely what-ifs; give way to requests for anything else."""
-
-    def give_way(_: Iteration) -> None:
-        with requests.mutex:
-            waiting = list(requests.queue)
-        if not all(_starts_from(request, later) for later in waiting):
-            raise CancelledError("another request waits")
-
-    # What is wrong with the orbit is said when something is asked of it.
-    with suppress(CancelledError, InputError, FitError):
-        fitter = fitters.of(request)
-        settings = base_settings(FitSettings.from_dict(request["settings"]))
-        fitted = fitter.fitted_settings
-        if fitted is None or not fitted.serves(settings):
-            base = base_of(request)
-            is_same = base is not None and base.settings == settings
-            fitter.prepare_what_ifs(settings, give_way, base.solution if base and is_same else None)
-        yield from fitter.precompute(settings.order)
-
-
-def _starts_from(prepared: Request, later: Request | None) -> bool:
-    """Return whether a later request is a what-if that starts from the prepared fit."""
-    return (
-        later is not None
-        and bool(later.get("what_if"))
-        and all(later[key] == prepared[key] for key in ("origin", "orbit"))
-    )

@@ -3,11 +3,15 @@
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 
+from plateviz.runs.scratch_result import write_scratch_result, write_verdict
+from plateviz.tables.verdict import with_verdict
+from solver.data.result import FitResult
 from solver.errors import InputError
 
-# What such work needs is large: some 100 MB for the eigenmodes of a full orbit.
-_MOST = 2
+# What such work needs is large: of a full orbit, some 40 MB for a verdict, 100 MB for eigenmodes.
+_MOST_VERDICTS, _MOST_EIGENMODES = 3, 2
 
 Work = Callable[[], object]
 
@@ -24,6 +28,16 @@ class PutOff:
         self._verdicts: deque[Work] = deque()
         self._eigenmodes: deque[Work] = deque()
 
+    def write(self, directory: Path, result: FitResult, *, is_partial: bool) -> None:
+        """Write a result, and put its verdict off, for whose tests the figures do not wait.
+
+        Parameters
+        ----------
+        is_partial : as of `write_scratch_result`, whose errors are raised
+        """
+        write_scratch_result(directory, result, is_partial=is_partial, is_judged=False)
+        self.add_verdict(lambda: _judge(directory, result))
+
     def add_verdict(self, work: Work) -> None:
         """Put the verdict on a result off."""
         self._verdicts.append(work)
@@ -34,9 +48,9 @@ class PutOff:
 
     def limit(self) -> None:
         """Let few results wait: do the oldest verdicts, and give up the oldest eigenmodes."""
-        while len(self._verdicts) > _MOST:
+        while len(self._verdicts) > _MOST_VERDICTS:
             _do(self._verdicts.popleft())
-        while len(self._eigenmodes) > _MOST:
+        while len(self._eigenmodes) > _MOST_EIGENMODES:
             self._eigenmodes.popleft()
 
     def finish_verdicts(self) -> None:
@@ -49,9 +63,15 @@ class PutOff:
         _finish(self._eigenmodes)
 
 
+def _judge(directory: Path, result: FitResult) -> None:
+    write_verdict(directory, with_verdict(result).summary["verdict"])
+
+
 def _finish(waiting: deque[Work]) -> None:
     while waiting:
-        _do(waiting.popleft())
+        _do(waiting[0])
+        # Work that is interrupted is done when there is time again.
+        waiting.popleft()
 
 
 def _do(work: Work) -> None:

@@ -8,6 +8,7 @@ server is removed by the next one.
 import hashlib
 import json
 import threading
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -19,6 +20,7 @@ from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.runs.run import runs_of
+from plateviz.runs.scratch_result import is_written
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.judge import Judge
 from plateviz.solving.made_solutions import MadeSolution, MadeSolutions
@@ -112,24 +114,51 @@ class SolutionStore:
         """
         directory = self._directory(orbit, settings, what_if)
         with self._lock:
-            for removed in self._results.expect(directory):
-                self._jobs.pop(removed, None)
+            self._expect(directory)
             job = self._jobs.get(directory)
             if job is None or job.status in (JobStatus.FAILED, JobStatus.CANCELLED):
-                job = self._solver.submit(Job(self._request(orbit, settings, what_if, directory)))
+                job = Job(self._request(orbit, settings, what_if, directory))
                 self._jobs[directory] = job
+                if what_if and is_written(directory):
+                    # It was likely to be asked for.
+                    job.take({"event": "done"})
+                else:
+                    self._solver.submit(job)
             job.hold()
             return job
 
-    def prepare(self, orbit: int | None, settings: FitSettings) -> None:
-        """Let the solver, once it is idle, fit what the what-ifs of a solution start from.
+    def prepare(
+        self,
+        orbit: int | None,
+        settings: FitSettings,
+        likely: Iterable[FitSettings] = (),
+        *,
+        may_fit: bool = True,
+    ) -> None:
+        """Let the solver, once it is idle, prepare what a person may ask for next.
 
-        A solution of a run was fitted by another process, which has ended. Only the first engine
-        answers what-ifs.
+        Only the first engine answers what-ifs.
+
+        Parameters
+        ----------
+        settings : of the solution that the what-ifs start from
+        likely : settings of what-ifs that are made, the likeliest first
+        may_fit : whether to fit what they start from: a solution of a run was fitted by another
+            process, which has ended
         """
-        if settings.engine == ENGINES[0]:
-            self._prepared = orbit
-            self._solver.prepare(self._fit_of(orbit, settings))
+        if settings.engine != ENGINES[0]:
+            return
+        made = [(one, self._directory(orbit, one, what_if=True)) for one in likely]
+        with self._lock:
+            for _, directory in made:
+                self._expect(directory)
+        self._prepared = orbit
+        request = {
+            **self._fit_of(orbit, settings),
+            "may_fit": may_fit,
+            "likely": [{"settings": one.to_dict(), "directory": str(at)} for one, at in made],
+        }
+        self._solver.prepare(request)
 
     def leave(self, orbit: int | None) -> None:
         """Give up what is prepared for an orbit that a page leaves: the page needs the cores.
@@ -182,6 +211,11 @@ class SolutionStore:
         self.background.shutdown(wait=False, cancel_futures=True)
         self._solver.close()
         self._folder.close()
+
+    def _expect(self, directory: Path) -> None:
+        """Make room for a result that may be written; the lock is held."""
+        for removed in self._results.expect(directory):
+            self._jobs.pop(removed, None)
 
     def _complete(self, directory: Path) -> bool:
         """Let the solver write what a result lacks; return whether it is at it."""

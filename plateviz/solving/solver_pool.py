@@ -100,7 +100,8 @@ class SolverPool:
     def complete(self, job: Job) -> bool:
         """Let its process write what it has put off of a job; return whether there is a process."""
         with self._lock:
-            queue = self._of_job.get(job)
+            # The result of a job that no queue has had was prepared for its orbit.
+            queue = self._of_job.get(job) or self._warm.get(_orbit(job.request))
         return queue is not None and queue.complete(job)
 
     def cancel(self, job: Job) -> None:

@@ -8,10 +8,11 @@ on standard error; `plateviz.solving.solver_queue` reports that and starts anoth
 Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory", "base"},
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
 "directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}, and without events
-{"do": "prepare", "origin", "orbit", "settings", "base"}: fit while idle what a what-if starts from,
-{"do": "rest"}: give up what is being prepared, and {"do": "complete"} with the rest of a "fit" that
-is done: write what was put off of its result. "base" is the solution of a run from which the
-what-ifs of the orbit can start, {"settings", "directory"}, or None.
+{"do": "prepare", "origin", "orbit", "settings", "base", "may_fit", "likely"}: while idle, make the
+likely what-ifs of a solution, each {"settings", "directory"}, and with "may_fit" fit what they
+start from, {"do": "rest"}: give up what is being prepared, and {"do": "complete"} with the rest of
+a "fit" that is done: write what was put off of its result. "base" is the solution of a run from
+which the what-ifs of the orbit can start, {"settings", "directory"}, or None.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -22,36 +23,29 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from plateviz.cache import keep_compilations
-from plateviz.runs.scratch_result import (
-    are_eigenmodes_written,
-    write_eigenmodes,
-    write_scratch_result,
-    write_verdict,
-)
-from plateviz.solving.fitters import Base, Fitters, Request, base_of, base_settings, prepare
+from plateviz.runs.scratch_result import are_eigenmodes_written, is_written, write_eigenmodes
+from plateviz.solving.fitters import Base, Fitters, Request, base_of, base_settings
+from plateviz.solving.preparation import Preparation, prepare
 from plateviz.solving.put_off import PutOff
-from plateviz.tables.verdict import with_verdict
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
-from solver.data.result import FitResult
 from solver.data.settings import COUNTED, FitSettings
 from solver.engines.gauss_newton import Iteration
 from solver.errors import CancelledError, FitError, InputError
 from solver.fit import OrbitFitter
 from solver.results.orbit_result import PartialResult
+from solver.runtime.interruption import interruptible
 from solver.runtime.memory import keep_memory
 from solver.runtime.termination import EXIT_CODE, ending_on_sigterm
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 
 Send = Callable[[dict], None]
-# Work in steps that speeds up likely next requests; done while no request waits.
-Speculative = Iterator[None]
 # Idle seconds before the verdict is begun. In these the server sends the solution, a browser draws
 # it, and the next request of a hand on a slider comes. On two cores, the figures would wait for it.
 _NEXT_S = 0.4
@@ -102,34 +96,42 @@ def _serve_all() -> None:
     reader = threading.Thread(target=_read, args=(sys.stdin, requests, cancellations), daemon=True)
     reader.start()
     send({"event": "ready"})
-    speculative: Speculative = iter(())
+    preparation = Preparation()
     kept = _Kept(Fitters(), PutOff())
-    while (request := _next_request(requests, speculative, kept.put_off)) is not None:
+    while (request := _next_request(requests, preparation, kept.put_off)) is not None:
         if request["do"] == "complete":
             _complete(request, kept)
         elif request["do"] == "prepare":
-            speculative = prepare(kept.fitters, request, requests)
+            preparation = prepare(kept.fitters, request, requests, kept.put_off)
         elif request["do"] == "rest":
-            speculative = iter(())
+            preparation = Preparation()
         else:
-            speculative = _serve(request, send, cancellations, kept)
+            preparation = _serve(request, send, cancellations, kept)
 
 
 def _next_request(
-    requests: queue.Queue[Request | None], speculative: Speculative, put_off: PutOff
+    requests: queue.Queue[Request | None], preparation: Preparation, put_off: PutOff
 ) -> Request | None:
-    """Wait for a request; do what was put off and speculative work once the process is idle."""
+    """Wait for a request; do what was put off, and prepare others, once the process is idle."""
     put_off.limit()
+
+    def check() -> None:
+        if not requests.empty():
+            raise CancelledError("a request waits")
+
     # A request that waits is sent once the one before is done, and a page that has received a
     # solution may send one, too.
-    for seconds, work in ((_NEXT_S, put_off.finish_verdicts), (_IDLE_S, put_off.finish)):
+    for seconds, work, steps in (
+        (_NEXT_S, put_off.finish_verdicts, preparation.soon),
+        (_IDLE_S, put_off.finish, preparation.later),
+    ):
         try:
             return requests.get(timeout=seconds)
         except queue.Empty:
-            work()
-    for _ in speculative:
-        if not requests.empty():
-            break
+            with interruptible(check), suppress(CancelledError):
+                work()
+                for _ in steps:
+                    check()
     return requests.get()
 
 
@@ -161,7 +163,7 @@ def _read(
     os._exit(EXIT_CODE)
 
 
-def _serve(request: Request, send: Send, cancellations: _Cancellations, kept: _Kept) -> Speculative:
+def _serve(request: Request, send: Send, cancellations: _Cancellations, kept: _Kept) -> Preparation:
     job = request["job"]
     work = {"fit": _fit, "simulate": _simulate, "survey": _survey}[request["do"]]
 
@@ -171,18 +173,21 @@ def _serve(request: Request, send: Send, cancellations: _Cancellations, kept: _K
 
     try:
         cancellations.check(job)
-        speculative = work(request, progress, kept)
+        preparation = work(request, progress, kept)
         send({"event": "done", "job": job})
-        return speculative
+        return preparation
     except CancelledError:
         send({"event": "cancelled", "job": job})
     except (InputError, FitError) as error:
         is_input = isinstance(error, InputError)
         send({"event": "failed", "job": job, "message": str(error), "is_input_error": is_input})
-    return iter(())
+    return Preparation()
 
 
-def _fit(request: Request, progress: Callable[..., None], kept: _Kept) -> Speculative:
+def _fit(request: Request, progress: Callable[..., None], kept: _Kept) -> Preparation:
+    if request["what_if"] and is_written(Path(request["directory"])):
+        # It was likely to be asked for.
+        return Preparation()
     progress(stage="reading the orbit")
     fitter, put_off = kept.fitters.of(request), kept.put_off
     settings = FitSettings.from_dict(request["settings"])
@@ -199,16 +204,10 @@ def _fit(request: Request, progress: Callable[..., None], kept: _Kept) -> Specul
     result = fitter.fit(settings, on_iteration) if found is None else found.result
     progress(stage="writing the result")
     directory = Path(request["directory"])
-    write_scratch_result(directory, result, is_partial=found is not None, is_judged=False)
-    put_off.add_verdict(lambda: _judge(directory, result))
+    put_off.write(directory, result, is_partial=found is not None)
     if found is not None:
         put_off.add_eigenmodes(lambda: write_eigenmodes(directory, found.eigenmodes()))
-    return fitter.precompute(settings.order)
-
-
-def _judge(directory: Path, result: FitResult) -> None:
-    """Write the verdict, for whose tests the figures of a solution do not wait."""
-    write_verdict(directory, with_verdict(result).summary["verdict"])
+    return Preparation(later=fitter.precompute(settings.order))
 
 
 def _what_if(
@@ -252,7 +251,7 @@ def _complete(request: Request, kept: _Kept) -> None:
             write_eigenmodes(directory, tables)
 
 
-def _simulate(request: Request, progress: Callable[..., None], _: _Kept) -> Speculative:
+def _simulate(request: Request, progress: Callable[..., None], _: _Kept) -> Preparation:
     settings = SurveySettings.from_dict(request["settings"])
     catalogue = request.get("catalogue")
     simulate_survey(
@@ -261,10 +260,10 @@ def _simulate(request: Request, progress: Callable[..., None], _: _Kept) -> Spec
         catalogue=None if catalogue is None else Path(catalogue),
         progress=lambda done, total: progress(stage="simulating", done=done, total=total),
     )
-    return iter(())
+    return Preparation()
 
 
-def _survey(request: Request, progress: Callable[..., None], _: _Kept) -> Speculative:
+def _survey(request: Request, progress: Callable[..., None], _: _Kept) -> Preparation:
     # Imported here since Dask takes half a second to import.
     from plateviz.runs.fit_survey import fit_survey
 
@@ -276,7 +275,7 @@ def _survey(request: Request, progress: Callable[..., None], _: _Kept) -> Specul
         request["workers"],
         progress=lambda now: progress(stage="fitting orbits", done=now.done, total=now.total),
     )
-    return iter(())
+    return Preparation()
 
 
 if __name__ == "__main__":

@@ -4,10 +4,10 @@ import shutil
 
 from bokeh.document import Document
 
-from plateviz.dashboard.app import _Ticker
 from plateviz.dashboard.lost_run import look_for_run
 from plateviz.dashboard.navigation import Navigation
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.ticker import Ticker
 from plateviz.dashboard.views.notice import NoticeView
 from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.source import SourcePage
@@ -44,7 +44,7 @@ def test_page_of_files_has_no_run_to_lose(fit_result):
 
 
 def test_page_that_has_ended_is_neither_looked_at_nor_woken(fit_result):
-    ticker, document, follower = _Ticker(), Document(), id
+    ticker, document, follower = Ticker(), Document(), id
     ticker._navigation = Navigation(Session(SurveyStore(fit_result, [])))
     ticker._document = document
     document.on_change(follower)

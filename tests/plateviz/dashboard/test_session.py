@@ -62,8 +62,8 @@ class FakeStore:
         self.requested.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
         return self.requested[-1][2]
 
-    def prepare(self, orbit, settings):
-        self.prepared.append((orbit, settings))
+    def prepare(self, orbit, settings, likely=(), *, may_fit=True):
+        self.prepared.append((orbit, settings, list(likely), may_fit))
 
     def leave(self, orbit):
         self.left.append(orbit)
@@ -115,15 +115,6 @@ def test_first_orbit_is_requested_with_the_settings_of_the_paper(session):
     assert session.other is None
 
 
-def test_solution_of_a_run_is_prepared_once_for_what_ifs(fit_result):
-    session = Session(FakeStore(fit_result))
-    session.show_result(of_run(fit_result))
-    assert session.store.prepared == []
-    session.prepare_what_ifs()
-    session.prepare_what_ifs()
-    assert session.store.prepared == [(0, fit_result.settings)]
-
-
 def test_preparations_for_an_orbit_are_given_up_when_it_is_left(fit_result):
     session = Session(FakeStore(fit_result))
     session.show_result(of_run(fit_result))
@@ -133,16 +124,23 @@ def test_preparations_for_an_orbit_are_given_up_when_it_is_left(fit_result):
     assert session.store.left == [0]
 
 
-def test_nothing_is_prepared_for_what_is_no_longer_shown_or_not_wanted(fit_result):
-    session = Session(FakeStore(fit_result))
-    session.show_result(of_run(fit_result))
-    session.refit()
+def test_solution_that_is_there_already_is_shown_without_a_change_before(session):
+    """Otherwise all figures would be faded for a moment."""
     finish(session)
-    session.prepare_what_ifs()
-    session.choices.what_if_at_once = False
-    session.show_result(of_run(fit_result, 1))
-    session.prepare_what_ifs()
-    assert session.store.prepared == []
+    stages = []
+    session.param.watch(lambda event: stages.append(event.new), "stage")
+    made = session.store.request
+
+    def done(*arguments, **options):
+        job = made(*arguments, **options)
+        job.take({"event": "done"})
+        return job
+
+    session.store.request = done
+    session.choices.order = 3
+    session.refit()
+    assert session.shown.settings.order == 3
+    assert set(stages) == {Stage.READY}
 
 
 def test_last_solution_stays_until_the_next_one_is_complete(session):

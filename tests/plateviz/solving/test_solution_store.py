@@ -4,6 +4,7 @@ import json
 import shutil
 import signal
 import tempfile
+import time
 from functools import partial
 
 import pandas as pd
@@ -221,6 +222,24 @@ def test_what_if_is_a_step_from_the_last_fit(store):
     for name in ("modes", "mode_parameters", "mode_shifts"):
         assert len(getattr(result, name)) == len(getattr(expected, name))
     pd.testing.assert_frame_equal(result.modes[["mode", "name"]], expected.modes[["mode", "name"]])
+
+
+def test_likely_what_if_is_there_when_it_is_asked_for(store):
+    settings = FitSettings(order=4)
+    assert store.request(1, settings).wait(LONG) is JobStatus.DONE
+    likely = settings.with_(order=3)
+    store.prepare(1, settings, [likely], may_fit=False)
+    end = time.monotonic() + LONG
+    while store.result(1, likely, what_if=True) is None and time.monotonic() < end:
+        time.sleep(0.02)
+    job = store.request(1, likely, what_if=True)
+    assert job.status is JobStatus.DONE
+    assert job.progress == []
+    result = store.result(1, likely, what_if=True)
+    assert result.summary["reason"] == FitStatus.WHAT_IF.value
+    assert result.summary["verdict"] == plain(with_verdict(result).summary["verdict"])
+    # Nobody may have asked for it: its eigenmodes are made now.
+    assert len(result.modes) > 0
 
 
 def test_eigenmodes_that_were_given_up_are_computed_when_asked_for(store):

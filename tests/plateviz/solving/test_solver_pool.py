@@ -99,7 +99,15 @@ def test_what_was_put_off_is_asked_of_the_process_that_put_it_off(pool, queues):
         queue._process = object()
     assert pool.complete(what_if)
     assert (queues[0].sent[-1], queues[1].sent[-1]) == ("complete", "fit")
-    assert not pool.complete(fit(0, what_if=True))
+    assert not pool.complete(fit(1, what_if=True))
+
+
+def test_what_was_put_off_of_a_prepared_what_if_is_asked_of_the_process_of_its_orbit(pool, queues):
+    pool.submit(fit(0))
+    pool.prepare({"origin": "sky", "orbit": 0})
+    queues[0]._process = object()
+    assert pool.complete(fit(0, what_if=True))
+    assert queues[0].sent[-1] == "complete"
 
 
 def test_one_process_does_everything_in_order(queues):

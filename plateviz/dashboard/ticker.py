@@ -1,0 +1,163 @@
+"""Ticker: draws what is due on a page, and follows what goes on elsewhere."""
+
+from contextvars import Context
+from functools import partial
+
+import panel as pn
+from bokeh.document import Document
+from tornado.ioloop import IOLoop
+
+from plateviz.dashboard.at_rest import AtRest
+from plateviz.dashboard.expected_what_ifs import ExpectedWhatIfs
+from plateviz.dashboard.lost_run import look_for_run
+from plateviz.dashboard.model_search import one_search
+from plateviz.dashboard.navigation import WORKSPACES, Navigation
+from plateviz.dashboard.selected import KINDS
+from plateviz.dashboard.views.pages import Pages
+from plateviz.solving.job import Job
+
+# Milliseconds between two looks at what a running job says.
+_PROGRESS_MILLISECONDS = 250
+# Milliseconds between two questions for what another thread makes.
+_PENDING_MILLISECONDS = 50
+# Milliseconds between two looks at a run that is not complete.
+_LOOK = 2000
+# Seconds between two looks whether the run is there at all, and whether others have begun.
+_LOOK_FOR_RUN_SECONDS = 10.0
+# The solver fits what what-ifs start from once a page has been at rest for so long. Before, the
+# browser draws and a person may step on to the next orbit, for which a fit would take the cores.
+_REST_SECONDS = 3.0
+# Seconds that the controls of a refit wait for a fit; one that takes longer can be cancelled.
+_CONTROLS_SECONDS = 3.0
+
+
+class Ticker:
+    """Follows job and run, draws figures that are due and completes the page, while there is need.
+
+    A job belongs to the server and may outlive the page: it calls when it is over, and what it
+    says in between is looked at now and then.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a page."""
+        self._progress = pn.state.add_periodic_callback(
+            self._tick, period=_PROGRESS_MILLISECONDS, start=False
+        )
+        self._looks = pn.state.add_periodic_callback(self._look, period=_LOOK, start=False)
+        self._navigation: Navigation | None = None
+        self._pages: Pages | None = None
+        self._watched: Job | None = None
+        self._document: Document | None = None
+        self._loop: IOLoop | None = None
+        self._is_to_tick = False
+        self._expected: ExpectedWhatIfs | None = None
+        self._rest: AtRest | None = None
+        self._looks_for_run: AtRest | None = None
+
+    def follow(self, navigation: Navigation, pages: Pages) -> None:
+        """Begin once the page has loaded; drawing before would delay it."""
+        session = navigation.session
+        session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
+        session.selection.param.watch(self.wake, ["field", "plates", "detector", *KINDS])
+        session.units.param.watch(self.wake, "unit")
+        names = ["view", *WORKSPACES.values(), "run_name", "written", "found"]
+        navigation.param.watch(self.wake, names)
+        navigation.param.watch(self._follow_run, "run_name")
+
+        def begin() -> None:
+            self._navigation, self._pages = navigation, pages
+            self._document, self._loop = pn.state.curdoc, IOLoop.current()
+            # A timer of this page's context would keep the page until its time has come.
+            later = (
+                None if self._document is None else partial(Context().run, self._loop.call_later)
+            )
+            self._expected = ExpectedWhatIfs(session)
+            self._rest = AtRest(self._expected.ask_for_fit, _REST_SECONDS, later)
+            self.wake()
+            self._follow_run()
+            if later is not None:
+                self._looks_for_run = AtRest(self._look_soon, _LOOK_FOR_RUN_SECONDS, later)
+                self._looks_for_run.begin()
+
+        pn.state.onload(begin)
+
+    def wake(self, *_: object) -> None:
+        """Tick until nothing is left to do."""
+        if self._navigation is None or self._is_to_tick:
+            return
+        if self._document is None:
+            # Nothing calls back into a page without a document.
+            self._start_looking()
+            return
+        if not self._has_ended:
+            self._is_to_tick = True
+            self._document.add_next_tick_callback(self._tick)
+
+    def _start_looking(self) -> None:
+        if not self._progress.running:
+            self._progress.start()
+
+    def _call(self) -> None:
+        """Tick soon; called from any thread."""
+        if self._loop is not None:
+            self._loop.add_callback(self.wake)
+
+    def _follow_run(self, *_: object) -> None:
+        """Look again and again what a run has that is not complete."""
+        if self._navigation is not None and self._navigation.growth and not self._looks.running:
+            self._looks.start()
+
+    def _look(self) -> None:
+        if self._pages is not None and self._pages.is_due:
+            # A table that the browser is still making takes no other rows.
+            return
+        if self._navigation is None or not self._navigation.look_again():
+            self._looks.stop()
+
+    @property
+    def _has_ended(self) -> bool:
+        """Whether the page has been closed; a timer or a job may come before it is forgotten."""
+        return self._document is None or self._document.session_context is None
+
+    def _look_soon(self) -> None:
+        if self._document is not None and not self._has_ended:
+            self._document.add_next_tick_callback(self._look_for_run)
+
+    def _look_for_run(self) -> None:
+        if self._navigation is not None and self._looks_for_run is not None:
+            look_for_run(self._navigation)
+            self._looks_for_run.begin()
+
+    def _tick(self) -> None:
+        self._is_to_tick = False
+        if self._navigation is None or self._pages is None:
+            return
+        session = self._navigation.session
+        # What follows from a new solution is sent as one message.
+        with pn.io.hold(), one_search(self._document):
+            session.poll()
+            session.judging.look()
+            self._pages.draw_due()
+        job = session.job
+        if job is not None and job is not self._watched:
+            self._watched = job
+            job.watch(self._call)
+            self._start_looking()
+        is_pending = self._pages.is_pending or session.judging.is_any_pending
+        if is_pending and self._document is not None:
+            # Another thread is at work, and would wait for a page that asks without a pause.
+            self._is_to_tick = True
+            self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
+        elif is_pending or self._pages.is_due or self._pages.complete(_is_brief(job)):
+            self.wake()
+        elif job is None:
+            if self._progress.running:
+                self._progress.stop()
+            self._navigation.expect_orbit()
+            if self._expected is not None and self._rest is not None:
+                self._expected.ask()
+                self._rest.begin()
+
+
+def _is_brief(job: Job | None) -> bool:
+    return job is not None and job.seconds < _CONTROLS_SECONDS

@@ -5,6 +5,7 @@ from functools import partial
 
 import panel as pn
 from bokeh.document import Document
+from bokeh.server.callbacks import TimeoutCallback
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.at_rest import AtRest
@@ -18,7 +19,8 @@ from plateviz.solving.job import Job
 
 # Milliseconds between two looks at what a running job says.
 _PROGRESS_MILLISECONDS = 250
-# Milliseconds between two questions for what another thread makes.
+# Milliseconds between two questions for what the solver process makes. Other threads tell when they
+# are done.
 _PENDING_MILLISECONDS = 50
 # Milliseconds between two looks at a run that is not complete.
 _LOOK = 2000
@@ -50,6 +52,7 @@ class Ticker:
         self._document: Document | None = None
         self._loop: IOLoop | None = None
         self._is_to_tick = False
+        self._later: TimeoutCallback | None = None
         self._expected: ExpectedWhatIfs | None = None
         self._rest: AtRest | None = None
         self._looks_for_run: AtRest | None = None
@@ -100,7 +103,15 @@ class Ticker:
     def _call(self) -> None:
         """Tick soon; called from any thread."""
         if self._loop is not None:
-            self._loop.add_callback(self.wake)
+            self._loop.add_callback(self._tick_now)
+
+    def _tick_now(self) -> None:
+        """Tick, without a wait for what is being made."""
+        later, self._later = self._later, None
+        if later is not None and not self._has_ended and self._document is not None:
+            self._document.remove_timeout_callback(later)
+            self._is_to_tick = False
+        self.wake()
 
     def _follow_run(self, *_: object) -> None:
         """Look again and again what a run has that is not complete."""
@@ -129,7 +140,7 @@ class Ticker:
             self._looks_for_run.begin()
 
     def _tick(self) -> None:
-        self._is_to_tick = False
+        self._is_to_tick, self._later = False, None
         if self._navigation is None or self._pages is None:
             return
         session = self._navigation.session
@@ -147,7 +158,8 @@ class Ticker:
         if is_pending and self._document is not None:
             # Another thread is at work, and would wait for a page that asks without a pause.
             self._is_to_tick = True
-            self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
+            self._later = self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
+            session.store.background.listen(self._call)
         elif is_pending or self._pages.is_due or self._pages.complete(_is_brief(job)):
             self.wake()
         elif job is None:

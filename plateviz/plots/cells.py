@@ -93,6 +93,17 @@ class Counts:
             self._count(row, column, self._with_value)
             self._count(row, column, self._sums, np.where(has_value, values, 0.0))
 
+    def merge(self, other: "Counts") -> None:
+        """Add the points that another one of the same frame has counted."""
+        self._counts += other._counts
+        for own, added in (
+            (self._fine, other._fine),
+            (self._sums, other._sums),
+            (self._with_value, other._with_value),
+        ):
+            if own is not None and added is not None:
+                own += added
+
     @property
     def number(self) -> int:
         """Number of points inside the frame."""

@@ -9,7 +9,6 @@ import hashlib
 import json
 import threading
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.queries import SurveyRun, survey_runs
 from plateviz.runs.run import runs_of
 from plateviz.runs.scratch_result import is_written
+from plateviz.solving.background import Background
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.judge import Judge
 from plateviz.solving.made_solutions import MadeSolution, MadeSolutions
@@ -35,9 +35,6 @@ from solver.data.settings import ENGINES, FitSettings
 from solver.errors import InputError
 from solver.io.disk import writing
 from solver.io.scratch import ScratchFolder, temporary_folder
-
-# Threads that read and count rows for all sessions, beside the one of the event loop.
-_READERS = 2
 
 
 class SolutionStore:
@@ -79,7 +76,7 @@ class SolutionStore:
         self._results = ScratchResults(self._complete)
         self._of_runs = OrbitCache()
         self.columns = ColumnCache()
-        self.background = ThreadPoolExecutor(_READERS, thread_name_prefix="reader")
+        self.background = Background()
         self.judge = Judge(self.background)
         self.run_reader = RunReader(self.background)
         self.reports = Turns()

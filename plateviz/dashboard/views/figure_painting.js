@@ -134,6 +134,15 @@ const layOutOnce = plot => {
   }
 }
 
+// Tell of a zoom with the wheel at once, and not after the next picture of what is drawn by now.
+const tellOfZoom = plot => {
+  const update = plot.update_range
+  plot.update_range = function (range, options) {
+    update.call(this, range, options)
+    if (options?.scrolling) this.trigger_ranges_update_event()
+  }
+}
+
 export function render() {
   const view = Bokeh.Models.get("Scatter").prototype.default_view.prototype
   // The page has one BokehJS, also where several dashboards are parts of it.
@@ -150,4 +159,5 @@ export function render() {
   const plot = Bokeh.Models.get("Plot").prototype.default_view.prototype
   Object.defineProperty(plot, "base_font_size", { get: () => 13 })
   layOutOnce(plot)
+  tellOfZoom(plot)
 }

@@ -13,6 +13,7 @@ class FigurePainting(pn.custom.JSComponent):
     copied to where the marks are. BokehJS also asks the style sheets for colours and sizes of words
     and lines, for which the browser computes the styles of the page anew; figures have their own.
     And it lays out a plot again for each property that changes; here, once for those of a message.
+    Of a zoom the server hears before the browser has painted the old marks between the new limits.
     """
 
     _esm = Path(__file__).with_suffix(".js").read_text(encoding="utf-8")

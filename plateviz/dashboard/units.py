@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import numpy as np
 import pandas as pd
 import param
 
@@ -45,6 +46,11 @@ class Units(param.Parameterized):
         chosen = self._chosen
         return figure if chosen is None or figure is None else chosen.figure(figure)
 
+    def of_axes(self, figure: Figure) -> np.ndarray:
+        """Return the factors from the units of the axes, x and y, to those on the screen."""
+        chosen = self._chosen
+        return np.array((1.0, 1.0) if chosen is None else chosen.of_axes(figure.frames[0]))
+
     def text(self, text: str) -> str:
         """Return a text, or markup that has no text of a person's, in the chosen unit."""
         chosen = self._chosen
@@ -84,6 +90,14 @@ class Units(param.Parameterized):
         numbers = table.select_dtypes("number").drop(columns="pull", errors="ignore")
         scaled = numbers.mul(factors.to_numpy(), axis=0)
         return table.assign(unit=[_OF_ROW.sub(chosen.unit, u) for u in table["unit"]], **scaled)
+
+    def changes(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Return a table of texts, whose rows begin with a label, in the chosen unit."""
+        chosen = self._chosen
+        if chosen is None:
+            return table
+        rows = [chosen.row(*row) for row in table.itertuples(index=False)]
+        return pd.DataFrame(rows, columns=table.columns)
 
     def _factor(self, heading: Heading) -> float:
         found = _OF_COLUMN.search(heading.group) or _OF_COLUMN.search(heading.title)

@@ -31,6 +31,8 @@ _ONE = re.compile(_NUMBER)
 _TWICE = re.compile(rf"({_NUMBER} {_UNITS}) = {_NUMBER} \2{_END}")
 _IN_LABEL = re.compile(rf"(?<=\(){_UNITS}(?=[,)/])|^{_UNITS}$")
 _FIELD = re.compile(r"@\{(\w+)\}(\{[^}]*\})?")
+# Place of the pointer, which is in the unit of the axis.
+_POINTER = re.compile(rf"(\$[xy](?:\{{[^}}]*\}})?) {_UNITS}{_END}")
 _FIELDS = re.compile(rf"((?:@\{{\w+\}}(?:\{{[^}}]*\}})?(?:, | ± | to )?)+) {_UNITS}{_END}")
 _UNIT_COLUMN = re.compile(r"(?<=\} )@\{(\w+)\}(?!\{)")
 _TWO_FIELDS = re.compile(rf"(@.+) {_UNITS} = @.+ \2$")
@@ -68,6 +70,17 @@ class AngleUnits:
         """Return a text with the unit behind the numbers that have one of the units."""
         return _TWICE.sub(r"\1", _NUMBERS.sub(lambda found: self._numbers(*found.groups()), text))
 
+    def of_axes(self, frame: Frame) -> tuple[float, float]:
+        """Return the factors from the units of a frame's axes, x and y, to the unit."""
+        return self._of_label(frame.x.label), self._of_label(frame.y.label)
+
+    def row(self, label: str, *texts: str) -> tuple[str, ...]:
+        """Return the row of a table whose label has the unit of its numbers in brackets."""
+        factor = self._of_label(label)
+        if factor != 1.0:
+            texts = tuple(_ONE.sub(lambda one: _scaled_text(one[0], factor), one) for one in texts)
+        return self.label(label), *texts
+
     def label(self, label: str) -> str:
         """Return the label of an axis or a column, "offset (mas)" or "mas", with the unit."""
         return _IN_LABEL.sub(self.unit, label)
@@ -83,7 +96,7 @@ class AngleUnits:
         return f"{_ONE.sub(lambda one: _scaled_text(one[0], factor), numbers)} {self.unit}"
 
     def _frame(self, frame: Frame) -> Frame:
-        factors = {"x": self._of_label(frame.x.label), "y": self._of_label(frame.y.label)}
+        factors = dict(zip("xy", self.of_axes(frame), strict=True))
         return replace(
             frame,
             glyphs=tuple(self._glyphs(one, factors) for one in frame.glyphs),
@@ -149,6 +162,7 @@ class AngleUnits:
             fields = _FIELD.sub(lambda one: _with_decimals(one[1], one[2] or "", digits), found[1])
             return f"{fields} {self.unit}"
 
+        text = _POINTER.sub(rf"\1 {self.unit}", text)
         return _TWO_FIELDS.sub(r"\1 \2", _FIELDS.sub(scaled, text))
 
 

@@ -51,7 +51,8 @@ def explored_figure(
     """
     title = f"{chosen.y} against {chosen.x}"
     extent = extent or extent_of(table, chosen)
-    labels = [_label(table.columns[name]) for name in (chosen.x, chosen.y)]
+    columns = [table.columns[name] for name in (chosen.x, chosen.y)]
+    labels = [_named(column.meaning, column) for column in columns]
     if not extent.n_shown:
         text = f"No {table.rows} to draw"
         return message(title, text, width=width, xlabel=labels[0], ylabel=labels[1])
@@ -71,7 +72,7 @@ def explored_figure(
         drawn = [_points(_Data(table, chosen, rows_in_frame(table, chosen, limits)), chosen)]
     if chosen.has_median:
         drawn += _medians(counts)
-        words += _in_numbers(counts)
+        words += _in_numbers(counts, _behind(table, chosen.y))
     return framed(
         [*_histograms(counts, x, y), *drawn],
         title=title,
@@ -111,8 +112,15 @@ class _Data:
         return self.table.numbers(name)[self.rows]
 
 
-def _label(column: Column) -> str:
-    return f"{column.meaning} ({unit_text(column.unit)})" if column.unit else column.meaning
+def _named(name: str, column: Column) -> str:
+    """Return a name with the unit of a column in brackets."""
+    return f"{name} ({unit_text(column.unit)})" if column.unit else name
+
+
+def _behind(table: ExplorableTable, name: str) -> str:
+    """Return the unit of a column as it stands behind a number; empty without one."""
+    unit = table.columns[name].unit if name else ""
+    return f" {unit_text(unit)}" if unit else ""
 
 
 def _axis(
@@ -160,13 +168,16 @@ def _points(data: _Data, chosen: Columns) -> Glyphs:
     table, has_sources = data.frame, data.table.has_sources
     hover = [("source", f"@{{{data.source}}}")] if has_sources else []
     hover += [(name, f"@{{{name}}}") for name in data.table.words]
-    hover += [(chosen.x, "@{x}{0.0000}"), (chosen.y, "@{y}{0.0000}")]
+    units = {name: _behind(data.table, name) for name in (chosen.x, chosen.y, chosen.colour)}
+    hover += [(chosen.x, f"@{{x}}{{0.0000}}{units[chosen.x]}")]
+    hover += [(chosen.y, f"@{{y}}{{0.0000}}{units[chosen.y]}")]
     keep = [name for name in table if name not in ("x", "y", "source_class")]
     if chosen.colour:
         values = data.column(chosen.colour)
         table["colour"] = values
-        ramp = Ramp("colour", "count", _span(values), label=chosen.colour)
-        hover.append((chosen.colour, "@{colour}{0.0000}"))
+        label = _named(chosen.colour, data.table.columns[chosen.colour])
+        ramp = Ramp("colour", "count", _span(values), label=label)
+        hover.append((chosen.colour, f"@{{colour}}{{0.0000}}{units[chosen.colour]}"))
         return points(
             table, "x", "y", name="rows by value", color=ramp, size=4.5, hover=hover, keep=keep
         )
@@ -197,7 +208,10 @@ def _span(values: np.ndarray) -> Limits:
 def _cells(
     table: ExplorableTable, chosen: Columns, counts: Counts, axes: tuple[Axis, Axis]
 ) -> Glyphs:
-    at = [(chosen.x, "$x{0.0000}"), (chosen.y, "$y{0.0000}")]
+    at = [
+        (name, f"${axis}{{0.0000}}{_behind(table, name)}")
+        for axis, name in (("x", chosen.x), ("y", chosen.y))
+    ]
     if not chosen.colour:
         numbers = counts.image()
         most = max(float(np.nanmax(numbers, initial=2.0)), 2.0)
@@ -206,8 +220,9 @@ def _cells(
         hover = [*at, (label, "@count{0,0}")]
         return cells(numbers, *axes, name="cells by number", ramp=ramp, hover=hover)
     means, label = counts.means(), f"mean {chosen.colour} per cell"
-    ramp = Ramp("value", "count", _span(means.ravel()), label=label)
-    hover = [*at, (label, "@value{0.0000}")]
+    named = _named(label, table.columns[chosen.colour])
+    ramp = Ramp("value", "count", _span(means.ravel()), label=named)
+    hover = [*at, (label, f"@{{value}}{{0.0000}}{_behind(table, chosen.colour)}")]
     return cells(means, *axes, name="cells by value", ramp=ramp, hover=hover)
 
 
@@ -246,11 +261,11 @@ def _medians(counts: Counts) -> list[Glyphs]:
     ]
 
 
-def _in_numbers(counts: Counts) -> list[str]:
+def _in_numbers(counts: Counts, unit: str) -> list[str]:
     median = counts.medians().median
     if not len(median):
         return []
-    return [f"medians from {median.min():.3g} to {median.max():.3g}".replace("-", "−")]
+    return [f"medians from {median.min():.3g} to {median.max():.3g}{unit}".replace("-", "−")]
 
 
 def _counted(table: ExplorableTable, extent: Extent, chosen: Columns) -> list[str]:

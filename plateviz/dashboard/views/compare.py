@@ -62,6 +62,7 @@ class CompareView(pn.viewable.Viewer):
         self._other.param.watch(self._choose, "value")
         self._session.param.watch(self._fill, ["shown", "other", "theme"])
         self._session.judging.param.watch(self._fill, "is_any_pending")
+        self._session.units.param.watch(self._fill, "unit")
         self._session.param.watch(self._offer, ["shown", "other"])
         self._session.journal.param.watch(self._offer, "made")
         navigation.param.watch(self._offer, ["run_name", "orbit_workspace"])
@@ -127,5 +128,5 @@ class CompareView(pn.viewable.Viewer):
             )
             return
         self._changes = solution_changes(other.result, shown.result)
-        table = in_words(self._changes, CHANGES)
+        table = in_words(session.units.changes(self._changes), CHANGES)
         self._table.object = themed(numbers(table, "changes"), session.theme)

@@ -76,6 +76,7 @@ class CompareRunsView(pn.viewable.Viewer):
         navigation.param.watch(self._read, ["view", "survey_workspace", "run_name", "written"])
         navigation.param.watch(self._read, "run_name", what="objects")
         self._session.param.watch(self._fill, "theme")
+        self._session.units.param.watch(self._fill, "unit")
         self._read()
 
     def __panel__(self) -> pn.viewable.Viewable:
@@ -211,7 +212,8 @@ class CompareRunsView(pn.viewable.Viewer):
         if self._changes.empty:
             self._table.object = paragraph(words, "empty", theme)
             return
-        table = themed(numbers(in_words(self._changes, CHANGES), "changes"), theme)
+        changes = in_words(self._session.units.changes(self._changes), CHANGES)
+        table = themed(numbers(changes, "changes"), theme)
         self._table.object = (paragraph(words, "caption", theme) if words else "") + table
 
     def _compare(self, a: ReadRun, b: ReadRun) -> str:

@@ -13,7 +13,7 @@ import panel_material_ui as pmui
 import param
 from astropy.table import Table
 
-from plateviz.dashboard.downloads import rows_of
+from plateviz.dashboard.explored_file import explored_file
 from plateviz.dashboard.latest_answer import PENDING, LatestAnswer, Pending
 from plateviz.dashboard.row_origins import RowsOrigin, TableRequest
 from plateviz.dashboard.selected import KINDS, Selected
@@ -31,19 +31,14 @@ from plateviz.plots.explored_rows import (
     Extent,
     extent_of,
     items_within,
-    kept_rows,
-    rows_in_frame,
 )
 from plateviz.plots.explored_text import SWITCHES
 from plateviz.plots.style import ROW_LIMIT
 from plateviz.tables.explore import ExplorableTable
 from solver.errors import InputError
 
-# Columns that say what a saved row is of, besides the id of its source.
-_KEYS = ("orbit_id", "field_id", "plate_id", "detector_id")
 MOST_SELECTED = 250_000
 """Sources, exposures or detectors that an area can select."""
-_MOST_SAVED = 1_000_000
 
 
 class _Text(NamedTuple):
@@ -120,6 +115,7 @@ class ExploreView(pn.viewable.Viewer):
         self._workspace = workspace(self.grid, self._controls())
         self._exploration.param.watch(self._change, list(self._exploration.param.values()))
         session.selection.param.watch(self._show_selected, [*KINDS])
+        session.units.param.watch(lambda *_: self._redraw(), "unit")
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the workspace."""
@@ -177,7 +173,7 @@ class ExploreView(pn.viewable.Viewer):
             return drawn
         self._drawn = drawn
         self._show_controls(drawn)
-        return drawn.figure
+        return self._session.units.figure(drawn.figure)
 
     def _make(self, request: TableRequest, chosen: Columns, selected: Selected) -> _Drawn:
         """Make a figure; runs on a thread of its own where that takes a while."""
@@ -195,20 +191,7 @@ class ExploreView(pn.viewable.Viewer):
         """Return the rows between the limits, with the columns that are drawn and those of keys."""
         if self._drawn is None:
             return {}
-        table, chosen = self._drawn.table, self._exploration.columns()
-        keys = [name for name in _KEYS if name in table.columns]
-        rows = kept_rows(table, chosen) if table.size <= _MOST_SAVED else None
-        if rows is None:
-            # Each column that nobody has asked for is to be read.
-            keys = keys[:1]
-            rows = rows_in_frame(table, chosen, chosen.limits)
-            if len(rows) > _MOST_SAVED:
-                raise InputError(
-                    f"{len(rows):,} rows are too many to save, at most {_MOST_SAVED:,}: "
-                    "zoom in, limit the rows, or read the Parquet files of the run"
-                )
-        drawn = filter(None, (chosen.x, chosen.y, chosen.colour, chosen.only))
-        return {table.rows: rows_of(table, rows, dict.fromkeys((*keys, *drawn)))}
+        return explored_file(self._drawn.table, self._exploration.columns())
 
     def _change(self, *_: object) -> None:
         if not self._is_following:
@@ -227,12 +210,21 @@ class ExploreView(pn.viewable.Viewer):
                 self._redraw()
 
     def _zoom(self, limits: tuple[Limits, Limits] | None) -> None:
+        if limits is not None:
+            x, y = self._of_columns(np.array(limits).T).T.tolist()
+            limits = tuple(x), tuple(y)
         self._exploration.limits = limits
 
     def _take_area(self, corners: np.ndarray) -> None:
         if self._drawn is not None and self._drawn.table.kinds:
-            self._area = corners
+            self._area = self._of_columns(corners)
             self._redraw()
+
+    def _of_columns(self, places: np.ndarray) -> np.ndarray:
+        """Return places in the picture, (n, 2), in the units of the columns."""
+        if self._drawn is None:
+            return places
+        return places / self._session.units.of_axes(self._drawn.figure)
 
     def _select(self, request: TableRequest) -> bool:
         """Select what is in the area that a person has drawn; return whether that is done."""

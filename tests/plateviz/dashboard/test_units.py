@@ -48,6 +48,26 @@ def test_rows_have_a_unit_each(units):
     assert "pull" in MOTION
 
 
+def test_changes_have_the_unit_of_their_labels(units):
+    rows = [
+        ("Median marginal σ in δ (mas)", "1.2000", "", "+0.0500"),
+        ("Median σ of proper motion (mas/yr)", "0.20", "0.10", "-0.10"),
+        ("Sources", "1,200", "12", "-1,188"),
+    ]
+    table = pd.DataFrame(rows, columns=["what", "a", "b", "change"])
+    assert units.changes(table) is table
+    units.unit = "µas"
+    shown = units.changes(table)
+    assert shown["what"].tolist() == [
+        "Median marginal σ in δ (µas)",
+        "Median σ of proper motion (µas/yr)",
+        "Sources",
+    ]
+    assert shown.iloc[0, 1:].tolist() == ["1,200.0", "", "+50.0"]
+    assert shown.iloc[1, 1:].tolist() == ["200", "100", "-100"]
+    assert shown.iloc[2].tolist() == list(rows[2])
+
+
 def test_unit_is_in_the_address(navigation):
     navigation.begin({"unit": "furlong"})
     assert "unit" not in navigation.address()

@@ -98,6 +98,24 @@ def test_coordinates_limits_hovers_and_words_are_scaled_together():
     ]
 
 
+def test_place_of_the_pointer_has_the_unit_of_the_axis():
+    cells = image(
+        np.ones((2, 2)),
+        (0.0, 1.0),
+        (0.0, 1.0),
+        name="cells",
+        ramp=Ramp("value", "count", (0.0, 1.0)),
+        hover=[("offset", "$x{0.00} mas"), ("sources", "$y{0}")],
+    )
+    figure = framed(
+        [cells], title="", x=Axis("offset (mas)", (0.0, 1.0)), y=Axis("n", (0.0, 1.0)), width=100
+    )
+    (frame,) = AngleUnits("µas", PIXEL).figure(figure)
+    assert frame.x.limits == (0.0, 1000.0)
+    assert list(frame.glyphs[0].hover) == [("offset", "$x{0.00} µas"), ("sources", "$y{0}")]
+    assert AngleUnits("µas", PIXEL).of_axes(figure.frames[0]) == (1000.0, 1.0)
+
+
 def test_colours_of_an_image_are_those_of_the_same_cells():
     ramp = Ramp("mean", "difference", (-3.0, 3.0), label="mpix")
     cells = image(np.eye(2), (0.0, 2.0), (0.0, 2.0), name="cells", ramp=ramp)

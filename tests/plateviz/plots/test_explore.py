@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from plateviz.figures.figure import Ramp
 from plateviz.plots.explore import explored_figure
 from plateviz.plots.explored_rows import Columns
 from plateviz.plots.style import ROW_LIMIT
@@ -51,6 +52,21 @@ def test_many_rows_are_counted_in_cells(many):
     assert np.nansum(cells) == many.size
     assert frame.subtitle == f"{many.size:,} stars"
     assert ("stars per cell", "@count{0,0}") in frame["cells by number"].hover
+
+
+def test_numbers_have_the_units_of_their_columns(many, fit_result):
+    (frame,) = explored_figure(many, Columns("x", "y", colour="x", has_median=True))
+    cells = frame["cells by value"]
+    assert ("x", "$x{0.0000} mas") in cells.hover
+    assert ("mean x per cell", "@{value}{0.0000} mas") in cells.hover
+    assert cells.looks["color"].label == "mean x per cell (mas)"
+    assert frame.subtitle.endswith(" mas")
+    table = EXPLORABLE["sources"](fit_result)
+    (frame,) = explored_figure(table, Columns("n_obs", "sigma_ra_marginal", colour="chi2"))
+    marks = frame["rows by value"]
+    assert ("n_obs", "@{x}{0.0000}") in marks.hover
+    assert ("sigma_ra_marginal", "@{y}{0.0000} mas") in marks.hover
+    assert [look.label for look in marks.looks.values() if isinstance(look, Ramp)][0] == "chi2"
 
 
 def test_zoom_counts_what_is_between_the_limits(many):

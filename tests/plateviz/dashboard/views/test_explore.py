@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from bokeh.events import RangesUpdate, SelectionGeometry
 
-from plateviz.dashboard import row_origins
+from plateviz.dashboard import explored_file, row_origins
 from plateviz.dashboard.navigation import Navigation, View
 from plateviz.dashboard.row_origins import OrbitRows, RunRows
 from plateviz.dashboard.selected import KINDS
@@ -124,6 +124,28 @@ def test_zoom_asks_for_the_part_on_the_screen_and_is_in_the_address(view, execut
     assert navigation.survey_exploration.limits == ((0.0, 0.9), (0.0, 1.0))
     assert navigation.address()["zoom"] == "0.0~0.9~0.0~1.0"
     assert navigation.workspace is SurveyWorkspace.EXPLORE
+
+
+def test_zoom_and_area_are_in_the_unit_that_a_person_has_chosen(view, executor, navigation):
+    navigation.survey_exploration.param.update(table="sources per orbit")
+    draw(view, executor)
+    navigation.survey_exploration.param.update(x="offset_ra", y="n_obs")
+    draw(view, executor)
+    navigation.session.units.unit = "µas"
+    draw(view, executor)
+    plot = card(view)._body[0].object.children[0][0]
+    assert plot.xaxis[0].axis_label.endswith("(µas)")
+    assert plot.x_range.end > 1000.0
+    area(view, -0.5, 0.5)
+    draw(view, executor)
+    # The rows between -0.5 and 0.5 µas, and not mas.
+    rows = np.linspace(-1.0, 1.0, SIZE)
+    inside = np.flatnonzero(np.abs(rows) < 0.5e-3) % 1000
+    assert navigation.session.selection.sources == frozenset(inside.tolist())
+    plot._trigger_event(RangesUpdate(plot, x0=-500.0, x1=250.0, y0=0.0, y1=1.0))
+    assert navigation.survey_exploration.limits == ((-0.5, 0.25), (0.0, 1.0))
+    draw(view, executor)
+    assert (plot.x_range.start, plot.x_range.end) == (-500.0, 250.0)
 
 
 def test_address_opens_what_it_says(fit_result, survey, navigation):
@@ -272,7 +294,7 @@ def test_run_that_grows_is_read_again(view, executor, navigation):
 
 def test_too_many_rows_are_not_saved(view, executor, navigation, monkeypatch):
     draw(view, executor)
-    monkeypatch.setattr(explore, "_MOST_SAVED", 1000)
+    monkeypatch.setattr(explored_file, "_MOST_SAVED", 1000)
     with pytest.raises(InputError, match="30,000 rows are too many to save"):
         view._rows()
     navigation.survey_exploration.limits = ((0.0, 0.01), (0.0, 0.01))

@@ -13,6 +13,7 @@ from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Orbits of each source"
 _YLABEL = "sources per bin"
+_NONE_YET = "Sources are counted after the last orbit of the run"
 # Drawn count of an empty bin, below the frame: zero has no logarithm.
 _NONE = 0.1
 _LOWEST = 0.7
@@ -28,7 +29,7 @@ def plot_orbit_counts(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figur
     width : of the frame, screen pixels
     """
     if table.empty:
-        return message(_TITLE, "No sources", width=width, xlabel=_xlabel(1), ylabel=_YLABEL)
+        return message(_TITLE, _NONE_YET, width=width, xlabel=_xlabel(1), ylabel=_YLABEL)
     last = float(table["right"].max())
     top = 1.8 * float(table["count"].max())
     ticks = log_ticks((_LOWEST, top), whole=True, powers_only=top > _ALL_TICKS_UP_TO)

@@ -1,5 +1,6 @@
 """The residuals of a solution on the focal plane, in the order of the exposures."""
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -112,9 +113,20 @@ def camera_rows(result: FitResult) -> tuple[Camera, Rows]:
 
     def pair(name: str) -> np.ndarray:
         # Each axis is contiguous.
-        return np.stack([column(f"{name}x"), column(f"{name}y")]).T
+        found = np.empty((2, len(order)))
+        for axis, letter in zip(found, "xy", strict=True):
+            np.take(table[f"{name}{letter}"].to_numpy(dtype=float), order, out=axis, mode="clip")
+        return found.T
 
-    pixel, sigma, focal, residual = pair("n"), pair("s"), pair("focal_"), pair("residual_")
+    def sources() -> np.ndarray:
+        # Few ids are searched for: all of them would take ten times as long.
+        source, known = pd.factorize(column("source_id"))
+        return np.searchsorted(result.sources["source_id"].to_numpy(), known)[source]
+
+    with ThreadPoolExecutor(1) as thread:
+        later = [thread.submit(sources), *(thread.submit(pair, one) for one in ("n", "focal_"))]
+        sigma, residual = pair("s"), pair("residual_")
+        source, pixel, focal = (one.result() for one in later)
     um, half = pitch.T.take(detector, axis=1).T, _largest(pixel, detector, n_det)
     first = np.searchsorted(exposure, np.arange(len(result.exposures) + 1))
     left = 1.0 - np.clip(0.5 * column("leverage"), 0.0, 1.0)
@@ -123,12 +135,10 @@ def camera_rows(result: FitResult) -> tuple[Camera, Rows]:
     # Older results lack it; the largest coordinate is near.
     largest = np.abs(focal).max(initial=1.0)
     scale = float(result.summary.get("distortion_scale_um", largest))
-    # Few ids are searched for: all of them would take ten times as long.
-    source, known = pd.factorize(column("source_id"))
     rows = Rows(
         exposure,
         detector,
-        np.searchsorted(result.sources["source_id"].to_numpy(), known)[source],
+        source,
         first,
         focal / scale,
         pixel,
@@ -161,8 +171,10 @@ def onto_focal_plane(vector: np.ndarray, turn: np.ndarray, detector: np.ndarray)
     detector : of each vector, shape (n,)
     """
     c, s = np.cos(turn).take(detector), np.sin(turn).take(detector)
-    x, y = vector[:, 0], vector[:, 1]
-    return np.stack([c * x + s * y, c * y - s * x]).T
+    (x, y), found = vector.T, np.empty((2, len(vector)))
+    np.add(c * x, s * y, out=found[0])
+    np.subtract(c * y, s * x, out=found[1])
+    return found.T
 
 
 def _far(squares: np.ndarray, left: np.ndarray, first: np.ndarray) -> np.ndarray:

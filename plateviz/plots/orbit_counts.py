@@ -13,7 +13,7 @@ from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Orbits of each source"
 _YLABEL = "sources per bin"
-_NONE_YET = "Sources are counted after the last orbit of the run"
+_NONE_YET = "No source is counted before the last orbit of the run is fitted"
 # Drawn count of an empty bin, below the frame: zero has no logarithm.
 _NONE = 0.1
 _LOWEST = 0.7

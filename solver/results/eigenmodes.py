@@ -12,6 +12,7 @@ measurements do not constrain; there the eigenmodes are the axes of simple struc
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +23,10 @@ from solver.linear.source_elimination import ReducedSystem
 from solver.linear.triangular import upper_transposed_times
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.priors import Priors
+from solver.problem.source_blocks import SourceBlock
 from solver.results.simple_structure import joint_axes
 from solver.runtime.interruption import give_way
+from solver.runtime.threads import one_blas_thread
 
 WEAK = 0.5
 """Share of the measurements below which an eigenmode is weak."""
@@ -33,6 +36,7 @@ MAX_NAMED = 12
 _UNCONSTRAINED = 1e-3
 # Eigenmodes are mixed only if their relative information is within this factor.
 _GAP = 10.0
+_WORKERS = 2
 # Share of the data below which they do not constrain a direction of a source.
 _NEGLIGIBLE = 1e-12
 
@@ -113,15 +117,28 @@ def _prior_terms(
     order = reduced.source_blocks.order
     weight, is_reference = _prior_root(reduced, priors)[order], is_reference[order]
     grams = [np.zeros(reduced.factor.shape) for _ in range(2)]
-    for block, matrix in zip(reduced.source_blocks.blocks, reduced.whitened, strict=True):
-        give_way()
-        weighted, of_block = _weighted(matrix, weight[block.places]), is_reference[block.places]
-        for gram, members in zip(grams, (of_block, ~of_block), strict=True):
-            gram[np.ix_(block.columns, block.columns)] += _gram(weighted[:, :, members])
     root = sl.solve_triangular(reduced.factor, np.eye(len(reduced.factor)))
-    references, sources = (
-        upper_transposed_times(root, upper_transposed_times(root, gram).T) for gram in grams
-    )
+    blocks = reduced.source_blocks.blocks
+
+    def of_block(block: SourceBlock, matrix: np.ndarray) -> list[np.ndarray]:
+        weighted, of_references = (
+            _weighted(matrix, weight[block.places]),
+            is_reference[block.places],
+        )
+        return [_gram(weighted[:, :, members]) for members in (of_references, ~of_references)]
+
+    def whitened(gram: np.ndarray) -> np.ndarray:
+        return upper_transposed_times(root, upper_transposed_times(root, gram).T)
+
+    with one_blas_thread(), ThreadPoolExecutor(_WORKERS) as helpers:
+        # Added in their order: the axes below depend on every rounding error.
+        for block, found in zip(
+            blocks, helpers.map(of_block, blocks, reduced.whitened), strict=True
+        ):
+            give_way()
+            for gram, of_some in zip(grams, found, strict=True):
+                gram[np.ix_(block.columns, block.columns)] += of_some
+        references, sources = helpers.map(whitened, grams)
     return _PriorTerms(
         references, sources, root, lambda vectors: priors.scaled(vectors, reduced.at[0])
     )
@@ -200,13 +217,13 @@ def _eigenmodes(
     information: Float[np.ndarray, " calib"],
 ) -> Eigenmodes:
     in_priors = prior_terms.scaled(vectors)
-    prior_shares = np.stack(
-        [
-            np.einsum("ik,ik->k", axes, prior_terms.references @ axes),
-            np.einsum("ik,ik->k", axes, prior_terms.sources @ axes),
-            np.einsum("ik,ik->k", in_priors, in_priors),
-        ]
-    )
+
+    def share(term: np.ndarray) -> np.ndarray:
+        return np.einsum("ik,ik->k", axes, term @ axes)
+
+    with one_blas_thread(), ThreadPoolExecutor(_WORKERS) as helpers:
+        of_sources = helpers.map(share, (prior_terms.references, prior_terms.sources))
+        prior_shares = np.stack([*of_sources, np.einsum("ik,ik->k", in_priors, in_priors)])
     data_share = np.maximum(1.0 - prior_shares.sum(axis=0), 0.0)
     # Exceeds one by the rounding errors of S.
     total = data_share + prior_shares.sum(axis=0)

@@ -59,6 +59,11 @@ class Residuals(NamedTuple):
     ideal: Float[np.ndarray, "obs 2"]
     focal: Float[np.ndarray, "obs 2"]
 
+    @property
+    def chi2(self) -> Float[np.ndarray, " obs"]:
+        """Square of the whitened residual of each measurement."""
+        return np.einsum("ij,ij->i", self.whitened, self.whitened)
+
 
 def residuals(
     problem: Problem,

@@ -1,6 +1,7 @@
 """The result of a fit, from the estimate of an engine."""
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -80,22 +81,27 @@ def partial_result(
     start, prepared = times
     solved = time.perf_counter()
     solution = solved_problem(problem, estimate, mode.reduced)
-    sources, places = source_table(solution), true_places(solution, data.truth)
-    tables = {
-        "sources": sources,
-        "residuals": residual_table(solution, data.measurements),
-        "calibration": calibration_table(solution, instrument),
-        "exposures": exposure_table(solution),
-        "trace": trace_table(mode),
-        "true_places": places,
-        "losses": loss_table(estimate.losses),
-    }
+    with ThreadPoolExecutor(1) as helper:
+        # The tables of the measurements are the largest.
+        residuals = helper.submit(residual_table, solution, data.measurements)
+        exposures = helper.submit(exposure_table, solution)
+        sources, places = source_table(solution), true_places(solution, data.truth)
+        numbers = summarise(solution, settings)
+        tables = {
+            "sources": sources,
+            "residuals": residuals.result(),
+            "calibration": calibration_table(solution, instrument),
+            "exposures": exposures.result(),
+            "trace": trace_table(mode),
+            "true_places": places,
+            "losses": loss_table(estimate.losses),
+        }
     seconds = {
         "prepare": prepared - start,
         "fit": solved - prepared,
         "diagnose": time.perf_counter() - solved,
     }
-    summary = {**summarise(solution, settings, seconds), **estimate.entries}
+    summary = {**numbers, "seconds": seconds, **estimate.entries}
     if places is not None:
         summary["truth"] = truth_summary(sources, places)
     result = FitResult(

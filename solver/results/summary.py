@@ -14,15 +14,8 @@ from solver.results.diagnostics import (
 from solver.results.tables import SolvedProblem
 
 
-def summarise(
-    solution: SolvedProblem, settings: FitSettings, seconds: dict[str, float]
-) -> dict[str, object]:
-    """Return the summary of one fit; residuals in pixels, other lengths in mas.
-
-    Parameters
-    ----------
-    seconds : wall time of each stage of the fit
-    """
+def summarise(solution: SolvedProblem, settings: FitSettings) -> dict[str, object]:
+    """Return the summary of one fit; residuals in pixels, other lengths in mas."""
     problem, mode, residuals = solution.problem, solution.mode, solution.residuals
     is_reference = problem.sources["is_reference"].to_numpy(bool)
     whitened = residuals.whitened
@@ -56,7 +49,6 @@ def summarise(
         "residual_rms_y": float(scatter[1]),
         **_reference_numbers(solution, is_reference),
         **_common_error(solution, ~is_reference),
-        "seconds": seconds,
     }
 
 

@@ -78,7 +78,7 @@ def source_table(solution: SolvedProblem) -> pd.DataFrame:
     ra, dec = sky_position(_displaced(frame, solution.mode.sources, RAD_PER_MAS))
     prior_ra, prior_dec = sky_position(frame[:, 0])
     n_src, index = problem.n_src, problem.measurements.index.source
-    chi2 = (solution.residuals.whitened**2).sum(axis=1)
+    chi2 = solution.residuals.chi2
     prior = uncertainties("prior", np.linalg.inv(problem.priors.precision))
     columns = {
         "source_id": sources["source_id"].to_numpy(),
@@ -135,7 +135,7 @@ def exposure_table(solution: SolvedProblem) -> pd.DataFrame:
     n_exp, index = len(problem.exposures), problem.measurements.index.exposure
     columns = {name: problem.exposures[name].to_numpy() for name in EXPOSURES.names[:4]}
     columns["n_obs"] = np.bincount(index, minlength=n_exp)
-    columns["chi2"] = np.bincount(index, (residuals.whitened**2).sum(axis=1), n_exp)
+    columns["chi2"] = np.bincount(index, residuals.chi2, n_exp)
     columns["dof"] = np.bincount(index, 2.0 - residuals.trace, n_exp)
     return _frame(columns, EXPOSURES)
 

@@ -55,6 +55,7 @@ NEVER = {
     "plateviz.figures.figure": ("pandas", *USER_INTERFACE),
     "plateviz.plots": ("panel", "param", "holoviews", "bokeh"),
     "plateviz.dashboard.state": ("panel",),
+    "plateviz.dashboard.fit_choices": ("panel",),
     "plateviz.dashboard.session": ("panel", "holoviews", "bokeh", "datashader"),
     "plateviz.dashboard.navigation": ("panel", "holoviews", "bokeh", "datashader"),
 }

@@ -1,9 +1,9 @@
 """ExpectedWhatIfs: what-ifs that a person may ask for next, which the solver makes while idle."""
 
+from plateviz.dashboard.fit_choices import FitChoices
 from plateviz.dashboard.selection_actions import SelectionActions
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution, what_if_settings
-from plateviz.dashboard.state import FitChoices
 from solver.data.settings import ENGINES, FitSettings
 from solver.errors import InputError
 
@@ -11,8 +11,9 @@ from solver.errors import InputError
 class ExpectedWhatIfs:
     """The what-ifs of the solution on the screen of a session that a person reaches in one step.
 
-    They are those without the selection, and with the next lower and the next higher order of the
-    distortion. Nobody waits for them; a what-if that is asked for is there at once if it is one.
+    They are those with a prior width that is being typed, without the selection, and with the next
+    lower and the next higher order of the distortion. Nobody waits for them; a what-if that is
+    asked for is there at once if it is one.
     """
 
     def __init__(self, session: Session) -> None:
@@ -46,7 +47,7 @@ class ExpectedWhatIfs:
             return []
         if fitted is None or now.engine != ENGINES[0]:
             return []
-        found = []
+        found = self._typed()
         if session.selection.selected and not self._actions.is_left_out:
             found.append(self._actions.without_selected(now))
         lowest = FitChoices.param["order"].bounds[0]
@@ -56,6 +57,13 @@ class ExpectedWhatIfs:
         known = [now, *(solution.settings for solution in session.solutions)]
         return [what_if_settings(one, fitted.settings) for one in found if one not in known]
 
+    def _typed(self) -> list[FitSettings]:
+        try:
+            return [self._session.choices.typed_settings()] if self._session.choices.typed else []
+        except InputError:
+            # A number is not complete.
+            return []
+
     def _ask(self, fitted: Solution) -> None:
         session = self._session
         if session.job is not None or not session.choices.what_if_at_once:
@@ -64,7 +72,14 @@ class ExpectedWhatIfs:
         if fitted is self._fitted and expected == self._asked:
             return
         self._fitted, self._asked = fitted, expected
-        session.store.prepare(fitted.orbit, fitted.settings, expected, may_fit=_is_read(fitted))
+        session.store.prepare(
+            fitted.orbit,
+            fitted.settings,
+            expected,
+            may_fit=_is_read(fitted),
+            # Nothing is drawn while a person types.
+            is_urgent=bool(session.choices.typed),
+        )
 
 
 def _is_read(solution: Solution) -> bool:

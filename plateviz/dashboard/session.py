@@ -5,13 +5,14 @@ The last solution stays on the screen until the next one is complete; then both 
 
 import param
 
+from plateviz.dashboard.fit_choices import ANSWERED_AT_ONCE, FitChoices
 from plateviz.dashboard.held_job import HeldJob
 from plateviz.dashboard.journal import Journal
 from plateviz.dashboard.judging import Judging
 from plateviz.dashboard.on_screen import OnScreen
 from plateviz.dashboard.solution import Request, Solution, what_if_settings
 from plateviz.dashboard.stage import Stage
-from plateviz.dashboard.state import ANSWERED_AT_ONCE, FitChoices, Selection
+from plateviz.dashboard.state import Selection
 from plateviz.dashboard.units import Units
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.solution_store import SolutionStore

@@ -6,6 +6,7 @@ from functools import partial
 import panel as pn
 from bokeh.document import Document
 from bokeh.server.callbacks import TimeoutCallback
+from param.parameterized import Event
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.at_rest import AtRest
@@ -75,6 +76,7 @@ class Ticker:
                 None if self._document is None else partial(Context().run, self._loop.call_later)
             )
             self._expected = ExpectedWhatIfs(session)
+            session.choices.param.watch(self._expect_typed, "typed")
             self._rest = AtRest(self._expected.ask_for_fit, _REST_SECONDS, later)
             self.wake()
             self._follow_run()
@@ -99,6 +101,10 @@ class Ticker:
     def _start_looking(self) -> None:
         if not self._progress.running:
             self._progress.start()
+
+    def _expect_typed(self, event: Event) -> None:
+        if self._expected is not None and event.new:
+            self._expected.ask()
 
     def _call(self) -> None:
         """Tick soon; called from any thread."""

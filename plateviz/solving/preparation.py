@@ -27,10 +27,12 @@ class Preparation(NamedTuple):
     ----------
     soon : what a person may ask for next
     later : what speeds up the requests after that
+    is_urgent : whether to begin as soon as no request waits
     """
 
     soon: Iterator[None] = iter(())
     later: Iterator[None] = iter(())
+    is_urgent: bool = False
 
 
 def prepare(fitters: Fitters, request: Request, requests: Requests, put_off: PutOff) -> Preparation:
@@ -44,7 +46,9 @@ def prepare(fitters: Fitters, request: Request, requests: Requests, put_off: Put
     """
     order = FitSettings.from_dict(request["settings"]).order
     return Preparation(
-        _soon(fitters, request, requests, put_off), _precomputed(fitters, request, order)
+        _soon(fitters, request, requests, put_off),
+        _precomputed(fitters, request, order),
+        request["is_urgent"],
     )
 
 

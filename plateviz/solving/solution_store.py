@@ -131,6 +131,7 @@ class SolutionStore:
         likely: Iterable[FitSettings] = (),
         *,
         may_fit: bool = True,
+        is_urgent: bool = False,
     ) -> None:
         """Let the solver, once it is idle, prepare what a person may ask for next.
 
@@ -142,6 +143,7 @@ class SolutionStore:
         likely : settings of what-ifs that are made, the likeliest first
         may_fit : whether to fit what they start from: a solution of a run was fitted by another
             process, which has ended
+        is_urgent : whether to begin as soon as no request waits
         """
         if settings.engine != ENGINES[0]:
             return
@@ -153,6 +155,7 @@ class SolutionStore:
         request = {
             **self._fit_of(orbit, settings),
             "may_fit": may_fit,
+            "is_urgent": is_urgent,
             "likely": [{"settings": one.to_dict(), "directory": str(at)} for one, at in made],
         }
         self._solver.prepare(request)

@@ -8,11 +8,11 @@ on standard error; `plateviz.solving.solver_queue` reports that and starts anoth
 Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory", "base"},
 {"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
 "directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}, and without events
-{"do": "prepare", "origin", "orbit", "settings", "base", "may_fit", "likely"}: while idle, make the
-likely what-ifs of a solution, each {"settings", "directory"}, and with "may_fit" fit what they
-start from, {"do": "rest"}: give up what is being prepared, and {"do": "complete"} with the rest of
-a "fit" that is done: write what was put off of its result. "base" is the solution of a run from
-which the what-ifs of the orbit can start, {"settings", "directory"}, or None.
+{"do": "prepare", "origin", "orbit", "settings", "base", "may_fit", "likely", "is_urgent"}: while
+idle, make the likely what-ifs of a solution, each {"settings", "directory"}, and with "may_fit" fit
+what they start from, {"do": "rest"}: give up what is being prepared, and {"do": "complete"} with
+the rest of a "fit" that is done: write what was put off of its result. "base" is the solution of a
+run from which the what-ifs of the orbit can start, {"settings", "directory"}, or None.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -122,7 +122,7 @@ def _next_request(
     # A request that waits is sent once the one before is done, and a page that has received a
     # solution may send one, too.
     for seconds, work, steps in (
-        (_NEXT_S, put_off.finish_verdicts, preparation.soon),
+        (0.0 if preparation.is_urgent else _NEXT_S, put_off.finish_verdicts, preparation.soon),
         (_IDLE_S, put_off.finish, preparation.later),
     ):
         try:

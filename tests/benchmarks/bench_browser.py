@@ -41,6 +41,8 @@ _ADDRESS = "a warm server's address"
 _FIRST_VISITS = 3
 # Time in which all other figures of a page are drawn, so that the next visit finds the server idle.
 _VISIT_MS = 3000
+# Between two keys of a person who types.
+_KEY_MS = 200
 # Sources in the box that is drawn in the footprint.
 _MANY = 1000
 _ALL_NEW = "strip and all visible figures"
@@ -153,7 +155,9 @@ def next_prior(page: Page, number: int, least: float = 2.0) -> Taken:
     entry = page.get_by_role("textbox", name="source positions")
     if not entry.is_visible():
         page.get_by_role("button", name="show more: Priors").click()
-    entry.fill(f"{least + 0.02 * number:.2f}")
+    entry.fill("")
+    entry.press_sequentially(f"{least + 0.02 * number:.2f}", delay=_KEY_MS)
+    page.wait_for_timeout(_KEY_MS)
     return answered(page, lambda: entry.press("Enter"))
 
 

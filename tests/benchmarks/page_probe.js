@@ -79,16 +79,24 @@ window.plateviz = (() => {
     const { data_source: source, glyph } = view.model.renderers
       .find(one => one.glyph.type === "Scatter" && column(one.data_source, "id"));
     const [x, y] = [glyph.x, glyph.y].map(of => Array.from(column(source, of.field)));
-    const at = row % x.length;
-    const far = x.map((_, i) => Math.max(Math.abs(x[i] - x[at]), Math.abs(y[i] - y[at])));
-    const half = [...far].sort((a, b) => a - b)[Math.min(count, far.length) - 1];
-    const frame = view.canvas_view.el.getBoundingClientRect();
-    const corner = sign => ({
-      x: frame.left + view.frame.x_scale.compute(x[at] + sign * half),
-      y: frame.top + view.frame.y_scale.compute(y[at] - sign * half),
-    });
+    const canvas = view.canvas_view.el.getBoundingClientRect(), { bbox } = view.frame;
+    // A drag that begins outside of the frame selects nothing.
+    const isInside = ({ x, y }) => x > canvas.left + bbox.left && x < canvas.left + bbox.right
+      && y > canvas.top + bbox.top && y < canvas.top + bbox.bottom;
+    const boxAt = at => {
+      const far = x.map((_, i) => Math.max(Math.abs(x[i] - x[at]), Math.abs(y[i] - y[at])));
+      const half = [...far].sort((a, b) => a - b)[Math.min(count, far.length) - 1];
+      return [-1, 1].map(sign => ({
+        x: canvas.left + view.frame.x_scale.compute(x[at] + sign * half),
+        y: canvas.top + view.frame.y_scale.compute(y[at] - sign * half),
+      }));
+    };
     window.plateviz.among = source;
-    return [corner(-1), corner(1)];
+    for (let k = 0; k < x.length; k++) {
+      const box = boxAt((row + k) % x.length);
+      if (box.every(isInside)) return box;
+    }
+    throw new Error(`${name}: no box of ${count} marks is inside the frame`);
   };
   // The elements that match, inside of components too.
   const elements = (selector, within = document) => {

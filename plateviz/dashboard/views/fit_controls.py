@@ -2,8 +2,9 @@
 
 import panel as pn
 import panel_material_ui as pmui
+from param.parameterized import Event
 
-from plateviz.dashboard.state import CONTROLS, FitChoices
+from plateviz.dashboard.fit_choices import CONTROLS, FitChoices
 from plateviz.dashboard.views.at_once import taken_at_once
 from solver.data.parameter_group import Group
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
@@ -43,11 +44,15 @@ def width_input(choices: FitChoices, group: Group) -> pmui.TextInput:
         sizing_mode="stretch_width",
     )
 
-    def take(event: object) -> None:
-        widths = choices.prior_widths
-        choices.prior_widths = {**widths, group.name: event.new}  # type: ignore[attr-defined]
+    def take(event: Event) -> None:
+        choices.param.update(typed={}, prior_widths={**choices.prior_widths, group.name: event.new})
+
+    def note(event: Event) -> None:
+        is_typed = event.new != entry.value
+        choices.typed = {group.name: event.new} if is_typed else {}
 
     entry.param.watch(take, "value")
+    entry.param.watch(note, "value_input")
     taken_at_once(entry)
     return entry
 

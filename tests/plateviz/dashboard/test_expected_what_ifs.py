@@ -7,6 +7,8 @@ import pytest
 from plateviz.dashboard.expected_what_ifs import ExpectedWhatIfs
 from plateviz.dashboard.selection_actions import SelectionActions
 from plateviz.dashboard.session import Session
+from plateviz.dashboard.views.fit_controls import width_input
+from solver.data.parameters import BY_NAME
 from solver.data.settings import FitSettings
 from tests.plateviz.dashboard.test_session import FakeStore, finish, of_run
 
@@ -69,10 +71,34 @@ def test_settings_that_are_invalid_or_of_another_engine_expect_nothing(live, exp
     assert expected.settings() == []
 
 
+def test_width_that_is_being_typed_is_what_is_expected_first(live, expected):
+    entry = width_input(live.choices, BY_NAME["sources"])
+    entry.value_input = "2.5"
+    expected.ask()
+    first, *_ = live.store.prepared[-1][2]
+    assert live.store.prepared[-1][-1]
+    assert first.prior_widths == {"sources": 2.5}
+    assert live.store.requested[-1][1].prior_widths == {}
+    entry.value_input = "2.5 m"
+    assert not any(one.prior_widths for one in expected.settings())
+    entry.value_input = entry.value = "2.5"
+    assert live.choices.typed == {}
+    assert live.store.requested[-1][1] == first
+
+
+def test_width_that_is_shown_is_not_being_typed(live, expected):
+    entry = width_input(live.choices, BY_NAME["sources"])
+    before = entry.value
+    entry.value_input = "7"
+    entry.value_input = before
+    assert live.choices.typed == {}
+    assert not any(one.prior_widths for one in expected.settings())
+
+
 def test_solver_is_asked_once_for_each_change(live, expected, fit_result):
     expected.ask()
     expected.ask_for_fit()
-    assert live.store.prepared == [(0, FitSettings(order=5), expected.settings(), False)]
+    assert live.store.prepared == [(0, FitSettings(order=5), expected.settings(), False, False)]
     live.selection.select_sources(frozenset(fit_result.sources["source_id"].tolist()[:1]))
     expected.ask()
     assert len(live.store.prepared) == 2
@@ -86,7 +112,7 @@ def test_orbit_of_a_run_is_fitted_once_the_page_is_at_rest(fit_result):
     assert session.store.prepared == []
     expected.ask_for_fit()
     expected.ask_for_fit()
-    assert session.store.prepared == [(0, fit_result.settings, expected.settings(), True)]
+    assert session.store.prepared == [(0, fit_result.settings, expected.settings(), True, False)]
     session.selection.select_exposures(frozenset({(0, 1)}))
     expected.ask()
     assert len(session.store.prepared) == 2

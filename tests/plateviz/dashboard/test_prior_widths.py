@@ -2,8 +2,8 @@
 
 import pytest
 
+from plateviz.dashboard.fit_choices import FitChoices
 from plateviz.dashboard.prior_widths import default_widths, width_texts, widths_of
-from plateviz.dashboard.state import FitChoices
 from solver.data.parameters import BY_NAME
 from solver.data.settings import FitSettings
 

@@ -6,17 +6,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from plateviz.dashboard.fit_choices import ANSWERED_AT_ONCE, CONTROLS, FitChoices
 from plateviz.dashboard.prior_widths import default_widths
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.solution import Solution
 from plateviz.dashboard.stage import Stage
-from plateviz.dashboard.state import (
-    ALL,
-    ANSWERED_AT_ONCE,
-    CONTROLS,
-    FitChoices,
-    Selection,
-)
+from plateviz.dashboard.state import ALL, Selection
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.solving.job import Job
 from plateviz.solving.made_solutions import MadeSolutions
@@ -62,8 +57,8 @@ class FakeStore:
         self.requested.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))
         return self.requested[-1][2]
 
-    def prepare(self, orbit, settings, likely=(), *, may_fit=True):
-        self.prepared.append((orbit, settings, list(likely), may_fit))
+    def prepare(self, orbit, settings, likely=(), *, may_fit=True, is_urgent=False):
+        self.prepared.append((orbit, settings, list(likely), may_fit, is_urgent))
 
     def leave(self, orbit):
         self.left.append(orbit)
@@ -442,5 +437,6 @@ def test_change_of_any_control_answered_at_once_requests_a_what_if(live, name, v
 
 def test_every_setting_with_a_control_is_a_parameter():
     controls = {name for name, one in SETTINGS.items() if one.control}
-    assert controls == set(CONTROLS) == set(FitChoices.param) - {"name", "what_if_at_once"}
+    others = {"name", "what_if_at_once", "typed"}
+    assert controls == set(CONTROLS) == set(FitChoices.param) - others
     assert set(ANSWERED_AT_ONCE) == controls - {"engine", "compare_orders"}

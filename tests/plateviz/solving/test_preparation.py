@@ -43,6 +43,7 @@ PREPARED = {
     "orbit": 0,
     "settings": SETTINGS.to_dict(),
     "may_fit": True,
+    "is_urgent": False,
     "likely": [],
 }
 
@@ -54,7 +55,7 @@ def prepared_with(monkeypatch, requests):
     def prepared(fitted=None):
         fitter, kept = Fitter(fitted), Fitters()
         monkeypatch.setattr(kept, "of", lambda request: fitter)
-        soon, later = prepare(kept, PREPARED, requests, PutOff())
+        soon, later, _ = prepare(kept, PREPARED, requests, PutOff())
         list(soon)
         return fitter.fitted_settings, list(later)
 

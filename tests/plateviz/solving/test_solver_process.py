@@ -81,6 +81,12 @@ def test_likely_what_ifs_are_made_before_what_takes_longer(requests):
     assert done == ["verdict", "what-if", "eigenmodes", "orders"]
 
 
+def test_what_is_urgent_begins_at_once(requests, monkeypatch):
+    monkeypatch.setattr(solver_process, "_NEXT_S", 60.0)
+    soon = (requests.put({"job": "1"}) for _ in range(1))
+    assert _next_request(requests, Preparation(soon, is_urgent=True), PutOff()) == {"job": "1"}
+
+
 def test_preparations_are_finished_without_requests(requests):
     done = []
 

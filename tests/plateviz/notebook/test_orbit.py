@@ -1,5 +1,6 @@
 """Surveys, orbits and sources in a notebook, with a real solver process."""
 
+import asyncio
 import os
 import subprocess
 import sys
@@ -106,8 +107,13 @@ def test_closed_survey_starts_its_solver_again(survey, solution):
 
 def test_dashboard_of_a_served_page_ends_with_its_session(survey):
     document = Document()
-    with set_curdoc(document):
-        part = survey.dashboard().__panel__()
+
+    async def serve():
+        with set_curdoc(document):
+            return survey.dashboard().__panel__()
+
+    # As on a server, where a loop runs.
+    part = asyncio.run(serve())
     assert [type(column).__name__ for column in part] == ["Column", "Column"]
     assert survey._solver._started
     for end in document.callbacks.session_destroyed_callbacks:

@@ -16,7 +16,7 @@ class Background(ThreadPoolExecutor):
     def __init__(self) -> None:
         """Begin without work."""
         super().__init__(_READERS, thread_name_prefix="reader")
-        self._listeners: list[WeakMethod[Callable[[], object]]] = []
+        self._listeners: set[WeakMethod[Callable[[], object]]] = set()
         # Work may be done, in its own thread or at once, while somebody begins to listen.
         self._changing = threading.Lock()
 
@@ -27,16 +27,16 @@ class Background(ThreadPoolExecutor):
         return future
 
     def listen(self, listener: Callable[[], object]) -> None:
-        """Call a method once, from any thread, when the next work is done.
+        """Call a method once, from any thread, when the next work is done, however often it asks.
 
         The method's object, such as a page that has been closed, is not kept alive.
         """
         with self._changing:
-            self._listeners.append(WeakMethod(listener))
+            self._listeners.add(WeakMethod(listener))
 
     def _tell(self, _: Future[Any]) -> None:
         with self._changing:
-            listeners, self._listeners = self._listeners, []
+            listeners, self._listeners = self._listeners, set()
         for reference in listeners:
             if (listener := reference()) is not None:
                 listener()

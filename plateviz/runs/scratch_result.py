@@ -107,6 +107,11 @@ def are_eigenmodes_written(directory: Path) -> bool:
     return _last_of_eigenmodes(directory).is_file()
 
 
+def is_verdict_written(directory: Path) -> bool:
+    """Return whether the verdict on a result is there that was to follow."""
+    return (directory / _JUDGEMENT).is_file()
+
+
 def are_eigenmodes_to_come(result: FitResult) -> bool:
     """Return whether the eigenmodes of a result are not there yet; ask for them then."""
     awaited = vars(result)[_LATER[0]]

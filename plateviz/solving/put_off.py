@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from plateviz.runs.scratch_result import write_scratch_result, write_verdict
-from plateviz.tables.verdict import with_verdict
+from plateviz.tables.verdict import as_plain, orbit_verdict
 from solver.data.result import FitResult
 from solver.errors import InputError
 
@@ -36,7 +36,7 @@ class PutOff:
         is_partial : as of `write_scratch_result`, whose errors are raised
         """
         write_scratch_result(directory, result, is_partial=is_partial, is_judged=False)
-        self.add_verdict(lambda: _judge(directory, result))
+        self.add_verdict(lambda: judge(directory, result))
 
     def add_verdict(self, work: Work) -> None:
         """Put the verdict on a result off."""
@@ -63,8 +63,9 @@ class PutOff:
         _finish(self._eigenmodes)
 
 
-def _judge(directory: Path, result: FitResult) -> None:
-    write_verdict(directory, with_verdict(result).summary["verdict"])
+def judge(directory: Path, result: FitResult) -> None:
+    """Write the verdict on a result; errors as of `write_verdict`."""
+    write_verdict(directory, as_plain(orbit_verdict(result)))
 
 
 def _finish(waiting: deque[Work]) -> None:

@@ -39,7 +39,7 @@ class Solver(Protocol):
         ...
 
     def complete(self, job: Job) -> bool:
-        """Let a process write what it has put off of a job; return whether there is a process."""
+        """Let a process write what a result lacks that was put off; return whether it will."""
         ...
 
     def cancel(self, job: Job) -> None:
@@ -98,7 +98,7 @@ class SolverPool:
             queue.rest()
 
     def complete(self, job: Job) -> bool:
-        """Let its process write what it has put off of a job; return whether there is a process."""
+        """Let its process write what a result lacks that was put off; return whether it will."""
         with self._lock:
             # The result of a job that no queue has had was prepared for its orbit.
             queue = self._of_job.get(job) or self._warm.get(_orbit(job.request))

@@ -11,7 +11,7 @@ Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "direct
 {"do": "prepare", "origin", "orbit", "settings", "base", "may_fit", "likely", "is_urgent"}: while
 idle, make the likely what-ifs of a solution, each {"settings", "directory"}, and with "may_fit" fit
 what they start from, {"do": "rest"}: give up what is being prepared, and {"do": "complete"} with
-the rest of a "fit" that is done: write what was put off of its result. "base" is the solution of a
+the rest of a "fit" that is done: write what its result lacks. "base" is the solution of a
 run from which the what-ifs of the orbit can start, {"settings", "directory"}, or None.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
@@ -29,10 +29,16 @@ from pathlib import Path
 from typing import NamedTuple, TextIO
 
 from plateviz.cache import keep_compilations
-from plateviz.runs.scratch_result import are_eigenmodes_written, is_written, write_eigenmodes
+from plateviz.runs.scratch_result import (
+    are_eigenmodes_written,
+    is_verdict_written,
+    is_written,
+    read_scratch_result,
+    write_eigenmodes,
+)
 from plateviz.solving.fitters import Base, Fitters, Request, base_of, base_settings
 from plateviz.solving.preparation import Preparation, prepare
-from plateviz.solving.put_off import PutOff
+from plateviz.solving.put_off import PutOff, judge
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
 from solver.data.settings import COUNTED, FitSettings
 from solver.engines.gauss_newton import Iteration
@@ -238,13 +244,15 @@ def _what_if(
 
 
 def _complete(request: Request, kept: _Kept) -> None:
-    """Write what a result lacks, of which the eigenmodes may have been given up."""
+    """Write what a result lacks: it was given up, or put off by a process that died."""
     kept.put_off.finish()
-    directory = Path(request["directory"])
-    # Nobody waits for an error: who waits for eigenmodes sees in the end that there are none.
+    directory, settings = Path(request["directory"]), FitSettings.from_dict(request["settings"])
+    # Nobody waits for an error: who waits for such a part sees in the end that it is missing.
     with suppress(InputError, FitError):
+        if not is_verdict_written(directory):
+            judge(directory, read_scratch_result(directory, lambda: False))
         if not are_eigenmodes_written(directory):
-            fitter, settings = kept.fitters.of(request), FitSettings.from_dict(request["settings"])
+            fitter = kept.fitters.of(request)
             found = _what_if(fitter, request, lambda _: None, kept.put_off)
             result = fitter.fit(settings) if found is None else found.whole()
             tables = {table.name: getattr(result, table.name) for table in EIGENMODE_TABLES}

@@ -49,6 +49,7 @@ class SolverQueue:
         self._lock = threading.RLock()
         self._jobs: deque[Job] = deque()
         self._process: subprocess.Popen[str] | None = None
+        self._is_closed = False
         self._start()
 
     def submit(self, job: Job) -> Job:
@@ -92,9 +93,12 @@ class SolverQueue:
                 self._send({"do": "rest"})
 
     def complete(self, job: Job) -> bool:
-        """Let the process write what it has put off of a job; return whether there is a process."""
+        """Let the process write what a result lacks that it has put off; return whether it will.
+
+        A new process computes it again. After `close` there is none.
+        """
         with self._lock:
-            if self._process is None:
+            if self._is_closed:
                 return False
             self._send({**job.request, "do": "complete"})
             return True
@@ -119,6 +123,7 @@ class SolverQueue:
             for job in self._jobs:
                 job.cancel()
             self._jobs.clear()
+            self._is_closed = True
             process = self._process
             if process is not None:
                 process.terminate()
@@ -145,7 +150,7 @@ class SolverQueue:
         )
         if self._niceness:
             _give_way(process.pid, self._niceness)
-        self._process = process
+        self._process, self._is_closed = process, False
         threading.Thread(target=self._listen, args=(process, errors), daemon=True).start()
         return process
 

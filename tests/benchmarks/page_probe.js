@@ -122,7 +122,9 @@ window.plateviz = (() => {
     const isEmpty = e => isInView(e) && !e.matches(".tabulator")
       && !elements("canvas, .empty, .tabulator, input", e).length;
     const isWaiting = e => isInView(e) && e.textContent.includes("Being drawn.");
-    return cards.length > 0 && !cards.some(isEmpty)
+    // A page may have nothing to draw, and say why.
+    const hasAny = cards.length > 0 || elements(".empty").some(isInView);
+    return hasAny && !cards.some(isEmpty)
       && !elements(".fading").some(isFaded) && !elements(".empty").some(isWaiting)
       && !elements(".judging").some(e => e.checkVisibility())
       && plots().every(view => view.model.background_fill_color === background);

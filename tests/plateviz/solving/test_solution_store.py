@@ -12,7 +12,12 @@ import pytest
 
 from plateviz.runs.fitted_orbit import write_fitted_orbit
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.scratch_result import are_eigenmodes_to_come, read_scratch_result
+from plateviz.runs.scratch_result import (
+    are_eigenmodes_to_come,
+    are_eigenmodes_written,
+    is_verdict_written,
+    read_scratch_result,
+)
 from plateviz.runs.worker_scratch import worker_scratch
 from plateviz.solving import scratch_results, solver_queue
 from plateviz.solving.job import Job, JobStatus
@@ -256,6 +261,26 @@ def test_eigenmodes_that_were_given_up_are_computed_when_asked_for(store):
     for name in names:
         pd.testing.assert_frame_equal(getattr(again, name), before[name])
     assert not are_eigenmodes_to_come(again)
+
+
+def test_what_a_process_had_put_off_when_it_died_is_computed_by_the_next_one(store):
+    settings = FitSettings(order=4)
+    assert store.request(0, settings).wait(LONG) is JobStatus.DONE
+    likely, died = settings.with_(order=3), store._solver._process
+    assert store.request(0, likely, what_if=True).wait(LONG) is JobStatus.DONE
+    died.kill()
+    directory, end = store._directory(0, likely, what_if=True), time.monotonic() + LONG
+    while store._solver._process is died and time.monotonic() < end:
+        time.sleep(0.02)
+    assert not is_verdict_written(directory)
+    assert not are_eigenmodes_written(directory)
+    assert are_eigenmodes_to_come(store.result(0, likely, what_if=True))
+    # A new process takes seconds.
+    while not are_eigenmodes_written(directory) and time.monotonic() < end:
+        time.sleep(0.02)
+    result = read_scratch_result(directory)
+    assert result.summary["verdict"] == plain(with_verdict(result).summary["verdict"])
+    assert len(result.modes) > 0
 
 
 def test_what_if_without_sources_starts_from_all_measurements(store):

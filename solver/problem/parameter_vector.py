@@ -1,10 +1,9 @@
 """VectorLayout: columns of the calibration parameters in the flat vector the engines solve for.
 
 Exposures come first, all groups of one exposure together with its walking distortion terms, then
-the two directions of the
-distortion and of its optional terms, then the detectors, all groups of one detector together,
-and last what moves from span to span. The parameters that one measurement depends on therefore
-lie in few contiguous ranges.
+the two directions of the distortion and of its optional terms, then the detectors, all groups of
+one detector together, and last what moves from span to span. The parameters that one measurement
+depends on therefore lie in few contiguous ranges.
 """
 
 from collections.abc import Iterable
@@ -75,12 +74,12 @@ class VectorLayout:
         """Return the groups with one value per element of `axis`."""
         return tuple(group for group in self.groups if group.axis == axis)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of calibration parameters."""
         return self.first_motion + sum(self._length(group) for group in self.on("motion"))
 
-    @property
+    @cached_property
     def n_terms(self) -> int:
         """Number of terms of one direction: the distortion's and the optional ones."""
         return sum(self._length(group) for group in self._terms(0))
@@ -103,22 +102,22 @@ class VectorLayout:
         """Which of the terms of both directions walk, first those of x."""
         return np.r_[: self.n_walk, self.n_terms : self.n_terms + self.n_walk]
 
-    @property
+    @cached_property
     def per_exposure(self) -> int:
         """Number of parameters of one exposure."""
         return len(self.on("exp")) + 2 * self.n_walk
 
-    @property
+    @cached_property
     def first_coefficient(self) -> int:
         """Column of the first distortion coefficient."""
         return self.n_exp * self.per_exposure
 
-    @property
+    @cached_property
     def first_detector(self) -> int:
         """Column of the first detector parameter."""
         return self.first_coefficient + 2 * self.n_terms
 
-    @property
+    @cached_property
     def first_motion(self) -> int:
         """Column of the first parameter that moves from span to span."""
         return self.first_detector + self.n_det * len(self.on("det"))

@@ -3,6 +3,9 @@
 After each change, Bokeh and Panel walk through all models of a page to find those that are new. At
 each step Bokeh lists the properties of the model's class that may have other models, and computes
 the default of each that was not set. This was half of the server's time for a page.
+
+A new model asks each of its properties whether its default may change, and gets a container of its
+own for each that can be filled, and seldom is. To send a model, Bokeh reads all its properties.
 """
 
 from collections.abc import Callable
@@ -12,6 +15,8 @@ from typing import Any
 
 from bokeh.core.has_props import HasProps
 from bokeh.core.property.descriptors import PropertyDescriptor
+from bokeh.core.property.singletons import Intrinsic, Undefined
+from bokeh.core.property.wrappers import PropertyValueContainer
 from bokeh.model import Model
 from bokeh.model import util as bokeh_models
 from bokeh.settings import settings
@@ -21,6 +26,7 @@ _PLAIN = frozenset({type(None), bool, int, float, str, bytes})
 _UNKNOWN = object()
 # It has no public name.
 _BOKEH_DEFAULT: Any = PropertyDescriptor._get_default  # noqa: SLF001
+_BOKEH_VALUES: Any = HasProps.query_properties_with_values
 
 Visitor = Callable[[Model], object]
 
@@ -38,6 +44,66 @@ def make_models_quick() -> None:
     descriptor._get_default = _default  # noqa: SLF001
     owner: Any = HasProps
     owner.themed_values = _themed_values
+    owner.__init__ = _begin
+    owner.query_properties_with_values = _values
+
+
+def _begin(self: Any, **properties: Any) -> None:  # noqa: ANN401 as Bokeh
+    """Begin a model with some values, and with the defaults that no other model may share."""
+    super(HasProps, self).__init__()
+    self._property_values = {}
+    self._unstable_default_values = {}
+    self._unstable_themed_values = {}
+    for name, value in properties.items():
+        if value is not Undefined and value is not Intrinsic:
+            setattr(self, name, value)
+    for descriptor in _own_defaults(type(self)):
+        if descriptor.name not in properties:
+            descriptor._get(self)  # noqa: SLF001 it keeps the default
+    self._initialized = True
+
+
+@cache
+def _own_defaults(kind: type[HasProps]) -> list[Any]:
+    """Return the properties of a class of whose defaults each model has its own from the start.
+
+    A container is made when somebody looks at it; until then it is neither sent nor has models.
+    """
+    found = []
+    for descriptor in kind.descriptors():
+        if _is_unstable(descriptor, kind):
+            default = descriptor.class_default(kind)
+            if not isinstance(default, PropertyValueContainer) or default:
+                found.append(descriptor)
+    return found
+
+
+def _values(
+    self: Any,  # noqa: ANN401 as Bokeh
+    query: Callable[[Any], bool],
+    *,
+    include_defaults: bool = True,
+    include_undefined: bool = False,
+) -> dict[str, Any]:
+    """Return values of properties; without the defaults, no other property is read."""
+    if include_defaults or include_undefined:
+        return _BOKEH_VALUES(
+            self, query, include_defaults=include_defaults, include_undefined=include_undefined
+        )
+    given, own, themed = (
+        self._property_values,  # noqa: SLF001
+        self._unstable_default_values,  # noqa: SLF001
+        _themed_values(self) or (),
+    )
+    found = {}
+    for descriptor in type(self).descriptors():
+        name = descriptor.name
+        if (name in given or name in own or name in themed) and query(descriptor):
+            value = descriptor.get_value(self)
+            is_empty = name in own and isinstance(value, PropertyValueContainer)
+            if not is_empty or name in themed:
+                found[name] = value
+    return found
 
 
 def _visit_models_of(value: Any, visitor: Visitor) -> None:  # noqa: ANN401 as Bokeh
@@ -46,12 +112,11 @@ def _visit_models_of(value: Any, visitor: Visitor) -> None:  # noqa: ANN401 as B
         _visit_models_in(value, visitor)
         return
     given = value._property_values  # noqa: SLF001
-    for name, descriptor in _descriptors_with_models(type(value)):
-        child = given.get(name, _UNKNOWN)
-        if child is _UNKNOWN or descriptor is None:
-            if descriptor is not None and _plain_default(descriptor, type(value)) is not _UNKNOWN:
-                continue
-            child = getattr(value, name)
+    filled = value._unstable_default_values  # noqa: SLF001
+    for name, is_bare in _names_with_models(type(value)):
+        child = given.get(name, _UNKNOWN) if is_bare is not None else _UNKNOWN
+        if child is _UNKNOWN:
+            child = filled.get(name) if is_bare else getattr(value, name)
         _visit_models_in(child, visitor)
 
 
@@ -77,14 +142,26 @@ def _visit_models_in(value: Any, visitor: Visitor) -> None:  # noqa: ANN401 as B
 
 
 @cache
-def _descriptors_with_models(kind: type[HasProps]) -> list[tuple[str, PropertyDescriptor | None]]:
-    """Return the properties of a class that may have models; None for another kind of property."""
-    found = []
+def _names_with_models(kind: type[HasProps]) -> list[tuple[str, bool | None]]:
+    """Return the properties of a class that may have models, and which have none unless given.
+
+    This is None for a property of another kind, whose value is not what it was given.
+    """
+    bare = {one.name for one in kind.descriptors()} - {one.name for one in _own_defaults(kind)}
+    found: list[tuple[str, bool | None]] = []
     for name in kind.properties_with_refs():
         descriptor = kind.lookup(name)
         is_usual = type(descriptor).__get__ is PropertyDescriptor.__get__
-        found.append((name, descriptor if is_usual else None))
+        is_bare = name in bare and (
+            _is_unstable(descriptor, kind) or _plain_default(descriptor, kind) is not _UNKNOWN
+        )
+        found.append((name, is_bare if is_usual else None))
     return found
+
+
+def _is_unstable(descriptor: Any, kind: Any) -> bool:  # noqa: ANN401 of any property
+    """Return whether models of a class may not share the default of a property."""
+    return descriptor.has_unstable_default(kind)
 
 
 def _default(descriptor: Any, owner: HasProps) -> Any:  # noqa: ANN401 of any property
@@ -100,7 +177,7 @@ def _default(descriptor: Any, owner: HasProps) -> Any:  # noqa: ANN401 of any pr
 @cache
 def _plain_default(descriptor: Any, kind: type[HasProps]) -> Any:  # noqa: ANN401 of any property
     """Return the default of a property, unless instances may have different ones."""
-    if descriptor.has_unstable_default(kind):
+    if _is_unstable(descriptor, kind):
         return _UNKNOWN
     default = descriptor.class_default(kind)
     return default if type(default) in _PLAIN else _UNKNOWN

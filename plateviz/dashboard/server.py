@@ -21,6 +21,7 @@ from plateviz.dashboard.headers import NotebookHeaders, SecurityHeaders
 from plateviz.dashboard.limits import Limits, PageLimit
 from plateviz.dashboard.page_request import send_empty_pages
 from plateviz.dashboard.password import PasswordLogin
+from plateviz.dashboard.quick_components import make_components_quick
 from plateviz.dashboard.quick_models import make_models_quick
 from plateviz.dashboard.refused_requests import refuse_floods, refuse_paths
 from plateviz.dashboard.returned_memory import ReturnedMemory, keep_no_first_page
@@ -103,6 +104,7 @@ def begin(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of B
 def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of Bokeh
     silence_closed_pages()
     make_models_quick()
+    make_components_quick()
     send_waiting_messages()
     check_websockets()
     hosts = sorted({endpoint.address, "localhost", "127.0.0.1"})

@@ -7,6 +7,7 @@ import pytest
 from bokeh.core.has_props import HasProps
 from bokeh.core.property.descriptors import PropertyDescriptor, UnsetValueError
 from bokeh.core.property.vectorization import Expr
+from bokeh.core.serialization import Serializer
 from bokeh.model import Model, get_class
 from bokeh.model import util as bokeh_models
 from bokeh.models import ColumnDataSource, CumSum, Plot, Scatter, Title
@@ -27,9 +28,12 @@ def quick(monkeypatch):
         (bokeh_models, "visit_value_and_its_immediate_references"),
         (PropertyDescriptor, "_get_default"),
         (HasProps, "themed_values"),
+        (HasProps, "__init__"),
+        (HasProps, "query_properties_with_values"),
     ):
         monkeypatch.setattr(owner, name, getattr(owner, name))
     monkeypatch.setattr(PropertyDescriptor, "_get_default", quick_models._BOKEH_DEFAULT)
+    monkeypatch.setattr(HasProps, "query_properties_with_values", quick_models._BOKEH_VALUES)
     yield quick_models.make_models_quick
     for one in (settings.perform_error_diagnostics, settings.perform_document_validation):
         one.unset_value()
@@ -74,6 +78,28 @@ def test_defaults_are_those_of_bokeh(quick):
     assert len(expected) > 5000
     quick()
     assert defaults() == expected
+
+
+def test_what_is_sent_of_a_model_is_the_same(quick):
+    def sent():
+        drawn = figure(title="a figure", tooltips="@x", x_axis_type="log")
+        drawn.scatter([1.0, 2.0], [1.0, 2.0], legend_label="points")
+        drawn.tags.append("seen")
+        drawn.apply_theme({"min_border": 7, "tags": ["themed"]})
+        models = {kind: model for kind, model in every_model() if isinstance(model, Model)}
+        texts = {}
+        for kind, model in {**models, "a figure": drawn}.items():
+            # Some are not whole without what they belong to.
+            with suppress(UnsetValueError):
+                content = Serializer().serialize(model).content
+                texts[kind] = re.sub(r"'p\d+'|0x\w+", "", repr(content))
+        return texts
+
+    expected = sent()
+    assert len(expected) > 200
+    quick()
+    found = sent()
+    assert {kind: found[kind] for kind in expected} == expected
 
 
 def test_default_that_may_change_is_not_shared(quick):

@@ -1,0 +1,54 @@
+"""Quick components: what Panel works out anew for every component of a page, worked out seldom.
+
+For its model, a component reads each of its parameters. Param then makes a copy of it for the
+component, in case that somebody changes it: a fifteenth of the server's time for a page. Panel also
+looks for the files of the component's class on the disk.
+"""
+
+from collections.abc import Callable
+from contextvars import ContextVar
+from functools import cache, wraps
+from typing import Any
+
+from panel.custom import ReactiveESM
+from panel.util import classproperty
+from param import parameterized
+
+# They have no public names. A test, run with the newest versions too, notices a change.
+_PARAM: Any = parameterized
+_COMPONENT: Any = ReactiveESM
+_METHODS = ("_get_model", "_get_properties")
+_IS_READING: ContextVar[bool] = ContextVar("is_reading", default=False)
+
+
+def make_components_quick() -> None:
+    """Let components in this process read the parameters of their class for their models."""
+    instantiated = _PARAM._instantiated_parameter  # noqa: SLF001
+    if hasattr(instantiated, "__wrapped__"):
+        return
+
+    @wraps(instantiated)
+    def read(owner: Any, parameter: Any) -> Any:  # noqa: ANN401 as Param
+        if _IS_READING.get():
+            own = owner._param__private.params  # noqa: SLF001
+            return own.get(parameter.name, parameter)
+        return instantiated(owner, parameter)
+
+    _PARAM._instantiated_parameter = read  # noqa: SLF001
+    for name in _METHODS:
+        setattr(_COMPONENT, name, _reading(getattr(_COMPONENT, name)))
+    # The files of a class are where they were.
+    find = vars(ReactiveESM)["_bundle_path"].f
+    _COMPONENT._bundle_path = classproperty(cache(find))  # noqa: SLF001
+
+
+def _reading(method: Callable) -> Callable:
+    @wraps(method)
+    def reading(*arguments: object, **named: object) -> object:
+        token = _IS_READING.set(True)
+        try:
+            return method(*arguments, **named)
+        finally:
+            _IS_READING.reset(token)
+
+    return reading

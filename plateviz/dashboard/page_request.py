@@ -9,6 +9,7 @@ import json
 import re
 import secrets
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -100,9 +101,9 @@ class PageHandler(DocHandler):
 class SessionHandler(DocHandler):
     """Makes the session of a page that loads its scripts, before it connects."""
 
-    def initialize(self, limits: Limits, **_: object) -> None:
-        """Take the limits of sessions."""
-        self._limits = limits
+    def initialize(self, limits: Limits, begin: Callable[[], object], **_: object) -> None:
+        """Take the limits of sessions, and what is called before one is made."""
+        self._limits, self._begin = limits, begin
 
     @authenticated
     async def post(self, *_: object, **__: object) -> None:
@@ -115,6 +116,7 @@ class SessionHandler(DocHandler):
         if self._limits.pages.reason(client) or not self._limits.may_open(client):
             self.set_status(429)
             return
+        self._begin()
         await self._quiet()
         own = self.application
         payload = get_token_payload(token)
@@ -192,19 +194,23 @@ class EmptyPage:
         return token.join(self._parts)
 
 
-def send_empty_pages(application: Application, page: pmui.Page, limits: Limits) -> None:
+def send_empty_pages(
+    application: Application, page: pmui.Page, limits: Limits, begin: Callable[[], object]
+) -> None:
     """Let the server of `application` answer requests of its page without making sessions.
 
     Parameters
     ----------
     page : the page of any session, of which only what is around its contents is taken
     limits : of the pages that are open
+    begin : called when a page opens, before its session is made
     """
     own: Any = application
     empty = EmptyPage(page, Resources.from_bokeh(own.resources()))
     arguments = {
         "page": empty,
         "limits": limits,
+        "begin": begin,
         "application_context": own.applications["/"],
         "bokeh_websocket_path": f"{own.prefix}/ws",
     }

@@ -140,7 +140,7 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
     application = server._tornado  # noqa: SLF001 it has no public name
     pages = PageLimit(endpoint.pages, endpoint.pages_per_address)
     limits = application.settings[LIMITS] = Limits(pages, is_proxied=bool(endpoint.origins))
-    send_empty_pages(application, empty_page(store), limits)
+    send_empty_pages(application, empty_page(store), limits, store.pause)
     refuse_floods(application, limits)
     refuse_paths(application)
     application.add_transform(NotebookHeaders if endpoint.in_notebook else SecurityHeaders)

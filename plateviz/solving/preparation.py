@@ -28,11 +28,20 @@ class Preparation(NamedTuple):
     soon : what a person may ask for next
     later : what speeds up the requests after that
     is_urgent : whether to begin as soon as no request waits
+    is_paused : whether to begin only when a page that opens has had time to
+    renew : returns the same again, but for what is done, if it has been interrupted
     """
 
     soon: Iterator[None] = iter(())
     later: Iterator[None] = iter(())
     is_urgent: bool = False
+    is_paused: bool = False
+    renew: Callable[[], "Preparation"] | None = None
+
+    def paused(self) -> "Preparation":
+        """Return the same, to begin later."""
+        renewed = self if self.renew is None else self.renew()
+        return renewed._replace(is_urgent=False, is_paused=True)
 
 
 def prepare(fitters: Fitters, request: Request, requests: Requests, put_off: PutOff) -> Preparation:
@@ -49,6 +58,7 @@ def prepare(fitters: Fitters, request: Request, requests: Requests, put_off: Put
         _soon(fitters, request, requests, put_off),
         _precomputed(fitters, request, order),
         request["is_urgent"],
+        renew=lambda: prepare(fitters, request, requests, put_off),
     )
 
 

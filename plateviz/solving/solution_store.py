@@ -160,6 +160,10 @@ class SolutionStore:
         }
         self._solver.prepare(request)
 
+    def pause(self) -> None:
+        """Let preparations wait for a moment: a page that opens needs the cores."""
+        self._solver.pause()
+
     def leave(self, orbit: int | None) -> None:
         """Give up what is prepared for an orbit that a page leaves: the page needs the cores.
 

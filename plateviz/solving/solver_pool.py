@@ -34,6 +34,10 @@ class Solver(Protocol):
         """Send a request for preparations, which give way to every job."""
         ...
 
+    def pause(self) -> None:
+        """Let what processes prepare wait for a moment."""
+        ...
+
     def rest(self) -> None:
         """Let processes give up what they prepare."""
         ...
@@ -90,11 +94,14 @@ class SolverPool:
             self._warm[_orbit(request)] = queue
         queue.prepare(request)
 
+    def pause(self) -> None:
+        """Let what processes prepare wait for a moment."""
+        for queue in self._all():
+            queue.pause()
+
     def rest(self) -> None:
         """Let processes give up what they prepare."""
-        with self._lock:
-            queues = list(self._queues)
-        for queue in queues:
+        for queue in self._all():
             queue.rest()
 
     def complete(self, job: Job) -> bool:
@@ -106,17 +113,17 @@ class SolverPool:
 
     def cancel(self, job: Job) -> None:
         """Cancel a job that waits or runs."""
-        with self._lock:
-            queues = list(self._queues)
-        for queue in queues:
+        for queue in self._all():
             queue.cancel(job)
 
     def close(self) -> None:
         """End all processes and cancel all jobs that are not over."""
-        with self._lock:
-            queues = list(self._queues)
-        for queue in queues:
+        for queue in self._all():
             queue.close()
+
+    def _all(self) -> list[SolverQueue]:
+        with self._lock:
+            return list(self._queues)
 
     def _queue_for(self, request: Mapping[str, Any]) -> SolverQueue:
         if self._most == 1:

@@ -86,11 +86,18 @@ class SolverQueue:
         with self._lock:
             self._send({"do": "prepare", **request})
 
+    def pause(self) -> None:
+        """Let what the process prepares wait for a moment."""
+        self._tell("pause")
+
     def rest(self) -> None:
         """Let the process give up what it prepares."""
+        self._tell("rest")
+
+    def _tell(self, what: str) -> None:
         with self._lock:
             if self._process is not None:
-                self._send({"do": "rest"})
+                self._send({"do": what})
 
     def complete(self, job: Job) -> bool:
         """Let the process write what a result lacks that it has put off; return whether it will.

@@ -155,7 +155,9 @@ def test_page_that_loads_its_scripts_has_its_session_made(store):
     async def scenario(address, server):
         page = (await get(f"{address}?view=orbit&orbit=0"))[1]
         token = token_of(page)
+        assert store.pauses == 0
         assert (await get(f"{address}session", **asked(token, WINDOW)))[0] == 204
+        assert store.pauses == 1
         (session,) = server.get_sessions()
         location = next(m for m in session.document.roots if hasattr(m, "pathname"))
         assert (location.pathname, location.search) == ("/", "?view=orbit&orbit=0")

@@ -45,7 +45,7 @@ class FakeStore:
     def __init__(self, result):
         self._result = result
         self.requested, self.prepared, self.cancelled, self.abandoned = [], [], [], []
-        self.left = []
+        self.left, self.pauses = [], 0
         self.judge = SimpleNamespace(has_judged=lambda _: True)
         self.background = AtOnce()
         self.run_reader = RunReader(self.background)
@@ -59,6 +59,9 @@ class FakeStore:
 
     def prepare(self, orbit, settings, likely=(), *, may_fit=True, is_urgent=False):
         self.prepared.append((orbit, settings, list(likely), may_fit, is_urgent))
+
+    def pause(self):
+        self.pauses += 1
 
     def leave(self, orbit):
         self.left.append(orbit)

@@ -55,9 +55,9 @@ def prepared_with(monkeypatch, requests):
     def prepared(fitted=None):
         fitter, kept = Fitter(fitted), Fitters()
         monkeypatch.setattr(kept, "of", lambda request: fitter)
-        soon, later, _ = prepare(kept, PREPARED, requests, PutOff())
-        list(soon)
-        return fitter.fitted_settings, list(later)
+        prepared = prepare(kept, PREPARED, requests, PutOff())
+        list(prepared.soon)
+        return fitter.fitted_settings, list(prepared.later)
 
     return prepared
 
@@ -183,6 +183,19 @@ def test_likely_what_if_gives_way_to_others(likely, requests, tmp_path):
     requests.put({**request, "do": "fit", "what_if": True, "directory": "another"})
     assert len(list(prepare(fitters, request, requests, PutOff()).soon)) < 3
     assert not is_written(tmp_path / "lower")
+
+
+def test_what_a_page_that_opens_has_interrupted_is_made_later(likely, requests, tmp_path):
+    fitters, request = likely
+    requests.put({"do": "pause"})
+    prepared = prepare(fitters, {**request, "is_urgent": True}, requests, PutOff())
+    list(prepared.soon)
+    assert not is_written(tmp_path / "lower")
+    requests.get()
+    paused = prepared.paused()
+    assert (paused.is_urgent, paused.is_paused) == (False, True)
+    list(paused.soon)
+    assert is_written(tmp_path / "lower")
 
 
 def test_what_needs_a_fit_is_not_made(likely, requests, tmp_path):

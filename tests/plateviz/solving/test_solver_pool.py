@@ -86,8 +86,9 @@ def test_preparations_go_where_the_what_ifs_will(pool, queues):
     pool.submit(fit(0, "svi"))
     pool.prepare({"origin": "sky", "orbit": 3})
     queues[0]._process = object()
+    pool.pause()
     pool.rest()
-    assert queues[0].sent == ["prepare", "rest"]
+    assert queues[0].sent == ["prepare", "pause", "rest"]
     assert pool.submit(fit(3, what_if=True)) in queues[0].jobs
 
 

@@ -87,6 +87,17 @@ def test_what_is_urgent_begins_at_once(requests, monkeypatch):
     assert _next_request(requests, Preparation(soon, is_urgent=True), PutOff()) == {"job": "1"}
 
 
+def test_what_is_paused_begins_later_but_a_verdict_does_not(requests, monkeypatch):
+    monkeypatch.setattr(solver_process, "_NEXT_S", 0.0)
+    monkeypatch.setattr(solver_process, "_PAUSE_S", 60.0)
+    done, put_off = [], PutOff()
+    put_off.add_verdict(lambda: done.append("verdict"))
+    soon = (done.append("what-if") for _ in range(1))
+    threading.Timer(0.05, requests.put, [{"job": "1"}]).start()
+    assert _next_request(requests, Preparation(soon).paused(), put_off) == {"job": "1"}
+    assert done == ["verdict"]
+
+
 def test_preparations_are_finished_without_requests(requests):
     done = []
 

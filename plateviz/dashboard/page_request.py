@@ -101,9 +101,9 @@ class PageHandler(DocHandler):
 class SessionHandler(DocHandler):
     """Makes the session of a page that loads its scripts, before it connects."""
 
-    def initialize(self, limits: Limits, begin: Callable[[], object], **_: object) -> None:
+    def initialize(self, limits: Limits, on_open: Callable[[], object], **_: object) -> None:
         """Take the limits of sessions, and what is called before one is made."""
-        self._limits, self._begin = limits, begin
+        self._limits, self._on_open = limits, on_open
 
     @authenticated
     async def post(self, *_: object, **__: object) -> None:
@@ -116,7 +116,7 @@ class SessionHandler(DocHandler):
         if self._limits.pages.reason(client) or not self._limits.may_open(client):
             self.set_status(429)
             return
-        self._begin()
+        self._on_open()
         await self._quiet()
         own = self.application
         payload = get_token_payload(token)
@@ -195,7 +195,7 @@ class EmptyPage:
 
 
 def send_empty_pages(
-    application: Application, page: pmui.Page, limits: Limits, begin: Callable[[], object]
+    application: Application, page: pmui.Page, limits: Limits, on_open: Callable[[], object]
 ) -> None:
     """Let the server of `application` answer requests of its page without making sessions.
 
@@ -203,14 +203,14 @@ def send_empty_pages(
     ----------
     page : the page of any session, of which only what is around its contents is taken
     limits : of the pages that are open
-    begin : called when a page opens, before its session is made
+    on_open : called when a page opens, before its session is made
     """
     own: Any = application
     empty = EmptyPage(page, Resources.from_bokeh(own.resources()))
     arguments = {
         "page": empty,
         "limits": limits,
-        "begin": begin,
+        "on_open": on_open,
         "application_context": own.applications["/"],
         "bokeh_websocket_path": f"{own.prefix}/ws",
     }

@@ -18,18 +18,23 @@ from param import parameterized
 _PARAM: Any = parameterized
 _COMPONENT: Any = ReactiveESM
 _METHODS = ("_get_model", "_get_properties")
-_IS_READING: ContextVar[bool] = ContextVar("is_reading", default=False)
+# The component whose model is made.
+_READING: ContextVar[Any] = ContextVar("reading", default=None)
 
 
 def make_components_quick() -> None:
-    """Let components in this process read the parameters of their class for their models."""
+    """Let a component of this process read the parameters of its class to make its model.
+
+    Those that are its own it has been given before. Other objects are not concerned, even if their
+    models are made meanwhile.
+    """
     instantiated = _PARAM._instantiated_parameter  # noqa: SLF001
     if hasattr(instantiated, "__wrapped__"):
         return
 
     @wraps(instantiated)
     def read(owner: Any, parameter: Any) -> Any:  # noqa: ANN401 as Param
-        if _IS_READING.get():
+        if owner is _READING.get():
             own = owner._param__private.params  # noqa: SLF001
             return own.get(parameter.name, parameter)
         return instantiated(owner, parameter)
@@ -44,11 +49,11 @@ def make_components_quick() -> None:
 
 def _reading(method: Callable) -> Callable:
     @wraps(method)
-    def reading(*arguments: object, **named: object) -> object:
-        token = _IS_READING.set(True)
+    def reading(component: ReactiveESM, *arguments: object, **named: object) -> object:
+        token = _READING.set(component)
         try:
-            return method(*arguments, **named)
+            return method(component, *arguments, **named)
         finally:
-            _IS_READING.reset(token)
+            _READING.reset(token)
 
     return reading

@@ -1,6 +1,7 @@
 """Components make the same models with parameters that are not copied for them."""
 
 import re
+from pathlib import Path
 
 import panel as pn
 import panel_material_ui as pmui
@@ -86,3 +87,12 @@ def test_parameter_that_a_component_has_changed_is_its_own(quick):
     one.get_root(Document())
     assert one.param["value"].label == "changed"
     assert other.param["value"].label != "changed"
+
+
+def test_files_of_a_class_are_looked_for_once(quick, monkeypatch):
+    quick()
+    Visibility().get_root(Document())
+    looked_for, is_file = [], Path.is_file
+    monkeypatch.setattr(Path, "is_file", lambda one: looked_for.append(one.name) or is_file(one))
+    Visibility().get_root(Document())
+    assert not [name for name in looked_for if name.endswith(".bundle.js")]

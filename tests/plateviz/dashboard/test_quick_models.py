@@ -102,6 +102,18 @@ def test_what_is_sent_of_a_model_is_the_same(quick):
     assert {kind: found[kind] for kind in expected} == expected
 
 
+def test_no_container_is_made_until_somebody_looks_at_it(quick):
+    quick()
+    one = Plot()
+    one.references()
+    Serializer().serialize(one)
+    own = one._unstable_default_values
+    assert "toolbar" in own
+    assert not {"tags", "renderers", "stylesheets"} & set(own)
+    assert one.tags == []
+    assert "tags" in own
+
+
 def test_default_that_may_change_is_not_shared(quick):
     quick()
     one, other = Plot(), Plot()

@@ -26,8 +26,10 @@ def inspect(
     found = inspect_files(files)
     for path, one in zip(files, found, strict=True):
         if one["kind"] == "survey":
+            one["runs"] = []
             for run in runs_of(path):
                 one["problems"] += run.changes()
+                one["runs"].append({"name": run.name, "orbits": len(run.complete_orbits())})
     if as_json:
         print_json(found)
     else:

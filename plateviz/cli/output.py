@@ -129,10 +129,20 @@ def print_inspection(reports: list[dict[str, Any]]) -> None:
             typer.echo(f"  {table['name']}: {table['rows']} rows")
             for column in table["columns"]:
                 typer.echo(f"    {_column(column)}")
+        for line in _survey_lines(report):
+            typer.echo(f"  {line}")
         for defect in report["defects"]:
             typer.echo(f"  simulated with the defect {defect}")
         for problem in report["problems"]:
             typer.echo(f"  WRONG: {problem}")
+
+
+def _survey_lines(report: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how many orbits and measurements a survey has, and orbits each of its runs."""
+    for what, number in report["counts"].items():
+        yield f"{what}: {number:,}"
+    for run in report.get("runs", []):
+        yield f"orbits solved in the run {run['name']}: {run['orbits']:,}"
 
 
 def _column(column: Mapping[str, Any]) -> str:

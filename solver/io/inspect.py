@@ -1,6 +1,7 @@
 """Inspection of files: kind, contents and problems of each file."""
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,9 +17,10 @@ from solver.errors import InputError
 from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
 from solver.io.fits import read_fits
 from solver.io.formats import has_reader, is_fits, place, read_tables
+from solver.io.parquet import count_rows
 from solver.io.read_orbit import names_of
 from solver.io.result import is_result, to_result
-from solver.io.survey import read_header, section
+from solver.io.survey import measurement_path, read_header, section, survey_orbits
 from solver.io.survey_manifest import survey_changes
 from solver.io.table_check import examine, matched_names
 
@@ -41,6 +43,7 @@ class _Finding:
     tables: list[dict] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
     defects: list[str] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
     frames: list[tuple[Table, str, pd.DataFrame]] = field(default_factory=list)
 
 
@@ -60,7 +63,8 @@ def inspect_files(paths: Iterable[Path]) -> list[dict]:
     "measurement", "environment", "catalogue", "truth", "result", "instrument", "survey" or
     "unknown"); `tables`, each with `name`, `file`, `kind`, `rows` and `columns` (`name`,
     `unit`, `type`, `min`, `max`, and `canonical`, the name it is read as, or None); `defects`,
-    those that a survey was simulated with; `problems`.
+    those that a survey was simulated with; `counts` of the `orbits` of a survey and of its
+    `measurements`, as far as their files can be read; `problems`.
     """
     findings = [_inspect(Path(path)) for path in paths]
     _cross_check(findings)
@@ -70,6 +74,7 @@ def inspect_files(paths: Iterable[Path]) -> list[dict]:
             "kind": finding.kind,
             "tables": finding.tables,
             "defects": finding.defects,
+            "counts": finding.counts,
             "problems": finding.problems,
         }
         for finding in findings
@@ -100,6 +105,7 @@ def _inspect_folder(finding: _Finding) -> None:
         finding.kind = "survey"
         finding.problems += survey_changes(finding.path)
         finding.defects = _defects_of(finding.path)
+        finding.counts = _counts_of(finding.path)
         return
     for path in files:
         _inspect_in_folder(finding, path)
@@ -117,6 +123,20 @@ def _defects_of(survey: Path) -> list[str]:
     except InputError:
         return []
     return [str(one) for one in defects] if isinstance(defects, list) else []
+
+
+def _counts_of(survey: Path) -> dict[str, int]:
+    """Return how many orbits a survey has, and measurements; nothing where it is damaged."""
+    try:
+        orbits = survey_orbits(survey)
+    except InputError:
+        return {}
+    n_rows = 0
+    for orbit in orbits:
+        # What is wrong with the file is among the problems.
+        with suppress(InputError):
+            n_rows += count_rows(str(measurement_path(survey, orbit)))
+    return {"orbits": len(orbits), "measurements": n_rows}
 
 
 def _inspect_file(finding: _Finding) -> None:

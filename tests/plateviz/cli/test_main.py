@@ -154,7 +154,9 @@ def test_simulate_puts_defects_in_and_inspect_names_them(run, tmp_path):
     assert code == 0
     assert "  simulated with the defect distortion-drift=0.1um\n" in out
     assert "  simulated with the defect noise=10%\n" in out
-    assert SurveyFolder(str(folder)).read(0).measurements["magnitude"].notna().all()
+    measurements = SurveyFolder(str(folder)).read(0).measurements
+    assert f"  orbits: 1\n  measurements: {len(measurements):,}\n" in out
+    assert measurements["magnitude"].notna().all()
 
 
 def test_simulate_refuses_an_unknown_defect_and_makes_nothing(run, tmp_path):

@@ -1,6 +1,7 @@
 """Inspection: kind, contents and problems of files, without exceptions."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from astropy.time import Time
 from solver.data.instrument import MINI_MOCK, write_instrument
 from solver.io.inspect import inspect_files
 from solver.io.result import write_result
+from solver.io.survey import measurement_path, read_survey_orbit
 from tests.solver.io_samples import (
     FIRST_ID,
     catalogue,
@@ -166,6 +168,19 @@ def test_survey_with_a_broken_table(tmp_path):
     (tmp_path / "reference.parquet").write_bytes(b"no")
     (found,) = _inspect(tmp_path)
     assert "reference.parquet: expected a Parquet table" in found["problems"][0]
+
+
+def test_measurements_of_a_survey_are_counted_where_their_files_can_be_read(small_survey, tmp_path):
+    survey = tmp_path / "survey"
+    shutil.copytree(small_survey, survey)
+    (whole,) = _inspect(survey)
+    assert whole["problems"] == []
+    n_rows = [len(read_survey_orbit(survey, orbit).measurements) for orbit in (0, 1)]
+    assert whole["counts"] == {"orbits": 2, "measurements": sum(n_rows)}
+    measurement_path(survey, 1).write_bytes(b"no")
+    (damaged,) = _inspect(survey)
+    assert "orbit=0001.parquet" in damaged["problems"][0]
+    assert damaged["counts"] == {"orbits": 2, "measurements": n_rows[0]}
 
 
 @pytest.mark.parametrize(

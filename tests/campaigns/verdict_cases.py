@@ -44,7 +44,7 @@ class DefectCase:
 
 CASES = (
     DefectCase("distortion-drift", 0.085, ("distortion-drifts",), {"drift": 2}),
-    DefectCase("distortion-orbital", 0.105, ("distortion-oscillates",), {"breathing": 2}),
+    DefectCase("distortion-orbital", 0.05, ("distortion-oscillates",), {"breathing": 2}),
     DefectCase("distortion-step", 0.068, ("distortion-steps",), {"field_distortion": 3}),
     DefectCase("distortion-order", 0.075, ("order",), {"order": 7}),
     DefectCase("focal-anisotropy", 4.5, ("anisotropy",), {"focal_anisotropy": True}),
@@ -59,7 +59,7 @@ CASES = (
     DefectCase("outliers", 0.066, ("outliers",), {"robust": True}),
     # A single one spoils the positions of two stars; so the amplitude is one that occurs.
     DefectCase("swapped", 0.2, ("swapped",), {"robust": True}),
-    DefectCase("reference-errors", 1400.0, ("reference-errors",), {"reference_scale": True}),
+    DefectCase("reference-errors", 440.0, ("reference-errors",), {"reference_scale": True}),
     # At five times that no more than the reference stars about the target.
     DefectCase("binaries", 7.0, ("wrong-references",)),
 )

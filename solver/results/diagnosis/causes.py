@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from solver.results.diagnosis import gains
+from solver.results.diagnosis.courses import COURSES, Courses, are_alternatives
 from solver.results.diagnosis.patterns import Family
 from solver.results.diagnosis.projection import Projection
 from solver.results.diagnosis.rate import sigmas
@@ -31,11 +32,8 @@ _LEAST_SHARE = 0.1
 # Patterns that name no cause: one is taken first, and only if it explains so much more than any
 # other.
 _WITHOUT_CAUSE, _MUCH_MORE = ("cells", "map"), 4.0
-# Courses in time of the same terms: of these only the one that explains most is named.
-_COURSES = ("drift", "bend", "step", "velocity")
-_VELOCITY_DEGREE = 2
 # Those whose tests follow one another.
-_PATTERNS = (*_COURSES, "order", "shift", "turn", "phase", "magnitude", *_WITHOUT_CAUSE)
+_PATTERNS = (*COURSES, "order", "shift", "turn", "phase", "magnitude", *_WITHOUT_CAUSE)
 # The positions of the sources carry these into all exposures.
 _MAKES_PATTERNS = (
     "swing",
@@ -140,7 +138,7 @@ def _patterns(diagnosis: Diagnosis) -> tuple[list[Found], float]:
     """Return the patterns that the residuals have, and how much of chi2 they explain."""
     projection: Projection = diagnosis.projection
     families, scale = list(diagnosis.patterns.families), diagnosis.scale
-    found: list[Found] = []
+    courses, taken, found = Courses(diagnosis), list[Family](), list[Found]()
     explained, limit = 0.0, _limit(diagnosis)
     while len(found) < _MOST_PATTERNS:
         tests = [(family, pattern_test(projection, family, scale)) for family in families]
@@ -150,14 +148,18 @@ def _patterns(diagnosis: Diagnosis) -> tuple[list[Found], float]:
         if not candidates:
             break
         gained = [(gains.of_pattern(projection, *one, scale), *one) for one in candidates]
-        gain, family, test = max(gained, key=_rank)
+        first = max(gained, key=_rank)[1]
+        rivals = [one[1] for one in gained if are_alternatives(one[1], first)]
+        likeliest = courses.likeliest(rivals, taken)
+        gain, family, test = next(one for one in gained if one[1] is likeliest)
         fall = scale * test.statistic
         if found and fall < _LEAST_SHARE * explained:
             break
         found.append(Found(test, gain, size=test.size_um))
         explained += fall - test.expected
         projection = projection.without(family)
-        families = [one for one in families if not _are_alternatives(one, family)]
+        taken.append(family)
+        families = [one for one in families if not are_alternatives(one, family)]
     return found, explained
 
 
@@ -167,14 +169,6 @@ def _rank(gained: tuple[float, Family, Test]) -> tuple[bool, float]:
     if test.subject in _WITHOUT_CAUSE:
         return gain > 0.0, gain / _MUCH_MORE
     return True, gain
-
-
-def _are_alternatives(one: Family, other: Family) -> bool:
-    """Return whether two families are courses in time of the same terms, or the same."""
-    if one.subject not in _COURSES or other.subject not in _COURSES:
-        return one is other
-    degrees = [f.what[0] if f.what else _VELOCITY_DEGREE for f in (one, other)]
-    return degrees[0] == degrees[1]
 
 
 def _swinging(diagnosis: Diagnosis) -> list[Found]:

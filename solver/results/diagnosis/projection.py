@@ -96,10 +96,20 @@ class Projection(NamedTuple):
 
 
 def covariance_of_products(
-    result: FitResult, camera: Camera, rows: Rows, patterns: Patterns
+    result: FitResult,
+    camera: Camera,
+    rows: Rows,
+    patterns: Patterns,
+    *,
+    all_exposures: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return `total` and `left` of `Projection`, which the residuals do not change."""
-    sample = sample_of(rows, camera, result.sources)
+    """Return `total` and `left` of `Projection`, which the residuals do not change.
+
+    Parameters
+    ----------
+    all_exposures : whether the sample has them all, of fewer sources
+    """
+    sample = sample_of(rows, camera, result.sources, all_exposures=all_exposures)
     parts = [_sums(result, camera, part, patterns) for part in sample.parts]
     total, left = reduce(_Sums.plus, parts).covariance(sample.weight)
     if len(parts) > 1:

@@ -10,6 +10,8 @@ from solver.results.diagnosis.rows import Camera, Rows
 
 # Measurements of a sample, and exposures of each span.
 _MOST_ROWS, _LEAST_EXPOSURES = 12_000, 4
+# Measurements of a sample that has all exposures.
+_MOST_OF_ALL_EXPOSURES = 24_000
 # Of sums of weights, relative.
 _ROUNDING = 1e-9
 # Bits of a coordinate in the order of the sources.
@@ -31,7 +33,9 @@ class Sample(NamedTuple):
     share: float
 
 
-def sample_of(rows: Rows, camera: Camera, sources: pd.DataFrame) -> Sample:
+def sample_of(
+    rows: Rows, camera: Camera, sources: pd.DataFrame, *, all_exposures: bool = False
+) -> Sample:
     """Return a sample.
 
     A source stays at one place of the focal plane while a field is exposed. So few exposures of
@@ -43,14 +47,16 @@ def sample_of(rows: Rows, camera: Camera, sources: pd.DataFrame) -> Sample:
     Parameters
     ----------
     sources : of the result
+    all_exposures : of few sources then; for what depends on the time in detail
     """
-    some = _heaviest_exposures(rows, camera)
+    some = rows if all_exposures else _heaviest_exposures(rows, camera)
+    most = _MOST_OF_ALL_EXPOSURES if all_exposures else _MOST_ROWS
     weight, counts = float(some.weight.sum()), np.bincount(some.source, minlength=len(sources))
-    if some.n <= _MOST_ROWS:
+    if some.n <= most:
         return Sample([some], weight, 1.0)
     order = _along_the_sky(sources)
     order = order[counts[order] > 0]
-    step = some.n / _MOST_ROWS
+    step = some.n / most
     taken = order[np.arange(0.0, len(order), step).astype(np.intp)]
     parts = [_of_sources(some, half, len(sources)) for half in (taken[::2], taken[1::2])]
     exposures = [np.flatnonzero(np.diff(part.first)) for part in (some, *parts)]

@@ -77,6 +77,7 @@ class Diagnosis(NamedTuple):
     Attributes
     ----------
     tests : the table
+    result : the solution
     camera, rows, patterns, projection : see there; the rows of exposures that swing are zero
     magnitude : of each source, NaN where unknown, and for reference stars, whose chi2 depends on
         the errors of the catalogue
@@ -89,6 +90,7 @@ class Diagnosis(NamedTuple):
     """
 
     tests: tuple[Test, ...]
+    result: FitResult
     camera: Camera
     rows: Rows
     patterns: Patterns
@@ -146,6 +148,7 @@ def diagnose(result: FitResult) -> Diagnosis:
     ]
     return Diagnosis(
         tuple(tests),
+        result,
         camera,
         rows,
         patterns,

@@ -142,7 +142,9 @@ def test_sample_of_the_sources_stands_for_all(clean, monkeypatch):
     sampled = np.isin(rows.source, np.concatenate([part.source for part in halves.parts]))
     both = sample_of(rows.of(np.flatnonzero(sampled)), camera, clean.sources)
     of_sample = left()
-    monkeypatch.setattr(projection, "sample_of", lambda *_: both._replace(weight=halves.weight))
+    monkeypatch.setattr(
+        projection, "sample_of", lambda *_, **__: both._replace(weight=halves.weight)
+    )
     rise, without = (
         np.trace(np.linalg.solve(one, of_all)) / len(of_all) for one in (of_sample, left())
     )
@@ -236,6 +238,24 @@ def displaced(diagnosis, amplitude):
     projection = diagnosis.projection
     products = projection.products + projection.left @ amplitude
     return diagnosis._replace(projection=projection._replace(products=products))
+
+
+def test_a_drift_is_not_taken_for_an_oscillation(clean, monkeypatch):
+    """Over a third of the period these differ by less than a few of the exposures tell."""
+    monkeypatch.setattr(sample, "_MOST_ROWS", 3000)
+    diagnosis = diagnose(clean)
+    _, left = covariance_of_products(
+        clean, diagnosis.camera, diagnosis.rows, diagnosis.patterns, all_exposures=True
+    )
+    exact = diagnosis._replace(projection=diagnosis.projection._replace(left=left))
+    (drift, *_) = [one for one in diagnosis.patterns.families if one.subject == "drift"]
+    random = np.random.default_rng(0)
+    for direction in random.standard_normal((6, len(drift.columns))):
+        amplitude = np.zeros(len(diagnosis.patterns))
+        amplitude[drift.columns] = 0.5 * direction / np.linalg.norm(direction)
+        products = displaced(exact, amplitude).projection.products
+        seen = diagnosis._replace(projection=diagnosis.projection._replace(products=products))
+        assert find_causes(seen).found[0].test.subject == "drift"
 
 
 def test_outliers_are_found_and_left_out_of_the_patterns(clean):

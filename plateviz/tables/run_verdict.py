@@ -24,7 +24,8 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     """Return the verdict on a run, by its tests and by the rules of `run_strip`.
 
     All tests together alarm in `CARE_RATE` of good runs. The run should not be trusted if the
-    alarm is also one of `BAD_RATE`, and a cause spoils much; or if orbits failed.
+    alarm is also one of `BAD_RATE`, and a cause spoils much; or if orbits failed. A run with one
+    orbit is judged as that is.
 
     Parameters
     ----------
@@ -38,6 +39,9 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     by_tests = "warn" if found else "good"
     if certain and any(cause.is_large for cause in causes):
         by_tests = "bad"
+    if len(diagnosis.states) == 1:
+        # Nothing is compared with other orbits: the run is as good as its only orbit.
+        by_tests = worst([by_tests, diagnosis.states.iloc[0]])
     of_orbits = orbit_states(orbits).drop(columns="status")
     is_off = (of_orbits == "bad").any(axis=1) & (orbits["status"] == COMPLETE)
     far = orbits[is_off]
@@ -50,6 +54,8 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     headline = _HEADLINES[state]
     if causes:
         headline = f"{headline[:-1]}: {causes[0].title}."
+    elif len(diagnosis.states) == 1 and (title := str(tables.orbit_causes["title"].iloc[0])):
+        headline = f"{headline[:-1]}: {title}."
     reasons = [*(cause.sentence() for cause in causes), *_tested(diagnosis, found, tables)]
     reasons += [*_fitted(orbits), *_motions(motions), *_sensitivity(tables.zonal)]
     faults = [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
@@ -68,6 +74,8 @@ def _tested(diagnosis: RunDiagnosis, found: Sequence[Test], tables: RunTests) ->
             "The run has not been tested as a whole: it is not gathered yet, or an older version "
             "made it."
         ]
+    if not diagnosis.tests:
+        return ["A run of one orbit has the tests of that orbit alone: they are in its verdict."]
     return [
         discoveries_in_words(diagnosis.tests, found, tests="tests of the run", good="good runs")
     ]

@@ -67,6 +67,27 @@ def test_cause_that_many_orbits_name_is_that_of_the_run(good):
     assert cause.significance == pytest.approx(6.0 * np.sqrt(30))
 
 
+@pytest.mark.parametrize(
+    ("n_drifting", "headline"),
+    [
+        (1, "This run should not be trusted as it is: the distortion drifts."),
+        (0, "This run can be trusted."),
+    ],
+)
+def test_run_of_one_orbit_is_as_good_as_that(good, n_drifting, headline):
+    orbits, motions = good
+    only = tables(
+        calibrations=calibrations().head(0),
+        orbit_tests=orbit_tests().head(5),
+        orbit_causes=causes(n_drifting).head(1),
+        zonal=zonal(11.0).head(0),
+    )
+    verdict = run_verdict(orbits.head(1), motions.head(0), only)
+    assert verdict.headline == headline
+    assert verdict.state == ("bad" if n_drifting else "good")
+    assert any("in its verdict" in sentence for sentence in verdict.reasons)
+
+
 def test_orbit_that_names_a_cause_twice_counts_once(good):
     several = causes(4)
     again = several[several["orbit_id"] < 4].assign(significance=5.0, title="another")

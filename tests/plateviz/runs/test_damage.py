@@ -94,6 +94,8 @@ def test_missing_measurements_are_found(run, survey):
     code, out, _ = run("inspect", survey)
     assert code == 2
     assert "orbit=0002.parquet: expected the file that was written, found none" in out
+    assert "  orbits: 3\n" in out
+    assert "  orbits solved in the run default: 3\n" in out
 
 
 @pytest.mark.parametrize(

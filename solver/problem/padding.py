@@ -5,6 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Shaped
 
+_LEAST_SOURCES, _EXPOSURES = 1024, 16
+
 
 def pad(
     values: Shaped[np.ndarray, "n ..."], axis: str, sizes: Mapping[str, int]
@@ -17,3 +19,13 @@ def pad(
     missing = max(sizes.get(axis, 0) - len(values), 0)
     padding = np.zeros(missing) if axis == "coef" else np.repeat(values[-1:], missing, axis=0)
     return np.concatenate([values, padding])
+
+
+def padded_sources(number: int) -> int:
+    """Return the next power of two: the orbits of a survey then have one or two of them."""
+    return max(_LEAST_SOURCES, 1 << (number - 1).bit_length())
+
+
+def padded_exposures(number: int) -> int:
+    """Return the next multiple of a number."""
+    return -(-number // _EXPOSURES) * _EXPOSURES

@@ -26,7 +26,7 @@ from solver.model.forward import Geometry
 from solver.problem.causes import causes_of, padded
 from solver.problem.elements import Elements, elements
 from solver.problem.measurements import KEY, Measurements, sort_measurements
-from solver.problem.padding import pad
+from solver.problem.padding import pad, padded_exposures, padded_sources
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.prior_centres import calibration_centres, catalogue_shift
 from solver.problem.priors import Priors, priors_of
@@ -252,9 +252,9 @@ def _geometry(
         centres["pointing_ra"] / ARCSEC_PER_DEG, centres["pointing_dec"] / ARCSEC_PER_DEG
     )
     order = max(settings.order, _MIN_COMPUTED_ORDER)
-    n_exp = _rounded_up(len(exposures), 16)
+    n_exp = padded_exposures(len(exposures))
     sizes = {
-        "src": _rounded_up(len(source_frame), 1024),
+        "src": padded_sources(len(source_frame)),
         "exp": n_exp,
         "coef": len(terms(order)),
         "walk": n_exp * layout.n_walk,
@@ -273,7 +273,3 @@ def _geometry(
         order=order,
         causes=None if causes is None else padded(causes, sizes),
     )
-
-
-def _rounded_up(length: int, step: int) -> int:
-    return -(-length // step) * step

@@ -7,6 +7,7 @@ from solver.data.parameters import BY_NAME
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import InputError
 from solver.linear.normal_equations import chunks
+from solver.problem.padding import padded_sources
 from solver.problem.problem import build_problem, thinned
 from tests.solver.small_orbit import Design, epoch_places, make_orbit
 
@@ -32,7 +33,7 @@ def test_sources_are_the_measured_ones_in_ascending_order(small_orbit, problem):
 
 def test_geometry_is_padded_without_changing_its_rows(problem):
     frame = np.asarray(problem.geometry.source_frame)
-    assert len(frame) % 1024 == 0
+    assert len(frame) == 1024
     last = np.tile(frame[problem.n_src - 1], (len(frame) - problem.n_src, 1, 1))
     np.testing.assert_array_equal(frame[problem.n_src :], last)
 
@@ -153,3 +154,10 @@ def test_thinned_problem_has_the_measurements_of_the_kept_sources(problem, expan
 def test_thinned_problem_keeps_the_shapes_of_the_full_problem(problem):
     subset = thinned(problem, np.arange(problem.n_src) % 2 == 0)
     assert subset.geometry.source_frame.shape == problem.geometry.source_frame.shape
+
+
+@pytest.mark.parametrize(
+    ("length", "padded"), [(1, 1024), (1024, 1024), (1025, 2048), (8193, 16384)]
+)
+def test_orbits_of_similar_lengths_share_a_compilation(length, padded):
+    assert padded_sources(length) == padded

@@ -178,7 +178,7 @@ class OrbitFitter:
         Returns
         -------
         The result; None if there is no fit to start from, or if a refit is needed (see
-        `solver.engines.warm_starts.WarmStarts.step`).
+        `solver.engines.warm_starts.WarmStarts.solution`).
         """
         found = self.partial_what_if(settings)
         return None if found is None else found.whole()
@@ -191,7 +191,7 @@ class OrbitFitter:
         start = time.perf_counter()
         data, problem = self._cache.get(settings, last.adjustments)
         prepared = time.perf_counter()
-        mode = self._starts and self._starts.step(problem, settings)
+        mode = self._starts and self._starts.solution(problem, settings)
         if mode is None:
             return None
         estimate = Estimate(mode)

@@ -91,16 +91,19 @@ def find_mode(
     problem: Problem,
     settings: FitSettings,
     progress: Callable[[Iteration], None] = lambda _: None,
-    start: Mode | StartingPoint | None = None,
+    start: Mode | StartingPoint | NormalEquations | None = None,
 ) -> Mode:
     """Find the posterior mode, starting at the origins of all parameters.
 
     Parameters
     ----------
     progress : called after every iteration; an exception it raises stops the fit
-    start : another point to start from, of a problem with the same parameters
+    start : another point to start from, of a problem with the same parameters, or the equations of
+        this problem near its mode
     """
     begin = time.perf_counter()
+    if isinstance(start, NormalEquations):
+        return _iterate(problem, settings, start, progress, begin)
     if start is not None:
         equations = _starting_at(problem, start.theta, start.sources)
         return _iterate(problem, settings, equations, progress, begin)

@@ -5,12 +5,15 @@ from typing import NamedTuple
 
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Mode, find_mode
-from solver.engines.what_if import linearised, solve_what_if
+from solver.engines.what_if import solve_what_if
 from solver.errors import InputError
+from solver.linear.update import update_equations
 from solver.problem.problem import Problem
 
 # Memory for precomputed warm starts, bytes.
 _MAX_BYTES = 2**29
+# How near its mode a lower order is solved that somebody waits for, sigma.
+_NEAR = 0.3
 
 
 class WarmStart(NamedTuple):
@@ -35,26 +38,27 @@ class WarmStarts:
         self._lower: dict[int, WarmStart | None] = {}
         self._latest = fit.settings.order
 
-    def step(self, problem: Problem, settings: FitSettings) -> Mode | None:
-        """Return the mode of a changed problem by a step, or None if it needs a fit.
+    def solution(self, problem: Problem, settings: FitSettings) -> Mode | None:
+        """Return the mode of a changed problem, or None if it needs a fit of its own.
 
-        A lower order that is too far for a step is solved for this what-if and those that follow.
+        It is found by a step, or where the model is not linear enough for one, by iterations that
+        begin at the warm start. A lower order is solved first, for this what-if and those that
+        follow it.
         """
-        mode = self._step(problem, settings)
-        if mode is None and self._is_new(settings.order):
-            self._lower[settings.order] = self._fitted(settings.order)
-            mode = self._step(problem, settings)
-        return mode
+        self._add(settings.order, _NEAR)
+        base = self._nearest(settings.order)
+        self._latest = base.settings.order
+        if base.settings.order < settings.order:
+            return None
+        mode = solve_what_if(base.mode, base.problem, problem, settings)
+        return mode or _iterated(base, problem, settings)
 
     def add(self, order: int) -> bool:
         """Solve a lower order than that of the fit, once; return whether it was not tried before.
 
         It may have no solution.
         """
-        if not self._is_new(order):
-            return False
-        self._lower[order] = self._stepped(order) or self._fitted(order)
-        return True
+        return self._add(order, self._fit.settings.tolerance)
 
     def likely(self, order: int) -> list[int]:
         """Return the orders of likely what-ifs that need Jacobians of their own: lower ones.
@@ -81,29 +85,25 @@ class WarmStarts:
         """Forget the solutions of all lower orders but that of the latest what-if."""
         self.keep([self._latest])
 
-    def _is_new(self, order: int) -> bool:
-        return order < self._fit.settings.order and order not in self._lower
+    def _add(self, order: int, tolerance: float) -> bool:
+        if order >= self._fit.settings.order or order in self._lower:
+            return False
+        self._lower[order] = self._solved(order, tolerance)
+        return True
 
-    def _step(self, problem: Problem, settings: FitSettings) -> Mode | None:
-        """Start from the lowest order that suffices."""
-        orders = [n for n, one in self._lower.items() if one is not None and n >= settings.order]
-        base = (self._lower[min(orders)] if orders else None) or self._fit
-        self._latest = base.settings.order
-        if base.settings.order < settings.order:
-            return None
-        return solve_what_if(base.mode, base.problem, problem, settings)
+    def _nearest(self, order: int) -> WarmStart:
+        """Return the solution of the lowest order that suffices, or the fit if there is none."""
+        orders = [n for n, one in self._lower.items() if one is not None and n >= order]
+        return (self._lower[min(orders)] if orders else None) or self._fit
 
-    def _stepped(self, order: int) -> WarmStart | None:
-        """Solve a lower order by a step from the fit; None if it is too far for one."""
-        found = self._problem(order)
-        mode = found and solve_what_if(self._fit.mode, self._fit.problem, found[1], found[0])
-        return WarmStart(*found, linearised(found[1], mode)) if found and mode else None
+    def _solved(self, order: int, tolerance: float) -> WarmStart | None:
+        """Solve a lower order; None if it has no solution.
 
-    def _fitted(self, order: int) -> WarmStart | None:
-        """Fit a lower order; None if it has no solution."""
-        found = self._problem(order)
-        mode = found and find_mode(found[1], found[0])
-        return WarmStart(*found, mode) if found and mode and mode.status.is_solution else None
+        It is too far for a step: new Jacobians on the way take less time than a step that fails.
+        """
+        found, base = self._problem(order), self._nearest(order)
+        mode = found and _iterated(base, found[1], found[0].with_(tolerance=tolerance))
+        return WarmStart(*found, mode) if found and mode else None
 
     def _problem(self, order: int) -> tuple[FitSettings, Problem] | None:
         settings = self._fit.settings.with_(order=order)
@@ -112,3 +112,10 @@ class WarmStarts:
         except InputError:
             # A prior is shifted for a term that the lower order lacks, or too few data remain.
             return None
+
+
+def _iterated(start: WarmStart, problem: Problem, settings: FitSettings) -> Mode | None:
+    """Return the mode of a changed problem by iterations; None if there is none to be found."""
+    equations = update_equations(start.mode.equations, start.problem, problem)
+    mode = equations and find_mode(problem, settings, start=equations)
+    return mode if mode and mode.status.is_solution else None

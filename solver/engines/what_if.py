@@ -15,7 +15,6 @@ from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, downhill, largest_step, objective
 from solver.linear.chi2 import gradient
-from solver.linear.normal_equations import accumulate
 from solver.linear.source_elimination import POORLY_CONSTRAINED, eliminate_sources
 from solver.linear.update import update_equations
 from solver.problem.problem import Problem
@@ -25,12 +24,6 @@ from solver.runtime.threads import one_blas_thread
 _MAX_STEPS = 5
 # Number of the step that keeps poorly constrained directions fixed, after the first, long one.
 _CORRECTION_STEP = 2
-
-
-def linearised(problem: Problem, mode: Mode) -> Mode:
-    """Return a solution with normal equations at its own point, as a warm start for what-ifs."""
-    equations = accumulate(problem, mode.theta, mode.sources)
-    return mode._replace(equations=equations, reduced=None)
 
 
 def _updated(mode: Mode, solved: Problem, changed: Problem) -> Mode | None:

@@ -9,8 +9,8 @@ import numpy as np
 from solver.data.instrument import MINI_MOCK
 from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
-from solver.engines.gauss_newton import Mode, find_mode
-from solver.engines.what_if import linearised, solve_what_if
+from solver.engines.gauss_newton import find_mode
+from solver.engines.warm_starts import WarmStart, WarmStarts
 from solver.linear.covariances import marginal_covariance
 from solver.problem.problem import Problem
 from solver.problem.problem_cache import ProblemCache
@@ -31,29 +31,29 @@ def fit_with_sigmas(problem: Problem, settings: FitSettings) -> object:
 
 
 def what_if(
-    data: OrbitData, before: FitSettings, after: FitSettings, precomputed: FitSettings | None = None
+    data: OrbitData, before: FitSettings, after: FitSettings, *, is_prepared: bool = False
 ) -> Callable[[], object]:
     """Return the what-if of one change; the fit and the changed problem are made beforehand.
 
     Parameters
     ----------
-    precomputed : settings of a warm start that the solver process precomputes while idle
+    is_prepared : whether a lower order is precomputed, as the solver process does while idle
     """
     cache = ProblemCache(data, MINI_MOCK)
     _, solved = cache.get(before)
-    mode = find_mode(solved, before)
-    if precomputed is not None:
-        _, lower = cache.get(precomputed)
-        found = solve_what_if(mode, solved, lower, precomputed) or find_mode(lower, precomputed)
-        mode, solved = linearised(lower, found), lower
+    fit = WarmStart(before, solved, find_mode(solved, before))
+    prepared = WarmStarts(fit, lambda other: cache.get(other)[1])
+    prepared.add(after.order)
     _, changed = cache.get(after)
     is_same = changed.measurements is solved.measurements
 
     def work() -> object:
+        starts = prepared if is_prepared else WarmStarts(fit, lambda other: cache.get(other)[1])
         # Tiles exist for the same measurements and have to be arranged for others.
-        target = changed if is_same else _as_new(changed)
-        reduced = _what_if(mode, solved, target, after).reduced
-        return None if reduced is None else marginal_covariance(reduced)
+        found = starts.solution(changed if is_same else _as_new(changed), after)
+        if found is None:
+            sys.exit(f"no what-if for {after}")
+        return None if found.reduced is None else marginal_covariance(found.reduced)
 
     return work
 
@@ -61,10 +61,3 @@ def what_if(
 def _as_new(problem: Problem) -> Problem:
     """Return a copy of a problem without arranged tiles."""
     return replace(problem, measurements=replace(problem.measurements))
-
-
-def _what_if(mode: Mode, solved: Problem, changed: Problem, settings: FitSettings) -> Mode:
-    found = solve_what_if(mode, solved, changed, settings)
-    if found is None:
-        sys.exit(f"no what-if for {settings}")
-    return found

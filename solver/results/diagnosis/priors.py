@@ -10,7 +10,7 @@ from solver.data.result import FitResult
 from solver.results.diagnosis.rate import log_chance, of_many
 
 
-class PriorChi2(NamedTuple):
+class PriorRms(NamedTuple):
     """How far the values of a group are from the centre of their prior.
 
     What moves one value may move all, as a focal length that is off in every exposure. So the
@@ -36,7 +36,7 @@ class PriorChi2(NamedTuple):
         return PARAMETERS.index(BY_NAME[self.group])
 
 
-def prior_chi2(result: FitResult) -> list[PriorChi2]:
+def prior_rms(result: FitResult) -> list[PriorRms]:
     """Return how far each group with a prior of finite width is from it, in table order.
 
     The prior of a random walk is one of its steps, and is none of these.
@@ -48,7 +48,7 @@ def prior_chi2(result: FitResult) -> list[PriorChi2]:
     by_hand = {*result.settings.prior_widths}
     by_hand |= {split_name(name)[0].name for name in result.settings.prior_shifts}
     return [
-        PriorChi2(
+        PriorRms(
             str(name),
             float(np.sqrt(square)),
             of_many(log_chance(float(square), 1.0), len(means)),

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.spatial import cKDTree
 
 from solver.data.result import FitResult
 from solver.results.diagnosis.rate import log_chance_poisson
@@ -57,11 +58,7 @@ def swapped(result: FitResult) -> Swapped:
         rows = chosen[group]
         if len(rows) < 2:
             continue
-        measured, model = at[rows], at[rows] - residual[rows]
-        apart = np.hypot(*(measured[:, None] - model[None]).transpose(2, 0, 1))
-        is_there = apart < _NEAR * np.minimum(distance[rows][:, None], distance[rows][None])
-        np.fill_diagonal(is_there, False)
-        a, b = np.nonzero(np.triu(is_there & is_there.T))
+        a, b = _pairs(at[rows], at[rows] - residual[rows], _NEAR * distance[rows])
         pairs += [np.stack([rows[a], rows[b]], axis=1).ravel()]
         # Each is there by chance.
         expected += 0.5 * float(np.minimum(share[rows], 1.0).sum()) ** 2
@@ -69,3 +66,18 @@ def swapped(result: FitResult) -> Swapped:
     chance = log_chance_poisson(len(found) // 2, expected)
     sources = tuple(np.unique(table["source_id"].to_numpy()[found]).tolist())
     return Swapped(found, sources, expected, chance, float(chi2[np.unique(found)].sum()))
+
+
+def _pairs(
+    measured: np.ndarray, model: np.ndarray, near: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows that are each near where the other should be, in ascending order."""
+    # Trees round distances in another way than the comparison below.
+    found = cKDTree(model).query_ball_point(measured, near * (1.0 + 1e-9), return_sorted=True)
+    a = np.repeat(np.arange(len(found)), [len(one) for one in found])
+    b = np.concatenate(found).astype(np.int64)
+    is_there = np.hypot(*(measured[a] - model[b]).T) < np.minimum(near[a], near[b])
+    there = set(zip(a[is_there].tolist(), b[is_there].tolist(), strict=True))
+    pairs = sorted((i, j) for i, j in there if i < j and (j, i) in there)
+    first, second = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    return first, second

@@ -12,7 +12,7 @@ from solver.data.result import FitResult
 from solver.results.diagnosis.exposures import WAVES, ExposureChi2, exposure_chi2
 from solver.results.diagnosis.modelled import is_adjusted
 from solver.results.diagnosis.patterns import Family, Patterns
-from solver.results.diagnosis.priors import PriorChi2, prior_chi2
+from solver.results.diagnosis.priors import PriorRms, prior_rms
 from solver.results.diagnosis.products import products
 from solver.results.diagnosis.projection import Projection, covariance_of_products
 from solver.results.diagnosis.rate import discoveries, log_chance, of_many, sigmas
@@ -101,7 +101,7 @@ class Diagnosis(NamedTuple):
     swinging: np.ndarray
     references: ReferenceChi2
     swapped: Swapped
-    priors: list[PriorChi2]
+    priors: list[PriorRms]
 
     def found(self, rate: float) -> tuple[Test, ...]:
         """Return the tests that are discoveries at a rate of false alarms over all tests."""
@@ -131,7 +131,7 @@ def diagnose(result: FitResult) -> Diagnosis:
         references, pairs = reference_chi2(result.sources), swapped(result)
         along, weight = products(patterns, rows), float(rows.weight.sum())
         projection = Projection(along, *covariance.result(), weight)
-    priors = prior_chi2(result)
+    priors = prior_rms(result)
     tests = [
         *(Test(one.name, one.name, (), *one[1:5], sigmas(one.log_chance)) for one in scatter),
         _of_pairs(pairs),
@@ -193,7 +193,7 @@ def pattern_test(projection: Projection, family: Family, scale: float) -> Test:
     )
 
 
-def prior_test(found: PriorChi2) -> Test:
+def prior_test(found: PriorRms) -> Test:
     """Return the test of a group of parameters against their prior, by the rms of the values.
 
     It is that of the worst of all groups, and counts as one test.

@@ -16,7 +16,7 @@ from solver.results.diagnosis import projection, sample
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.columns import columns_at, order_of
 from solver.results.diagnosis.patterns import Patterns
-from solver.results.diagnosis.priors import prior_chi2
+from solver.results.diagnosis.priors import prior_rms
 from solver.results.diagnosis.projection import covariance_of_products
 from solver.results.diagnosis.rows import camera_rows, onto_focal_plane
 from solver.results.diagnosis.sample import sample_of
@@ -392,5 +392,5 @@ def test_walk_has_no_prior_of_its_values(clean):
     walk = clean.calibration.iloc[:3].assign(group="drift_walk_x", offset=100.0, prior_sigma=0.01)
     together = pd.concat([clean.calibration, walk], ignore_index=True)
     assert "drift_walk_x" not in {
-        one.group for one in prior_chi2(replace(clean, calibration=together))
+        one.group for one in prior_rms(replace(clean, calibration=together))
     }

@@ -120,14 +120,10 @@ async def _order(client: PageClient, number: int, pace: Pace) -> float:
     return await client.answered([chosen], _FIGURES)
 
 
-async def _residuals(client: PageClient, number: int, pace: Pace) -> float:
+async def _workspace(client: PageClient, number: int, pace: Pace) -> float:
     del number, pace
-    return await _turn(client, OrbitWorkspace.RESIDUALS)
-
-
-async def _verdict(client: PageClient, number: int, pace: Pace) -> float:
-    del number, pace
-    return await _turn(client, OrbitWorkspace.VERDICT)
+    other = client.exchange(title_of(OrbitWorkspace.VERDICT), title_of(OrbitWorkspace.RESIDUALS))
+    return await client.answered([other], _FIGURES | {"shown"})
 
 
 async def _choose(client: PageClient, label: str, number: int) -> float:
@@ -138,10 +134,6 @@ async def _choose(client: PageClient, label: str, number: int) -> float:
     return await client.answered([client.put(label, others[number % len(others)])], _FIGURES)
 
 
-async def _turn(client: PageClient, workspace: OrbitWorkspace) -> float:
-    return await client.answered([client.choose_among(title_of(workspace))], _FIGURES | {"shown"})
-
-
 Act = Callable[[PageClient, int, Pace], Awaitable[float]]
 ACTIONS: Sequence[tuple[str, Act]] = (
     ("next exposure", _exposure),
@@ -149,8 +141,8 @@ ACTIONS: Sequence[tuple[str, Act]] = (
     ("what-if: prior", _prior),
     ("what-if: order", _order),
     ("selection of 1,000 sources", _selection),
-    ("workspace", _residuals),
-    ("workspace", _verdict),
+    ("workspace", _workspace),
+    ("workspace", _workspace),
     ("orbit", _orbit),
 )
 

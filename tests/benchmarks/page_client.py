@@ -176,13 +176,15 @@ class PageClient:
         """Return the value of a control."""
         return _plain(self._models[self._control(label)].get(attribute))
 
-    def choose_among(self, option: str) -> Event:
-        """Return the event of the switch that has an option, which is chosen."""
+    def exchange(self, first: str, second: str) -> Event:
+        """Return the event of the switch between two options; the second if another is chosen."""
         for one, model in self._models.items():
             options = _plain(model.get("options")) or []
-            if option in options:
-                return _changed(one, "value", option)
-        raise PageError(f"expected a switch with {option!r}")
+            if {first, second} <= set(options):
+                # Messages leave out the value of a control that has never been changed.
+                now = _plain(model.get("value")) or options[0]
+                return _changed(one, "value", first if now == second else second)
+        raise PageError(f"expected a switch with {first!r} and {second!r}")
 
     def select_rows(self, count: int, number: int) -> Event:
         """Return the event of some `count` sources that are selected in the figure with most."""

@@ -142,7 +142,8 @@ def simulate(
     if as_json:
         print_json({"output": str(directory), "orbits": orbits, "seconds": seconds})
     else:
-        typer.echo(f"{directory}: survey of {orbits} orbits, simulated in {seconds:.1f} s")
+        counted = "1 orbit" if orbits == 1 else f"{orbits} orbits"
+        typer.echo(f"{directory}: survey of {counted}, simulated in {seconds:.1f} s")
 
 
 app.command()(gaia)

@@ -80,7 +80,7 @@ def run_survey(
             }
         )
     else:
-        counts = f"{len(report.fitted)} orbits fitted"
+        counts = f"{len(report.fitted)} {'orbit' if len(report.fitted) == 1 else 'orbits'} fitted"
         counts += f", {len(report.kept)} fitted before" if report.kept else ""
         state = "complete" if report.run.is_complete else "not complete yet"
         typer.echo(

@@ -114,6 +114,12 @@ def _fitted(orbits: pd.DataFrame) -> list[str]:
     if fitted.empty:
         return ["No orbit has a solution."]
     chi2, converged = fitted["chi2_per_dof"], int((fitted["converged"] == 1).sum())
+    if len(orbits) == 1:
+        state = "converged" if converged else "did not converge"
+        return [
+            f"The only orbit has a solution, which {state}; its χ² per degree of freedom is "
+            f"{chi2.iloc[0]:.3f}, expected 1."
+        ]
     return [
         f"{len(fitted):,} of {len(orbits):,} orbits have a solution; {converged:,} of these "
         "converged.",

@@ -169,7 +169,7 @@ def test_simulate_refuses_an_unknown_defect_and_makes_nothing(run, tmp_path):
 def test_simulate_prints_the_number_of_orbits(run, tmp_path):
     code, out, _ = run("simulate", tmp_path / "survey", *SMALL)
     assert code == 0
-    assert "survey of 1 orbits, simulated in" in out
+    assert "survey of 1 orbit, simulated in" in out
 
 
 def test_simulate_refuses_a_survey_with_other_settings(run, tmp_path):

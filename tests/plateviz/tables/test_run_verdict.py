@@ -86,6 +86,9 @@ def test_run_of_one_orbit_is_as_good_as_that(good, n_drifting, headline):
     assert verdict.headline == headline
     assert verdict.state == ("bad" if n_drifting else "good")
     assert any("in its verdict" in sentence for sentence in verdict.reasons)
+    # A median and a range of one number would say nothing.
+    (chi2,) = (sentence for sentence in verdict.reasons if "χ² per degree" in sentence)
+    assert chi2.startswith("The only orbit has a solution, which converged; its χ²")
 
 
 def test_orbit_that_names_a_cause_twice_counts_once(good):

@@ -27,12 +27,14 @@ from solver.model.forward import (
     directions,
     ideal_position,
     image,
+    on_detector,
 )
 from solver.problem.parameter_vector import local_groups
 
 # Traced once, and not again for each of the twenty derivatives.
 _ideal_position = jax.jit(ideal_position, inline=True)
 _image = jax.jit(image, inline=True)
+_on_detector = jax.jit(on_detector, inline=True)
 
 
 class Linearised(NamedTuple):
@@ -146,7 +148,7 @@ def _derivatives(
 ) -> tuple[Pair, list[Pair], list[Pair], list[Pair]]:
     """Return the fields of `Linearised` except the prediction, which would be copied here."""
     prediction, (along_x, along_y) = imaged
-    ideal = prediction.ideal
+    focal = prediction.focal
 
     def through_plane(shift: Pair) -> Pair:
         """Chain a derivative through the ideal plane, where both stages have two components."""
@@ -164,26 +166,27 @@ def _derivatives(
         if name in turn.axes:
             return whiten(*by_directions("axes", turn.axes[name]))
         values, one = jnp.asarray(offsets[name]), jnp.ones_like(offsets[name])
-        on_plane, on_detector = (
+        # None acts on the distortion between the two, which is most of the model.
+        by_plane, by_detector = (
             jax.jvp(stage, (values,), (one,))[1]
             for stage in (
                 lambda moved: _ideal_position(turn.at, {**offsets, name: moved}, geometry, index),
-                lambda moved: _image(ideal, {**offsets, name: moved}, geometry, index).pixel,
+                lambda moved: _on_detector(focal, {**offsets, name: moved}, geometry, index),
             )
         )
-        return whiten(*jax.tree.map(jnp.add, through_plane(on_plane), on_detector))
+        return whiten(*jax.tree.map(jnp.add, through_plane(by_plane), by_detector))
 
     def whiten(x: Float[Array, "*#obs"], y: Float[Array, "*#obs"]) -> Pair:
         return weight[0] * x, weight[1] * y
 
     def displaced(moved: Pair) -> Pair:
-        return _image(ideal, offsets, geometry, index, moved).pixel
+        return _on_detector(moved, offsets, geometry, index)
 
     x, y = prediction.pixel
     residual = whiten(measured[0] - x, measured[1] - y)
     source = [whiten(*by_directions("source", tangent)) for tangent in turn.source]
     local = [by_group(g.name) for g in local_groups(offsets)]
-    displacement = [whiten(*by) for by in _by_axes(displaced, jax.tree.map(jnp.zeros_like, ideal))]
+    displacement = [whiten(*by) for by in _by_axes(displaced, focal)]
     return residual, source, local, displacement
 
 

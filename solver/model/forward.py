@@ -192,16 +192,26 @@ def image(
         ideal[axis] + (sum(c * b for c, b in zip(terms, values, strict=True)) + shift)
         for axis, (terms, shift) in enumerate(zip(coefficients, displacement, strict=True))
     )
-    n = index.detector
+    pixel = on_detector((focal_x, focal_y), offsets, geometry, index)
+    return Prediction(ideal, (focal_x, focal_y), pixel, values)
+
+
+def on_detector(focal: Pair, offsets: Offsets, geometry: Geometry, index: Index) -> Pair:
+    """Return pixels from the centres of the detectors.
+
+    Parameters
+    ----------
+    focal : positions on the distorted focal plane, um
+    """
+    n, optional = index.detector, geometry.optional(offsets)
     centre_x, centre_y = _pair(offsets, geometry, "detector")
     pitch_x, pitch_y = _pair(offsets, geometry, "pitch")
     rotation = RAD_PER_ARCSEC * geometry.value(offsets, "detector_rotation")
     centre, angle = moved_detector(
         (centre_x[n], centre_y[n]), rotation[n], optional, geometry.causes, index.exposure, n
     )
-    pixel = to_pixel((focal_x, focal_y), centre, angle, (pitch_x[n], pitch_y[n]))
-    pixel = shifted_on_detector(pixel, optional, geometry.causes, index.source, n)
-    return Prediction(ideal, (focal_x, focal_y), pixel, values)
+    pixel = to_pixel(focal, centre, angle, (pitch_x[n], pitch_y[n]))
+    return shifted_on_detector(pixel, optional, geometry.causes, index.source, n)
 
 
 def _coefficients(offsets: Offsets, geometry: Geometry, direction: str) -> list[Float[Array, ""]]:

@@ -49,16 +49,6 @@ POINT = f"""([name, key]) => {{ {VIEWS}
                y: box.y + figure.frame.y_scale.compute(y)}};
     }} }}"""
 
-# The server changes a button after it was drawn, and before it follows its model.
-LATE = """document.addEventListener('DOMContentLoaded', () => {
-  const models = Bokeh.Models.get('panel.models.esm.ReactiveESM').prototype, { watch } = models;
-  models.watch = function (view, name, ...rest) {
-    if (name === 'label' && this.data.label === 'All solutions')
-      this.data.setv({ label: 'Changed meanwhile' }, { sync: false });
-    watch.call(this, view, name, ...rest);
-  };
-}, { once: true })"""
-
 
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory, chromium_path):
@@ -234,13 +224,3 @@ def test_a_survey_without_a_run_says_what_to_do(tmp_path, open_page, chromium_pa
         turn_to(page, "Source")
         expect(page.locator("p.empty:visible")).to_contain_text("plateviz survey")
         expect(page.get_by_label("Source id")).to_be_disabled()
-
-
-@pytest.mark.newest
-def test_what_changes_while_a_component_is_drawn_is_shown(served, browser):
-    with browser.new_context() as context:
-        context.add_init_script(LATE)
-        page = context.new_page()
-        page.goto(f"{served}?view=orbit&orbit=0")
-        expect(page.get_by_role("button", name="Changed meanwhile")).to_be_visible()
-        assert page.get_by_role("button", name="All solutions").count() == 0

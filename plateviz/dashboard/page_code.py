@@ -27,7 +27,9 @@ from plateviz.solving.origin import SurveyFolder
 from solver.errors import InputError
 
 _OTHER = f"{NAME}-other"
-_OF_WHAT_IF = "It is a what-if; a fit agrees with it to a thousandth of each uncertainty."
+_OF_WHAT_IF = (
+    "It is a what-if: the positions of a fit agree with it to a thousandth of their uncertainties."
+)
 _OF_ONE_ORBIT = "Without --orbits, the command fits all orbits of the survey."
 _OF_OTHER_ORBIT = "The report does not compare with another orbit; the Python does."
 

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import astropy.units as u
@@ -112,8 +113,9 @@ def test_dashboard_of_a_served_page_ends_with_its_session(survey):
         with set_curdoc(document):
             return survey.dashboard().__panel__()
 
-    # As on a server, where a loop runs.
-    part = asyncio.run(serve())
+    # As on a server, where a loop runs. This thread may have one for browser tests.
+    with ThreadPoolExecutor(1) as thread:
+        part = thread.submit(lambda: asyncio.run(serve())).result()
     assert [type(column).__name__ for column in part] == ["Column", "Column"]
     assert survey._solver._started
     for end in document.callbacks.session_destroyed_callbacks:

@@ -23,6 +23,7 @@ from plateviz.cli.report import report
 from plateviz.cli.reproduce import reproduce
 from plateviz.cli.serve import open_endpoint, run_server, serve
 from plateviz.cli.watch import watch
+from plateviz.plots.units import orbits_text
 from plateviz.runs.run import DEFAULT_RUN
 from solver.data.settings import ENGINES
 from solver.errors import DistrustError, FitError, InputError
@@ -142,8 +143,7 @@ def simulate(
     if as_json:
         print_json({"output": str(directory), "orbits": orbits, "seconds": seconds})
     else:
-        counted = "1 orbit" if orbits == 1 else f"{orbits} orbits"
-        typer.echo(f"{directory}: survey of {counted}, simulated in {seconds:.1f} s")
+        typer.echo(f"{directory}: survey of {orbits_text(orbits)}, simulated in {seconds:.1f} s")
 
 
 app.command()(gaia)

@@ -6,6 +6,7 @@ from pathlib import Path
 import typer
 
 from plateviz.cli.output import print_json
+from plateviz.plots.units import orbits_text
 from plateviz.solving.survey_progress import fit_and_report, require_all, require_trust
 from plateviz.tables.verdict import as_plain
 from solver.data.settings import FitSettings
@@ -80,7 +81,7 @@ def run_survey(
             }
         )
     else:
-        counts = f"{len(report.fitted)} {'orbit' if len(report.fitted) == 1 else 'orbits'} fitted"
+        counts = f"{orbits_text(len(report.fitted))} fitted"
         counts += f", {len(report.kept)} fitted before" if report.kept else ""
         state = "complete" if report.run.is_complete else "not complete yet"
         typer.echo(

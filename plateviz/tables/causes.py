@@ -104,11 +104,11 @@ def _stuck(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> Cause:
 def _in_words(case: Case) -> Cause:
     said = said_of(case)
     spoils, is_large = harm(case)
-    words = said.words
-    if np.isfinite(case.found.test.size_um) and abs(case.causes.left.value - 1.0) < 0.02:
+    words, left = said.words, case.causes.left
+    if np.isfinite(case.found.test.size_um) and left and abs(left.value - 1.0) < 0.02:
         words += (
             f" It is not noise: with the patterns named here in the model, χ² per degree of "
-            f"freedom would be {case.causes.left.value:.3f}."
+            f"freedom would be {left.value:.3f}."
         )
     action, options = said.action, said.options
     if options and remedied(case.result.settings, options) is None:

@@ -51,6 +51,9 @@ _OF_EXPOSURES = ("stretch", "shear", "quadratic")
 _OF_ITS_OWN = 0.5
 # Outliers are wrong identifications if these have this share of their chi2.
 _OF_OUTLIERS = 0.5
+# Patterns that explain more of chi2 than this are too large for their products to be linear: how
+# much noise they leave is not known, and sources scatter because of them.
+_MOST_LINEAR = 0.5
 _REFERENCE_LIMIT = 0.01
 _SCATTER = ("noise", "exposures", "sources", "detectors", "magnitudes")
 
@@ -78,25 +81,24 @@ class Causes(NamedTuple):
     Attributes
     ----------
     found : the causes, the most likely first
-    left : chi2 per degree of freedom without what the patterns explain, as a test
+    left : chi2 per degree of freedom without what the patterns explain, as a test; None where
+        they are so large that it is not known
     """
 
     found: tuple[Found, ...]
-    left: Scatter
+    left: Scatter | None
 
 
 def find_causes(diagnosis: Diagnosis) -> Causes:
     """Return the causes that explain the tests of a solution."""
     patterns, explained = _patterns(diagnosis)
     of_exposures, of_each = _of_exposures(diagnosis, explained)
-    scatter = scatter_tests(
-        diagnosis.rows, diagnosis.magnitude, explained + of_each, without=diagnosis.swinging
-    )
+    scatter = _scatter(diagnosis, explained + of_each)
     found = [*_swinging(diagnosis), *patterns, *of_exposures, *_of_outliers(diagnosis)]
     found += [*_of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
     found += _of_priors(diagnosis)
     found.sort(key=lambda one: -one.gain)
-    return Causes(tuple(_of_their_own(found)), scatter[0])
+    return Causes(tuple(_of_their_own(found)), scatter[0] if scatter else None)
 
 
 def _of_their_own(found: list[Found]) -> list[Found]:
@@ -214,11 +216,21 @@ def _of_outliers(diagnosis: Diagnosis) -> list[Found]:
     return [Found(test, gains.of_outliers(rows), size=float(rows.is_far.sum()))]
 
 
+def _scatter(diagnosis: Diagnosis, explained: float) -> list[Scatter]:
+    """Return the tests of the size of the residuals after patterns; none if these are too large."""
+    rows = diagnosis.rows
+    if explained > _MOST_LINEAR * float(rows.chi2[~rows.is_far].sum()):
+        return []
+    return scatter_tests(rows, diagnosis.magnitude, explained, without=diagnosis.swinging)
+
+
 def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
     """Return the cause that changes the size of the residuals, after what patterns explain.
 
     The tails of their distribution are a cause of their own.
     """
+    if not scatter:
+        return []
     limit, noise = _limit(diagnosis), scatter[0]
     tests = {one.subject: one for one in diagnosis.tests}
     found = []

@@ -12,8 +12,8 @@ from numpy.polynomial import legendre
 
 from solver.results.diagnosis.rows import Camera, Rows
 
-# Degrees of the distortion that may change during the orbit, and how far above the fitted order.
-VARIABLE, ABOVE = (2, 3), 2
+# Degrees of the distortion that may change during the orbit.
+VARIABLE = (2, 3)
 _MOST_STEPS = 3
 # Cells along each side of a detector.
 CELLS = 3
@@ -82,8 +82,7 @@ class Patterns:
         typical = np.median(magnitude[known]) if known.any() else 0.0
         self.faintness = 10.0 ** (0.2 * (np.where(known, magnitude, typical) - typical))
         self.times = _times(camera)
-        above = range(order + 1, order + 1 + ABOVE)
-        self.degrees = [*VARIABLE, *(n for n in above if n not in VARIABLE)]
+        self.degrees = [*VARIABLE, *(n for n in degrees_above(order) if n not in VARIABLE)]
         self.terms = [(n - j, j) for n in self.degrees for j in range(n + 1)]
         self.place, self.time = np.array(list(self._columns(order))).T
         self.families = families(self, order)
@@ -159,7 +158,7 @@ def families(patterns: Patterns, order: int) -> list[Family]:
     velocity = np.concatenate([patterns.of_degree(2, time) for time in (COSINE, SINE)])
     weights = np.kron(np.eye(2), _ABERRATION)
     found.append(Family("differential aberration", "velocity", velocity, weights))
-    above = [patterns.of_degree(n, 0) for n in range(order + 1, order + 1 + ABOVE)]
+    above = [patterns.of_degree(n, 0) for n in degrees_above(order)]
     found.append(Family("distortion above the order", "order", np.concatenate(above)))
     for d in range(len(patterns.camera.turn)):
         moves = np.stack([patterns.of_detector(d, time) for time in range(1, N_POWERS)])
@@ -174,6 +173,11 @@ def families(patterns: Patterns, order: int) -> list[Family]:
             faint = patterns.of_axis(axis, magnitude=True)
             found.append(Family("magnitude along an axis", "magnitude", faint, what=(axis,)))
     return found
+
+
+def degrees_above(order: int) -> range:
+    """Return the degrees above the fitted order that are looked for: two, and the variable ones."""
+    return range(order + 1, max(order + 2, *VARIABLE) + 1)
 
 
 def _times(camera: Camera) -> np.ndarray:

@@ -32,7 +32,7 @@ ORDER = 5
 SETTINGS = replace(SurveySettings(orbits=100, seed=4).scaled(14_000), magnitudes=True)
 
 
-def fitted(*defects, orbit=0):
+def fitted(*defects, orbit=0, order=ORDER):
     """Return the solution of a simulated orbit with defects."""
     settings = replace(SETTINGS, defects=defects)
     truth = truth_catalogue(settings)
@@ -40,7 +40,8 @@ def fitted(*defects, orbit=0):
     rows = measure_orbit(orbit, truth, settings)
     measured = truth["source_id"].isin(rows.measurements["source_id"])
     tables = (table[measured].reset_index(drop=True) for table in (catalogue, truth))
-    return fit_orbit(OrbitData(rows.measurements, rows.exposures, *tables))
+    data = OrbitData(rows.measurements, rows.exposures, *tables)
+    return fit_orbit(data, settings=FitSettings(order=order))
 
 
 @pytest.fixture(scope="module")
@@ -218,6 +219,17 @@ def test_cause_is_named(defect, subject):
 )
 def test_every_cause_is_named(defect, subject):
     assert find_causes(diagnose(fitted(defect))).found[0].test.subject == subject
+
+
+@pytest.mark.parametrize(
+    "order",
+    [2, *(pytest.param(one, marks=pytest.mark.full) for one in (0, 1, 3, 4))],
+)
+def test_order_that_is_too_low_is_named(order):
+    """Far too low, what it leaves is not noise, nor sources that scatter by more than theirs."""
+    assert [one.test.subject for one in find_causes(diagnose(fitted(order=order))).found] == [
+        "order"
+    ]
 
 
 def test_pattern_without_a_cause_is_not_laid_to_a_weak_one(clean):

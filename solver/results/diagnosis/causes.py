@@ -51,8 +51,8 @@ _OF_EXPOSURES = ("stretch", "shear", "quadratic")
 _OF_ITS_OWN = 0.5
 # Outliers are wrong identifications if these have this share of their chi2.
 _OF_OUTLIERS = 0.5
-# Patterns that explain more of chi2 than this are too large for their products to be linear: how
-# much noise they leave is not known, and sources scatter because of them.
+# Patterns that explain more of chi2 than this are beyond what is linear. How much noise they leave
+# is not known; and stars scatter, and measurements may be far off, because of them.
 _MOST_LINEAR = 0.5
 _REFERENCE_LIMIT = 0.01
 _SCATTER = ("noise", "exposures", "sources", "detectors", "magnitudes")
@@ -93,12 +93,18 @@ def find_causes(diagnosis: Diagnosis) -> Causes:
     """Return the causes that explain the tests of a solution."""
     patterns, explained = _patterns(diagnosis)
     of_exposures, of_each = _of_exposures(diagnosis, explained)
-    scatter = _scatter(diagnosis, explained + of_each)
     found = [*_swinging(diagnosis), *patterns, *of_exposures, *_of_outliers(diagnosis)]
-    found += [*_of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
     found += _of_priors(diagnosis)
+    rows, left = diagnosis.rows, None
+    if explained + of_each < _MOST_LINEAR * float(rows.chi2[~rows.is_far].sum()):
+        left, *_ = scatter = scatter_tests(
+            rows, diagnosis.magnitude, explained + of_each, without=diagnosis.swinging
+        )
+        found += [*_of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
     found.sort(key=lambda one: -one.gain)
-    return Causes(tuple(_of_their_own(found)), scatter[0] if scatter else None)
+    if left is None and found[0] in patterns:
+        found = patterns
+    return Causes(tuple(_of_their_own(found)), left)
 
 
 def _of_their_own(found: list[Found]) -> list[Found]:
@@ -151,10 +157,14 @@ def _patterns(diagnosis: Diagnosis) -> tuple[list[Found], float]:
             break
         gained = [(gains.of_pattern(projection, *one, scale), *one) for one in candidates]
         first = max(gained, key=_rank)[1]
-        rivals = [one[1] for one in gained if are_alternatives(one[1], first)]
-        likeliest = courses.likeliest(rivals, taken)
-        gain, family, test = next(one for one in gained if one[1] is likeliest)
-        fall = scale * test.statistic
+        gained = [one for one in gained if are_alternatives(one[1], first)]
+        falls = [scale * test.statistic for _, _, test in gained]
+        # Before they are compared, which takes as long as all tests.
+        if found and max(falls) < _LEAST_SHARE * explained:
+            break
+        likeliest = courses.likeliest([family for _, family, _ in gained], taken)
+        number = next(i for i, one in enumerate(gained) if one[1] is likeliest)
+        (gain, family, test), fall = gained[number], falls[number]
         if found and fall < _LEAST_SHARE * explained:
             break
         found.append(Found(test, gain, size=test.size_um))
@@ -200,7 +210,7 @@ def wrong_identifications(diagnosis: Diagnosis) -> list[Found]:
     if pairs.log_chance > _limit(diagnosis):
         return []
     test = next(one for one in diagnosis.tests if one.subject == "swapped")
-    gain = gains.of_outliers(diagnosis.rows)
+    gain = gains.of_outliers(diagnosis)
     return [Found(test, gain, pairs.items, float(len(pairs.items)))]
 
 
@@ -213,15 +223,7 @@ def _of_outliers(diagnosis: Diagnosis) -> list[Found]:
     test = next(one for one in diagnosis.tests if one.subject == "outliers")
     if test.log_chance > _limit(diagnosis):
         return []
-    return [Found(test, gains.of_outliers(rows), size=float(rows.is_far.sum()))]
-
-
-def _scatter(diagnosis: Diagnosis, explained: float) -> list[Scatter]:
-    """Return the tests of the size of the residuals after patterns; none if these are too large."""
-    rows = diagnosis.rows
-    if explained > _MOST_LINEAR * float(rows.chi2[~rows.is_far].sum()):
-        return []
-    return scatter_tests(rows, diagnosis.magnitude, explained, without=diagnosis.swinging)
+    return [Found(test, gains.of_outliers(diagnosis), size=float(rows.is_far.sum()))]
 
 
 def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
@@ -229,8 +231,6 @@ def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
 
     The tails of their distribution are a cause of their own.
     """
-    if not scatter:
-        return []
     limit, noise = _limit(diagnosis), scatter[0]
     tests = {one.subject: one for one in diagnosis.tests}
     found = []

@@ -9,7 +9,6 @@ import numpy as np
 from solver.results.diagnosis.exposures import WAVES
 from solver.results.diagnosis.patterns import Family
 from solver.results.diagnosis.projection import Projection
-from solver.results.diagnosis.rows import Rows
 from solver.results.diagnosis.scatter import Scatter
 from solver.results.diagnosis.table import Diagnosis, Test
 
@@ -95,6 +94,8 @@ def of_kurtosis(noise: Scatter, kurtosis: Scatter) -> float:
     return of_scale(noise.value, noise.freedom) + n * float(np.log1p(squares / n)) - PER_PARAMETER
 
 
-def of_outliers(rows: Rows) -> float:
-    """Return the gain of leaving out the outliers."""
-    return float(rows.chi2[rows.is_far].sum() - 2.0 * PER_PARAMETER * rows.is_far.sum())
+def of_outliers(diagnosis: Diagnosis) -> float:
+    """Return the gain of leaving out the outliers, by the scatter of the other residuals."""
+    rows = diagnosis.rows
+    chi2 = float(rows.chi2[rows.is_far].sum()) / diagnosis.scale
+    return chi2 - 2.0 * PER_PARAMETER * float(rows.is_far.sum())

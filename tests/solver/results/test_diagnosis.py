@@ -222,14 +222,21 @@ def test_every_cause_is_named(defect, subject):
 
 
 @pytest.mark.parametrize(
-    "order",
-    [2, *(pytest.param(one, marks=pytest.mark.full) for one in (0, 1, 3, 4))],
+    ("order", "orbit"),
+    [
+        (2, 0),
+        *(pytest.param(*one, marks=pytest.mark.full) for one in ((0, 0), (1, 0), (2, 6), (4, 0))),
+    ],
 )
-def test_order_that_is_too_low_is_named(order):
-    """Far too low, what it leaves is not noise, nor sources that scatter by more than theirs."""
-    assert [one.test.subject for one in find_causes(diagnose(fitted(order=order))).found] == [
-        "order"
-    ]
+def test_order_that_is_too_low_is_named(order, orbit):
+    """Far too low, what it leaves is neither noise nor outliers nor an error of the catalogue."""
+    causes = find_causes(diagnose(fitted(order=order, orbit=orbit)))
+    assert [one.test.subject for one in causes.found] == ["order"]
+
+
+@pytest.mark.full
+def test_wrong_identifications_are_named_where_they_make_large_patterns():
+    assert find_causes(diagnose(fitted("swapped=0.05%"))).found[0].test.subject == "swapped"
 
 
 def test_pattern_without_a_cause_is_not_laid_to_a_weak_one(clean):

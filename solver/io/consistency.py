@@ -1,6 +1,5 @@
 """Consistency checks between the tables of an observation, the catalogue and the truth."""
 
-import numpy as np
 import pandas as pd
 
 _MAX_LISTED = 5
@@ -43,9 +42,8 @@ def catalogue_problems(
     measurements: pd.DataFrame, catalogue: pd.DataFrame, where: str, where_catalogue: str
 ) -> list[str]:
     """Return messages if measured sources are missing from the catalogue or none is a reference."""
-    measured = np.unique(measurements["source_id"])
-    known = catalogue["source_id"].to_numpy()
-    missing = measured[~np.isin(measured, known)]
+    measured, known = _measured(measurements), catalogue["source_id"].to_numpy()
+    missing = measured[~measured.isin(known)]
     found = []
     if missing.size:
         found.append(
@@ -53,7 +51,7 @@ def catalogue_problems(
             f"found {missing.size} of {measured.size} that are not: {_listed(missing.tolist())}"
         )
     references = known[catalogue["is_reference"].to_numpy(dtype=bool)]
-    if not np.isin(measured, references).any():
+    if not measured.isin(references).any():
         found.append(
             f"{where_catalogue}, column is_reference: expected at least one reference source "
             f"among the {measured.size} measured in {where}, found none"
@@ -65,8 +63,8 @@ def truth_problems(
     measurements: pd.DataFrame, truth: pd.DataFrame, where: str, where_truth: str
 ) -> list[str]:
     """Return a message if no measured source is in the truth; some missing ones are allowed."""
-    measured = np.unique(measurements["source_id"])
-    if np.isin(measured, truth["source_id"]).any():
+    measured = _measured(measurements)
+    if measured.isin(truth["source_id"]).any():
         return []
     return [
         f"{where_truth}, column source_id: expected some of the {measured.size} sources "
@@ -77,6 +75,11 @@ def truth_problems(
 def exposures_of(table: pd.DataFrame) -> set[tuple[int, int, int]]:
     """Return the exposures (orbit_id, field_id, plate_id) that have a row in `table`."""
     return set(table[_EXPOSURE].drop_duplicates().itertuples(index=False, name=None))
+
+
+def _measured(measurements: pd.DataFrame) -> pd.Index:
+    """Return the ids of the measured sources, ascending."""
+    return pd.Index(measurements["source_id"].unique()).sort_values()
 
 
 def _listed(items: list) -> str:

@@ -18,7 +18,6 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pyarrow as pa
 
@@ -247,7 +246,7 @@ def _is_without_values(frame: pd.DataFrame, column: Column) -> bool:
 
 
 def _measured(sources: pd.DataFrame, measurements: pd.DataFrame) -> pd.DataFrame:
-    measured = np.isin(sources["source_id"].to_numpy(), measurements["source_id"].unique())
+    measured = sources["source_id"].isin(measurements["source_id"].unique())
     return sources[measured].reset_index(drop=True)
 
 

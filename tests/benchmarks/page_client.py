@@ -62,6 +62,8 @@ class PageClient:
         self._listening: asyncio.Task | None = None
         self._models: dict[str, dict[str, Any]] = {}
         self._marks: list[Mark] = []
+        # Changes of the orbit so far; and how many there had been when a table got its rows.
+        self._n_turned, self._filled = 0, dict[str, int]()
         self._is_there = self._is_closing = self.is_lost = False
         self._seen_cards: set[str] = set()
         self._new_cards: list[str] = []
@@ -162,6 +164,7 @@ class PageClient:
 
     def put(self, label: str, value: object, attribute: str = "value") -> Event:
         """Return the event of a control that gets a value."""
+        self._n_turned += label == "Orbit"
         return _changed(self._control(label), attribute, value)
 
     def click(self, label: str) -> Event:
@@ -187,23 +190,26 @@ class PageClient:
         raise PageError(f"expected a switch with {first!r} and {second!r}")
 
     def select_rows(self, count: int, number: int) -> Event:
-        """Return the event of some `count` sources that are selected in the figure with most."""
+        """Return the event of some `count` sources that are selected in the figure with most.
+
+        A figure that is not in view may still show the orbit before.
+        """
         tables = [
-            (rows, _id(model["selected"]) or "")
-            for model in self._tables_of_points()
+            (self._filled.get(table, 0), rows, _id(model["selected"]) or "")
+            for table, model in self._tables_of_points()
             if (rows := _rows_with_id(model))
         ]
-        rows, selected = max(tables, default=(0, ""))
+        _, rows, selected = max(tables, default=(0, 0, ""))
         if not selected:
             raise PageError("expected a figure with sources")
         first = 97 * number % max(rows - count, 1)
         return _changed(selected, "indices", list(range(first, min(first + count, rows))))
 
-    def _tables_of_points(self) -> Iterator[dict[str, Any]]:
+    def _tables_of_points(self) -> Iterator[tuple[str, dict[str, Any]]]:
         for model in self._models.values():
             glyph, table = (_id(model.get(name)) for name in ("glyph", "data_source"))
             if glyph and table and self._models[glyph]["name"] == "Scatter":
-                yield self._models[table]
+                yield table, self._models[table]
 
     def _find(self, label: str) -> str | None:
         """Return the model with the value of a control; a symbol may follow its label."""
@@ -268,12 +274,14 @@ class PageClient:
         new = event.get("new", event.get("data"))
         if "Plot" in self._gather(new):
             yield "drawn"
-        model = self._models.get(_id(event.get("model")) or "")
+        changed = _id(event.get("model")) or ""
+        model = self._models.get(changed)
         if model is None:
             return
         attribute = event.get("attr", "data")
         model[attribute] = _merged(model.get(attribute), new, event)
         if attribute == "data" and model["name"] == "ColumnDataSource":
+            self._filled[changed] = self._n_turned
             yield "data"
         if attribute == "indices":
             yield "selected"
@@ -292,6 +300,7 @@ class PageClient:
                 if one.get("type") == "object" and "id" in one:
                     attributes = one.get("attributes", {})
                     self._models[one["id"]] = {**attributes, "name": one["name"]}
+                    self._filled[one["id"]] = self._n_turned
                     names.add(one["name"])
                     self._note_card(attributes)
                 parts += one.values()

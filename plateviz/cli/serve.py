@@ -61,8 +61,8 @@ def serve(
     solvers: Annotated[
         int | None,
         typer.Option(
-            help="Number of solver processes, of which the first keeps to what-ifs and fits that "
-            "take a second; as a rule two where the machine has the memory and the cores.",
+            help="Number of solver processes, of which half keep to what-ifs and fits that take a "
+            "second; as a rule three where the machine has the memory and the cores.",
             min=1,
             max=MOST_SOLVERS,
             metavar="N",

@@ -14,6 +14,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -30,12 +31,18 @@ from solver.io.failures import reading
 from solver.io.settings import parse_settings
 
 _HEAD, _JUDGEMENT = "result.json", "verdict.json"
-_VERDICT = "verdict"
+VERDICT, EIGENMODES = "verdict", "eigenmodes"
+"""Parts of a result that may be written later."""
 _LATER = tuple(table.name for table in EIGENMODE_TABLES)
 # Windows removes no file that is read in place.
 _IS_IN_PLACE = sys.platform != "win32"
 # A page may ask again and again for longer than a thread waits.
 _PATIENCE_SECONDS, _PATIENCE_OF_PAGE, _LOOK_SECONDS = 10.0, 60.0, 0.005
+# A solver with other requests puts a verdict off, and in the end gives it up. So a page that is
+# still there after so long asks for it.
+_LATE_SECONDS = 5.0
+
+Complete = Callable[[str], bool]
 
 
 def write_scratch_result(
@@ -92,7 +99,7 @@ def write_verdict(directory: Path, verdict: Mapping[str, Any]) -> None:
     verdict : as `plateviz.tables.verdict.with_verdict` adds it to a summary
     """
     with writing(directory, "to write the verdict on a fit"):
-        part = directory / f"{_VERDICT}.part"
+        part = directory / f"{VERDICT}.part"
         part.write_text(json.dumps(verdict), encoding="utf-8")
         part.rename(directory / _JUDGEMENT)
 
@@ -123,14 +130,12 @@ def is_written(directory: Path) -> bool:
     return (directory / _HEAD).is_file()
 
 
-def read_scratch_result(
-    directory: Path, complete: Callable[[], bool] = lambda: True
-) -> "ScratchResult":
+def read_scratch_result(directory: Path, complete: Complete = lambda _: True) -> "ScratchResult":
     """Read a result; its tables stay in their files, and are loaded where they are used.
 
     Parameters
     ----------
-    complete : called when something is used that has not been written yet; whether it will be
+    complete : called with a part that is used and has not been written yet; whether it will be
 
     Raises
     ------
@@ -139,7 +144,7 @@ def read_scratch_result(
     """
     with reading(str(directory), "the result of a fit"):
         head = json.loads((directory / _HEAD).read_text(encoding="utf-8"))
-        eigenmodes = _Awaited(_last_of_eigenmodes(directory), complete)
+        eigenmodes = _Awaited(_last_of_eigenmodes(directory), partial(complete, EIGENMODES))
         tables: dict[str, pd.DataFrame | _Awaited | None] = {
             table.name: eigenmodes
             if head["is_partial"] and table.name in _LATER
@@ -148,7 +153,8 @@ def read_scratch_result(
         }
         summary = head["summary"]
         if not head["is_judged"]:
-            summary = _JudgedLater(summary, _Awaited(directory / _JUDGEMENT, complete))
+            verdict = _Awaited(directory / _JUDGEMENT, partial(complete, VERDICT))
+            summary = _JudgedLater(summary, verdict)
         return ScratchResult(
             **tables,  # type: ignore[arg-type]
             summary=summary,
@@ -205,15 +211,16 @@ class _JudgedLater(Mapping[str, Any]):
 
     def __init__(self, known: dict[str, Any], verdict: _Awaited) -> None:
         self._known, self._verdict = known, verdict
-        self._end = time.monotonic() + _PATIENCE_SECONDS
+        self._late, self._is_missing = time.monotonic() + _LATE_SECONDS, False
 
     @property
     def is_to_come(self) -> bool:
-        is_known = _VERDICT in self._known or self._verdict.is_there
-        return not is_known and time.monotonic() < self._end
+        if VERDICT in self._known or self._verdict.is_there or self._is_missing:
+            return False
+        return time.monotonic() < self._late or self._verdict.is_to_come()
 
     def __getitem__(self, key: str) -> Any:  # noqa: ANN401 whatever a summary holds
-        return (self._whole() if key == _VERDICT else self._known)[key]
+        return (self._whole() if key == VERDICT else self._known)[key]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._whole())
@@ -222,11 +229,11 @@ class _JudgedLater(Mapping[str, Any]):
         return len(self._whole())
 
     def _whole(self) -> dict[str, Any]:
-        if self.is_to_come and not self._verdict.wait(self._end):
-            self._end = -math.inf
-        if _VERDICT not in self._known and self._verdict.is_there:
+        if self.is_to_come:
+            self._is_missing = not self._verdict.wait(time.monotonic() + _PATIENCE_SECONDS)
+        if VERDICT not in self._known and self._verdict.is_there:
             text = self._verdict.path.read_text(encoding="utf-8")
-            self._known[_VERDICT] = json.loads(text)
+            self._known[VERDICT] = json.loads(text)
         return self._known
 
 

@@ -7,7 +7,7 @@ import os
 
 from solver.runtime.threads import count_cores
 
-_MOST_SOLVERS, _BYTES_PER_SOLVER = 2, 3 * 2**30
+_MOST_QUICK, _BYTES_PER_SOLVER = 2, 3 * 2**30
 # An orbit of 8,000 sources, with what a what-if starts from, takes 0.2 to 0.3 GB.
 _BYTES_PER_ORBIT = 0.3 * 2**30
 _LEAST_ORBITS, _MOST_ORBITS = 4, 16
@@ -16,8 +16,11 @@ _SHARE = 1 / 8
 
 
 def usual_solvers() -> int:
-    """Return the number of solver processes that suits this machine: two where it has room."""
-    return max(1, min(_MOST_SOLVERS, count_cores(), _memory() // _BYTES_PER_SOLVER))
+    """Return the number of solver processes that suits this machine.
+
+    These are two for what-ifs, and one for long fits, where it has the cores and the memory.
+    """
+    return max(1, min(min(_MOST_QUICK, count_cores()) + 1, _memory() // _BYTES_PER_SOLVER))
 
 
 def ready_orbits() -> int:

@@ -27,12 +27,12 @@ _LEAST, _MOST_READ = 16, 16
 class ScratchResults:
     """Results by directory, in the order in which they were used last."""
 
-    def __init__(self, complete: Callable[[Path], bool], most_bytes: int = MOST_BYTES) -> None:
+    def __init__(self, complete: Callable[[Path, str], bool], most_bytes: int = MOST_BYTES) -> None:
         """Begin without any.
 
         Parameters
         ----------
-        complete : called with a directory when a part of its result is used that has not been
+        complete : called with a directory and a part of its result that is used and has not been
             written yet; whether it will be
         """
         self._most_bytes = most_bytes

@@ -221,10 +221,10 @@ class SolutionStore:
         for removed in self._results.expect(directory):
             self._jobs.pop(removed, None)
 
-    def _complete(self, directory: Path) -> bool:
-        """Let the solver write what a result lacks; return whether it is at it."""
+    def _complete(self, directory: Path, part: str) -> bool:
+        """Let the solver write a part that a result lacks; return whether it is at it."""
         job = self._jobs.get(directory)
-        return job is not None and self._solver.complete(job)
+        return job is not None and self._solver.complete(job, part)
 
     def _request(
         self, orbit: int | None, settings: FitSettings, what_if: bool, directory: Path

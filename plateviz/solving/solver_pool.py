@@ -1,8 +1,9 @@
 """SolverPool: several solver processes, so that what is quick does not wait for what is not.
 
-The first process does quick work only: fits with the first engine and what-ifs. Long fits run in
-the others, one after the other in each. A what-if goes to the process that has fitted its orbit,
-since another one would have to fit it again.
+Half of the processes, the first among them, do quick work only: fits with the first engine and
+what-ifs. The others give way to them: each runs long fits, one after the other, and quick work only
+while it has none. A what-if goes to the process that has fitted its orbit, since another one would
+have to fit it again.
 """
 
 import threading
@@ -17,8 +18,9 @@ from plateviz.solving.forecast import JobTimes, is_long
 from plateviz.solving.job import Job
 from plateviz.solving.solver_queue import SolverQueue
 
-# How far the processes of long fits give way to that of what-ifs.
-_NICENESS = 10
+# How far the processes give way to those of the server and of a browser, for which many wait, and
+# the one of long fits to the others.
+_QUICK, _LONG = 2, 12
 # Quick jobs that wait for one process before another is started, which takes some seconds itself.
 _FEW = 3
 
@@ -42,8 +44,8 @@ class Solver(Protocol):
         """Let processes give up what they prepare."""
         ...
 
-    def complete(self, job: Job) -> bool:
-        """Let a process write what a result lacks that was put off; return whether it will."""
+    def complete(self, job: Job, part: str) -> bool:
+        """Let a process write a part of a result that was put off; return whether it will."""
         ...
 
     def cancel(self, job: Job) -> None:
@@ -63,15 +65,15 @@ class SolverPool:
 
         Parameters
         ----------
-        most : number of processes
+        most : number of processes; half of them, or one less, run long fits
         start : makes a queue, with the arguments of `SolverQueue`
         """
         times = JobTimes()
         self._lock = threading.Lock()
-        self._most = most
+        self._most, self._most_long = most, most // 2
         self._n_ready = most * ready_orbits()
         self._start = partial(start, times=times)
-        self._queues = [self._start()]
+        self._quick, self._long = [self._start(niceness=_QUICK)], list[SolverQueue]()
         # The queue that has last fitted an orbit, the latest last.
         self._warm: OrderedDict[str, SolverQueue] = OrderedDict()
         # The queue of each job that somebody still knows.
@@ -90,7 +92,7 @@ class SolverPool:
     def prepare(self, request: Mapping[str, object]) -> None:
         """Send a request for preparations to the process that will answer what-ifs of its orbit."""
         with self._lock:
-            queue = self._warm.get(_orbit(request), self._queues[0])
+            queue = self._warm.get(_orbit(request), self._quick[0])
             self._warm[_orbit(request)] = queue
         queue.prepare(request)
 
@@ -104,12 +106,12 @@ class SolverPool:
         for queue in self._all():
             queue.rest()
 
-    def complete(self, job: Job) -> bool:
-        """Let its process write what a result lacks that was put off; return whether it will."""
+    def complete(self, job: Job, part: str) -> bool:
+        """Let its process write a part of a result that was put off; return whether it will."""
         with self._lock:
             # The result of a job that no queue has had was prepared for its orbit.
             queue = self._of_job.get(job) or self._warm.get(_orbit(job.request))
-        return queue is not None and queue.complete(job)
+        return queue is not None and queue.complete(job, part)
 
     def cancel(self, job: Job) -> None:
         """Cancel a job that waits or runs."""
@@ -123,26 +125,36 @@ class SolverPool:
 
     def _all(self) -> list[SolverQueue]:
         with self._lock:
-            return list(self._queues)
+            return [*self._quick, *self._long]
 
     def _queue_for(self, request: Mapping[str, Any]) -> SolverQueue:
         if self._most == 1:
-            return self._queues[0]
+            return self._quick[0]
         if is_long(request):
-            return self._least_busy(self._queues[1:], at_most=0)
-        quick = [q for q in self._queues if not any(is_long(job.request) for job in q.jobs)]
+            return self._queue_of_long_fits()
+        free = [q for q in self._long if not any(is_long(job.request) for job in q.jobs)]
         warm = self._warm.get(_orbit(request))
-        if warm in quick:
+        if warm in (candidates := [*self._quick, *free]):
             return warm
-        return self._least_busy(quick, at_most=_FEW)
-
-    def _least_busy(self, queues: list[SolverQueue], at_most: int) -> SolverQueue:
-        """Return the queue with the fewest jobs, a new one if all have more than `at_most`."""
-        best = min(queues, key=lambda queue: len(queue.jobs), default=None)
-        if best is not None and (len(best.jobs) <= at_most or len(self._queues) == self._most):
+        best = _least_busy(candidates)
+        if len(best.jobs) <= _FEW:
             return best
-        self._queues.append(self._start(niceness=_NICENESS))
-        return self._queues[-1]
+        if len(self._quick) < self._most - self._most_long:
+            self._quick.append(self._start(niceness=_QUICK))
+            return self._quick[-1]
+        return best if self._long else self._queue_of_long_fits()
+
+    def _queue_of_long_fits(self) -> SolverQueue:
+        """Return the queue of long fits with the fewest jobs, a new one if none is without."""
+        best = _least_busy(self._long) if self._long else None
+        if best is not None and (not best.jobs or len(self._long) == self._most_long):
+            return best
+        self._long.append(self._start(niceness=_LONG))
+        return self._long[-1]
+
+
+def _least_busy(queues: list[SolverQueue]) -> SolverQueue:
+    return min(queues, key=lambda queue: len(queue.jobs))
 
 
 def _orbit(request: Mapping[str, Any]) -> str:

@@ -11,9 +11,9 @@ Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "direct
 {"do": "prepare", "origin", "orbit", "settings", "base", "may_fit", "likely", "is_urgent"}: while
 idle, make the likely what-ifs of a solution, each {"settings", "directory"}, and with "may_fit" fit
 what they start from, {"do": "pause"}: let that wait while a page opens, {"do": "rest"}: give it up,
-and {"do": "complete"} with the rest of a "fit" that is done: write what its result lacks. "base" is
-the solution of a run from which the what-ifs of the orbit can start, {"settings", "directory"}, or
-None.
+and {"do": "complete", "part"} with the rest of a "fit" that is done: write a part that its result
+lacks, `VERDICT` or `EIGENMODES` of `plateviz.runs.scratch_result`. "base" is the solution of a run
+from which the what-ifs of the orbit can start, {"settings", "directory"}, or None.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
 """
 
@@ -31,6 +31,7 @@ from typing import NamedTuple, TextIO
 
 from plateviz.cache import keep_compilations
 from plateviz.runs.scratch_result import (
+    VERDICT,
     are_eigenmodes_written,
     is_verdict_written,
     is_written,
@@ -211,7 +212,7 @@ def _fit(request: Request, progress: Callable[..., None], kept: _Kept) -> Prepar
         progress(stage=stage, **iteration._asdict())
 
     progress(stage="linearising")
-    found = _what_if(fitter, request, on_iteration, put_off) if request["what_if"] else None
+    found = _what_if(fitter, request, on_iteration) if request["what_if"] else None
     if found is None:
         # A fit may take long, and a page waits for the verdict.
         put_off.finish_verdicts()
@@ -225,10 +226,7 @@ def _fit(request: Request, progress: Callable[..., None], kept: _Kept) -> Prepar
 
 
 def _what_if(
-    fitter: OrbitFitter,
-    request: Request,
-    progress: Callable[[Iteration], None],
-    put_off: PutOff,
+    fitter: OrbitFitter, request: Request, progress: Callable[[Iteration], None]
 ) -> PartialResult | None:
     """Return a solution by a step from a fit, or None if it needs a fit of its own.
 
@@ -243,7 +241,6 @@ def _what_if(
         base = Base(base_settings(settings), None)
     if base is None or fitter.fitted_settings == base.settings:
         return None
-    put_off.finish_verdicts()
     try:
         fitter.prepare_what_ifs(base.settings, progress, base.solution)
     except FitError:
@@ -252,16 +249,19 @@ def _what_if(
 
 
 def _complete(request: Request, kept: _Kept) -> None:
-    """Write what a result lacks: it was given up, or put off by a process that died."""
-    kept.put_off.finish()
+    """Write a part that a result lacks: it was given up, or put off by a process that died."""
     directory, settings = Path(request["directory"]), FitSettings.from_dict(request["settings"])
     # Nobody waits for an error: who waits for such a part sees in the end that it is missing.
     with suppress(InputError, FitError):
-        if not is_verdict_written(directory):
-            judge(directory, read_scratch_result(directory, lambda: False))
+        if request["part"] == VERDICT:
+            kept.put_off.finish_verdict(directory)
+            if not is_verdict_written(directory):
+                judge(directory, read_scratch_result(directory, lambda _: False))
+            return
+        kept.put_off.finish()
         if not are_eigenmodes_written(directory):
             fitter = kept.fitters.of(request)
-            found = _what_if(fitter, request, lambda _: None, kept.put_off)
+            found = _what_if(fitter, request, lambda _: None)
             result = fitter.fit(settings) if found is None else found.whole()
             tables = {table.name: getattr(result, table.name) for table in EIGENMODE_TABLES}
             write_eigenmodes(directory, tables)

@@ -99,15 +99,15 @@ class SolverQueue:
             if self._process is not None:
                 self._send({"do": what})
 
-    def complete(self, job: Job) -> bool:
-        """Let the process write what a result lacks that it has put off; return whether it will.
+    def complete(self, job: Job, part: str) -> bool:
+        """Let the process write a part of a result that it has put off; return whether it will.
 
         A new process computes it again. After `close` there is none.
         """
         with self._lock:
             if self._is_closed:
                 return False
-            self._send({**job.request, "do": "complete"})
+            self._send({**job.request, "do": "complete", "part": part})
             return True
 
     def cancel(self, job: Job) -> None:

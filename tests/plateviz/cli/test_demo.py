@@ -37,7 +37,7 @@ class NoSolver:
     def submit(self, job):
         pytest.fail(f"expected no request, found {job.request}")
 
-    def complete(self, job):
+    def complete(self, job, part):
         pytest.fail("expected no request")
 
 

@@ -116,17 +116,17 @@ def test_eigenmodes_that_follow_are_the_same(fit_result, partial):
 def test_who_uses_eigenmodes_asks_for_them_once(fit_result, partial):
     directory, finish = partial
     asked = []
-    result = read_scratch_result(directory, complete=lambda: asked.append("modes") or finish())
+    result = read_scratch_result(directory, complete=lambda part: asked.append(part) or finish())
     # A widget with solutions to choose from makes a text of each.
     assert repr(result) == f"<FitResult of orbit {fit_result.orbit_id}: order 5>"
     assert not asked
     # As `keep` and every export do: all fields are read.
     same(fit_result, replace(result))
-    assert asked == ["modes"]
+    assert asked == ["eigenmodes"]
 
 
 def test_eigenmodes_that_never_come_are_an_error_at_once(partial):
-    result = read_scratch_result(partial[0], complete=lambda: False)
+    result = read_scratch_result(partial[0], complete=lambda _: False)
     for name in EIGENMODES:
         with pytest.raises(InputError, match="the solver ended or had no time to write them"):
             getattr(result, name)
@@ -137,14 +137,14 @@ def test_page_that_has_given_up_does_not_wait_again(partial, monkeypatch):
     monkeypatch.setattr(scratch_result, "_PATIENCE_OF_PAGE", 0.0)
     monkeypatch.setattr(scratch_result.time, "sleep", lambda _: pytest.fail("waited"))
     asked = []
-    result = read_scratch_result(partial[0], complete=lambda: asked.append("modes") or True)
+    result = read_scratch_result(partial[0], complete=lambda part: asked.append(part) or True)
     assert not are_eigenmodes_to_come(result)
     with pytest.raises(InputError, match="had no time"):
         result.modes.head()
-    assert asked == ["modes"]
+    assert asked == ["eigenmodes"]
     monkeypatch.setattr(scratch_result, "_PATIENCE_OF_PAGE", 60.0)
     assert are_eigenmodes_to_come(result)
-    assert asked == ["modes", "modes"]
+    assert asked == ["eigenmodes", "eigenmodes"]
 
 
 @pytest.fixture
@@ -178,7 +178,7 @@ def test_verdict_that_follows_is_the_same(unjudged):
 def test_who_uses_the_verdict_waits_for_it(unjudged, use):
     directory, judged, finish = unjudged
     asked = []
-    result = read_scratch_result(directory, complete=lambda: asked.append("verdict") or finish())
+    result = read_scratch_result(directory, complete=lambda part: asked.append(part) or finish())
     assert result.summary["engine"] == judged.summary["engine"]
     assert not asked
     assert use(result.summary) == use(json.loads(json.dumps(judged.summary)))
@@ -187,14 +187,28 @@ def test_who_uses_the_verdict_waits_for_it(unjudged, use):
 
 
 def test_result_whose_verdict_never_comes_has_none(fit_result, unjudged):
-    result = read_scratch_result(unjudged[0], complete=lambda: False)
+    result = read_scratch_result(unjudged[0], complete=lambda _: False)
     assert result.summary.get("verdict") is None
     assert not is_judged_later(result)
     same(fit_result, result)
 
 
-def test_overdue_verdict_is_not_waited_for(unjudged, monkeypatch):
+def test_page_asks_once_for_a_verdict_that_is_late(unjudged, monkeypatch):
+    asked = []
+    result = read_scratch_result(unjudged[0], complete=lambda part: asked.append(part) or True)
+    assert is_judged_later(result)
+    assert not asked
+    monkeypatch.setattr(scratch_result, "_LATE_SECONDS", 0.0)
+    result = read_scratch_result(unjudged[0], complete=lambda part: asked.append(part) or True)
+    assert is_judged_later(result)
+    assert is_judged_later(result)
+    assert asked == ["verdict"]
+
+
+def test_overdue_verdict_is_not_waited_for_again(unjudged, monkeypatch):
     monkeypatch.setattr(scratch_result, "_PATIENCE_SECONDS", 0.0)
     result = read_scratch_result(unjudged[0])
-    assert not is_judged_later(result)
     assert "verdict" not in result.summary
+    assert not is_judged_later(result)
+    monkeypatch.setattr(scratch_result.time, "sleep", lambda _: pytest.fail("waited"))
+    assert result.summary.get("verdict") is None

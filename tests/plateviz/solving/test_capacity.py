@@ -7,7 +7,7 @@ from plateviz.solving.capacity import ready_orbits, usual_solvers
 
 
 @pytest.mark.parametrize(
-    ("gib", "solvers", "orbits"), [(2, 1, 4), (8, 2, 4), (24, 2, 10), (1024, 2, 16)]
+    ("gib", "solvers", "orbits"), [(2, 1, 4), (8, 2, 4), (24, 3, 10), (1024, 3, 16)]
 )
 def test_more_memory_has_room_for_more(gib, solvers, orbits, monkeypatch):
     monkeypatch.setattr(capacity, "_memory", lambda: gib * 2**30)
@@ -15,7 +15,7 @@ def test_more_memory_has_room_for_more(gib, solvers, orbits, monkeypatch):
     assert (usual_solvers(), ready_orbits()) == (solvers, orbits)
 
 
-def test_one_core_has_room_for_one_solver(monkeypatch):
+def test_one_core_has_one_solver_for_what_ifs_and_one_for_long_fits(monkeypatch):
     monkeypatch.setattr(capacity, "_memory", lambda: 24 * 2**30)
     monkeypatch.setattr(capacity, "count_cores", lambda: 1)
-    assert usual_solvers() == 1
+    assert usual_solvers() == 2

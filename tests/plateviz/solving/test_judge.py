@@ -50,7 +50,7 @@ def test_solution_of_the_solver_is_judged_there(fit_result, tmp_path):
     waiting = Waiting()
     judge, judged = Judge(waiting), with_verdict(fit_result)
     write_scratch_result(tmp_path / "result", fit_result, is_judged=False)
-    result = read_scratch_result(tmp_path / "result", complete=lambda: pytest.fail("waited"))
+    result = read_scratch_result(tmp_path / "result", complete=lambda _: pytest.fail("waited"))
     assert not judge.has_judged(result)
     write_verdict(tmp_path / "result", judged.summary["verdict"])
     assert judge.has_judged(result)
@@ -59,10 +59,10 @@ def test_solution_of_the_solver_is_judged_there(fit_result, tmp_path):
 
 
 def test_solution_whose_solver_has_ended_is_judged_here(fit_result, tmp_path, monkeypatch):
-    monkeypatch.setattr(scratch_result, "_PATIENCE_SECONDS", 0.0)
+    monkeypatch.setattr(scratch_result, "_LATE_SECONDS", 0.0)
     waiting = Waiting()
     write_scratch_result(tmp_path / "result", fit_result, is_judged=False)
-    result = read_scratch_result(tmp_path / "result")
+    result = read_scratch_result(tmp_path / "result", complete=lambda _: False)
     assert not Judge(waiting).has_judged(result)
     ((work, arguments),) = waiting.waiting
     work(*arguments)

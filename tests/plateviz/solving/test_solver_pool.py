@@ -63,6 +63,20 @@ def test_long_fits_wait_for_each_other(pool, queues):
     assert [queue.jobs for queue in queues] == [[], jobs]
 
 
+def test_what_ifs_have_a_second_process_beside_that_of_long_fits(queues):
+    pool = made_pool(queues, 3)
+    long = [pool.submit(fit(0, "svi")), pool.submit(fit(1, "svi"))]
+    quick = [pool.submit(fit(orbit, what_if=True)) for orbit in range(6)]
+    assert [queue.jobs for queue in queues] == [quick[:4], long, quick[4:]]
+    assert queues[0]._niceness == queues[2]._niceness < queues[1]._niceness
+
+
+def test_half_of_many_processes_run_long_fits(queues):
+    pool = made_pool(queues, 5)
+    long = [pool.submit(fit(orbit, "svi")) for orbit in range(3)]
+    assert [queue.jobs for queue in queues] == [[], [long[0], long[2]], [long[1]]]
+
+
 def test_second_process_is_started_only_when_many_wait(pool, queues):
     for orbit in range(4):
         pool.submit(fit(orbit))
@@ -95,17 +109,17 @@ def test_preparations_go_where_the_what_ifs_will(pool, queues):
 def test_what_was_put_off_is_asked_of_the_process_that_put_it_off(pool, queues):
     what_if = pool.submit(fit(0, what_if=True))
     pool.submit(fit(0, "svi"))
-    assert pool.complete(what_if)
+    assert pool.complete(what_if, "verdict")
     assert (queues[0].sent[-1], queues[1].sent[-1]) == ("complete", "fit")
-    assert not pool.complete(fit(1, what_if=True))
+    assert not pool.complete(fit(1, what_if=True), "verdict")
     pool.close()
-    assert not pool.complete(what_if)
+    assert not pool.complete(what_if, "verdict")
 
 
 def test_what_was_put_off_of_a_prepared_what_if_is_asked_of_the_process_of_its_orbit(pool, queues):
     pool.submit(fit(0))
     pool.prepare({"origin": "sky", "orbit": 0})
-    assert pool.complete(fit(0, what_if=True))
+    assert pool.complete(fit(0, what_if=True), "eigenmodes")
     assert queues[0].sent[-1] == "complete"
 
 

@@ -2,6 +2,8 @@
 
 import queue
 import threading
+from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +16,8 @@ from plateviz.solving.solver_process import _next_request
 from solver.errors import InputError
 from solver.fit import OrbitFitter
 from solver.runtime.interruption import give_way
+
+ONE = Path("result")
 
 
 @pytest.fixture
@@ -69,7 +73,7 @@ def test_request_interrupts_what_gives_way_to_it(requests):
 def test_likely_what_ifs_are_made_before_what_takes_longer(requests):
     done, put_off = [], PutOff()
     put_off.add_eigenmodes(lambda: done.append("eigenmodes"))
-    put_off.add_verdict(lambda: done.append("verdict"))
+    put_off.add_verdict(ONE, lambda: done.append("verdict"))
 
     def later():
         done.append("orders")
@@ -91,7 +95,7 @@ def test_what_is_paused_begins_later_but_a_verdict_does_not(requests, monkeypatc
     monkeypatch.setattr(solver_process, "_NEXT_S", 0.0)
     monkeypatch.setattr(solver_process, "_PAUSE_S", 60.0)
     done, put_off = [], PutOff()
-    put_off.add_verdict(lambda: done.append("verdict"))
+    put_off.add_verdict(ONE, lambda: done.append("verdict"))
     soon = (done.append("what-if") for _ in range(1))
     threading.Timer(0.05, requests.put, [{"job": "1"}]).start()
     assert _next_request(requests, Preparation(soon).paused(), put_off) == {"job": "1"}
@@ -114,30 +118,33 @@ def test_preparations_are_finished_without_requests(requests):
 def test_verdict_is_next_and_eigenmodes_are_when_idle(requests, monkeypatch):
     done, put_off = [], PutOff()
     put_off.add_eigenmodes(lambda: done.append("eigenmodes"))
-    put_off.add_verdict(lambda: done.append("verdict"))
+    put_off.add_verdict(ONE, lambda: done.append("verdict"))
     # The server sends the next request once it has heard that the one before is done.
     monkeypatch.setattr(solver_process, "_NEXT_S", 20.0)
     threading.Timer(0.02, requests.put, [{"job": "1"}]).start()
     _next_request(requests, Preparation(), put_off)
     assert done == []
     monkeypatch.setattr(solver_process, "_NEXT_S", 0.0)
-    put_off.add_verdict(lambda: requests.put({"job": "2"}))
+    put_off.add_verdict(Path("another"), lambda: requests.put({"job": "2"}))
     _next_request(requests, Preparation(), put_off)
     assert done == ["verdict"]
 
 
 def test_few_results_wait():
-    """The verdicts of the others are done, and their eigenmodes given up until somebody asks."""
+    """The oldest are given up until somebody asks; the latest is the one that is looked at."""
     done, put_off = [], PutOff()
     for number in range(4):
-        put_off.add_verdict(lambda number=number: done.append(f"verdict {number}"))
-        put_off.add_eigenmodes(lambda number=number: done.append(f"eigenmodes {number}"))
+        work = partial(done.append, f"verdict {number}")
+        put_off.add_verdict(Path(f"result {number}"), work)
+        put_off.add_eigenmodes(partial(done.append, f"eigenmodes {number}"))
     put_off.limit()
-    assert done == ["verdict 0"]
+    assert done == []
+    put_off.finish_verdict(Path("result 0"))
+    put_off.finish_verdict(Path("result 2"))
     put_off.finish()
     put_off.finish()
-    assert done[1:4] == ["verdict 1", "verdict 2", "verdict 3"]
-    assert done[4:] == ["eigenmodes 2", "eigenmodes 3"]
+    assert done[:3] == ["verdict 2", "verdict 3", "verdict 1"]
+    assert done[3:] == ["eigenmodes 2", "eigenmodes 3"]
 
 
 def test_what_cannot_be_written_ends_nothing(requests):
@@ -145,7 +152,7 @@ def test_what_cannot_be_written_ends_nothing(requests):
         raise InputError("the disk is full")
 
     put_off = PutOff()
-    put_off.add_verdict(full)
+    put_off.add_verdict(ONE, full)
     put_off.add_eigenmodes(lambda: requests.put({"job": "1"}))
     assert _next_request(requests, Preparation(), put_off) == {"job": "1"}
 

@@ -166,7 +166,7 @@ def test_only_what_shows_eigenmodes_waits_for_them(fresh, tmp_path):
     tables = {name: getattr(whole, name) for name in ("modes", "mode_parameters", "mode_shifts")}
     partial = replace(whole, **dict.fromkeys(tables))
     write_scratch_result(tmp_path / "result", partial, is_partial=True)
-    what_if = read_scratch_result(tmp_path / "result", lambda: asked.append("eigenmodes") or True)
+    what_if = read_scratch_result(tmp_path / "result", lambda part: asked.append(part) or True)
     session.shown = session.shown._replace(result=what_if)
     assert figure(page).is_drawn
     assert not asked

@@ -56,6 +56,8 @@ def with_server(store, scenario, **options):
             path = f"{endpoint.prefix}/" if endpoint.prefix else ""
             await scenario(f"http://127.0.0.1:{endpoint.port}/{path}", server)
         finally:
+            # The session of a connection that has just closed is told so by this loop.
+            await asyncio.sleep(0.1)
             server.stop()
 
     # Playwright, in the process of other tests, has an event loop in this thread.

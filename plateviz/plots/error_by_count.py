@@ -8,7 +8,7 @@ from plateviz.figures.glyphs import line, points, segments
 from plateviz.plots.style import CLASS_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.ticks import log_ticks
-from plateviz.plots.units import angle_text
+from plateviz.plots.units import angle_text, orbits_text
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.sources import ARTIFICIAL, REFERENCE
 from plateviz.tables.survey_tables import SurveyTables
@@ -139,7 +139,7 @@ def _limits(rows: pd.DataFrame) -> tuple[Limits, Limits]:
 def _subtitle(rows: pd.DataFrame) -> str:
     first, last = rows.iloc[0], rows.iloc[-1]
     noise, floor = angle_text(float(first["noise_mas"])), angle_text(float(last["floor_mas"]))
-    orbits = f"{int(first['n_orbits'])} orbit{'s' if first['n_orbits'] > 1 else ''}"
+    orbits = orbits_text(int(first["n_orbits"]))
     return (
         f"{int(rows['n_sources'].max()):,} sources; noise of {orbits} {noise}; "
         f"floor at {int(last['n_orbits'])} orbits {floor}"

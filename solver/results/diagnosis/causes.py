@@ -96,13 +96,13 @@ def find_causes(diagnosis: Diagnosis) -> Causes:
     found = [*_swinging(diagnosis), *patterns, *of_exposures, *_of_outliers(diagnosis)]
     found += _of_priors(diagnosis)
     rows, left = diagnosis.rows, None
-    if explained + of_each < _MOST_LINEAR * float(rows.chi2[~rows.is_far].sum()):
+    if explained + of_each <= _MOST_LINEAR * float(rows.chi2[~rows.is_far].sum()):
         left, *_ = scatter = scatter_tests(
             rows, diagnosis.magnitude, explained + of_each, without=diagnosis.swinging
         )
         found += [*_of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
     found.sort(key=lambda one: -one.gain)
-    if left is None and found[0] in patterns:
+    if left is None and found[:1] == patterns[:1]:
         found = patterns
     return Causes(tuple(_of_their_own(found)), left)
 

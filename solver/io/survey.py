@@ -16,6 +16,7 @@ by orbits that `solver.io.survey_growth` adds.
 import hashlib
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
 import pandas as pd
@@ -27,7 +28,7 @@ from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
 from solver.data.toml import parse_toml, toml_text
 from solver.errors import InputError
-from solver.io.atomic import write_atomically
+from solver.io.atomic import sha256_of, write_atomically
 from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
 from solver.io.manifest import (
     manifest_of,
@@ -98,17 +99,15 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
     if has_survey_table(directory, TRUTH_FILE):
         paths.append(directory / TRUTH_FILE)
     provenance = require_unchanged_files(directory, paths)
-    measurements, catalogue, exposures = (
-        _read_table(path, schema)
-        for path, schema in zip(paths, (MEASUREMENT, CATALOGUE, ENVIRONMENT), strict=False)
-    )
+    measurements, exposures = _read_table(paths[0], MEASUREMENT), _read_table(paths[2], ENVIRONMENT)
+    catalogue = _table_of_sources(paths[1], provenance[REFERENCE], CATALOGUE)
     _check_orbit(measurements, orbit_id, paths[0])
     where, where_catalogue, where_exposures = map(str, paths[:3])
     found = exposure_problems(measurements, exposures, where, where_exposures)
     found += catalogue_problems(measurements, catalogue, where, where_catalogue)
     truth = None
     if (path := directory / TRUTH_FILE) in paths:
-        truth = _read_table(path, TRUTH)
+        truth = _table_of_sources(path, provenance[TRUTH_FILE], TRUTH)
         found += truth_problems(measurements, truth, where, str(path))
     refuse(found)
     key = list(ENVIRONMENT.key)
@@ -210,6 +209,20 @@ def read_survey_table(path: Path, schema: Table) -> pd.DataFrame:
     path = Path(path)
     require_unchanged_files(path.parents[path.parent.name in (MEASUREMENTS, DEFECTS)], [path])
     return _read_table(path, schema)
+
+
+@lru_cache(maxsize=2)
+def _table_of_sources(path: Path, digest: str, schema: Table) -> pd.DataFrame:
+    """Read a table that all orbits of a survey share, once for all of them; it is not changed.
+
+    Parameters
+    ----------
+    digest : SHA-256 of the file
+    """
+    frame = _read_table(path, schema)
+    if sha256_of(path) != digest:
+        raise InputError(f"{path}: expected no change while the file is read, found other contents")
+    return frame
 
 
 def _read_table(path: Path, schema: Table) -> pd.DataFrame:

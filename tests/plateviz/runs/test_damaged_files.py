@@ -4,8 +4,10 @@ import os
 import re
 import shutil
 
+import numpy as np
 import pytest
 
+import solver.io.survey as survey_module
 from plateviz.runs.load_tables import survey_tables
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run import Run
@@ -19,6 +21,7 @@ from solver.io.survey import (
     read_survey_orbit,
     read_survey_table,
     survey_orbits,
+    write_survey_table,
 )
 from tests.campaigns import seed_files
 from tests.campaigns.seed_files import FIRST_ID, RUN
@@ -67,6 +70,43 @@ def test_missing_truth_is_refused_where_the_manifest_lists_it(survey):
     (survey / "manifest.sha256").unlink()
     assert read_survey_orbit(survey, 0).truth is None
     assert survey_tables(_run(survey)).truth is None
+
+
+@pytest.mark.parametrize(("name", "schema"), [("reference", CATALOGUE), ("truth", TRUTH)])
+def test_table_of_sources_that_was_written_again_is_read_again(survey, name, schema):
+    first = read_survey_orbit(survey, 0)
+    (survey / "manifest.sha256").unlink()
+    path = survey / f"{name}.parquet"
+    moved = read_survey_table(path, schema)
+    moved["ra"] += 0.25
+    write_survey_table(moved, schema, path)
+    field = {"reference": "catalogue", "truth": "truth"}[name]
+    before, after = (getattr(one, field)["ra"] for one in (first, read_survey_orbit(survey, 0)))
+    assert np.allclose(after - before, 0.25)
+
+
+def test_orbits_share_no_table_that_can_be_changed(survey):
+    first = read_survey_orbit(survey, 0)
+    true_ra = first.truth["ra"].copy()
+    for frame in (first.catalogue, first.truth):
+        frame.loc[:, "ra"] = 0.0
+    again = read_survey_orbit(survey, 0)
+    assert again.truth["ra"].equals(true_ra)
+    assert again.catalogue["ra"].all()
+
+
+def test_catalogue_that_changes_while_it_is_read_is_refused(survey, monkeypatch):
+    path, read = survey / "reference.parquet", survey_module.find_catalogue
+
+    def replaced(asked):
+        found = read(asked)
+        if asked == path:
+            path.write_bytes(path.read_bytes() + b" ")
+        return found
+
+    monkeypatch.setattr(survey_module, "find_catalogue", replaced)
+    with pytest.raises(InputError, match=r"reference\.parquet: expected no change while"):
+        read_survey_orbit(survey, 0)
 
 
 @pytest.mark.parametrize(("name", "schema"), [("reference", CATALOGUE), ("truth", TRUTH)])

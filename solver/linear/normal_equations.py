@@ -77,22 +77,26 @@ def chunks(
 
     JAX computes the next chunk while the caller works on this one.
     """
-    n_chunks = len(problem.measurements.tiles.measured)
+    launched = _launched(problem, theta, sources)
+    current = next(launched)
+    for ahead in launched:
+        give_way()
+        yield jax.tree.map(np.asarray, current)
+        current = ahead
+    give_way()
+    yield jax.tree.map(np.asarray, current)
+
+
+def _launched(
+    problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
+) -> Iterator[Linearised]:
+    """Yield each chunk while JAX still computes it."""
     # Transferred once, not with every chunk.
     offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
-    turn = turning(offsets, geometry)
-
-    def launch(i: int) -> Linearised:
+    turn, n_padded = turning(offsets, geometry), problem.geometry.sizes["coef"]
+    for i in range(len(problem.measurements.tiles.measured)):
         chunk = linearise(turn, offsets, geometry, *problem.measurements.tiles.chunk(i))
-        return chunk.with_terms(problem.layout.n_coef, problem.geometry.sizes["coef"])
-
-    ahead = launch(0)
-    for i in range(n_chunks):
-        give_way()
-        current = ahead
-        if i + 1 < n_chunks:
-            ahead = launch(i + 1)
-        yield jax.tree.map(np.asarray, current)
+        yield chunk.with_terms(problem.layout.n_coef, n_padded)
 
 
 def accumulate(
@@ -114,7 +118,8 @@ def accumulate(
     source, by_source = np.zeros((n_det, 2, 2, n_src)), np.zeros((n_det, 2, n_src))
     is_known = coefficients is not None
     term_blocks = coefficients if is_known else np.zeros((n_det, 2, n_coef, 2, n_coef))
-    sums = TileSums.empty(index.source.shape, len(layout.local_groups), n_coef, layout.n_walk)
+    touched = layout.touched(index.exposure[..., 0], index.detector[..., 0])
+    sums = TileSums.empty(index.source.shape, touched.shape[-1], n_coef, layout.n_walk)
     with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
         pending = helper.submit(lambda: None)
         for i, chunk in enumerate(chunks(problem, theta, sources)):
@@ -129,7 +134,7 @@ def accumulate(
             in_order = chunk_index._replace(
                 source=problem.source_blocks.position[chunk_index.source]
             )
-            _add_cross_local(in_order, by_row, layout, cross)
+            _add_cross_local(in_order.source, touched[i], by_row, cross)
             add_cross_walk(in_order, sums.shared[:, :, i], chunk.prediction.basis, layout, cross)
         pending.result()
         cross_by_detector = np.empty((n_det, 2 * n_coef, 2, n_src))
@@ -137,7 +142,7 @@ def accumulate(
         # A cached property, computed before both threads need it.
         places = problem.measurements.by_source
         pending = helper.submit(_cross_coefficients, places, sums, first_half, cross_by_detector)
-        hessian, by_theta, chi2 = _assemble(index, layout, sums, term_blocks)
+        hessian, by_theta, chi2 = _assemble(index, touched, layout, sums, term_blocks)
         _cross_coefficients(places, sums, second_half, cross_by_detector)
         pending.result()
     np.sum(cross_by_detector, axis=0, out=cross[layout.coefficients()])
@@ -194,29 +199,30 @@ def _add_sources(
     n_det, _, n_src = gradient.shape
     pair = (index.detector * n_src + index.source).ravel()
 
-    def sums(values: Float[np.ndarray, "tile slot"]) -> Float[np.ndarray, "det src"]:
-        return np.bincount(pair, values.ravel(), n_det * n_src).reshape(n_det, n_src)
-
-    squares = one_by_one(rows, rows)
-    for a in range(2):
-        gradient[:, a] += sums(by_residual[a])
-        for b in range(a + 1):
-            hessian[:, a, b] += sums(squares[a, b])
+    squares, totals = one_by_one(rows, rows), [(gradient[:, a], by_residual[a]) for a in (0, 1)]
+    totals += [(hessian[:, a, b], squares[a, b]) for a, b in ((0, 0), (1, 0), (1, 1))]
+    for total, values in totals:
+        total += np.bincount(pair, values.ravel(), n_det * n_src).reshape(n_det, n_src)
     hessian[:, 0, 1] = hessian[:, 1, 0]
 
 
 def _add_cross_local(
-    index: Index,
-    by_row: Float[np.ndarray, "local 2 tile slot"],
-    layout: VectorLayout,
+    source: Int[np.ndarray, "tile slot"],
+    touched: Int[np.ndarray, "tile local"],
+    by_row: Float[np.ndarray, "rows 2 tile slot"],
     cross: Float[np.ndarray, "calib 2 src"],
 ) -> None:
-    """Add the blocks between the sources and the local parameters of their measurements."""
+    """Add the blocks between the sources and the local parameters of their measurements.
+
+    Parameters
+    ----------
+    source : places of the sources in block order
+    touched : columns of the local parameters of each tile, of which `by_row` has the first rows
+    """
     n_src, flat = cross.shape[-1], cross.reshape(-1)
-    for number, group in enumerate(layout.local_groups):
-        row = layout.columns(group)[layout.element(group.axis, index.exposure, index.detector)]
+    for number, columns in enumerate(touched.T):
         for a in range(2):
-            place = (2 * row + a) * n_src + index.source
+            place = (2 * columns[:, None] + a) * n_src + source
             np.add.at(flat, place.ravel(), by_row[number, a].ravel())
 
 
@@ -247,16 +253,21 @@ def _cross_coefficients(
 
 def _assemble(
     index: Index,
+    columns: Int[np.ndarray, "chunk tile local"],
     layout: VectorLayout,
     sums: TileSums,
     coefficients: Float[np.ndarray, "det 2 coef 2 coef"],
 ) -> tuple[
     Float[np.ndarray, "det calib calib"], Float[np.ndarray, "det calib"], Float[np.ndarray, " det"]
 ]:
-    """Return Hessian, gradient and chi2 of the calibration for each detector."""
+    """Return Hessian, gradient and chi2 of the calibration for each detector.
+
+    Parameters
+    ----------
+    columns : of the local parameters of each tile
+    """
     size, n_det, shared, local = layout.size, layout.n_det, layout.coefficients(), slice(-1)
     detector = index.detector[..., 0]
-    columns = layout.touched(index.exposure[..., 0], detector)
     # Start of each detector's vector in the concatenated vectors.
     first = size * detector[..., None]
     rows = size * (first + columns)[..., :, None]

@@ -9,7 +9,7 @@ dense matrix per source block (`solver.problem.source_blocks`).
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.linalg as sl
@@ -229,18 +229,24 @@ def _without_sources(
     """Return the matrix of Z of each source block, and U - Z Z' without priors."""
     blocks, remaining = equations.source_blocks.blocks, equations.theta.copy()
     ordered = source_factor[equations.source_blocks.order]
-
-    def of_block(
-        block: SourceBlock,
-    ) -> tuple[Float[np.ndarray, "_ 2 _"], Float[np.ndarray, "_ _"]]:
-        cross = equations.cross[block.columns, :, block.places]
-        matrix = lower_solve(ordered[block.places], cross)
-        rows = matrix.reshape(len(matrix), -1)
-        return matrix, rows @ rows.T
-
     # Blocks side by side: BLAS threads would wait for one another in a busy loop.
     with one_blas_thread(), ThreadPoolExecutor(max_workers=_WORKERS) as helpers:
-        parts = list(helpers.map(of_block, blocks))
+        parts = list(helpers.map(partial(_of_block, equations, ordered), blocks))
     for block, (_, product) in zip(blocks, parts, strict=True):
         remaining[np.ix_(block.columns, block.columns)] -= product
     return tuple(matrix for matrix, _ in parts), remaining
+
+
+def _of_block(
+    equations: NormalEquations, source_factor: Float[np.ndarray, "src 2 2"], block: SourceBlock
+) -> tuple[Float[np.ndarray, "_ 2 _"], Float[np.ndarray, "_ _"]]:
+    """Return Z of a source block, and its part of Z Z'.
+
+    Parameters
+    ----------
+    source_factor : L of each source, in block order
+    """
+    cross = equations.cross[block.columns, :, block.places]
+    matrix = lower_solve(source_factor[block.places], cross)
+    rows = matrix.reshape(len(matrix), -1)
+    return matrix, rows @ rows.T

@@ -149,12 +149,12 @@ class VectorLayout:
         self, exposure: Int[np.ndarray, "*n"], detector: Int[np.ndarray, "*n"]
     ) -> Int[np.ndarray, "*n local"]:
         """Return the columns of `local_groups`, as the last axis, of exposures and detectors."""
+        element = {
+            axis: self.element(axis, exposure, detector)
+            for axis in {group.axis for group in self.local_groups}
+        }
         return np.stack(
-            [
-                self.columns(group)[self.element(group.axis, exposure, detector)]
-                for group in self.local_groups
-            ],
-            axis=-1,
+            [self._columns[group.name][element[group.axis]] for group in self.local_groups], axis=-1
         )
 
     def walked(self, exposure: Int[np.ndarray, "*n"]) -> Int[np.ndarray, "*n two_walk"]:
@@ -189,12 +189,12 @@ class VectorLayout:
         """Return the flat vector from values per group."""
         flat = np.empty(self.size)
         for group in self.groups:
-            flat[self.columns(group)] = values[group.name]
+            flat[self._columns[group.name]] = values[group.name]
         return flat
 
     def scatter(self, flat: Shaped[AnyArray, " calib"]) -> dict[str, Shaped[AnyArray, " _"]]:
         """Return the values per group from a flat NumPy or JAX vector."""
-        return {group.name: flat[self.columns(group)] for group in self.groups}
+        return {name: flat[columns] for name, columns in self._columns.items()}
 
     def _length(self, group: Group) -> int:
         sizes = {"exp": self.n_exp, "coef": self.n_coef, "det": self.n_det}

@@ -84,8 +84,8 @@ class Problem:
         self, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
     ) -> dict[str, Float[np.ndarray, "..."]]:
         """Return the parameters as `solver.model.forward.predict` expects them, padded."""
-        values = {**self.layout.scatter(theta), SOURCES.name: sources}
-        return {n: pad(v, BY_NAME[n].axis, self.geometry.sizes) for n, v in values.items()}
+        values, sizes = {**self.layout.scatter(theta), SOURCES.name: sources}, self.geometry.sizes
+        return {n: pad(v, BY_NAME[n].axis, sizes) for n, v in values.items()}
 
     def gathered(
         self, offsets: Mapping[str, Float[np.ndarray, "..."]]

@@ -14,6 +14,8 @@ from solver.runtime.interruption import give_way
 
 _MIN_ANGLE = 1e-9
 _MAX_SWEEPS = 60
+# The first and the second axis of each pair that is rotated.
+_Round = tuple[Int[np.ndarray, " pair"], Int[np.ndarray, " pair"]]
 
 
 def joint_axes(
@@ -29,19 +31,13 @@ def joint_axes(
     rounds = list(_rounds(len(axes)))
     for _ in range(_MAX_SWEEPS):
         give_way()
-        largest = 0.0
-        for a, b in rounds:
-            angles = _angles(matrices, a, b)
-            rotation = _rotation(angles, a, b, len(axes))
-            matrices = rotation.T @ matrices @ rotation
-            axes = axes @ rotation
-            largest = max(largest, float(np.abs(angles).max(initial=0.0)))
+        matrices, axes, largest = _swept(matrices, axes, rounds)
         if largest < _MIN_ANGLE:
             break
     return axes
 
 
-def _rounds(n: int) -> Iterator[tuple[Int[np.ndarray, " pair"], Int[np.ndarray, " pair"]]]:
+def _rounds(n: int) -> Iterator[_Round]:
     """Yield every pair of n axes once, in rounds of disjoint pairs, which rotate at once.
 
     As in a tournament of n players: one stays, the others move on by one place after each round.
@@ -55,26 +51,22 @@ def _rounds(n: int) -> Iterator[tuple[Int[np.ndarray, " pair"], Int[np.ndarray, 
         places = np.concatenate([places[:1], np.roll(places[1:], 1)])
 
 
-def _angles(
+def _swept(
     matrices: Float[np.ndarray, "matrix n n"],
-    a: Int[np.ndarray, " pair"],
-    b: Int[np.ndarray, " pair"],
-) -> Float[np.ndarray, " pair"]:
-    """Return the angles by which to rotate axes a and b, each in the plane of its pair."""
-    difference, mixed = matrices[:, a, a] - matrices[:, b, b], 2.0 * matrices[:, a, b]
-    gain = 2.0 * (difference * mixed).sum(axis=0)
-    loss = (difference**2 - mixed**2).sum(axis=0)
-    return 0.25 * np.arctan2(gain, loss)
-
-
-def _rotation(
-    angles: Float[np.ndarray, " pair"],
-    a: Int[np.ndarray, " pair"],
-    b: Int[np.ndarray, " pair"],
-    n: int,
-) -> Float[np.ndarray, "n n"]:
-    rotation = np.eye(n)
-    rotation[a, a] = rotation[b, b] = np.cos(angles)
-    rotation[b, a] = np.sin(angles)
-    rotation[a, b] = -rotation[b, a]
-    return rotation
+    axes: Float[np.ndarray, "n n"],
+    rounds: list[_Round],
+) -> tuple[Float[np.ndarray, "matrix n n"], Float[np.ndarray, "n n"], float]:
+    """Return the matrices and the axes after every pair was rotated, and the largest angle."""
+    largest, unit = 0.0, np.eye(len(axes))
+    for a, b in rounds:
+        difference, mixed = matrices[:, a, a] - matrices[:, b, b], 2.0 * matrices[:, a, b]
+        gain = 2.0 * (difference * mixed).sum(axis=0)
+        loss = (difference**2 - mixed**2).sum(axis=0)
+        angles = 0.25 * np.arctan2(gain, loss)
+        rotation = unit.copy()
+        rotation[a, a] = rotation[b, b] = np.cos(angles)
+        rotation[b, a] = np.sin(angles)
+        rotation[a, b] = -rotation[b, a]
+        matrices, axes = rotation.T @ matrices @ rotation, axes @ rotation
+        largest = max(largest, float(np.abs(angles).max(initial=0.0)))
+    return matrices, axes, largest

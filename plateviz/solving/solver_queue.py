@@ -111,7 +111,11 @@ class SolverQueue:
             return True
 
     def cancel(self, job: Job) -> None:
-        """Cancel a job at its next progress event; kill the process if there is none in time."""
+        """Cancel a job; its process ends it at its next progress event, or is killed after a while.
+
+        A fit is over for those who wait for it at once, since it leaves nothing that is half
+        written. The jobs behind it wait until the process has ended it.
+        """
         with self._lock:
             if job not in self._jobs:
                 return
@@ -120,6 +124,8 @@ class SolverQueue:
                 job.cancel()
                 return
             self._send({"do": "cancel", "job": job.id})
+            if job.request["do"] == "fit":
+                job.cancel()
         timer = threading.Timer(_GRACE_SECONDS, self._kill_if_running, args=(job,))
         timer.daemon = True
         timer.start()
@@ -195,7 +201,8 @@ class SolverQueue:
             if event["event"] == "ready" or not self._jobs or self._jobs[0].id != event["job"]:
                 return
             self._jobs[0].take(event)
-            if self._jobs[0].status.is_over:
+            # A job that was cancelled is over before its process has ended it.
+            if event["event"] != "progress":
                 self._times.note(self._jobs[0])
                 self._start_next_job()
 

@@ -116,7 +116,12 @@ def test_page_says_why_a_block_is_not_run(page):
 @pytest.mark.usefixtures("few_figures")
 @pytest.mark.parametrize(
     "page",
-    [page for page in PAGES if page != CONTRIBUTING and run_of(page, "sh")],
+    [
+        # Its commands differ in their causes only, whose fits and options have tests of their own.
+        pytest.param(page, marks=pytest.mark.full if page.stem == "causes" else ())
+        for page in PAGES
+        if page != CONTRIBUTING and run_of(page, "sh")
+    ],
     ids=lambda page: page.stem,
 )
 def test_commands_of_a_page_run(page, command, workplace):

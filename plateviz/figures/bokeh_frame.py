@@ -11,6 +11,7 @@ from plateviz.figures.bokeh_glyphs import BokehGlyphs
 from plateviz.figures.figure import Axis, Frame
 from plateviz.figures.theme import FONT, LABEL_SIZE, SMALL_SIZE, TITLE_SIZE, Theme
 from plateviz.figures.tick_count import columns_of_ticks, rows_of_ticks
+from plateviz.figures.tick_numbers import tick_numbers
 from plateviz.figures.words import MENU, Words
 
 # Least room to the left of a frame, screen pixels.
@@ -235,7 +236,7 @@ class BokehFrame:
 
 
 def _axis(axis: Axis) -> models.LinearAxis | models.LogAxis:
-    return models.LogAxis() if axis.is_log else models.LinearAxis()
+    return models.LogAxis() if axis.is_log else models.LinearAxis(formatter=tick_numbers())
 
 
 def _follow_axis(

@@ -12,6 +12,7 @@ from bokeh.models.glyph import Glyph
 from plateviz.figures.figure import HANDLES, By, Glyphs, Look, Ramp
 from plateviz.figures.packed_texts import PackedTexts
 from plateviz.figures.theme import FONT, Theme
+from plateviz.figures.tick_numbers import tick_numbers
 
 _GLYPHS: Mapping[str, Callable[..., Glyph]] = MappingProxyType(
     {
@@ -87,8 +88,10 @@ class BokehGlyphs:
         self._categories: dict[str, models.CategoricalMapper] = {}
         self.hover: models.HoverTool | None = None
         self.bar: models.ColorBar | None = None
-        if any(ramp.label is not None for ramp in _ramps(glyphs)):
-            self.bar = models.ColorBar(width=10)
+        labelled = [ramp for ramp in _ramps(glyphs) if ramp.label is not None]
+        if labelled:
+            formatter = "auto" if labelled[0].is_log else tick_numbers()
+            self.bar = models.ColorBar(width=10, formatter=formatter)
         if glyphs.hover:
             self.hover = models.HoverTool(
                 renderers=[self.renderer], limit=_HOVER_LIMIT, visible=False

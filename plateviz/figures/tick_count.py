@@ -10,6 +10,8 @@ _LEAST, _MOST = 2, 6
 # Screen pixels between two labels beside each other, and for a label above another.
 _GAP, _ROW = 5, 20
 _TYPICAL = 4
+# From here on digits stand in groups of three.
+_GROUPED = 1e4
 
 
 def columns_of_ticks(axis: Axis, width: int) -> int:
@@ -33,7 +35,8 @@ def _label(axis: Axis) -> str:
     step = axis.length / _TYPICAL
     decimals = max(0, -math.floor(math.log10(step))) if step > 0 else 0
     sign = "−" if min(axis.limits) < 0 else ""
-    return f"{sign}{max(map(abs, axis.limits)):.{decimals}f}"
+    most = max(map(abs, axis.limits))
+    return f"{sign}{most:{',' if most >= _GROUPED else ''}.{decimals}f}"
 
 
 def _limited(number: float) -> int:

@@ -28,4 +28,5 @@ def log_ticks(
 
 
 def _label(tick: float) -> str:
-    return f"{tick:,.0f}" if tick == int(tick) else f"{tick:g}"
+    # Groups of three digits from five on, as on linear axes.
+    return f"{tick:{',' if tick >= 1e4 else ''}.0f}" if tick == int(tick) else f"{tick:g}"

@@ -30,7 +30,11 @@ def _size(case: Case) -> str:
 
 def _fall(case: Case) -> str:
     test = case.found.test
-    return f"χ² would fall by {test.statistic:,.0f} with {test.expected:.0f} parameters more"
+    # Scaled, because a stated noise that is too small would make every cause look large.
+    return (
+        f"χ², scaled to the scatter that is left, would fall by {test.statistic:,.0f} with "
+        f"{test.expected:.0f} parameters more"
+    )
 
 
 def _degree(case: Case) -> str:

@@ -149,10 +149,8 @@ class VectorLayout:
         self, exposure: Int[np.ndarray, "*n"], detector: Int[np.ndarray, "*n"]
     ) -> Int[np.ndarray, "*n local"]:
         """Return the columns of `local_groups`, as the last axis, of exposures and detectors."""
-        element = {
-            axis: self.element(axis, exposure, detector)
-            for axis in {group.axis for group in self.local_groups}
-        }
+        axes: set[Axis] = {group.axis for group in self.local_groups}
+        element = {axis: self.element(axis, exposure, detector) for axis in axes}
         return np.stack(
             [self._columns[group.name][element[group.axis]] for group in self.local_groups], axis=-1
         )

@@ -236,7 +236,11 @@ class BokehFrame:
 
 
 def _axis(axis: Axis) -> models.LinearAxis | models.LogAxis:
-    return models.LogAxis() if axis.is_log else models.LinearAxis(formatter=tick_numbers())
+    if axis.is_log:
+        return models.LogAxis()
+    drawn = models.LinearAxis()
+    drawn.update(formatter=tick_numbers())
+    return drawn
 
 
 def _follow_axis(

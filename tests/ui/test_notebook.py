@@ -151,12 +151,13 @@ def assert_cells_show_what_they_are_to_show(notebook):
     assert "<iframe src='http://127.0.0.1:" in shown["dashboard"]["text/html"]
 
 
+# What a notebook shows is tested without Jupyter, and its cells run as a served page below.
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("application", "path"),
     [
         pytest.param("jupyterlab", "lab/tree", id="lab"),
-        # The two share their server and most of their code.
-        pytest.param("notebook", "notebooks", id="classic", marks=pytest.mark.full),
+        pytest.param("notebook", "notebooks", id="classic"),
     ],
 )
 def test_tour_runs_and_every_figure_is_drawn(nbformat, folder, open_jupyter, application, path):

@@ -11,7 +11,7 @@ from plateviz.figures.bokeh_glyphs import BokehGlyphs
 from plateviz.figures.figure import Axis, Frame
 from plateviz.figures.theme import FONT, LABEL_SIZE, SMALL_SIZE, TITLE_SIZE, Theme
 from plateviz.figures.tick_count import columns_of_ticks, rows_of_ticks
-from plateviz.figures.tick_numbers import tick_numbers
+from plateviz.figures.tick_numbers import with_tick_numbers
 from plateviz.figures.words import MENU, Words
 
 # Least room to the left of a frame, screen pixels.
@@ -236,11 +236,7 @@ class BokehFrame:
 
 
 def _axis(axis: Axis) -> models.LinearAxis | models.LogAxis:
-    if axis.is_log:
-        return models.LogAxis()
-    drawn = models.LinearAxis()
-    drawn.update(formatter=tick_numbers())
-    return drawn
+    return models.LogAxis() if axis.is_log else models.LinearAxis()
 
 
 def _follow_axis(
@@ -252,6 +248,8 @@ def _follow_axis(
 ) -> None:
     start, end = axis.limits
     limits.update(start=start, end=end, reset_start=start, reset_end=end)
+    if not axis.is_log:
+        with_tick_numbers(drawn, axis.limits)
     if axis.ticks is not None:
         places = [place for place, _ in axis.ticks]
         if not isinstance(drawn.ticker, models.FixedTicker):

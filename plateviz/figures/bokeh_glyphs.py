@@ -12,7 +12,7 @@ from bokeh.models.glyph import Glyph
 from plateviz.figures.figure import HANDLES, By, Glyphs, Look, Ramp
 from plateviz.figures.packed_texts import PackedTexts
 from plateviz.figures.theme import FONT, Theme
-from plateviz.figures.tick_numbers import tick_numbers
+from plateviz.figures.tick_numbers import with_tick_numbers
 
 _GLYPHS: Mapping[str, Callable[..., Glyph]] = MappingProxyType(
     {
@@ -88,10 +88,8 @@ class BokehGlyphs:
         self._categories: dict[str, models.CategoricalMapper] = {}
         self.hover: models.HoverTool | None = None
         self.bar: models.ColorBar | None = None
-        labelled = [ramp for ramp in _ramps(glyphs) if ramp.label is not None]
-        if labelled:
-            formatter = "auto" if labelled[0].is_log else tick_numbers()
-            self.bar = models.ColorBar(width=10, formatter=formatter)
+        if any(ramp.label is not None for ramp in _ramps(glyphs)):
+            self.bar = models.ColorBar(width=10)
         if glyphs.hover:
             self.hover = models.HoverTool(
                 renderers=[self.renderer], limit=_HOVER_LIMIT, visible=False
@@ -166,6 +164,8 @@ class BokehGlyphs:
         self._mapper.update(low=low, high=high, palette=theme.palette(ramp.palette))
         if self.bar is not None:
             self.bar.update(color_mapper=self._mapper, title=ramp.label or None)
+            if not ramp.is_log:
+                with_tick_numbers(self.bar, ramp.limits)
         if self.kind == "image":
             return {"color_mapper": self._mapper}
         return {name: Field(ramp.column, transform=self._mapper)}

@@ -5,13 +5,12 @@ import math
 from plateviz.figures.figure import Axis
 from plateviz.figures.text_width import text_width
 from plateviz.figures.theme import SMALL_SIZE
+from plateviz.figures.tick_numbers import is_grouped
 
 _LEAST, _MOST = 2, 6
 # Screen pixels between two labels beside each other, and for a label above another.
 _GAP, _ROW = 5, 20
 _TYPICAL = 4
-# From here on digits stand in groups of three.
-_GROUPED = 1e4
 
 
 def columns_of_ticks(axis: Axis, width: int) -> int:
@@ -36,7 +35,7 @@ def _label(axis: Axis) -> str:
     decimals = max(0, -math.floor(math.log10(step))) if step > 0 else 0
     sign = "−" if min(axis.limits) < 0 else ""
     most = max(map(abs, axis.limits))
-    return f"{sign}{most:{',' if most >= _GROUPED else ''}.{decimals}f}"
+    return f"{sign}{most:{',' if is_grouped(axis.limits) else ''}.{decimals}f}"
 
 
 def _limited(number: float) -> int:

@@ -1,22 +1,21 @@
-"""Numbers at ticks, as a journal prints them: 5000 and 25,000, with the decimals that all need."""
+"""Numbers at ticks, as journals print them: 5000 and 25,000, never 2.5e+4."""
 
 from bokeh import models
 
-# As many digits as a double is sure to have, so that 0.1 + 0.2 is 0.3.
-_CODE = """
-    const short = number => String(+(number || 0).toPrecision(12));
-    const reach = Math.max(...ticks.map(Math.abs));
-    let text = short(tick);
-    if (reach >= 1e-4 && reach < 1e12) {
-      const digits = Math.max(...ticks.map(one => (short(one).split(".")[1] ?? "").length));
-      text = (+text).toLocaleString("en-US", {
-        minimumFractionDigits: digits, maximumFractionDigits: digits, useGrouping: reach >= 1e4,
-      });
-    }
-    return text.replaceAll("-", "−");
-"""
+from plateviz.figures.figure import Limits
+
+# From here on digits stand in groups of three.
+_GROUPED, _FORMAT = 1e4, "0,0.[000]"
 
 
-def tick_numbers() -> models.CustomJSTickFormatter:
-    """Return what writes the numbers at the ticks of a linear axis or colour bar."""
-    return models.CustomJSTickFormatter(code=_CODE)
+def with_tick_numbers(drawn: models.Axis | models.ColorBar, limits: Limits) -> None:
+    """Let a linear axis or colour bar write its numbers as those between two limits are written."""
+    grouped = is_grouped(limits)
+    if isinstance(drawn.formatter, models.NumeralTickFormatter) is not grouped:
+        with_groups = models.NumeralTickFormatter(format=_FORMAT)
+        drawn.update(formatter=with_groups if grouped else models.BasicTickFormatter())
+
+
+def is_grouped(limits: Limits) -> bool:
+    """Return whether the digits of numbers between two limits stand in groups."""
+    return max(map(abs, limits)) >= _GROUPED

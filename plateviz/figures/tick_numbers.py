@@ -5,15 +5,20 @@ from bokeh import models
 from plateviz.figures.figure import Limits
 
 # From here on digits stand in groups of three.
-_GROUPED, _FORMAT = 1e4, "0,0.[000]"
+_GROUPED = 1e4
+# As many decimals as a date needs in the smallest frame; none that are zero at the end.
+_FORMAT = "0,0.[000000000]"
 
 
 def with_tick_numbers(drawn: models.Axis | models.ColorBar, limits: Limits) -> None:
     """Let a linear axis or colour bar write its numbers as those between two limits are written."""
     grouped = is_grouped(limits)
     if isinstance(drawn.formatter, models.NumeralTickFormatter) is not grouped:
-        with_groups = models.NumeralTickFormatter(format=_FORMAT)
-        drawn.update(formatter=with_groups if grouped else models.BasicTickFormatter())
+        drawn.update(
+            formatter=models.NumeralTickFormatter(format=_FORMAT)
+            if grouped
+            else models.BasicTickFormatter()
+        )
 
 
 def is_grouped(limits: Limits) -> bool:

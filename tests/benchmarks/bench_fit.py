@@ -4,13 +4,13 @@
 
 One unit is NumPy's `Z.T @ Z` for a float64 Z of 2 x sources rows and as many columns as
 there are calibration parameters: the largest product that the elimination of the sources
-needs. It is timed in the same run, so that results of different machines can be compared.
+needs. It is timed before each stage, so that results of different machines can be compared. Each
+row is written as soon as it is known: a run that is ended early has told what it found.
 """
 
 import argparse
-import statistics
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,6 +47,7 @@ from tests.benchmarks.stages import (
 
 # 576 parameters more than by default.
 WALKING = FitSettings(drift_walk=2)
+ONE_STEP = "svi, one step"
 
 
 def main() -> None:
@@ -61,14 +62,6 @@ def main() -> None:
     # Measured before the other stages, which keep several solutions at once.
     peak = peak_memory_mib()
     fit_orbit(data, MINI_MOCK, WALKING)
-    product, units, timings = unit_product(problem), [], {}
-    for name, work in stages(data, problem, settings, warm).items():
-        # Timed before each stage, because the speed of a shared machine varies.
-        units.append(time_of(product, UNIT_REPEATS))
-        timings[name] = time_of(work, arguments.repeat)
-    unit = statistics.median(units)
-    # The time of a step includes its share of the linearisations of a block.
-    timings["svi, one step"] /= settings.svi.block
     write(machine())
     write(f"JAX on {device()}")
     write(
@@ -76,9 +69,17 @@ def main() -> None:
         f"{len(problem.exposures)} exposures, {problem.layout.size} calibration parameters"
     )
     write(f"converged: {warm.summary['converged']}, iterations: {warm.summary['iterations']}")
+    product = unit_product(problem)
+    unit = time_of(product, UNIT_REPEATS)
     write(f"unit: Z.T @ Z, Z of {2 * problem.n_src} x {problem.layout.size}: {unit:.4f} s\n")
     write(f"{'stage':<44}{'seconds':>9}{'units':>9}")
-    for name, seconds in timings.items():
+    for name, work in stages(data, problem, settings, warm):
+        # Timed before each stage, because the speed of a shared machine varies.
+        unit = time_of(product, UNIT_REPEATS)
+        seconds = time_of(work, arguments.repeat)
+        if name == ONE_STEP:
+            # Its share of the linearisations of a block is included.
+            seconds /= settings.svi.block
         write(f"{name:<44}{seconds:9.3f}{seconds / unit:9.1f}")
     write(f"\npeak memory of one fit, simulation included: {peak:.0f} MiB")
 
@@ -94,8 +95,8 @@ def parse_arguments() -> argparse.Namespace:
 
 def stages(
     data: OrbitData, problem: Problem, settings: FitSettings, fit: FitResult
-) -> dict[str, Callable[[], object]]:
-    """Return the timed stages by name.
+) -> Iterator[tuple[str, Callable[[], object]]]:
+    """Yield the name and the work of each stage to be timed.
 
     Parameters
     ----------
@@ -108,31 +109,28 @@ def stages(
     if reduced is None:
         sys.exit("the simulated orbit has no solution")
     covariance = covariances(reduced)
-    walking = build_problem(data, MINI_MOCK, WALKING)
+    yield "build_problem", lambda: build_problem(data, MINI_MOCK, settings)
+    yield "rebuilt, for other settings", lambda: rebuilt(problem, MINI_MOCK, settings)
+    yield "accumulate, one linearisation pass", lambda: accumulate(problem, theta, sources)
+    yield "gradient, one pass", lambda: gradient(problem, theta, sources)
+    yield "reduce", lambda: eliminate_sources(equations, problem.priors)
+    yield "marginal covariances of the sources", lambda: marginal_covariance(reduced)
+    yield "all covariances", lambda: covariances(reduced)
+    yield "residuals with leverage", lambda: residuals(problem, theta, sources, covariance)
+    yield "from the catalogue to marginal sigmas", lambda: fit_with_sigmas(problem, settings)
     found = changes(problem)
-    return {
-        "build_problem": lambda: build_problem(data, MINI_MOCK, settings),
-        "rebuilt, for other settings": lambda: rebuilt(problem, MINI_MOCK, settings),
-        "accumulate, one linearisation pass": lambda: accumulate(problem, theta, sources),
-        "gradient, one pass": lambda: gradient(problem, theta, sources),
-        "reduce": lambda: eliminate_sources(equations, problem.priors),
-        "marginal covariances of the sources": lambda: marginal_covariance(reduced),
-        "all covariances": lambda: covariances(reduced),
-        "residuals with leverage": lambda: residuals(problem, theta, sources, covariance),
-        "from the catalogue to marginal sigmas": lambda: fit_with_sigmas(problem, settings),
-        **{f"what if: {name}": what_if(data, *change) for name, change in found.items()},
-        **{
-            f"what if: {name}, precomputed": what_if(data, *change, is_prepared=True)
-            for name, change in found.items()
-            if name.startswith("order")
-        },
-        "svi, one step": svi_block(problem, settings, mode),
-        "to marginal sigmas, random walk 2": lambda: fit_with_sigmas(walking, WALKING),
-        "fit_orbit, with all tables": lambda: fit_orbit(data, MINI_MOCK, settings),
-        "fit_orbit, random walk 2": lambda: fit_orbit(data, MINI_MOCK, WALKING),
-        # Of a copy, which keeps nothing of the time before.
-        "the verdict on a fit": lambda: with_verdict(replace(fit)),
-    }
+    for name, change in found.items():
+        yield f"what if: {name}", what_if(data, *change)
+    for name, change in found.items():
+        if name.startswith("order"):
+            yield f"what if: {name}, precomputed", what_if(data, *change, is_prepared=True)
+    yield ONE_STEP, svi_block(problem, settings, mode)
+    walking = build_problem(data, MINI_MOCK, WALKING)
+    yield "to marginal sigmas, random walk 2", lambda: fit_with_sigmas(walking, WALKING)
+    yield "fit_orbit, with all tables", lambda: fit_orbit(data, MINI_MOCK, settings)
+    yield "fit_orbit, random walk 2", lambda: fit_orbit(data, MINI_MOCK, WALKING)
+    # Of a copy, which keeps nothing of the time before.
+    yield "the verdict on a fit", lambda: with_verdict(replace(fit))
 
 
 def changes(problem: Problem) -> dict[str, tuple[FitSettings, FitSettings]]:

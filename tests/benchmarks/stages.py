@@ -15,7 +15,7 @@ from solver.linear.covariances import marginal_covariance
 from solver.problem.problem import Problem
 from solver.problem.problem_cache import ProblemCache
 
-UNIT_REPEATS = 5
+UNIT_REPEATS = 9
 
 
 def unit_product(problem: Problem) -> Callable[[], object]:

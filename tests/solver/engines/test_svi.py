@@ -135,7 +135,9 @@ def test_other_settings_start_from_the_beginning(small_orbit):
     with pytest.raises(CancelledError):
         fitter.fit(settings, cancel)
     iterations = []
-    fitter.fit(settings.with_(order=4), lambda row: iterations.append(row.iteration))
+    fitter.fit(
+        settings.with_(prior_widths={"sources": 2.0}), lambda row: iterations.append(row.iteration)
+    )
     assert iterations[0] == settings.svi.block
 
 

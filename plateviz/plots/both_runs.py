@@ -53,5 +53,7 @@ def figure_of_both_runs(figure: SurveyFigure, tables: SurveyTables) -> Figure:
     """
     if tables.other is None:
         return message(_TITLE, "There is no run to compare with.")
-    a, b = replace(tables.other, other=None), replace(tables, other=None)
+    # Each knows of the other, so that arrows have one scale.
+    a = replace(tables.other, other=replace(tables, other=None))
+    b = replace(tables, other=replace(tables.other, other=None))
     return with_same_limits(figure.title, figure.plot(a), figure.plot(b))

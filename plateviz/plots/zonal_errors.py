@@ -25,12 +25,15 @@ _TYPICAL_SHARE = 0.045
 _LIMIT = 3.0
 
 
-def plot_zonal_errors(zonal: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figure:
+def plot_zonal_errors(
+    zonal: pd.DataFrame, *, arrow_scale: float | None = None, width: int = PANEL_WIDTH
+) -> Figure:
     """Draw the most likely field of smooth errors, catalogue minus sky, east to the left.
 
     Parameters
     ----------
     zonal : `run_schema.ZONAL_FIELD`
+    arrow_scale : drawn length over error, deg mas^-1; None for that of the field alone
     width : of the frame, screen pixels
     """
     if zonal.empty:
@@ -43,11 +46,9 @@ def plot_zonal_errors(zonal: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figur
         u=table["error_ra_mas"],
         v=table["error_dec_mas"],
     )
-    half = _MARGIN * float(zonal[["half_ra", "half_dec"]].to_numpy().max())
-    area = Field((half, -half), (-half, half))
-    # To the scale of what can be seen: a field that is mere chance has short arrows.
-    size = max(found.typical_mas, found.rms_mas)
-    scale, length = round_125(_TYPICAL_SHARE * area.width / size), round_125(2.0 * size)
+    area = _area(zonal)
+    scale = arrow_scale or _scale(zonal)
+    length = round_125(2.0 * _TYPICAL_SHARE * area.width / scale)
     return framed(
         [
             *arrows(vectors, scale=scale, field=area, colour="mark", hover=_HOVER),
@@ -61,6 +62,17 @@ def plot_zonal_errors(zonal: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figur
     )
 
 
+def _area(zonal: pd.DataFrame) -> Field:
+    half = _MARGIN * float(zonal[["half_ra", "half_dec"]].to_numpy().max())
+    return Field((half, -half), (-half, half))
+
+
+def _scale(zonal: pd.DataFrame) -> float:
+    """Return the scale of what can be seen: a field that is mere chance has short arrows."""
+    found = zonal_statistics(zonal)
+    return round_125(_TYPICAL_SHARE * _area(zonal).width / max(found.typical_mas, found.rms_mas))
+
+
 def _subtitle(found: ZonalStatistics) -> str:
     is_more = found.chi2 > found.dof + _LIMIT * found.scatter
     size = f"rms {angle_text(found.rms_mas)}" if is_more else "as by chance"
@@ -71,7 +83,9 @@ def _subtitle(found: ZonalStatistics) -> str:
 
 
 def _plot(tables: SurveyTables) -> Figure:
-    return plot_zonal_errors(tables.tests.zonal)
+    both = [tables, *([tables.other] if tables.other else [])]
+    scales = [_scale(one.tests.zonal) for one in both if not one.tests.zonal.empty]
+    return plot_zonal_errors(tables.tests.zonal, arrow_scale=min(scales, default=None))
 
 
 SURVEY_FIGURES = (

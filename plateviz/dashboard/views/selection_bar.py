@@ -27,7 +27,9 @@ from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.dashboard.views.selection_list import SelectionList
 from solver.errors import InputError
 
-_WORDS: Mapping[str, Any] = MappingProxyType({"variant": "body2", "margin": (0, 8), "sx": IN_BAR})
+_WORDS: Mapping[str, Any] = MappingProxyType(
+    {"variant": "body2", "margin": (0, 8, 0, 24), "align": "center", "sx": IN_BAR}
+)
 
 
 class SelectionBar(pn.viewable.Viewer):

@@ -45,6 +45,26 @@ def test_every_figure_of_a_run_stands_beside_that_of_the_other(figure, tables):
     assert plots_of(both)
 
 
+def test_arrows_of_both_runs_have_one_scale(tables):
+    field = tables.tests.zonal
+    larger = field.assign(coefficient=5.0 * field["coefficient"], rms=5.0 * field["rms"])
+    other = replace(tables.other, tests=replace(tables.other.tests, zonal=larger))
+    (figure,) = (one for one in comparable_survey_figures() if one.name == "zonal-errors")
+    a, b = figure_of_both_runs(figure, replace(tables, other=other)).frames
+    assert a["key text"].columns["text"] == b["key text"].columns["text"]
+    np.testing.assert_allclose(largest_arrow(a), 5.0 * largest_arrow(b))
+    # Alone, the smaller field is drawn to a scale of its own.
+    (alone,) = figure.plot(replace(tables, other=None))
+    assert largest_arrow(alone) > 2.0 * largest_arrow(b)
+
+
+def largest_arrow(frame):
+    """Return the largest extent of a stroke; the first stroke of an arrow is its shaft."""
+    drawn = frame["arrows"]
+    x0, y0, x1, y1 = (drawn.values(name) for name in ("x0", "y0", "x1", "y1"))
+    return np.hypot(x1 - x0, y1 - y0).max()
+
+
 def test_catalogue_that_runs_share_is_not_compared():
     names = [one.name for one in comparable_survey_figures()]
     assert "orbit-health" in names

@@ -20,7 +20,13 @@ def test_step_is_at_the_field_that_comes_first_in_time(step, field):
         diagnosis=SimpleNamespace(patterns=patterns),
         result=SimpleNamespace(exposures=exposures),
     )
-    assert said_of(case).title == f"the distortion changes at field {field}"
+    said = said_of(case)
+    assert said.title == f"the distortion changes at field {field}"
+    assert said.words == (
+        "The terms of the second degree are not the same before and after: 100 nm rms on the focal "
+        "plane; χ², scaled to the scatter that is left, would fall by 50 with 6 parameters more."
+    )
+    assert said.options == ("--field-distortion 2",)
 
 
 @pytest.mark.parametrize(("kurtosis", "title"), [(0.3, "more large errors"), (-0.3, "fewer large")])

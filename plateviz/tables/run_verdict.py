@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from plateviz.tables.causes import Cause
 from plateviz.tables.run_causes import run_causes
 from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests, diagnose_run
 from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
@@ -57,7 +58,8 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     elif len(diagnosis.states) == 1 and (title := str(tables.orbit_causes["title"].iloc[0])):
         headline = f"{headline[:-1]}: {title}."
     reasons = [*(cause.sentence() for cause in causes), *_tested(diagnosis, found, tables)]
-    reasons += [*_fitted(orbits), *_motions(motions), *_sensitivity(tables.zonal)]
+    reasons += [*_fitted(orbits), *_motions(motions)]
+    reasons += _smooth_errors(tables.zonal, found, causes)
     faults = [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
     notable = _failed(orbits)
     if len(far):
@@ -138,12 +140,21 @@ def _motions(motions: pd.DataFrame) -> list[str]:
     ]
 
 
-def _sensitivity(zonal: pd.DataFrame) -> list[str]:
-    """Return how small smooth errors of the catalogue are seen."""
+def _smooth_errors(
+    zonal: pd.DataFrame, found: Sequence[Test], causes: Sequence[Cause]
+) -> list[str]:
+    """Return how small smooth errors of the catalogue are seen, unless they are a cause."""
     if zonal.empty or not np.isfinite(zonal["typical"].iloc[0]):
         return [
             "Smooth errors of the catalogue were not looked for: that takes eight orbits, fitted "
             "by this version."
+        ]
+    is_found = any(test.subject == "zonal" for test in found)
+    if is_found and all(cause.name != "zonal-errors" for cause in causes):
+        return [
+            f"The catalogue may have smooth errors as well, of about {zonal['rms'].iloc[0]:.2g} "
+            "mas along each axis: what is named first can look like them. They can be told from "
+            "it once it is mended."
         ]
     return [
         f"Smooth errors of the catalogue would be seen in half of such runs if their rms were "

@@ -56,6 +56,16 @@ def test_smooth_errors_of_the_catalogue_are_named_with_what_they_spoil(good):
     assert float(value) > 1.0
 
 
+def test_smooth_errors_beside_a_more_certain_cause_are_not_passed_over(good):
+    drifting = {"orbit_causes": causes(30), "orbit_tests": orbit_tests(5.0)}
+    verdict = judged(good, zonal=zonal(80.0), **drifting)
+    assert [cause.name for cause in verdict.causes] == ["distortion-drifts"]
+    (sentence,) = (one for one in verdict.reasons if "smooth errors" in one.lower())
+    assert "may have smooth errors as well, of about 0.4 mas" in sentence
+    (sentence,) = (one for one in judged(good, **drifting).reasons if "Smooth errors" in one)
+    assert "would be seen in half" in sentence
+
+
 def test_cause_that_many_orbits_name_is_that_of_the_run(good):
     verdict = judged(good, orbit_causes=causes(30), orbit_tests=orbit_tests(5.0))
     assert verdict.state == "bad"

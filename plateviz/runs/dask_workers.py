@@ -13,7 +13,8 @@ from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 from plateviz.cache import keep_compilations
 from plateviz.runs.run import Run
 from plateviz.runs.worker_scratch import worker_scratch
-from plateviz.tables.verdict import with_verdict
+from plateviz.tables.verdict import orbit_verdict, with_verdict
+from solver.data.result import FitResult
 from solver.errors import DiskError, FitError, InputError
 from solver.io.disk import disk_error
 from solver.io.survey import read_survey_instrument, read_survey_orbit
@@ -67,8 +68,21 @@ def _fit(run: Run, orbit: int) -> None:
     instrument = read_survey_instrument(run.survey)
     fitter = OrbitFitter(read_survey_orbit(run.survey, orbit), instrument)
     result = with_verdict(fitter.fit(run.settings()))
-    tables = {"history": fitter.history(result), **fitter.sky_statistics(result)}
+    try:
+        tables = {"history": fitter.history(result), **fitter.sky_statistics(result)}
+    except FitError as error:
+        raise FitError(_with_cause(str(error), result)) from error
     run.keep(orbit, result, tables)
+
+
+def _with_cause(reason: str, result: FitResult) -> str:
+    """Return why an orbit has no solution, and what to do where the verdict knows the cause."""
+    causes = orbit_verdict(result).causes
+    # What the residuals look like before the last step is no more than a hint.
+    if not causes or causes[0].name == "not-converged":
+        return reason
+    title, options = causes[0].title, " ".join(causes[0].options)
+    return f"{reason}. {title[0].upper()}{title[1:]}: {causes[0].action} ({options})"
 
 
 @contextmanager

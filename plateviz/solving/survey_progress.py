@@ -85,4 +85,5 @@ def _failure_message(failed: dict[int, str]) -> str:
     lines = [f"  {message}" for _, message in sorted(failed.items())[:_MAX_LISTED]]
     more = len(failed) - len(lines)
     lines += [f"  and {more} more"] if more > 0 else []
-    return "\n".join([f"{len(failed)} orbits failed; the others are kept:", *lines])
+    counted = "1 orbit" if len(failed) == 1 else f"{len(failed)} orbits"
+    return "\n".join([f"{counted} failed; what else is fitted is kept:", *lines])

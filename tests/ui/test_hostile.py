@@ -31,7 +31,7 @@ def survey(tmp_path_factory, chromium_path):
     measurement_path(directory, 1).write_bytes(b"PAR1")
     command = [sys.executable, "-m", "plateviz.cli.main", "survey", str(directory)]
     run = subprocess.run([*command, "--workers", "1"], capture_output=True, text=True)
-    assert "orbits failed" in run.stderr
+    assert "1 orbit failed" in run.stderr
     # The command refuses such a name, and a folder may be copied to it.
     shutil.copytree(directory / "runs" / "default", directory / "runs" / HOSTILE)
     return directory

@@ -24,6 +24,8 @@ from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from solver.errors import InputError
 from solver.io.survey import measurement_path
+from solver.simulate.settings import SurveySettings
+from solver.simulate.survey import simulate_survey
 
 pytestmark = pytest.mark.slow
 
@@ -69,6 +71,24 @@ def test_complete_run_is_not_changed(report, fitted_survey):
     again = fit_survey(fitted_survey, "one", SETTINGS)
     assert (again.fitted, again.kept) == ([], [0, 1, 2])
     assert {p: p.stat().st_mtime_ns for p in report.run.directory.rglob("*")} == before
+
+
+@pytest.mark.slow
+def test_orbit_without_a_solution_says_what_to_do(tmp_path):
+    survey = tmp_path / "sky"
+    settings = SurveySettings(orbits=1, seed=3, defects=("swapped=5%",)).scaled(4_000)
+    simulate_survey(survey, settings)
+    failed = fit_survey(survey, "swapped", SETTINGS, workers=1).failed
+    assert failed[0].endswith(
+        "before the steps became small. Measurements have each other's identification: let the "
+        "fit find, list and leave them out (--robust)"
+    )
+
+
+def test_orbit_that_was_ended_early_says_that_only(fitted_survey):
+    hurried = SETTINGS.with_(max_iterations=1)
+    failed = fit_survey(fitted_survey, "hurried", hurried, [0], workers=1).failed
+    assert failed[0].endswith("before the steps became small")
 
 
 def test_run_in_parts_and_with_a_failed_orbit_ends_as_the_same_run(report, fitted_survey):

@@ -1,6 +1,7 @@
 """Fit of a whole survey with a line of progress."""
 
 import time
+from collections.abc import Sized
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
@@ -68,11 +69,11 @@ def require_trust(report: "Report", verdict: Verdict) -> None:
     if orbits:
         listed = ", ".join(orbits[:_MAX_LISTED])
         listed += f" and {len(orbits) - _MAX_LISTED} more" if len(orbits) > _MAX_LISTED else ""
-        counted = "1 orbit" if len(orbits) == 1 else f"{len(orbits)} orbits"
         raise DistrustError(
-            f"the solutions of {counted} should not be trusted as they are: {listed}; they are "
-            f"written. `plateviz report {quote(str(report.run.survey))} --run {report.run.name} "
-            f"--orbit {orbits[0]}` says why, and --accept ends with exit code 0"
+            f"the solutions of {_counted(orbits)} should not be trusted as they are: {listed}; "
+            f"they are written. `plateviz report {quote(str(report.run.survey))} "
+            f"--run {report.run.name} --orbit {orbits[0]}` says why, and --accept ends with exit "
+            "code 0"
         )
     if verdict.state == "bad":
         raise DistrustError(
@@ -85,5 +86,8 @@ def _failure_message(failed: dict[int, str]) -> str:
     lines = [f"  {message}" for _, message in sorted(failed.items())[:_MAX_LISTED]]
     more = len(failed) - len(lines)
     lines += [f"  and {more} more"] if more > 0 else []
-    counted = "1 orbit" if len(failed) == 1 else f"{len(failed)} orbits"
-    return "\n".join([f"{counted} failed; what else is fitted is kept:", *lines])
+    return "\n".join([f"{_counted(failed)} failed; what else is fitted is kept:", *lines])
+
+
+def _counted(orbits: Sized) -> str:
+    return "1 orbit" if len(orbits) == 1 else f"{len(orbits)} orbits"

@@ -101,7 +101,10 @@ def _in_words(diagnosis: RunDiagnosis, found: Sequence[Test]) -> list[TestInWord
 
 def _failed(orbits: pd.DataFrame) -> list[str]:
     failed = orbits[orbits["status"] == FAILED]
-    return [f"Orbit {row.orbit_id} has no solution: {row.message}" for row in failed.itertuples()]
+    return [
+        f"Orbit {number} has no solution: {reason.removeprefix(f'orbit {number}: ')}"
+        for number, reason in zip(failed["orbit_id"], failed["message"], strict=True)
+    ]
 
 
 def _named(orbits: pd.Series) -> str:

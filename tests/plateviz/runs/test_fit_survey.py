@@ -73,7 +73,6 @@ def test_complete_run_is_not_changed(report, fitted_survey):
     assert {p: p.stat().st_mtime_ns for p in report.run.directory.rglob("*")} == before
 
 
-@pytest.mark.slow
 def test_orbit_without_a_solution_says_what_to_do(tmp_path):
     survey = tmp_path / "sky"
     settings = SurveySettings(orbits=1, seed=3, defects=("swapped=5%",)).scaled(4_000)

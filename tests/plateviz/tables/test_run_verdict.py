@@ -245,6 +245,9 @@ def test_run_names_its_failed_orbits(survey):
     assert verdict.state == "bad"
     failed = [sentence for sentence in verdict.notable if "has no solution" in sentence]
     assert [sentence.split()[1] for sentence in failed] == ["11", "12"]
+    named = survey.orbits.assign(message="orbit 11: too few measurements")
+    verdict = run_verdict(named, survey.motions, no_tests())
+    assert "Orbit 11 has no solution: too few measurements" in verdict.notable
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ CAMPAIGN = Path(__file__).resolve().parent / "campaigns" / "mutations.py"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("trials", [120, pytest.param(500, marks=pytest.mark.full)])
+@pytest.mark.parametrize("trials", [30, pytest.param(500, marks=pytest.mark.full)])
 def test_first_trials_have_no_fault(trials, tmp_path):
     records = tmp_path / "mutations.jsonl"
     command = [sys.executable, str(CAMPAIGN), "--trials", str(trials), "--records", str(records)]

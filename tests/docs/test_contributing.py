@@ -156,6 +156,7 @@ def test_recipes_are_clean_code(tree, run_in):
     run_in(tree, "-m", "ruff", "format", "--diff", *paths)
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_parameter_group_is_fitted(tree, run_in):
     assert set(add("Add a parameter group", tree)) == GROUP_FILES

@@ -123,6 +123,7 @@ def test_renumbered_exposures_only_reorder_the_rows(small_orbit, result, fit, wi
     )
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_unmeasured_detector_does_not_change_the_solution(small_orbit, with_tables, fit):
     rows = small_orbit.data.measurements

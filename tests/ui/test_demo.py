@@ -25,6 +25,7 @@ main()
 _PATIENCE_SECONDS = 400
 
 
+@pytest.mark.full
 def test_demo_shows_the_first_orbit_and_then_the_whole_survey(tmp_path, open_page):
     _see_demo(tmp_path, open_page, ("-c", SMALL), 6)
 

@@ -39,6 +39,7 @@ def test_fit_prints_a_summary_as_text(run, sample, tmp_path):
     assert "36312 measurements of 814 sources (58 reference)" in out
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_svi_with_a_checkpoint_stops_at_the_limit_and_removes_it(run, sample, tmp_path):
     """At the limit of steps, the exit code is 1 and the checkpoint file is removed."""

@@ -35,8 +35,9 @@ def shell_of(page):
     return re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
 
 
-def test_page_is_reproducible_except_for_its_time(report, page):
-    later = page_of(report, made=MADE.replace(year=2031))
+def test_page_is_reproducible_except_for_its_time(fit_result, instrument, few_figures):
+    report = orbit_report(fit_result, instrument, FACTS)
+    page, later = (page_of(report, made=MADE.replace(year=year)) for year in (2030, 2031))
     assert later != page
     assert later.replace("2031-01-02", "2030-01-02") == page
 
@@ -60,7 +61,7 @@ def test_choices_can_be_left_out(fit_result, instrument, report):
     assert any(len(figure.choices) > 1 for figure in report.figures)
 
 
-def test_page_has_command_settings_and_hashes(fit_result, instrument):
+def test_page_has_command_settings_and_hashes(fit_result, instrument, few_figures):
     hashed = replace(fit_result, provenance={"obs.fits": "0123abcd"})
     shell = shell_of(page_of(orbit_report(hashed, instrument, FACTS)))
     for text in ("plateviz report &lt;b&gt;here&lt;/b&gt;", "0123abcd", "gauss-newton"):

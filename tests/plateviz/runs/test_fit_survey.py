@@ -133,6 +133,7 @@ def test_killed_run_continues_with_the_missing_orbits(report, fitted_survey):
     assert contents(killed) == contents(report.run)
 
 
+@pytest.mark.full
 def test_run_killed_before_gathering_is_completed(report, fitted_survey):
     late = fit_survey(fitted_survey, "late", SETTINGS, [0], 1).run
     for orbit in (1, 2):

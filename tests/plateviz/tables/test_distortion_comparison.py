@@ -147,6 +147,7 @@ def test_common_shift_of_the_detectors_is_seen_in_the_distortion_alone(fit_resul
     assert part_of(table, TOGETHER)["shift_um"].iloc[0] == pytest.approx(shift, rel=1e-3)
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_left_out_sources_change_the_calibration_within_its_uncertainty():
     orbit = make_orbit(n_sources=150, n_reference=60)

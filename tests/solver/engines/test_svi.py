@@ -124,6 +124,7 @@ def test_cancelled_fit_is_resumed(small_orbit):
     assert list(result.losses["step"]) == list(range(1, iterations[-1] + 1))
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_other_settings_start_from_the_beginning(small_orbit):
     settings = replace(SETTINGS, svi=SviSettings(steps=100, max_steps=100))
@@ -171,6 +172,7 @@ def test_rate_falls_over_seven_decades_and_stays_constant():
     np.testing.assert_allclose(rates, [1e4, np.sqrt(1e4 * 1e-3), 1e-3, 1e-3], rtol=1e-12)
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_constant_loss_away_from_the_mode_restarts_the_rate(svi_problem, exact):
     """The rate is raised until the mode is reached, as the paper's authors did by hand."""

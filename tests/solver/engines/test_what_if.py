@@ -201,6 +201,7 @@ def test_request_need_not_wait_for_a_step_of_the_precomputation(orbit):
     pd.testing.assert_frame_equal(found.sources, expected.sources)
 
 
+@pytest.mark.full
 def test_what_ifs_with_fewer_measurements_have_nothing_to_compile(sample_orbit, monkeypatch):
     """JAX compiles once for each shape of the chunks."""
     fitter, shapes = OrbitFitter(sample_orbit), set()

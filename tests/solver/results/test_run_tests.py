@@ -148,6 +148,7 @@ def test_smooth_errors_are_seen_and_mapped(frames):
     assert np.sum(shown * true) / np.sqrt(np.sum(shown**2) * np.sum(true**2)) > 0.9
 
 
+@pytest.mark.full
 def test_typical_field_is_seen_in_half_of_the_runs(frames):
     typical = zonal_of(frames, np.zeros(N_FIELDS)).typical_mas
 

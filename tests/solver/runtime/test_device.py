@@ -74,6 +74,7 @@ def test_tests_refuse_a_device_that_is_absent():
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.full
 def test_fit_uses_only_the_default_device(result):
     done = run(
         "-c",

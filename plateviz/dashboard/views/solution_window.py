@@ -62,7 +62,8 @@ class SolutionWindow(pn.viewable.Viewer):
         self._theirs = pmui.TextAreaInput(
             label="The note as somebody else has left it", disabled=True, visible=False, **wide
         )
-        self._save_list = SaveButton("solutions", table_choices(lambda: "solutions", self._files))
+        choices = table_choices(lambda: "solutions", self._files)
+        self._save_list = SaveButton("solutions", choices, text="Save the list", align="center")
         self._window = window(
             "Solutions",
             self._choice,

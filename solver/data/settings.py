@@ -212,14 +212,19 @@ class FitSettings(ModelSettings):
         return tuple(getattr(self, name) for name, one in SETTINGS.items() if one.selects)
 
     def what_if_holds(self, other: "FitSettings") -> bool:
-        """Return whether a what-if from a fit with these settings can solve with `other`."""
+        """Return whether a what-if from a fit with these settings can solve with `other`.
+
+        It takes the steps of the first engine, whichever found the fit.
+        """
         refit = [name for name, one in SETTINGS.items() if one.change is Change.REFIT]
-        return all(getattr(self, name) == getattr(other, name) for name in refit)
+        is_same = all(getattr(self, name) == getattr(other, name) for name in refit)
+        return is_same and other.engine == ENGINES[0]
 
     def serves(self, other: "FitSettings") -> bool:
         """Return whether what-ifs with `other`, and those that follow it, can start from a fit."""
-        is_whole = not self.exclusions and self.order >= other.order
-        return is_whole and self.what_if_holds(other)
+        of_all = other.with_(exclusions=Exclusions())
+        has_all = self.selection() in (of_all.selection(), of_all.with_(thin=1).selection())
+        return has_all and self.order >= other.order and self.what_if_holds(other)
 
     def describe(self) -> str:
         """Return a short description: the order, and every setting that is not its default."""

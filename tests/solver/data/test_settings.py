@@ -158,10 +158,27 @@ def test_identity_ignores_settings_that_do_not_affect_the_solution():
         ({"prior_widths": {"pitch_x": 0.1}}, True),
         ({"aberration": False}, False),
         ({"robust": True}, False),
+        ({"engine": "nuts"}, False),
     ],
 )
-def test_what_if_is_valid_unless_the_model_or_the_outliers_change(changes, holds):
+def test_what_if_is_valid_unless_the_model_the_outliers_or_the_engine_change(changes, holds):
     assert FitSettings().what_if_holds(FitSettings(**changes)) == holds
+
+
+@pytest.mark.parametrize(
+    ("fit", "asked", "serves"),
+    [
+        ({}, {"order": 3}, True),
+        ({}, {"order": 6}, False),
+        ({}, {"exclusions": Exclusions(detectors=frozenset({1}))}, True),
+        ({"exclusions": Exclusions(detectors=frozenset({1}))}, {}, False),
+        ({"thin": 10}, {}, False),
+        ({"thin": 10}, {"thin": 10}, True),
+        ({}, {"thin": 10}, True),
+    ],
+)
+def test_what_ifs_start_from_a_fit_of_all_their_measurements(fit, asked, serves):
+    assert FitSettings(**fit).serves(FitSettings(**asked)) == serves
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,8 @@ def _fit(
     if engine == "svi" and request.checkpoint is not None:
         from solver.engines.checkpoint import resume_from
 
-        resumption = resume_from(request.checkpoint, data, settings)
+        instrument = request.files.read_instrument()
+        resumption = resume_from(request.checkpoint, data, instrument, settings)
     return fitter.fit(
         settings, lambda it: reporter.say(f"{engine}: {COUNTED[engine]} {it.iteration}"), resumption
     )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from solver.data.instrument import Instrument, write_instrument
 from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration
@@ -18,13 +19,16 @@ from solver.io.failures import reading
 _ARRAYS = ("theta", "sources", "scale", "losses")
 
 
-def resume_from(path: Path, data: OrbitData, settings: FitSettings) -> Resumption:
+def resume_from(
+    path: Path, data: OrbitData, instrument: Instrument, settings: FitSettings
+) -> Resumption:
     """Return the state to resume from, and save later states to the same file.
 
     Parameters
     ----------
     path : checkpoint of the same fit, or a path that does not exist yet
     data : orbit to fit; its files are recognised by their contents
+    instrument : of the fit
 
     Raises
     ------
@@ -32,14 +36,15 @@ def resume_from(path: Path, data: OrbitData, settings: FitSettings) -> Resumptio
         If the file is not a checkpoint of this fit, or cannot be written.
     """
     require_writable(path)
-    fit = _fingerprint(data, settings)
+    fit = _fingerprint(data, instrument, settings)
     return Resumption(
         _read(path, fit) if path.exists() else None, lambda state: _write(path, fit, state)
     )
 
 
-def _fingerprint(data: OrbitData, settings: FitSettings) -> str:
-    identity = [settings.identity(), sorted(data.provenance.values()), data.orbit_id]
+def _fingerprint(data: OrbitData, instrument: Instrument, settings: FitSettings) -> str:
+    files = sorted(data.provenance.values())
+    identity = [settings.identity(), files, data.orbit_id, write_instrument(instrument)]
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
 
@@ -57,8 +62,8 @@ def _read(path: Path, fit: str) -> SviState:
         head = json.loads(str(file["head"]))
         if head["fit"] != fit:
             raise InputError(
-                f"{path}: expected the checkpoint of this fit, found that of other files "
-                "or settings"
+                f"{path}: expected the checkpoint of this fit, found that of other files, "
+                "settings, or another instrument"
             )
         trace = [Iteration(**row) for row in head["trace"]]
         step, rate = head["cycle"]

@@ -110,6 +110,11 @@ def _reweighted_fit(
         if np.abs(weight - before).max() < _WEIGHT_TOLERANCE:
             break
         mode = find_mode(_weighted(problem, weight), settings, progress, start=mode)
+    else:
+        # The last fit was made with these weights, but is not the one that they follow from.
+        if mode.reduced is None:
+            return None
+        squares = (whitened_residuals(problem, mode) ** 2).sum(axis=1)
     return _ReweightedFit(mode, squares, weight)
 
 

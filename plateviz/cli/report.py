@@ -106,15 +106,17 @@ def report(
     more = tuple(both or ()), tuple(explore or ())
     request = ReportRequest(path, orbit, source, survey, run, other, instrument, *more)
     if pages:
-        _write_pages(request, output, pdf, workers)
+        _write_pages(request, output, pdf or overwrite, workers)
+    elif workers is not None:
+        raise InputError("--workers: expected with --pages only, found a single page")
     else:
         _write_page(request, output, pdf, overwrite)
 
 
-def _write_pages(request: ReportRequest, folder: Path, pdf: bool, workers: int | None) -> None:
+def _write_pages(request: ReportRequest, folder: Path, has_more: bool, workers: int | None) -> None:
     of_one_page = (request.orbit, request.source, request.other, request.instrument)
-    has_more = bool(request.both or request.explore)
-    if pdf or has_more or any(option is not None for option in of_one_page):
+    has_more |= bool(request.survey or request.both or request.explore)
+    if has_more or any(option is not None for option in of_one_page):
         raise InputError(
             "--pages: expected no option but --run and --workers, found an option of a single page"
         )

@@ -85,6 +85,11 @@ def serve(
         pages=pages,
         pages_per_address=pages_per_address,
     )
+    if reference is None and (truth or instrument or orbit is not None):
+        raise InputError(
+            "--truth, --orbit, --instrument: expected with the files OBS and REF of an orbit only, "
+            f"found the survey {path}"
+        )
     if reference is None:
         origin: OrbitFiles | SurveyFolder = SurveyFolder(str(path))
         if not origin.orbits():

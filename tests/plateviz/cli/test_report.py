@@ -121,6 +121,14 @@ def test_result_file_with_an_orbit_option_is_refused(run, fit_result, tmp_path):
     assert "expected a survey directory" in err
 
 
+def test_options_of_a_page_and_of_pages_are_not_mixed(run, run_dir, tmp_path):
+    for options in (("--pages", "--overwrite"), ("--workers", 2)):
+        code, _, err = run("report", run_dir, "-o", tmp_path / "r", *options)
+        assert code == 2
+        assert "expected" in err
+        assert not (tmp_path / "r").exists()
+
+
 def test_pdf_without_chromium_is_refused_before_writing(run, run_dir, tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda _: None)
     code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html", "--pdf")

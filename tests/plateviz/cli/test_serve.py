@@ -30,6 +30,14 @@ def test_survey_without_an_orbit_is_refused(run, made_survey, tmp_path):
     assert "expected a survey with an orbit, found none yet" in err
 
 
+@pytest.mark.parametrize("option", ["--truth", "--instrument", "--orbit"])
+def test_option_of_files_is_refused_for_a_survey(run, made_survey, option):
+    value = 3 if option == "--orbit" else "t.parquet"
+    code, _, err = run("serve", made_survey, option, value)
+    assert code == 2
+    assert "expected with the files OBS and REF of an orbit only" in err
+
+
 def test_host_is_normalised_as_browsers_send_it():
     assert check_origin("Astro.Example.org:8443 ") == "astro.example.org:8443"
 

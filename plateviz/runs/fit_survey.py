@@ -29,7 +29,7 @@ from solver.io.atomic import write_atomically
 from solver.io.disk import size_text
 from solver.io.lock import locked
 from solver.io.parquet import write_parquet
-from solver.io.survey import survey_orbits
+from solver.io.survey import orbit_ranges, survey_orbits
 from solver.io.survey_manifest import survey_changes
 from solver.io.table_check import refuse
 from solver.model.apparent_motion import julian_year
@@ -177,7 +177,8 @@ def _needed(run: Run, missing: list[int]) -> str:
         return ""
     files = [path for one in complete for path in run.orbit_directory(one).iterdir()]
     size = sum(path.stat().st_size for path in files) / len(complete) * len(left)
-    return f"; {len(left)} orbits are left, which need about {size_text(size)}"
+    counted = "1 orbit is" if len(left) == 1 else f"{len(left):,} orbits are"
+    return f"; {counted} left, for about {size_text(size)} more"
 
 
 def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:
@@ -187,7 +188,7 @@ def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:
     absent = sorted(set(orbits) - set(there))
     if absent:
         raise InputError(
-            f"{survey}: expected orbits of the survey, {there[0]} to {there[-1]}, "
+            f"{survey}: expected orbits out of {orbit_ranges(there)}, "
             f"found {', '.join(map(str, absent[:5]))}"
         )
     return sorted(set(orbits))

@@ -118,9 +118,15 @@ class Degree(Whole):
 
     def check(self, name: str, value: object) -> None:
         """Raise `InputError` for 1 as well."""
-        super().check(name, value)
+        try:
+            super().check(name, value)
+        except InputError as error:
+            raise InputError(self._expected(value)) from error
         if value == 1:
-            raise InputError(f"{self.label.lower()}: expected 0 or 2 to {self.high}, found 1")
+            raise InputError(self._expected(value))
+
+    def _expected(self, value: object) -> str:
+        return f"{self.label.lower()}: expected 0 or 2 to {self.high}, found {value!r}"
 
 
 @dataclass(frozen=True, kw_only=True)

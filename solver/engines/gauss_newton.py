@@ -268,5 +268,5 @@ def _parameter_name(problem: Problem, column: int) -> str:
     for group in problem.layout.groups:
         place = np.flatnonzero(problem.layout.columns(group) == column)
         if len(place):
-            return f"{group.label} [{place[0]}]"
+            return f"{group.label} [{problem.elements[group.axis][place[0]].name}]"
     raise IndexError(f"no calibration parameter in column {column}")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from solver.errors import DiskError, InputError
 
-_REPEAT = "and repeat the command, which goes on with what is there"
+_REPEAT = "and try again"
 # What is found, and what to do about it.
 _REASONS = {
     errno.ENOSPC: ("a full disk", f"free some space, {_REPEAT}"),

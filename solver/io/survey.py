@@ -93,7 +93,7 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
     orbits = survey_orbits(directory)
     if orbit_id not in orbits:
         raise InputError(
-            f"{directory}: expected an orbit out of {_ranges(orbits)}, found {orbit_id}"
+            f"{directory}: expected an orbit out of {orbit_ranges(orbits)}, found {orbit_id}"
         )
     paths = [measurement_path(directory, orbit_id), directory / REFERENCE, directory / EXPOSURES]
     if has_survey_table(directory, TRUTH_FILE):
@@ -269,7 +269,8 @@ def _check_orbit(measurements: pd.DataFrame, orbit_id: int, path: Path) -> None:
         raise InputError(f"{path}, column orbit_id: expected {orbit_id} alone, found {found}")
 
 
-def _ranges(orbits: list[int]) -> str:
+def orbit_ranges(orbits: list[int]) -> str:
+    """Return the ids of the orbits of a survey in words."""
     if not orbits:
         return "none, since there are no measurements"
     consecutive = orbits == list(range(orbits[0], orbits[-1] + 1))

@@ -106,7 +106,8 @@ def _faintness(sources: pd.DataFrame, settings: FitSettings) -> Float[np.ndarray
     )
     if not np.isfinite(magnitude).any():
         raise InputError(
-            "shift by magnitude: expected a column magnitude in the catalogue, found none"
+            "charge transfer and shifts by magnitude: expected magnitudes in the catalogue, found "
+            "none"
         )
     return faintness(magnitude)
 

@@ -81,7 +81,7 @@ def test_full_disk_stops_the_survey_with_one_message(survey_folder, fit_as, fit_
     assert names(run.directory) == ["run.toml"]
     tried.clear()
     fit_as(fit)
-    with pytest.raises(DiskError, match=r"1 orbits are left, which need about .* [kM]B$"):
+    with pytest.raises(DiskError, match=r"1 orbit is left, for about .* [kM]B more$"):
         fit_survey.fit_survey(survey_folder, "full", SETTINGS, workers=1)
     assert len(run.complete_orbits()) == 2
     assert run.failures() == {}

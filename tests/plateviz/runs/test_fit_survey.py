@@ -253,7 +253,7 @@ def test_new_run_is_empty(fitted_survey):
 
 
 def test_unknown_orbit_is_refused(fitted_survey):
-    with pytest.raises(InputError, match="expected orbits of the survey, 0 to 2, found 7"):
+    with pytest.raises(InputError, match="expected orbits out of 0 to 2, found 7"):
         fit_survey(fitted_survey, "one", SETTINGS, [1, 7])
 
 

@@ -4,6 +4,7 @@ An origin consists of plain values, so that the web process, which never loads m
 send it to the solver process, which does.
 """
 
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -76,7 +77,7 @@ class SurveyFolder:
     @property
     def title(self) -> str:
         """Name of the origin."""
-        return Path(self.directory).resolve().name
+        return Path(os.path.realpath(self.directory)).name
 
     @property
     def solutions(self) -> Path:

@@ -58,7 +58,7 @@ def require_writable(path: Path) -> Path:
     InputError
         If the folder is missing, or `path` exists and is not a file that can be replaced.
     """
-    target = Path(path).resolve()
+    target = Path(os.path.realpath(path))
     folder = target.parent
     if not folder.is_dir():
         raise InputError(f"{path}: expected to write into a folder, found no folder {folder}")

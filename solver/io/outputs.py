@@ -1,5 +1,6 @@
 """Checks of the output files of a command, before the command starts its work."""
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -49,7 +50,7 @@ def _is_same(path: Path, other: Path) -> bool:
     # Names that differ may be links to one file, or differ in case only.
     if path.exists() and other.exists():
         return path.samefile(other)
-    return path.resolve() == other.resolve()
+    return os.path.realpath(path) == os.path.realpath(other)
 
 
 def _either(names: tuple[str, ...]) -> str:

@@ -1,5 +1,6 @@
 """Read an orbit from an observation, a catalogue and optionally a truth, and check them."""
 
+import os
 from pathlib import Path
 from shlex import quote
 from typing import NamedTuple
@@ -206,7 +207,7 @@ def _hashes(
 ) -> dict[str, str]:
     files = [measured.path, catalogue.path, *([truth.path] if truth else []), environment.path]
     hashes: dict[str, str] = {}
-    for path in dict.fromkeys(file.resolve() for file in files):
+    for path in dict.fromkeys(Path(os.path.realpath(file)) for file in files):
         # Files of the same name in different folders are told apart by the folder's name.
         name = path.name if path.name not in hashes else f"{path.parent.name}/{path.name}"
         hashes[name] = sha256_of(path)

@@ -35,6 +35,16 @@ def hard_linked(path, folder):
     return folder / "hard.fits"
 
 
+def test_link_that_leads_to_itself_is_refused_in_words(run, orbit, tmp_path):
+    loop = tmp_path / "loop.fits"
+    loop.symlink_to(loop)
+    for arguments in (("fit", loop, orbit[1], "-o", tmp_path / "x.fits"), ("report", loop)):
+        more = () if arguments[0] == "fit" else ("-o", tmp_path / "r.html")
+        code, _, err = run(*arguments, *more)
+        assert code == 2
+        assert "loop.fits: expected" in err
+
+
 @pytest.mark.parametrize("overwrite", [[], ["--overwrite"]], ids=["", "overwrite"])
 @pytest.mark.parametrize("which", [0, 1], ids=["observation", "reference"])
 @pytest.mark.parametrize(

@@ -32,8 +32,11 @@ def remedies(settings: FitSettings, causes: Iterable[Cause]) -> list[Remedy]:
 def try_settings(session: Session, settings: FitSettings) -> None:
     """Request a solution beside the one on the screen.
 
-    It is a what-if where a change of a control shows one, and a fit otherwise.
+    It is a what-if where a change of a control shows one, and a fit otherwise. One that is being
+    computed goes on.
     """
+    if session.awaits(settings):
+        return
     choices = session.choices
     is_what_if = choices.what_if_at_once and settings.engine == ENGINES[0] and session.job is None
     choices.load(settings)

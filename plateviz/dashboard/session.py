@@ -142,8 +142,20 @@ class Session(OnScreen):
         except InputError as error:
             self.refuse(str(error))
             return
-        self._cancel_job()
-        self._request(Request(self.selection.orbit, settings))
+        asked = Request(self.selection.orbit, settings)
+        if self.job is None or self._requested != asked:
+            self._cancel_job()
+            self._request(asked)
+
+    def awaits(self, settings: FitSettings) -> bool:
+        """Return whether a solution of the orbit with these settings is being computed."""
+        if self.job is None or self._requested.orbit != self.selection.orbit:
+            return False
+        # A what-if does not compare the orders.
+        asked, wanted = (
+            one.with_(compare_orders=False) for one in (self._requested.settings, settings)
+        )
+        return asked == wanted
 
     def ask_what_if(self) -> None:
         """Request a what-if with the settings of the controls; the fitted solution is kept.

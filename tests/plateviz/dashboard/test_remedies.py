@@ -57,6 +57,20 @@ def test_remedy_that_was_cancelled_is_tried_again(live):
     assert [one[1] for one in live.store.requested[-2:]] == [DRIFT, DRIFT]
 
 
+def test_remedy_that_is_being_computed_goes_on(live):
+    try_settings(live, DRIFT)
+    job, n_requested = live.job, len(live.store.requested)
+    try_settings(live, DRIFT)
+    assert live.job is job
+    live.refit()
+    fit = live.job
+    assert fit is not job
+    live.refit()
+    try_settings(live, DRIFT)
+    assert live.job is fit
+    assert len(live.store.requested) == n_requested + 1
+
+
 @pytest.mark.parametrize("before", ["no what-ifs", "another fit runs", "another engine"])
 def test_remedy_is_fitted_where_there_is_no_what_if(live, before):
     settings = DRIFT

@@ -205,8 +205,11 @@ def test_invalid_prior_requests_nothing(session):
     assert len(session.store.requested) == 1
 
 
-def test_new_request_cancels_the_running_one(session):
+def test_new_request_cancels_the_running_one_unless_it_is_the_same(session):
     first = session.job
+    session.refit()
+    assert session.job is first
+    session.choices.order = 3
     session.refit()
     assert session.store.cancelled == [first]
 

@@ -79,7 +79,7 @@ def plot_comparison_map(
             *key(mas / _MAS_PER_ARCMIN, length, scale=scale, field=field),
         ],
         title=_MAP,
-        subtitle=f"{what}\nArrows enlarged {scale:,g} times; key: {length}",
+        subtitle=f"{what}\nArrows enlarged {scale:,.12g} times; key: {length}",
         x=Axis(_MAP_X, field.x),
         y=Axis(_MAP_Y, field.ylim),
         width=width,

@@ -55,7 +55,7 @@ def plot_distortion(
         ],
         title=_TITLE,
         subtitle=f"Zero at the optical centre; rms {rms_um:.3g} µm.\n"
-        f"Arrows enlarged {scale:,g} times; key: {length}",
+        f"Arrows enlarged {scale:,.12g} times; key: {length}",
         x=Axis(XLABEL, field.x),
         y=Axis(YLABEL, field.ylim),
         width=width,

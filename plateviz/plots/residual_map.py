@@ -57,7 +57,7 @@ def plot_residual_map(
         ],
         title=_title(detector),
         subtitle=f"{_shown_exposures(table)}. {binning}\n"
-        f"Arrows enlarged {scale:,g} times; key: {length_text}",
+        f"Arrows enlarged {scale:,.12g} times; key: {length_text}",
         x=Axis(xlabel, field.x),
         y=Axis(ylabel, field.ylim),
         width=width,

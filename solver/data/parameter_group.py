@@ -61,7 +61,7 @@ class Group:
     unit : unit of offsets, sigmas and prior widths
     value_unit : unit of the full value, centre plus offset, in tables
     family : prior distribution about its centre
-    width : standard deviation of the default prior, in `unit`
+    width : standard deviation of the default prior, in `width_unit`
     relative : whether `width` is a fraction of the centre
     origin : origin of the prior's centre: the catalogue, a column of the environment table,
         an attribute of the instrument's detectors, or zero

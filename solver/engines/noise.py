@@ -1,7 +1,7 @@
 """Noise model: by how much the errors differ from those stated, by restricted likelihood.
 
 The logarithm of the variance of a measurement is that of its stated variance plus a linear
-predictor: of its exposure, powers of its star's magnitude, or neither. A floor may be added in
+predictor: of its exposure, powers of its star's magnitude, both or neither. A floor may be added in
 quadrature (`solver.engines.variance_model`). The logarithm of the reference stars' catalogue
 variance has one addition for all. Where the restricted likelihood is largest, the squared residuals
 that go with each parameter sum to their expectation, which leverage lowers; scoring steps get there

@@ -1,6 +1,6 @@
 """The posterior of one orbit as a numpyro model, generated from the parameter table.
 
-Paper, Eqs. (method:posterior) and (exp:priors): a prior for every group, and the likelihood of
+Paper, Eqs. (method:posterior:radec), (exp:priors): a prior for every group, and the likelihood of
 the measurements under the observation model. `in_coordinates` is the same model in the
 coordinates in which the svi and nuts engines work (`solver.linear.whitening`).
 """

@@ -1,7 +1,7 @@
 """The svi engine: the paper's stochastic variational inference, in whitened coordinates.
 
-Paper, Eq. (method:svi) and section "Optimization": the guide is normal for the sources and a
-point for the calibration, the loss is minus the evidence lower bound, and Adam follows its
+Paper, Eq. (method:posterior:svi) and section "Optimization": the guide is normal for the sources
+and a point for the calibration, the loss is minus the evidence lower bound, and Adam follows its
 gradient with a learning rate that falls over seven decades. In the units of the published code
 Adam does not get near the mode; here it moves in coordinates whitened by the linearised problem
 (`solver.linear.whitening`). After every block of steps the coordinates are recomputed and Adam's

@@ -1,9 +1,9 @@
 """The variational guide of the paper: a normal for every source, a point for the calibration.
 
-Paper, Eq. (method:svi). A draw lies one standard deviation from the mean in every coordinate, on
-a random side: the two nodes of the Gauss-Hermite rule. Averaged with its mirror image, the
-evidence lower bound and its gradient are exact where the posterior is Gaussian, which saves most
-of the steps.
+Paper, Eq. (method:posterior:svi). A draw lies one standard deviation from the mean in every
+coordinate, on a random side: the two nodes of the Gauss-Hermite rule. Averaged with its mirror
+image, the evidence lower bound and its gradient are exact where the posterior is Gaussian, which
+saves most of the steps.
 """
 
 from collections.abc import Callable

@@ -83,6 +83,6 @@ class ProblemCache:
         return None
 
     def _keep(self, entry: _Entry) -> None:
-        """Move an entry to the front, and forget those that were used last."""
+        """Move an entry to the front, and forget those used least recently."""
         others = (other for other in self._entries if other is not entry)
         self._entries = [entry, *others][:_CAPACITY]

@@ -16,8 +16,8 @@ _MIN_OBS = 10
 _LARGE_SHARE = 0.5
 # Uncertainties wrong by more than this share.
 _LARGE_ERROR = 0.1
-# Outliers of so many of the sources, and so many of the exposures, are not few.
-_LARGE_PARTS = {"outliers": 0.02, "swapped": 0.02, "swing": 0.1}
+# Outliers of so many of the sources are not few.
+_LARGE_PARTS = {"outliers": 0.02, "swapped": 0.02}
 # Rms deviation of the reference stars over its expected value, beyond which the frame is wrong.
 _LARGE_DEVIATION = 1.2
 # Groups of sources of similar magnitudes.
@@ -30,7 +30,6 @@ def harm(case: Case) -> tuple[str, bool]:
     of_parts = {
         "outliers": len(case.result.sources),
         "swapped": len(case.result.sources),
-        "swing": len(case.result.exposures),
         "reference": len(case.diagnosis.references.chi2),
     }
     size = found.test.size_um if np.isfinite(found.test.size_um) else _rms(case)
@@ -45,6 +44,8 @@ def harm(case: Case) -> tuple[str, bool]:
         return spoils, error > _LARGE_SHARE * typical
     if subject in of_parts:
         return _harm_of_parts(case, of_parts[subject])
+    if subject == "swing":
+        return _harm_of_swings(case)
     if subject == "references":
         spoils = (
             "It spoils the error that all positions share, which is up to "
@@ -54,7 +55,8 @@ def harm(case: Case) -> tuple[str, bool]:
     if subject == "kurtosis":
         spoils = (
             "It spoils no uncertainty as a root mean square, but a position that rests on few "
-            "measurements is more often far off, or less often, than its uncertainty says."
+            f"measurements is {'more' if found.test.statistic > 0.0 else 'less'} often far off "
+            "than its uncertainty says."
         )
         return spoils, False
     if subject == "prior":
@@ -83,8 +85,18 @@ def _harm_of_prior(case: Case) -> tuple[str, bool]:
     )
 
 
+def _harm_of_swings(case: Case) -> tuple[str, bool]:
+    """Return the same for exposures whose pointing jittered."""
+    error, typical = _shift_by_swings(case), _typical_sigma(case.result)
+    spoils = (
+        f"It spoils the positions of the sources in these exposures, by {error:.2g} mas rms "
+        f"where a typical uncertainty is {typical:.2g} mas."
+    )
+    return spoils, error > _LARGE_SHARE * typical
+
+
 def _harm_of_parts(case: Case, total: int) -> tuple[str, bool]:
-    """Return the same for a cause that concerns some sources or exposures."""
+    """Return the same for a cause that concerns some of the sources."""
     found, subject = case.found, case.found.test.subject
     count = len(found.items) or int(found.size)
     is_large = count > _LARGE_PARTS.get(subject, 0.0) * total
@@ -95,12 +107,6 @@ def _harm_of_parts(case: Case, total: int) -> tuple[str, bool]:
             f"It spoils all positions alike, by about {_frame_shift(case):.2g} mas where the error "
             f"that they share is {shared:.2g} mas: the frame follows the reference stars.",
             _references_off(case.result),
-        )
-    if subject == "swing":
-        return (
-            "It spoils the positions of the sources in these exposures, by at most "
-            f"{_swing_size(case):.2g} mas rms.",
-            is_large,
         )
     return (
         f"It spoils the positions of up to {count:,} sources, by at most "
@@ -156,12 +162,20 @@ def _largest_shift_of_one(case: Case) -> float:
     return _on_sky(case, float((residual * (1.0 - left) / left).max(initial=0.0)))
 
 
-def _swing_size(case: Case) -> float:
-    """Return the rms displacement in the exposures that swing, mas along one axis."""
+def _shift_by_swings(case: Case) -> float:
+    """Return the rms shift of the sources in the exposures that swing, mas along one axis.
+
+    A source is at the mean of its measurements, and exposures swing independently.
+    """
     found, rows, which = case.diagnosis.exposures, case.diagnosis.rows, list(case.found.items)
     weight = np.bincount(rows.exposure, rows.weight, len(found.swing))
     excess = np.maximum((found.swing * found.scale)[which] - 4.0 * WAVES, 0.0)
-    return _on_sky(case, float(np.sqrt((excess / weight[which]).max(initial=0.0))))
+    size = np.zeros(len(weight))
+    size[which] = np.sqrt(excess / weight[which])
+    moved = np.bincount(rows.source, (rows.weight * size[rows.exposure]) ** 2)
+    shift = np.sqrt(moved) / np.bincount(rows.source, rows.weight)
+    of_these = shift[moved > 0.0]
+    return _on_sky(case, float(np.sqrt(np.mean(of_these**2)))) if len(of_these) else 0.0
 
 
 def _frame_shift(case: Case) -> float:

@@ -8,6 +8,7 @@ import pandas as pd
 from plateviz.tables.cause_case import Case
 from plateviz.tables.cause_harm import harm
 from plateviz.tables.cause_words import said_of
+from plateviz.tables.estimated_noise import reference_factor
 from plateviz.tables.labels import exposure_labels, id_strings
 from plateviz.tables.prior_words import narrowed_priors, usual_priors
 from plateviz.tables.remedy import remedied
@@ -17,6 +18,8 @@ from solver.results.diagnosis.table import Diagnosis
 
 # Share of chi2 from which the measurements that are far off explain why a fit does not converge.
 _WILD_SHARE = 0.5
+# No catalogue states errors that are so many times too small: something else is wrong with it.
+_WRONG_FACTOR = 30.0
 
 
 class Cause(NamedTuple):
@@ -60,6 +63,31 @@ def causes_in_words(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> 
     if not result.summary["converged"]:
         return [_stuck(result, diagnosis, causes)]
     return [_in_words(Case(one, causes, diagnosis, result)) for one in causes.found]
+
+
+def wrong_catalogue(result: FitResult) -> list[Cause]:
+    """Return as a cause that the fit had to multiply the catalogue's errors by very much.
+
+    With these errors, nothing is left for the tests to find.
+    """
+    found = reference_factor(result)
+    if found is None or found[0] < _WRONG_FACTOR:
+        return []
+    factor, significance = found
+    cause = Cause(
+        "wrong-catalogue",
+        "the reference stars are nowhere near the catalogue",
+        f"The fit has multiplied the catalogue's errors by {factor:.1f} to agree with them. "
+        "Positions of another epoch, wrong proper motions, wrong times of the exposures or wrong "
+        "units do this.",
+        significance,
+        "It spoils what all positions have in common, perhaps by more than they state.",
+        "check the epochs, proper motions and units of the catalogue, and the times of the "
+        "exposures",
+        (),
+        True,
+    )
+    return [cause]
 
 
 def _stuck(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> Cause:

@@ -47,14 +47,25 @@ def said_of_kurtosis(case: Case) -> Said:
     """Return what is said of noise that is not normal."""
     test = case.found.test
     has_more = test.statistic > 0.0
+    words = (
+        f"The excess kurtosis of the residuals within six sigma is {test.statistic:+.3f}, that of "
+        f"normal ones 0 ± {test.scatter:.2g}, in all exposures and sources alike."
+    )
+    if not has_more:
+        action = "check whether large errors were removed from the measurements, or others rounded"
+    else:
+        action = "look at what the centring does to faint, blended or trailed images"
+        if case.result.settings.robust:
+            words += (
+                " The fit has left outliers out; those that are too small to be told from noise "
+                "are still there, and make such tails."
+            )
+            action = f"nothing, if outliers of every size are expected; otherwise {action}"
     return Said(
         "tails",
         f"the noise has {'more' if has_more else 'fewer'} large errors than a normal distribution",
-        f"The excess kurtosis of the residuals within six sigma is {test.statistic:+.3f}, that of "
-        f"normal ones 0 ± {test.scatter:.2g}, in all exposures and sources alike.",
-        "look at what the centring does to faint, blended or trailed images"
-        if has_more
-        else "check whether large errors were removed from the measurements, or others rounded",
+        words,
+        action,
     )
 
 
@@ -63,7 +74,7 @@ def said_of_outliers(case: Case) -> Said:
     return Said(
         "outliers",
         "some measurements are outliers",
-        f"{int(case.found.size):,} residuals are beyond six sigma; chance makes "
+        f"{int(case.found.size):,} measurements are beyond six sigma; chance makes "
         f"{case.found.test.expected:.1g}.",
         "let the fit find and leave them out",
         ("--robust",),

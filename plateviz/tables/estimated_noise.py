@@ -26,6 +26,19 @@ def noise_sentences(result: FitResult) -> list[str]:
     return [words]
 
 
+def reference_factor(result: FitResult) -> tuple[float, float] | None:
+    """Return the estimated factor on the errors of the reference stars, and its distance from 1.
+
+    The distance is in sigmas, of the factor's logarithm. None if it was not estimated.
+    """
+    entry = result.summary.get("noise") or {}
+    log_factor = entry.get("log_factor", {}).get(_REFERENCES)
+    if log_factor is None:
+        return None
+    sigma = float(entry["sigma"][_REFERENCES])
+    return float(np.exp(log_factor)), float(log_factor) / sigma if sigma > 0.0 else 0.0
+
+
 def _parts(entry: Mapping[str, Any]) -> list[str]:
     log_factor, sigma = entry["log_factor"], entry["sigma"]
     of_exposures = [value for name, value in log_factor.items() if name.startswith(_EXPOSURE)]

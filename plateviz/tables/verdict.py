@@ -7,14 +7,15 @@ from typing import Any, NamedTuple
 import pandas as pd
 from scipy.special import chdtrc
 
-from plateviz.tables.causes import Cause, causes_in_words
+from plateviz.tables.causes import Cause, causes_in_words, wrong_catalogue
 from plateviz.tables.estimated_noise import noise_sentences
 from plateviz.tables.notable_in_orbit import notable_sentences
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
 from plateviz.tables.tests_in_words import TestInWords, discoveries_in_words, tests_in_words
 from plateviz.tables.unseen import unseen_sentences
-from solver.data.result import FitResult
+from solver.data.result import FitResult, FitStatus
+from solver.data.settings import COUNTED
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, diagnose
 
@@ -111,8 +112,10 @@ def _judge(result: FitResult) -> Verdict:
     causes = causes_in_words(result, diagnosis, find_causes(diagnosis)) if has_causes else []
     state: State = "warn" if found else "good"
     is_large = any(cause.is_large for cause in causes)
-    if not converged or (certain and is_large):
+    catalogue = wrong_catalogue(result)
+    if not converged or (certain and is_large) or catalogue:
         state = "bad"
+    causes = [*catalogue, *causes]
     headline = _HEADLINES[state]
     if causes:
         headline = f"{headline[:-1]}: {causes[0].title}."
@@ -167,10 +170,11 @@ def _converged(result: FitResult) -> str:
     summary = result.summary
     if not summary["converged"]:
         return f"The fit has not converged: {summary['reason']}."
-    return (
-        f"The fit converged after {summary['iterations']} iterations of the {summary['engine']} "
-        f"engine: {summary['reason']}."
-    )
+    if summary["reason"] == FitStatus.WHAT_IF.value:
+        return f"The solution is {summary['reason']}."
+    engine, count = str(summary["engine"]), int(summary["iterations"])
+    steps = f"{count:,} {COUNTED[engine]}{'' if count == 1 else 's'}"
+    return f"The fit converged after {steps} of the {engine} engine: {summary['reason']}."
 
 
 def _sentence(item: SummaryItem) -> str:

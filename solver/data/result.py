@@ -18,7 +18,7 @@ class FitStatus(Enum):
     """How a fit ended; the value is the message to show."""
 
     CONVERGED = "every step of the last iteration is below the tolerance times its uncertainty"
-    WHAT_IF = "one step of the linearised model, which a refit would confirm"
+    WHAT_IF = "a step from another fit by its linearised model, which a refit would confirm"
     MAX_ITERATIONS = "the limit of iterations was reached before the steps became small"
     STUCK = "no part of the step made chi2 fall any further, and the steps are not small"
     AT_REST = "the loss has come to rest, and the linearised problem puts the mode there"

@@ -17,6 +17,7 @@ from solver.results.diagnosis.patterns import Family
 from solver.results.diagnosis.projection import Projection
 from solver.results.diagnosis.rate import sigmas
 from solver.results.diagnosis.references import MEDIAN_CHI2
+from solver.results.diagnosis.rows import Rows
 from solver.results.diagnosis.scatter import Scatter, scatter_tests
 from solver.results.diagnosis.table import (
     CARE_RATE,
@@ -34,25 +35,16 @@ _LEAST_SHARE = 0.1
 _WITHOUT_CAUSE, _MUCH_MORE = ("cells", "map"), 4.0
 # Those whose tests follow one another.
 _PATTERNS = (*COURSES, "order", "shift", "turn", "phase", "magnitude", *_WITHOUT_CAUSE)
-# The positions of the sources carry these into all exposures.
-_MAKES_PATTERNS = (
-    "swing",
-    "outliers",
-    "swapped",
-    "stretch",
-    "shear",
-    "quadratic",
-    "references",
-    "reference",
-    "prior",
-)
 _OF_EXPOSURES = ("stretch", "shear", "quadratic")
+# The positions of the sources carry these into all exposures.
+_MAKES_PATTERNS = ("swing", "outliers", "swapped", "references", "reference", "prior")
 # A cause of another kind is named beside the first one from this share of its sigmas.
 _OF_ITS_OWN = 0.5
+# What these bring about explains at most so many times what the positions carry.
+_SHIFTS_STARS, _MARGIN = ("swing", "outliers"), 2.0
 # Outliers are wrong identifications if these have this share of their chi2.
 _OF_OUTLIERS = 0.5
-# Patterns that explain more of chi2 than this are beyond what is linear. How much noise they leave
-# is not known; and stars scatter, and measurements may be far off, because of them.
+# Patterns that explain more of chi2 are not linear: what they leave tells nothing about the noise.
 _MOST_LINEAR = 0.5
 _REFERENCE_LIMIT = 0.01
 _SCATTER = ("noise", "exposures", "sources", "detectors", "magnitudes")
@@ -93,39 +85,48 @@ def find_causes(diagnosis: Diagnosis) -> Causes:
     """Return the causes that explain the tests of a solution."""
     patterns, explained = _patterns(diagnosis)
     of_exposures, of_each = _of_exposures(diagnosis, explained)
-    found = [*_swinging(diagnosis), *patterns, *of_exposures, *_of_outliers(diagnosis)]
-    found += _of_priors(diagnosis)
+    found = [*_swinging(diagnosis), *patterns, *of_exposures]
+    found += [*_of_outliers(diagnosis), *_of_priors(diagnosis)]
     rows, left = diagnosis.rows, None
     if explained + of_each <= _MOST_LINEAR * float(rows.chi2[~rows.is_far].sum()):
         left, *_ = scatter = scatter_tests(
             rows, diagnosis.magnitude, explained + of_each, without=diagnosis.swinging
         )
         found += [*_of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
-    found.sort(key=lambda one: -one.gain)
+    # Tails spoil no positions, and make nothing but scatter.
+    spoils = any(one.test.subject not in (*_SCATTER, "kurtosis") for one in found)
+    found.sort(key=lambda one: (spoils and one.test.subject == "kurtosis", -one.gain))
     if left is None and found[:1] == patterns[:1]:
         found = patterns
-    return Causes(tuple(_of_their_own(found)), left)
+    return Causes(tuple(_of_their_own(found, rows)), left)
 
 
-def _of_their_own(found: list[Found]) -> list[Found]:
+def _of_their_own(found: list[Found], rows: Rows) -> list[Found]:
     """Return the causes without those that the first one may have brought about.
 
     Patterns were tested one after the other. Of two kinds of causes the weaker may be a result of
     the stronger; the next fit finds it if it is not.
     """
-    first = found[:1]
-    if not first:
+    if not found:
         return []
-    leads = first[0].test
-    others = [one for one in found[1:] if not _is_of_tails(one.test.subject, leads.subject)]
-    return first + [
-        one
-        for one in others
-        if one.test.sigma > _OF_ITS_OWN * leads.sigma
-        and one.gain > _LEAST_SHARE * first[0].gain
-        and not (one.test.subject in _PATTERNS and leads.subject in _MAKES_PATTERNS)
-        or (one.test.subject in _PATTERNS and leads.subject in _PATTERNS)
-    ]
+    leads, *others = found
+    subject = leads.test.subject
+    # One wrong of n measurements shifts its star by 1/n; its other residuals have 1/n of the chi2.
+    carried = _MARGIN * leads.gain * len(np.unique(rows.source)) / max(rows.n, 1)
+
+    def is_named(one: Found) -> bool:
+        is_pattern = one.test.subject in _PATTERNS
+        if is_pattern and subject in _PATTERNS:
+            return True
+        is_weak = one.test.sigma <= _OF_ITS_OWN * leads.test.sigma
+        if is_weak or _is_of_tails(one.test.subject, subject):
+            return False
+        if is_pattern and subject in _SHIFTS_STARS:
+            return one.gain > carried
+        is_made = is_pattern and subject in (*_MAKES_PATTERNS, *_OF_EXPOSURES)
+        return one.gain > _LEAST_SHARE * leads.gain and not is_made
+
+    return [leads, *filter(is_named, others)]
 
 
 def _is_of_tails(subject: str, leads: str) -> bool:

@@ -78,9 +78,14 @@ def test_wrong_reference_star_shifts_the_frame_by_its_share(fit_result, monkeypa
     assert number_after(spoils, "by about ") == pytest.approx(2.0)
 
 
-def test_noise_with_other_tails_spoils_no_uncertainty_as_a_whole(fit_result):
-    spoils, is_large = harm_of(fit_result, "kurtosis")
+@pytest.mark.parametrize(("kurtosis", "word"), [(0.3, "more"), (-0.3, "less")])
+def test_noise_with_other_tails_spoils_no_uncertainty_as_a_whole(fit_result, kurtosis, word):
+    diagnosis = diagnose(fit_result)
+    test = diagnosis.tests[0]._replace(subject="kurtosis", statistic=kurtosis)
+    case = Case(Found(test, 0.0), find_causes(diagnosis), diagnosis, fit_result)
+    spoils, is_large = harm(case)
     assert spoils.startswith("It spoils no uncertainty as a root mean square")
+    assert f"is {word} often far off" in spoils
     assert not is_large
 
 
@@ -88,7 +93,23 @@ def test_exposure_that_does_not_swing_is_not_said_to_spoil_by_chance(fit_result)
     diagnosis = diagnose(fit_result)
     excess = (diagnosis.exposures.swing * diagnosis.exposures.scale).argsort()[:3]
     spoils, _ = harm_of(fit_result, "swing", *map(int, excess))
-    assert number_after(spoils, "by at most ") == 0.0
+    assert number_after(spoils, "these exposures, by ") == 0.0
+
+
+def test_exposure_that_swings_spoils_much_if_it_moves_its_sources_far(fit_result):
+    exposure = 7
+    of_it = fit_result.exposure_index == exposure
+    moved, large = [], []
+    for sigmas in (3.0, 12.0):
+        residuals = fit_result.residuals.copy()
+        wave = np.sin(2.0 * np.pi * residuals["ny"] / np.ptp(residuals["ny"]))
+        residuals["residual_x"] += of_it * sigmas * wave * residuals["sx"]
+        swinging = replace(fit_result, residuals=residuals)
+        spoils, is_large = harm_of(swinging, "swing", exposure)
+        moved.append(number_after(spoils, "these exposures, by "))
+        large.append(is_large)
+    assert moved[1] == pytest.approx(4.0 * moved[0], rel=0.15)
+    assert large == [False, True]
 
 
 def test_prior_spoils_much_where_the_residuals_show_it(monkeypatch, fit_result):

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from plateviz.tables.cause_words import said_of
+from solver.data.settings import FitSettings
 from solver.results.diagnosis.table import Test
 
 
@@ -29,9 +30,13 @@ def test_step_is_at_the_field_that_comes_first_in_time(step, field):
     assert said.options == ("--field-distortion 2",)
 
 
+@pytest.mark.parametrize("robust", [False, True])
 @pytest.mark.parametrize(("kurtosis", "title"), [(0.3, "more large errors"), (-0.3, "fewer large")])
-def test_noise_that_is_not_normal_has_more_or_fewer_large_errors(kurtosis, title):
+def test_noise_that_is_not_normal_has_more_or_fewer_large_errors(kurtosis, title, robust):
     test = Test("kurtosis", "kurtosis", (), kurtosis, 0.0, 0.01, -400.0, 30.0)
-    said = said_of(SimpleNamespace(found=SimpleNamespace(test=test)))
+    result = SimpleNamespace(settings=FitSettings(robust=robust))
+    said = said_of(SimpleNamespace(found=SimpleNamespace(test=test), result=result))
     assert title in said.title
     assert f"is {kurtosis:+.3f}" in said.words
+    # Small outliers, which a robust fit keeps, make large errors and no small ones.
+    assert ("outliers" in said.words) == (robust and kurtosis > 0.0)

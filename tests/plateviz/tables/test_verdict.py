@@ -74,6 +74,21 @@ def stuck_with(result, rows, factor):
     return replace(with_summary(result, converged=False, reason="stuck"), residuals=residuals)
 
 
+@pytest.mark.parametrize(("factor", "state"), [(1.5, "good"), (27.0, "good"), (53.8, "bad")])
+def test_catalogue_whose_errors_had_to_be_multiplied_by_much_is_not_trusted(
+    monkeypatch, fit_result, factor, state
+):
+    good = with_chances(monkeypatch, fit_result)
+    log_factor = {"references": float(np.log(factor))}
+    entry = {"log_factor": log_factor, "sigma": {"references": 0.1}, "converged": True, "rounds": 3}
+    settings = good.settings.with_(reference_scale=True)
+    found = orbit_verdict(replace(with_summary(good, noise=entry), settings=settings))
+    assert found.state == state
+    names = [one.name for one in found.causes]
+    assert names == ([] if state == "good" else ["wrong-catalogue"])
+    assert ("nowhere near the catalogue" in found.headline) == (state != "good")
+
+
 def test_fit_that_does_not_converge_says_what_helps(fit_result):
     stuck = stuck_with(fit_result, slice(None, None, 100), 1000.0)
     judged = orbit_verdict(stuck)

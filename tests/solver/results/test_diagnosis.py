@@ -32,16 +32,32 @@ ORDER = 5
 SETTINGS = replace(SurveySettings(orbits=100, seed=4).scaled(14_000), magnitudes=True)
 
 
-def fitted(*defects, orbit=0, order=ORDER):
-    """Return the solution of a simulated orbit with defects."""
+def orbit_of(*defects, orbit=0):
+    """Return a simulated orbit with defects."""
     settings = replace(SETTINGS, defects=defects)
     truth = truth_catalogue(settings)
     catalogue, _ = defective_catalogue(reference_catalogue(truth, settings), truth, settings)
     rows = measure_orbit(orbit, truth, settings)
     measured = truth["source_id"].isin(rows.measurements["source_id"])
     tables = (table[measured].reset_index(drop=True) for table in (catalogue, truth))
-    data = OrbitData(rows.measurements, rows.exposures, *tables)
-    return fit_orbit(data, settings=FitSettings(order=order))
+    return OrbitData(rows.measurements, rows.exposures, *tables)
+
+
+def fitted(*defects, orbit=0, order=ORDER):
+    """Return the solution of a simulated orbit with defects."""
+    return fit_orbit(orbit_of(*defects, orbit=orbit), settings=FitSettings(order=order))
+
+
+def fitted_with_noise(clean, noise, *defects):
+    """Return the solution of an orbit whose noise is replaced, in units of the stated one."""
+    data = orbit_of(*defects)
+    new = {
+        f"n{axis}": data.measurements[f"n{axis}"]
+        + (of_axis * clean.residuals[f"s{axis}"] - clean.residuals[f"residual_{axis}"]).to_numpy()
+        for axis, of_axis in zip("xy", noise, strict=True)
+    }
+    data = replace(data, measurements=data.measurements.assign(**new))
+    return fit_orbit(data, settings=FitSettings(order=ORDER))
 
 
 @pytest.fixture(scope="module")
@@ -222,6 +238,32 @@ def test_every_cause_is_named(defect, subject):
 
 
 @pytest.mark.parametrize(
+    ("defects", "subjects"),
+    [
+        (("pointing-jitter=8mas", "detector-shift=0.3um"), ["swing", "shift"]),
+        (("outliers=0.05%", "detector-shift=0.3um"), ["outliers", "shift"]),
+        *(
+            pytest.param((one,), [subject], marks=pytest.mark.full)
+            for one, subject in (("pointing-jitter=20mas", "swing"), ("outliers=1%", "outliers"))
+        ),
+    ],
+    ids=str,
+)
+def test_pattern_is_named_beside_what_shifts_stars_if_it_is_more_than_these_carry(
+    defects, subjects
+):
+    found = find_causes(diagnose(fitted(*defects))).found
+    assert [one.test.subject for one in found] == subjects
+
+
+def test_tails_do_not_hide_a_pattern(clean):
+    rng = np.random.default_rng(5)
+    noise = rng.standard_t(10, (2, len(clean.residuals))) / np.sqrt(1.25)
+    found = find_causes(diagnose(fitted_with_noise(clean, noise, "detector-shift=0.1um"))).found
+    assert "shift" in [one.test.subject for one in found]
+
+
+@pytest.mark.parametrize(
     ("order", "orbit"),
     [
         (2, 0),
@@ -346,12 +388,8 @@ def test_measurements_in_each_others_place_are_found(clean):
     ids=["t", "triangular"],
 )
 def test_noise_that_is_not_normal_is_named(clean, drawn, more):
-    residuals = clean.residuals.copy()
-    noise = drawn(np.random.default_rng(1), (2, len(residuals)))
-    left = np.sqrt(1.0 - 0.5 * residuals["leverage"])
-    for axis, of_axis in zip("xy", noise, strict=True):
-        residuals[f"residual_{axis}"] = of_axis * left * residuals[f"s{axis}"]
-    first = find_causes(diagnose(replace(clean, residuals=residuals))).found[0]
+    noise = drawn(np.random.default_rng(1), (2, len(clean.residuals)))
+    (first,) = find_causes(diagnose(fitted_with_noise(clean, noise))).found
     assert first.test.subject == "kurtosis"
     assert (first.test.statistic > 0.0) == more
     # Both axes together have three quarters of the kurtosis of each if they are independent.

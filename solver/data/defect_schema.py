@@ -1,4 +1,4 @@
-"""Table of what a simulated survey's defects affected; only tests read it."""
+"""Table of what a simulated survey's defects affected; no fit reads it."""
 
 from solver.data.columns import Column, Table
 from solver.data.input_schema import MEASURED, SOURCE

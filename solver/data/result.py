@@ -54,7 +54,7 @@ class FitResult:
     calibration : `schema.CALIBRATION`, every parameter group except the sources
     exposures : `schema.EXPOSURES`, in order of (field_id, plate_id)
     trace : `schema.TRACE`
-    summary : plain numbers and text; keys as written by `solver.fit`
+    summary : plain numbers and text; keys as in `solver.results.summary`
     settings : settings of the fit
     provenance : file name -> SHA-256 of the inputs
     true_places : `schema.TRUE_PLACES`, or None if there is no truth

@@ -27,5 +27,5 @@ def padded_sources(number: int) -> int:
 
 
 def padded_exposures(number: int) -> int:
-    """Return the next multiple of a number."""
+    """Return the number of exposures, rounded up to the next multiple of `_EXPOSURES`."""
     return -(-number // _EXPOSURES) * _EXPOSURES

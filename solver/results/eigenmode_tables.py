@@ -16,7 +16,7 @@ from solver.results.tables import SolvedProblem
 def eigenmode_tables(
     solution: SolvedProblem, calibration: pd.DataFrame, instrument: Instrument
 ) -> dict[str, pd.DataFrame]:
-    """Return `schema.MODES`, `MODE_PARAMETERS` and `MODE_SHIFTS` by name.
+    """Return `MODES`, `MODE_PARAMETERS` and `MODE_SHIFTS` of `eigenmode_schema` by name.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ N_FRAME, N_FIELDS = 2 * len(FRAME_DEGREES), 2 * len(FIELD_DEGREES)
 
 
 class SkyOrbit(NamedTuple):
-    """Statistics of one orbit, as in `survey_schema.SKY_STATISTICS`.
+    """Statistics of one orbit, as in `run_schema.SKY_STATISTICS`.
 
     The rows are the terms of the distortion, the polynomial of the frame, and the fields.
 

@@ -21,7 +21,6 @@ from plateviz.notebook.report import write_report
 from plateviz.notebook.runs import changes_of, figures_of_both, figures_of_run
 from plateviz.notebook.source import OpenSource
 from plateviz.notebook.table import OpenTable, input_table
-from plateviz.plots.units import orbits_text
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
@@ -263,7 +262,8 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
 
     def _titles(self) -> tuple[str, str]:
         state = "not fitted as a whole" if self.run_name is None else f"run {self.run_name}"
-        return f"Survey {self.directory.name}", f"{orbits_text(len(self._numbers))}, {state}"
+        plural = "" if len(self._numbers) == 1 else "s"
+        return f"Survey {self.directory.name}", f"{len(self._numbers):,} orbit{plural}, {state}"
 
     def _call(self) -> str:
         return f"plateviz.open({str(self.directory)!r}, run={self.run_name!r})"

@@ -169,5 +169,5 @@ def test_a_change_of_the_time_scale_needs_a_refit(problem, expansion_point, data
 
 @pytest.mark.parametrize("setting", ["charge_transfer", "magnitude_shift"])
 def test_a_shift_by_magnitude_needs_magnitudes(small_orbit, setting):
-    with pytest.raises(InputError, match="expected a column magnitude in the catalogue"):
+    with pytest.raises(InputError, match="expected magnitudes in the catalogue, found none"):
         build_problem(small_orbit.data, small_orbit.instrument, FitSettings(**{setting: True}))

@@ -81,8 +81,9 @@ def _with_cause(reason: str, result: FitResult) -> str:
     # What the residuals look like before the last step is no more than a hint.
     if not causes or causes[0].name == "not-converged":
         return reason
-    title, options = causes[0].title, " ".join(causes[0].options)
-    return f"{reason}. {title[0].upper()}{title[1:]}: {causes[0].action} ({options})"
+    title, options = causes[0].title, f" ({' '.join(causes[0].options)})"
+    said = f"{title[0].upper()}{title[1:]}: {causes[0].action}"
+    return f"{reason}. {said}{options if causes[0].options else ''}"
 
 
 @contextmanager

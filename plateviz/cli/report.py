@@ -199,11 +199,11 @@ def _compose_from_file(request: ReportRequest) -> "Report":
         )
     from plateviz.reports.orbit import orbit_report
     from plateviz.reports.report import SOLVED
-    from solver.data.instrument import MINI_MOCK, read_instrument
     from solver.io.result import read_result, read_versions
+    from solver.io.result_instrument import instrument_of
 
-    focal_plane = read_instrument(request.instrument) if request.instrument else MINI_MOCK
     result = read_result(request.path)
+    focal_plane = instrument_of(result, request.instrument)
     other = read_result(Path(request.other)) if request.other else None
     facts = {**_facts(), SOLVED: read_versions(request.path)}
     return orbit_report(result, focal_plane, facts, other, more=request.more)
@@ -216,15 +216,16 @@ def _compose_from_kept(request: ReportRequest, kept: "KeptSolution") -> "Report"
             "found a kept solution"
         )
     from plateviz.reports.orbit import orbit_report
-    from plateviz.runs.kept_solutions import instrument_of, simulation_of_kept
-    from solver.data.instrument import read_instrument
+    from plateviz.runs.kept_solutions import simulation_of_kept, survey_instrument_of
     from solver.io.result import read_result
+    from solver.io.result_instrument import instrument_of
 
-    focal_plane = read_instrument(request.instrument) if request.instrument else instrument_of(kept)
+    result = kept.read()
+    focal_plane = instrument_of(result, request.instrument, survey_instrument_of(kept))
     other = read_result(Path(request.other)) if request.other else None
     simulation = simulation_of_kept(kept)
     return orbit_report(
-        kept.read(), focal_plane, _facts(), other, simulation=simulation, more=request.more
+        result, focal_plane, _facts(), other, simulation=simulation, more=request.more
     )
 
 

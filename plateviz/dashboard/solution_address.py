@@ -88,7 +88,7 @@ def find_solution(
             raise InputError(f"expected a run that has orbit {number}, found {match['run'][:40]!r}")
         return found
     if text.startswith(_KEPT):
-        return read_kept(kept.find(text.removeprefix(_KEPT)))
+        return read_kept(kept, kept.find(text.removeprefix(_KEPT)))
     words = text.split()
     settings = parse_setting_words(word for word in words if word != WHAT_IF)
     is_what_if = WHAT_IF in words
@@ -102,10 +102,10 @@ def in_words(solution: Solution) -> str:
     return " ".join([*setting_words(solution.settings), *([WHAT_IF] if solution.is_step else [])])
 
 
-def read_kept(kept: KeptSolution) -> Solution:
-    """Return a kept solution; InputError if it is damaged."""
-    result = kept.read()
-    return Solution(kept.orbit, result.settings, result, is_step=kept.is_step, kept=kept.name)
+def read_kept(kept: KeptSolutions, one: KeptSolution) -> Solution:
+    """Return a kept solution; InputError if it is damaged, or of another instrument."""
+    result = kept.read(one)
+    return Solution(one.orbit, result.settings, result, is_step=one.is_step, kept=one.name)
 
 
 def solution_of_run(run: SurveyRun | None, orbit: int | None) -> Solution | None:

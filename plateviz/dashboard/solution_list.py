@@ -97,7 +97,7 @@ class SolutionList:
         """
         what = entry.what
         if isinstance(what, KeptSolution):
-            return read_kept(what)
+            return read_kept(self._session.store.kept, what)
         if isinstance(what, OfRun):
             found = solution_of_run(what.run, what.orbit)
             if found is None:

@@ -9,13 +9,17 @@ from plateviz.notebook.orbit import OpenOrbit
 from plateviz.notebook.report import path_of
 from plateviz.notebook.solution import OpenSolution
 from plateviz.notebook.survey import OpenSurvey
-from plateviz.runs.kept_solutions import instrument_of, kept_solution, simulation_of_kept
+from plateviz.runs.kept_solutions import (
+    kept_solution,
+    simulation_of_kept,
+    survey_instrument_of,
+)
 from plateviz.solving.job import Job
 from plateviz.solving.origin import OrbitFiles
-from solver.data.instrument import MINI_MOCK, read_instrument
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
 from solver.io.result import read_result
+from solver.io.result_instrument import instrument_of
 from solver.io.survey import HEADER, read_header, section
 from solver.simulate.settings import SurveySettings
 
@@ -61,13 +65,10 @@ def open(
     target = _existing_path(path)
     if (kept := kept_solution(target)) is not None:
         _refuse(given_names - {"instrument"}, "a kept solution")
-        camera = (
-            instrument_of(kept)
-            if instrument is None
-            else read_instrument(_existing_path(instrument))
-        )
+        result = kept.read()
+        camera = instrument_of(result, _given(instrument), survey_instrument_of(kept))
         return OpenSolution(
-            kept.read(),
+            result,
             camera,
             kept.name,
             f"plateviz.open({str(target)!r})",
@@ -77,8 +78,9 @@ def open(
         _refuse(given_names - {"run"}, "a survey directory")
         return OpenSurvey(target, run)
     _refuse(given_names - {"instrument"}, "a result file; measurements need a reference catalogue")
-    camera = MINI_MOCK if instrument is None else read_instrument(_existing_path(instrument))
-    return OpenSolution(read_result(target), camera, target.name, f"plateviz.open({str(target)!r})")
+    result = read_result(target)
+    camera = instrument_of(result, _given(instrument))
+    return OpenSolution(result, camera, target.name, f"plateviz.open({str(target)!r})")
 
 
 def simulate(
@@ -179,3 +181,7 @@ def _check_same(directory: Path, settings: SurveySettings, catalogue: Path | Non
             f"{directory}: expected no survey or one with these settings, found one with other "
             f"{', '.join(different)}; plateviz.open opens it"
         )
+
+
+def _given(path: _Path | None) -> Path | None:
+    return None if path is None else _existing_path(path)

@@ -15,6 +15,7 @@ from typing import Any
 import pandas as pd
 import pyarrow as pa
 
+from solver.data.instrument import instrument_from, instrument_text
 from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES, TRACE, Table
 from solver.data.settings import FitSettings
@@ -114,6 +115,7 @@ def read_fitted_orbit(directory: Path) -> FitResult:
             summary={**head["summary"], "seconds": timings["seconds"]},
             settings=parse_settings(head["settings"], str(directory / _HEAD)),
             provenance=head["provenance"],
+            instrument=instrument_from(head.get("instrument"), directory / _HEAD),
         )
 
 
@@ -199,6 +201,7 @@ def _write_head(directory: Path, result: FitResult) -> None:
         "settings": result.settings.to_dict(),
         "summary": summary,
         "provenance": dict(result.provenance),
+        "instrument": instrument_text(result.instrument),
     }
     timings["sha256"] = _digest(timings)
     for name, content in ((_HEAD, head), (_TIMINGS, timings)):

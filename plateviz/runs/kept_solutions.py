@@ -25,6 +25,7 @@ from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import flush
 from solver.io.disk import writing
+from solver.io.result_instrument import instrument_of
 from solver.io.scratch import scratch_beside
 from solver.io.survey import HEADER, read_survey_instrument
 from solver.simulate.settings import SurveySettings
@@ -73,9 +74,10 @@ class KeptSolution(NamedTuple):
 class KeptSolutions:
     """The kept solutions of one survey, or of the files of one orbit."""
 
-    def __init__(self, folder: Path) -> None:
-        """Look in a folder, which need not exist."""
+    def __init__(self, folder: Path, instrument: Instrument = MINI_MOCK) -> None:
+        """Look in a folder, which need not exist, for solutions with an instrument."""
         self.folder = folder
+        self._instrument = instrument
 
     def all(self) -> list[KeptSolution]:
         """Return the kept solutions by name."""
@@ -97,6 +99,16 @@ class KeptSolutions:
         if found is None:
             raise InputError(f"expected the name of a kept solution, found {name[:60]!r}")
         return found
+
+    def read(self, kept: KeptSolution) -> FitResult:
+        """Read one of them; InputError if it is damaged, or of another instrument."""
+        result = kept.read()
+        if instrument_of(result, otherwise=self._instrument) != self._instrument:
+            raise InputError(
+                f"kept solution {kept.name!r}: expected one with the instrument that is open, "
+                "found another, with other values; `plateviz report` shows it with its own"
+            )
+        return result
 
     def keep(self, name: str, orbit: int | None, is_step: bool, result: FitResult) -> KeptSolution:
         """Keep a fitted orbit under a name.
@@ -129,7 +141,7 @@ class KeptSolutions:
         return KeptSolution(target / directory, orbit, is_step)
 
 
-def instrument_of(kept: KeptSolution) -> Instrument:
+def survey_instrument_of(kept: KeptSolution) -> Instrument:
     """Return the instrument of the survey that a solution is kept in; the mini-mock's of files."""
     survey = kept.directory.parent.parent.parent
     return read_survey_instrument(survey) if (survey / HEADER).is_file() else MINI_MOCK

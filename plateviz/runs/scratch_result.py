@@ -23,6 +23,7 @@ import pandas as pd
 import pyarrow as pa
 
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
+from solver.data.instrument import instrument_from, instrument_text
 from solver.data.result import FitResult
 from solver.data.schema import RESULT_TABLES
 from solver.errors import InputError
@@ -73,6 +74,7 @@ def write_scratch_result(
                 "settings": result.settings.to_dict(),
                 "summary": dict(result.summary),
                 "provenance": dict(result.provenance),
+                "instrument": instrument_text(result.instrument),
                 "is_partial": is_partial,
                 "is_judged": is_judged,
             }
@@ -160,6 +162,7 @@ def read_scratch_result(directory: Path, complete: Complete = lambda _: True) ->
             summary=summary,
             settings=parse_settings(head["settings"], str(directory / _HEAD)),
             provenance=head["provenance"],
+            instrument=instrument_from(head["instrument"], directory / _HEAD),
         )
 
 

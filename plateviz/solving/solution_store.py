@@ -61,7 +61,7 @@ class SolutionStore:
         self._orbits = origin.orbits()
         self.instrument: Instrument = origin.read_instrument()
         self.simulation = origin.read_simulation()
-        self.kept = KeptSolutions(origin.solutions)
+        self.kept = KeptSolutions(origin.solutions, self.instrument)
         self.selections = KeptSelections(origin.solutions)
         self.made = MadeSolutions()
         self._solver = solver

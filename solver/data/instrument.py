@@ -70,10 +70,21 @@ class Instrument:
         return [detector.detector_id for detector in self.detectors]
 
     def index_of(self, detector_ids: np.ndarray) -> np.ndarray:
-        """Return the index of each id along the detector axis; -1 if unknown."""
+        """Return the index of each id along the detector axis.
+
+        Raises
+        ------
+        InputError
+            If an id is not that of a detector.
+        """
         known = {d.detector_id: i for i, d in enumerate(self.detectors)}
         ids, inverse = np.unique(detector_ids, return_inverse=True)
-        return np.array([known.get(int(i), -1) for i in ids], dtype=np.int64)[inverse]
+        if unknown := [int(i) for i in ids if int(i) not in known]:
+            raise InputError(
+                f"column detector_id: expected detectors of the instrument {self.name!r} "
+                f"({self.detector_ids}), found {unknown}"
+            )
+        return np.array([known[int(i)] for i in ids], dtype=np.int64)[inverse]
 
 
 def _mini_mock() -> Instrument:
@@ -123,13 +134,13 @@ def read_instrument(path: Path) -> Instrument:
     return parse_instrument(text, path)
 
 
-def parse_instrument(text: str, path: Path) -> Instrument:
+def parse_instrument(text: str, path: Path | str) -> Instrument:
     """Return the instrument described by a TOML text.
 
     Parameters
     ----------
     text : content of the file, as for `read_instrument`
-    path : file name for error messages
+    path : the file, or where in it, for error messages
 
     Raises
     ------
@@ -168,7 +179,17 @@ def write_instrument(instrument: Instrument) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _detector(path: Path, number: int, table: dict) -> Detector:
+def instrument_text(instrument: Instrument | None) -> str | None:
+    """Return what `instrument_from` reads back: TOML text, or None if there is no instrument."""
+    return None if instrument is None else write_instrument(instrument)
+
+
+def instrument_from(text: str | None, path: Path | str) -> Instrument | None:
+    """Return the instrument of a text, None if there is none; otherwise as `parse_instrument`."""
+    return None if text is None else parse_instrument(text, path)
+
+
+def _detector(path: Path | str, number: int, table: dict) -> Detector:
     where = f"detector number {number}"
     _expect_keys(path, where, table, set(_DETECTOR_KEYS))
     for key in ("pitch_x_um", "pitch_y_um", "n_x", "n_y"):
@@ -185,7 +206,7 @@ def _detector(path: Path, number: int, table: dict) -> Detector:
     return Detector(**values)
 
 
-def _expect_keys(path: Path, where: str, table: dict, expected: set[str]) -> None:
+def _expect_keys(path: Path | str, where: str, table: dict, expected: set[str]) -> None:
     missing, unknown = sorted(expected - set(table)), sorted(set(table) - expected)
     if missing or unknown:
         raise InputError(
@@ -194,7 +215,7 @@ def _expect_keys(path: Path, where: str, table: dict, expected: set[str]) -> Non
         )
 
 
-def _positive(path: Path, name: str, value: object) -> float:
+def _positive(path: Path | str, name: str, value: object) -> float:
     if not isinstance(value, int | float) or not _is_finite(value) or not value > 0:
         raise InputError(f"{path}: expected {name} to be a positive number, found {value!r}")
     return float(value)

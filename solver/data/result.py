@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from solver.data.instrument import Instrument
 from solver.data.parameter_group import Axis, Group
 from solver.data.parameters import PARAMETERS
 from solver.data.settings import FitSettings
@@ -57,6 +58,7 @@ class FitResult:
     summary : plain numbers and text; keys as in `solver.results.summary`
     settings : settings of the fit
     provenance : file name -> SHA-256 of the inputs
+    instrument : nominal focal plane of the fit; None in a result of an older version without it
     true_places : `schema.TRUE_PLACES`, or None if there is no truth
     outliers : `schema.OUTLIERS`, or None if the fit was not robust
     orders : `schema.ORDERS`, or None if orders were not compared
@@ -75,6 +77,7 @@ class FitResult:
     summary: Mapping[str, Any]
     settings: FitSettings
     provenance: Mapping[str, str] = field(default_factory=dict)
+    instrument: Instrument | None = None
     true_places: pd.DataFrame | None = None
     losses: pd.DataFrame | None = None
     outliers: pd.DataFrame | None = None

@@ -14,7 +14,7 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _LARGEST_INTEGER = 2**63 - 1
 
 
-def parse_toml(text: str, path: Path, expected: str) -> dict[str, Any]:
+def parse_toml(text: str, path: Path | str, expected: str) -> dict[str, Any]:
     """Return the content of a TOML text.
 
     Parameters

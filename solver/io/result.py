@@ -10,6 +10,7 @@ from astropy.io import fits
 from astropy.table import Table as RawTable
 
 from solver.data import schema
+from solver.data.instrument import instrument_from, instrument_text
 from solver.data.result import FitResult
 from solver.errors import InputError
 from solver.io import published_layout as layout
@@ -23,7 +24,8 @@ from solver.io.settings import parse_settings
 
 _SUMMARY = "SUMMARY"
 _N_TABLES = "NTABLES"
-_SECTIONS = ("summary", "settings", "provenance")
+_SECTIONS = ("summary", "settings", "provenance", "instrument")
+_TOML = "toml"
 # Tables that a result may lack.
 _OPTIONAL = {
     "true_places": layout.TRUE_PLACES,
@@ -121,6 +123,7 @@ def to_result(path: Path, file: FitsFile) -> FitResult:
         summary=sections["summary"],
         settings=settings,
         provenance=sections["provenance"],
+        instrument=instrument_from(sections["instrument"].get(_TOML), f"{path}, HDU {_SUMMARY}"),
         **{
             name: _frame(path, file, hdu_layout) if hdu_layout.hdu in file.tables else None
             for name, hdu_layout in _OPTIONAL.items()
@@ -216,7 +219,8 @@ def _unescape(text: str) -> str:
 
 
 def _summary_columns(result: FitResult) -> list[Derived]:
-    contents = (result.summary, result.settings.to_dict(), result.provenance)
+    camera = {_TOML: instrument_text(result.instrument)}
+    contents = (result.summary, result.settings.to_dict(), result.provenance, camera)
     rows = [
         (section, _escape(str(key)), json.dumps(value, default=_plain))
         for section, content in zip(_SECTIONS, contents, strict=True)

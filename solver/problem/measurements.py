@@ -14,7 +14,6 @@ import pandas as pd
 from jaxtyping import Bool, Float, Int
 
 from solver.data.instrument import Instrument
-from solver.errors import InputError
 from solver.model.forward import Index
 from solver.problem.source_blocks import FieldSets, field_sets
 from solver.problem.tiles import Gathering, Tiles, lay_tiles
@@ -129,13 +128,6 @@ def sort_measurements(
     keys = pd.MultiIndex.from_frame(exposures[KEY])
     exposure = keys.get_indexer(pd.MultiIndex.from_frame(measurements[KEY]))
     detector = instrument.index_of(measurements["detector_id"].to_numpy())
-    if (detector < 0).any():
-        unknown = sorted(set(measurements["detector_id"].to_numpy()[detector < 0].tolist()))
-        known = instrument.detector_ids
-        raise InputError(
-            f"column detector_id of the measurements: expected detectors of the instrument "
-            f"{instrument.name!r} ({known}), found {unknown}"
-        )
     row = np.lexsort((source, detector, exposure))
     index = Index(source[row], exposure[row], detector[row])
     table = measurements.iloc[row]

@@ -105,6 +105,10 @@ def partial_result(
     if places is not None:
         summary["truth"] = truth_summary(sources, places)
     result = FitResult(
-        **tables, summary=summary, settings=settings, provenance=dict(data.provenance)
+        **tables,
+        summary=summary,
+        settings=settings,
+        provenance=dict(data.provenance),
+        instrument=instrument,
     )
     return PartialResult(result, solution, instrument)

@@ -129,6 +129,7 @@ def synthetic_fit(seed: int = 1, n_sources: int = N_SOURCES) -> tuple[FitResult,
         trace=_trace(len(residuals)),
         summary=_summary(sources, residuals, exposures, float(chi2.sum())),
         settings=FitSettings(order=ORDER),
+        instrument=MINI_MOCK,
         true_places=truth[["source_id", "ra", "dec"]].assign(induced_ra=0.02, induced_dec=-0.01),
     )
     result = replace(result, **_eigenmodes(random, result))

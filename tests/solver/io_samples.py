@@ -8,6 +8,7 @@ import pandas as pd
 from astropy.io import fits
 from astropy.table import Table
 
+from solver.data.instrument import MINI_MOCK
 from solver.data.parameters import CALIBRATION_GROUPS
 from solver.data.result import FitResult
 from solver.data.schema import CALIBRATION, EXPOSURES, RESIDUALS, SOURCES, TRACE, TRUE_PLACES
@@ -158,6 +159,7 @@ def small_result(seed=2) -> FitResult:
         },
         settings=FitSettings(order=5, prior_widths={"focal_length": float("inf"), "sources": 2.0}),
         provenance={"OBS.fits": "ab" * 32, "a long name, it's é.fits" * 4: "cd" * 32},
+        instrument=replace(MINI_MOCK, name='the astronomer\'s "camera" µ'),
         true_places=random_table(TRUE_PLACES, 4, rng),
     )
 

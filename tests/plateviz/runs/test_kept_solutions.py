@@ -1,12 +1,14 @@
 """Kept solutions: copied whole under a name that is free, and read back; notes beside them."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 
 import plateviz
 from plateviz.runs.kept_solutions import KeptSolutions, kept_solution
 from plateviz.runs.note import MOST_BYTES, NoteChangedError, read_note, write_note
+from solver.data.instrument import MINI_MOCK
 from solver.errors import InputError
 
 
@@ -24,6 +26,14 @@ def test_kept_solution_is_read_back(kept, fit_result):
     assert made.read().sources.equals(fit_result.sources)
     assert kept.keep("of-files", None, False, fit_result).directory.name == "orbit=file"
     assert [one.orbit for one in kept.all()] == [3, None]
+
+
+def test_solution_of_another_instrument_is_refused(kept, fit_result):
+    made = kept.keep("a", None, False, fit_result)
+    assert kept.read(made).instrument == fit_result.instrument
+    other = KeptSolutions(kept.folder, replace(MINI_MOCK, focal_length_um=2e6))
+    with pytest.raises(InputError, match="kept solution 'a': expected one with the instrument"):
+        other.read(other.find("a"))
 
 
 def test_name_that_is_taken_changes_nothing(kept, fit_result):

@@ -58,7 +58,9 @@ def test_special_characters_in_the_name_round_trip(read_text, name):
 def test_detector_ids_may_be_arbitrary(read_text):
     detectors = tuple(replace(d, detector_id=10 * d.detector_id + 3) for d in MINI_MOCK.detectors)
     instrument = read_text(write_instrument(replace(MINI_MOCK, detectors=detectors)))
-    np.testing.assert_array_equal(instrument.index_of(np.array([33, 3, 4, 13])), [3, 0, -1, 1])
+    np.testing.assert_array_equal(instrument.index_of(np.array([33, 3, 3, 13])), [3, 0, 0, 1])
+    with pytest.raises(InputError, match=r"\(\[3, 13, 23, 33\]\), found \[4\]"):
+        instrument.index_of(np.array([33, 4]))
 
 
 def test_integer_lengths_are_accepted(read_text):

@@ -1,4 +1,4 @@
-"""A start for fits whose estimated pointings or position angles are far off.
+"""A start for fits whose estimated pointings, position angles or detectors' turns are far off.
 
 The steps of Gauss-Newton find the mode from pointings that are arcminutes off and from position
 angles up to some 90 deg off. Two programs that define a sign or a zero point in different ways
@@ -12,8 +12,10 @@ import numpy as np
 from jaxtyping import Float
 
 from solver.data.parameters import BY_NAME
+from solver.engines.detector_axes import detector_turns
+from solver.errors import InputError
 from solver.model.astrometry import sky_position
-from solver.model.directions import tangent_frame
+from solver.model.directions import displaced, tangent_frame
 from solver.problem.problem import Problem
 from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
 
@@ -25,6 +27,8 @@ _SUSPICIOUS = 1e6
 _WEIGHT_OF_START = 1e-12
 # Smallest cosine of the angle between two pointings that their tangent plane can express well.
 _NEAREST_TO_HORIZON = 0.1
+# Smallest turn of a detector that is not left to the fit, and most widths of its prior, arcsec.
+_LARGE_TURN, _MOST_WIDTHS = 30.0 * 3600.0, 5.0
 _TURN = 2.0 * np.pi
 _ATTITUDE = ("pointing_ra", "pointing_dec", "position_angle")
 
@@ -47,13 +51,21 @@ def attitude_start(
     Returns
     -------
     `theta` itself unless its residuals are very large
+
+    Raises
+    ------
+    InputError
+        If these are, and the pixel axes of a detector are mirrored, or turned by an angle that
+        the prior of its rotation does not allow.
     """
     if not chi2 > _SUSPICIOUS * 2 * problem.n_obs:
         return theta
     axes = _axes(problem, theta)
     exposure, frame = problem.measurements.index.exposure, problem.geometry.source_frame
-    seen = _displaced(frame[: problem.n_src], RAD_PER_MAS * sources)
+    seen = displaced(frame[: problem.n_src], *(RAD_PER_MAS * sources).T)
     seen = seen[problem.measurements.index.source]
+    looking = _looking(problem, theta)
+    theta = _with_turned_detectors(problem, theta, detector_turns(problem, looking, seen))
     looking = _looking(problem, theta)
     aligned = np.zeros_like(axes)
     for i, j in np.ndindex(3, 3):
@@ -77,19 +89,11 @@ def _values(
     }
 
 
-def _displaced(
-    frame: Float[np.ndarray, "n 3 3"], offset: Float[np.ndarray, "n 2"]
-) -> Float[np.ndarray, "n 3"]:
-    """Return unit vectors displaced in the tangent plane of their frames, rad."""
-    moved = frame[:, 0] + np.einsum("ni,nij->nj", offset, frame[:, 1:])
-    return moved / np.linalg.norm(moved, axis=-1, keepdims=True)
-
-
 def _axes(problem: Problem, theta: Float[np.ndarray, " calib"]) -> Float[np.ndarray, "exp 3 3"]:
     """Return the axes of the focal plane of each exposure, as `projection.focal_axes`."""
     values = _values(problem, theta)
-    offset = RAD_PER_ARCSEC * np.stack([values["pointing_ra"], values["pointing_dec"]], axis=-1)
-    centre = _displaced(problem.geometry.pointing_frame[: len(offset)], offset)
+    offset = [RAD_PER_ARCSEC * values[f"pointing_{axis}"] for axis in ("ra", "dec")]
+    centre = displaced(problem.geometry.pointing_frame[: len(offset[0])], *offset)
     _, east, north = tangent_frame(*sky_position(centre)).swapaxes(0, 1)
     angle = RAD_PER_ARCSEC * values["position_angle"][:, None]
     c, s = np.cos(angle), np.sin(angle)
@@ -110,6 +114,27 @@ def _looking(problem: Problem, theta: Float[np.ndarray, " calib"]) -> Float[np.n
     y = values["detector_y"][n] - s * along + c * across
     looking = np.stack([x, y, values["focal_length"][index.exposure]], axis=-1)
     return looking / np.linalg.norm(looking, axis=-1, keepdims=True)
+
+
+def _with_turned_detectors(
+    problem: Problem, theta: Float[np.ndarray, " calib"], turns: Float[np.ndarray, " det"]
+) -> Float[np.ndarray, " calib"]:
+    """Return the calibration with the detectors turned that are far from their rotation."""
+    columns = problem.layout.columns(BY_NAME["detector_rotation"])
+    turned = abs(turns) > _LARGE_TURN * RAD_PER_ARCSEC
+    moved = theta.copy()
+    moved[columns] += np.where(turned, turns / RAD_PER_ARCSEC, 0.0)
+    refused = turned & (abs(moved[columns]) > _MOST_WIDTHS * problem.priors.width[columns])
+    if refused.any():
+        called = [problem.elements["det"][number].name for number in np.flatnonzero(refused)]
+        angles = ", ".join(f"{angle:.0f}" for angle in np.degrees(turns[refused]))
+        raise InputError(
+            "columns nx, ny, detector_id of the measurements: expected detectors turned as in the "
+            f"instrument, found detector {', '.join(called)} turned by about {angles} deg against "
+            "it: check the ids, the signs of nx and ny and rotation_deg of the instrument, or "
+            "widen the prior, such as --prior detector_rotation=180deg"
+        )
+    return moved
 
 
 def _with_axes(

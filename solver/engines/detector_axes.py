@@ -1,0 +1,108 @@
+"""How the pixel axes of the detectors lie on the sky: mirrored, or turned against the instrument.
+
+The fit takes small steps, and can undo neither. In complex numbers the focal plane shows the sky
+around a pointing as z = exp(-i theta) w, Eq. (method:ideal), with z = x + i y and w = -E + i N,
+E to the east and N to the north. Mirrored axes go with the conjugate of w instead.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+
+from solver.errors import InputError
+from solver.model.astrometry import sky_position
+from solver.model.directions import tangent_frame
+from solver.problem.problem import Problem
+
+# Stars of one exposure on one detector from which the directions of its axes are clear.
+_FEWEST = 5
+# How much better the conjugate has to correlate than w does, of 1.
+_CLEAR = 0.5
+# Share of the largest correlation from which an angle is known; wrong identifications have none.
+_COHERENT = 0.5
+
+
+class _Groups(NamedTuple):
+    """The group of each measurement: those of an exposure, or of a detector in an exposure."""
+
+    number: Int[np.ndarray, " obs"]
+    count: int
+
+    def sums(self, values: Complex[np.ndarray, " obs"]) -> Complex[np.ndarray, " group"]:
+        """Return the sums over each group."""
+        real, imaginary = (
+            np.bincount(self.number, part, self.count)
+            for part in (np.real(values), np.imag(values))
+        )
+        return real + 1j * imaginary
+
+    def centred(self, values: Complex[np.ndarray, " obs"]) -> Complex[np.ndarray, " obs"]:
+        """Return the differences to the mean of each group."""
+        many = np.bincount(self.number, minlength=self.count)
+        return values - (self.sums(values) / np.maximum(many, 1))[self.number]
+
+
+def detector_turns(
+    problem: Problem, looking: Float[np.ndarray, "obs 3"], seen: Float[np.ndarray, "obs 3"]
+) -> Float[np.ndarray, " det"]:
+    """Return by how much each detector is turned against its rotation in `looking`, rad.
+
+    The places of the detectors on the sky give the angle from which it counts. It is 0 where it is
+    not known.
+
+    Parameters
+    ----------
+    looking : directions of the measured pixels along the axes of their exposure
+    seen : directions to their sources; any error of the pointings is harmless
+
+    Raises
+    ------
+    InputError
+        If a detector shows the sky mirrored.
+    """
+    index, n_det = problem.measurements.index, problem.measurements.n_det
+    n_exp = problem.layout.n_exp
+    exposures = _Groups(index.exposure, n_exp)
+    groups = _Groups(index.exposure * n_det + index.detector, n_exp * n_det)
+    z = exposures.centred(looking[:, 0] + 1j * looking[:, 1])
+    w = exposures.centred(_on_the_sky(exposures, seen))
+    z_here, w_here = groups.centred(z), groups.centred(w)
+    along, mirrored = groups.sums(z_here * w_here.conj()), groups.sums(z_here * w_here)
+    many = np.bincount(groups.number, minlength=groups.count) >= _FEWEST
+    squares = (groups.sums(one * one.conj()) for one in (z_here, w_here))
+    scale = np.prod(np.real(list(squares)), axis=0)
+    handedness = np.full(groups.count, np.nan)
+    np.divide(abs(along) ** 2 - abs(mirrored) ** 2, scale, out=handedness, where=many & (scale > 0))
+    _require_handedness(problem, handedness.reshape(n_exp, n_det))
+    of_places = exposures.sums((z - z_here) * (w - w_here).conj())
+    of_places = of_places[:, None].conj()
+    turned = np.where(many, along, 0.0).reshape(n_exp, n_det) * of_places
+    possible = np.where(many, np.sqrt(scale), 0.0).reshape(n_exp, n_det) * abs(of_places)
+    total, is_known = turned.sum(axis=0), possible.sum(axis=0) > 0.0
+    is_known &= abs(total) > _COHERENT * possible.sum(axis=0)
+    return np.where(is_known, np.angle(total), 0.0)
+
+
+def _on_the_sky(
+    exposures: _Groups, seen: Float[np.ndarray, "obs 3"]
+) -> Complex[np.ndarray, " obs"]:
+    """Return -E + i N of directions, relative to the mean direction of their exposure."""
+    centre = np.stack([np.real(exposures.sums(one + 0j)) for one in seen.T], axis=-1)
+    frame = tangent_frame(*sky_position(centre))[exposures.number]
+    east, north = (np.einsum("oj,oj->o", frame[:, axis], seen) for axis in (1, 2))
+    return -east + 1j * north
+
+
+def _require_handedness(problem: Problem, handedness: Float[np.ndarray, "exp det"]) -> None:
+    mirrored = [
+        element.name
+        for element, values in zip(problem.elements["det"], handedness.T, strict=True)
+        if np.isfinite(values).any() and np.nanmedian(values) < -_CLEAR
+    ]
+    if mirrored:
+        raise InputError(
+            "columns nx, ny of the measurements: expected pixel axes with the handedness of "
+            f"Eq. (exp:model:nxny), found the sky mirrored on detector {', '.join(mirrored)}: "
+            "exchange nx and ny there, or change the sign of one of them"
+        )

@@ -3,7 +3,8 @@
 from typing import NamedTuple
 
 from solver.data.result import FitResult
-from solver.results.diagnosis.causes import Causes, Found
+from solver.results.diagnosis.causes import Causes
+from solver.results.diagnosis.found import Found
 from solver.results.diagnosis.table import Diagnosis
 
 

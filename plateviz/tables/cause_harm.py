@@ -46,6 +46,10 @@ def harm(case: Case) -> tuple[str, bool]:
         return _harm_of_parts(case, of_parts[subject])
     if subject == "swing":
         return _harm_of_swings(case)
+    if subject in ("others", "other"):
+        return _harm_of_others(case)
+    if subject == "references" and found.test.statistic < found.test.expected:
+        return "It spoils the error that all positions share, which is smaller than stated.", False
     if subject == "references":
         spoils = (
             "It spoils the error that all positions share, which is up to "
@@ -113,6 +117,27 @@ def _harm_of_parts(case: Case, total: int) -> tuple[str, bool]:
         f"{_largest_shift_of_one(case):.2g} mas, where a typical uncertainty is "
         f"{_typical_sigma(case.result):.2g} mas.",
         is_large,
+    )
+
+
+def _harm_of_others(case: Case) -> tuple[str, bool]:
+    """Return the same for stars other than references that the catalogue has elsewhere.
+
+    A catalogue position counts with the inverse of its variance, against that of the measurements.
+    """
+    rows, items = case.result.sources, case.found.items
+    chosen = rows["source_id"].isin(items) if items else ~rows["is_reference"].astype(bool)
+    sigma, prior, offset = (
+        rows.loc[chosen, [name.format(axis) for axis in ("ra", "dec")]].to_numpy(dtype=float)
+        for name in ("sigma_{}_marginal", "prior_sigma_{}", "offset_{}")
+    )
+    shift = float(np.sqrt(np.nanmean(np.square(offset * (sigma / prior) ** 2))))
+    typical, frame = float(np.nanmedian(sigma)), _references_off(case.result)
+    also = ", and the frame with them: the reference stars deviate, too" if frame else ""
+    return (
+        f"It spoils the positions of these stars, by {shift:.2g} mas rms where their uncertainty "
+        f"is {typical:.2g} mas{also}.",
+        frame or shift > _LARGE_SHARE * typical,
     )
 
 

@@ -7,6 +7,8 @@ from plateviz.tables.data_cause_words import (
     said_of_kurtosis,
     said_of_noise,
     said_of_noise_of,
+    said_of_other,
+    said_of_others,
     said_of_outliers,
     said_of_reference,
     said_of_references,
@@ -230,5 +232,7 @@ _WORDS: dict[str, Callable[[Case], Said]] = {
     "swing": _swing,
     "references": said_of_references,
     "reference": said_of_reference,
+    "others": said_of_others,
+    "other": said_of_other,
     "prior": said_of_prior,
 }

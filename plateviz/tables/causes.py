@@ -8,18 +8,17 @@ import pandas as pd
 from plateviz.tables.cause_case import Case
 from plateviz.tables.cause_harm import harm
 from plateviz.tables.cause_words import said_of
+from plateviz.tables.data_cause_words import WRONG_FACTOR, said_of_wrong_catalogue
 from plateviz.tables.estimated_noise import reference_factor
 from plateviz.tables.labels import exposure_labels, id_strings
 from plateviz.tables.prior_words import narrowed_priors, usual_priors
 from plateviz.tables.remedy import remedied
 from solver.data.result import FitResult
-from solver.results.diagnosis.causes import Causes, wrong_identifications
+from solver.results.diagnosis.causes import SCATTER, Causes, wrong_identifications
 from solver.results.diagnosis.table import Diagnosis
 
 # Share of chi2 from which the measurements that are far off explain why a fit does not converge.
 _WILD_SHARE = 0.5
-# No catalogue states errors that are so many times too small: something else is wrong with it.
-_WRONG_FACTOR = 30.0
 
 
 class Cause(NamedTuple):
@@ -71,23 +70,14 @@ def wrong_catalogue(result: FitResult) -> list[Cause]:
     With these errors, nothing is left for the tests to find.
     """
     found = reference_factor(result)
-    if found is None or found[0] < _WRONG_FACTOR:
+    if found is None or found[0] < WRONG_FACTOR:
         return []
     factor, significance = found
-    cause = Cause(
-        "wrong-catalogue",
-        "the reference stars are nowhere near the catalogue",
-        f"The fit has multiplied the catalogue's errors by {factor:.1f} to agree with them. "
-        "Positions of another epoch, wrong proper motions, wrong times of the exposures or wrong "
-        "units do this.",
-        significance,
-        "It spoils what all positions have in common, perhaps by more than they state.",
-        "check the epochs, proper motions and units of the catalogue, and the times of the "
-        "exposures",
-        (),
-        True,
+    said = said_of_wrong_catalogue(
+        f"The fit has multiplied the catalogue's errors by {factor:.1f} to agree with them."
     )
-    return [cause]
+    spoils = "It spoils what all positions have in common, perhaps by more than they state."
+    return [Cause(said.name, said.title, said.words, significance, spoils, said.action, (), True)]
 
 
 def _stuck(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> Cause:
@@ -140,8 +130,7 @@ def _in_words(case: Case) -> Cause:
         )
     action, options = said.action, said.options
     if options and remedied(case.result.settings, options) is None:
-        action = f"the fit has {' '.join(options)} already; look at what remains in the residuals"
-        options = ()
+        action, options = _already(case, options), ()
     sigma = float(case.found.test.sigma)
     return Cause(
         said.name,
@@ -154,6 +143,17 @@ def _in_words(case: Case) -> Cause:
         bool(is_large),
         _items(case),
     )
+
+
+def _already(case: Case, options: tuple[str, ...]) -> str:
+    """Return what to do where the fit has the options already that a cause suggests."""
+    given = " ".join(options)
+    if case.found.test.subject in SCATTER and case.result.summary.get("noise") is None:
+        return (
+            f"the fit has {given}, but could not estimate the noise with it: leave out the "
+            "exposures whose residuals are largest, or mend what else is named here first"
+        )
+    return f"the fit has {given} already; look at what remains in the residuals"
 
 
 def _items(case: Case) -> tuple[str, ...]:

@@ -9,6 +9,10 @@ from plateviz.tables.cause_case import Case, Said
 from plateviz.tables.labels import id_strings
 
 _MOST_NAMED = 8
+# So many options a person would still give.
+_MOST_LEFT_OUT = 20
+# No catalogue states errors that are so many times too small: something else is wrong with it.
+WRONG_FACTOR = 30.0
 
 
 def said_of_noise(case: Case) -> Said:
@@ -97,19 +101,71 @@ def said_of_swapped(case: Case) -> Said:
 
 
 def said_of_references(case: Case) -> Said:
-    """Return what is said of reference stars whose errors are larger than stated."""
-    settings = case.result.settings
+    """Return what is said of reference stars whose errors are larger, or smaller, than stated."""
+    settings, test = case.result.settings, case.found.test
+    factor = case.found.size * settings.width("sources")
+    if factor >= WRONG_FACTOR:
+        return said_of_wrong_catalogue(
+            f"Its errors would have to be {case.found.size:.1f} times those stated."
+        )
     action, option = "let the fit estimate how large the catalogue's errors are", "reference-scale"
     if settings.reference_scale:
         # The errors are in units of the prior's sigmas, which the fit may have widened already.
-        factor = max(case.found.size, 1.1) * settings.width("sources")
-        action, option = "widen the prior of the reference stars", f"prior sources={factor:.2f}"
+        action = "widen the prior of the reference stars"
+        option = f"prior sources={max(factor, 1.1 * settings.width('sources')):.2f}"
+    is_nearer = test.statistic < test.expected
+    words = f"Its errors are about {case.found.size:.2f} times those stated."
+    if is_nearer:
+        words = (
+            f"Their rms deviation is {test.statistic:.2g} of its errors, where {test.expected:.2g} "
+            "is expected."
+        )
     return Said(
         "reference-errors",
-        "the reference stars are further from the catalogue than it states",
-        f"Its errors are about {case.found.size:.2f} times those stated.",
+        f"the reference stars are {'nearer' if is_nearer else 'further from'} the catalogue than "
+        "it states",
+        words,
         action,
         (f"--{option}",),
+    )
+
+
+def said_of_wrong_catalogue(evidence: str) -> Said:
+    """Return what is said of a catalogue that the reference stars are nowhere near."""
+    return Said(
+        "wrong-catalogue",
+        "the reference stars are nowhere near the catalogue",
+        f"{evidence} Positions of another epoch, wrong proper motions, wrong times of the "
+        "exposures or wrong units do this.",
+        "check the epochs, proper motions and units of the catalogue, and the times of the "
+        "exposures",
+    )
+
+
+def said_of_others(case: Case) -> Said:
+    """Return what is said of other stars whose catalogue errors are larger than stated."""
+    return Said(
+        "catalogue-errors",
+        "the stars that are no reference stars are further from the catalogue than it states",
+        f"Its errors are about {case.found.size:.3g} times those stated.",
+        "check the units and epochs of the catalogue, or state larger errors there",
+    )
+
+
+def said_of_other(case: Case) -> Said:
+    """Return what is said of single other stars that are wrong."""
+    ids = id_strings(pd.Series(case.found.items, dtype=np.int64))
+    some, are_few = len(ids) > 1, len(ids) <= _MOST_LEFT_OUT
+    named = f"{', '.join(ids[:_MOST_NAMED])}{', ...' if len(ids) > _MOST_NAMED else ''}"
+    leave = f", or leave {'these stars' if some else 'this star'} out"
+    return Said(
+        "wrong-positions",
+        f"{len(ids):,} star{'s are' if some else ' is'} not where the catalogue has "
+        f"{'them' if some else 'it'}",
+        f"The measurements have {'each' if some else 'it'} far from there, as with a wrong "
+        f"identification or a wrong position: {named}.",
+        f"correct the catalogue or the identification{leave if are_few else ''}",
+        tuple(f"--exclude source={one}" for one in ids) if are_few else (),
     )
 
 

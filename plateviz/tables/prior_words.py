@@ -7,6 +7,9 @@ from solver.data.parameters import BY_NAME, PARAMETERS
 from solver.data.prior_text import format_width, split_name
 from solver.data.settings import FitSettings
 
+# Instruments are known to better than so many widths.
+_NOT_BY_CHANCE = 30.0
+
 
 def said_of_prior(case: Case) -> Said:
     """Return what is said of a prior that contradicts the values of its parameters."""
@@ -24,7 +27,12 @@ def said_of_prior(case: Case) -> Said:
         words += " Its centre was shifted for this fit."
         return Said("prior", title, words, "take back the shift of its centre")
     wider = float(f"{2.0 * rms * width:.1g}")
-    return Said("prior", title, words, "widen it", (_option(group.name, wider),))
+    action = "widen it"
+    if rms > _NOT_BY_CHANCE:
+        action = (
+            "check the instrument and the units of the measurements; if they are right, widen it"
+        )
+    return Said("prior", title, words, action, (_option(group.name, wider),))
 
 
 def narrowed_priors(settings: FitSettings) -> list[str]:

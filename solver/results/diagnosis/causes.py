@@ -9,22 +9,24 @@ is not noise.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtri
 
 from solver.results.diagnosis import gains
+from solver.results.diagnosis.contradictions import (
+    is_beyond_noise,
+    of_others,
+    of_priors,
+    of_references,
+)
 from solver.results.diagnosis.courses import COURSES, Courses, are_alternatives
+from solver.results.diagnosis.found import Found, limit_of
 from solver.results.diagnosis.patterns import Family
 from solver.results.diagnosis.projection import Projection
 from solver.results.diagnosis.rate import sigmas
-from solver.results.diagnosis.references import MEDIAN_CHI2
-from solver.results.diagnosis.rows import Rows
 from solver.results.diagnosis.scatter import Scatter, scatter_tests
 from solver.results.diagnosis.table import (
-    CARE_RATE,
     Diagnosis,
     Test,
     pattern_test,
-    prior_test,
 )
 
 _MOST_PATTERNS = 4
@@ -37,7 +39,13 @@ _WITHOUT_CAUSE, _MUCH_MORE = ("cells", "map"), 4.0
 _PATTERNS = (*COURSES, "order", "shift", "turn", "phase", "magnitude", *_WITHOUT_CAUSE)
 _OF_EXPOSURES = ("stretch", "shear", "quadratic")
 # The positions of the sources carry these into all exposures.
-_MAKES_PATTERNS = ("swing", "outliers", "swapped", "references", "reference", "prior")
+_MAKES_PATTERNS = (
+    "swing",
+    "outliers",
+    "swapped",
+    *("references", "reference", "others", "other"),
+    "prior",
+)
 # A cause of another kind is named beside the first one from this share of its sigmas.
 _OF_ITS_OWN = 0.5
 # What these bring about explains at most so many times what the positions carry.
@@ -46,25 +54,7 @@ _SHIFTS_STARS, _MARGIN = ("swing", "outliers"), 2.0
 _OF_OUTLIERS = 0.5
 # Patterns that explain more of chi2 are not linear: what they leave tells nothing about the noise.
 _MOST_LINEAR = 0.5
-_REFERENCE_LIMIT = 0.01
-_SCATTER = ("noise", "exposures", "sources", "detectors", "magnitudes")
-
-
-class Found(NamedTuple):
-    """A cause that the tests point to.
-
-    Attributes
-    ----------
-    test : the test that says so, after the causes before it
-    gain : how much more likely the cause makes the residuals (`solver.results.diagnosis.gains`)
-    items : indices of exposures, or ids of sources, that it is about; may be empty
-    size : rms displacement, um, or another amplitude of the cause
-    """
-
-    test: Test
-    gain: float
-    items: tuple[int, ...] = ()
-    size: float = float("nan")
+SCATTER = ("noise", "exposures", "sources", "detectors", "magnitudes")
 
 
 class Causes(NamedTuple):
@@ -86,22 +76,22 @@ def find_causes(diagnosis: Diagnosis) -> Causes:
     patterns, explained = _patterns(diagnosis)
     of_exposures, of_each = _of_exposures(diagnosis, explained)
     found = [*_swinging(diagnosis), *patterns, *of_exposures]
-    found += [*_of_outliers(diagnosis), *_of_priors(diagnosis)]
+    found += [*_of_outliers(diagnosis), *of_priors(diagnosis), *of_others(diagnosis)]
     rows, left = diagnosis.rows, None
     if explained + of_each <= _MOST_LINEAR * float(rows.chi2[~rows.is_far].sum()):
         left, *_ = scatter = scatter_tests(
             rows, diagnosis.magnitude, explained + of_each, without=diagnosis.swinging
         )
-        found += [*_of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
+        found += [*of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
     # Tails spoil no positions, and make nothing but scatter.
-    spoils = any(one.test.subject not in (*_SCATTER, "kurtosis") for one in found)
+    spoils = any(one.test.subject not in (*SCATTER, "kurtosis") for one in found)
     found.sort(key=lambda one: (spoils and one.test.subject == "kurtosis", -one.gain))
     if left is None and found[:1] == patterns[:1]:
         found = patterns
-    return Causes(tuple(_of_their_own(found, rows)), left)
+    return Causes(tuple(_of_their_own(found, diagnosis)), left)
 
 
-def _of_their_own(found: list[Found], rows: Rows) -> list[Found]:
+def _of_their_own(found: list[Found], diagnosis: Diagnosis) -> list[Found]:
     """Return the causes without those that the first one may have brought about.
 
     Patterns were tested one after the other. Of two kinds of causes the weaker may be a result of
@@ -110,7 +100,7 @@ def _of_their_own(found: list[Found], rows: Rows) -> list[Found]:
     if not found:
         return []
     leads, *others = found
-    subject = leads.test.subject
+    subject, rows = leads.test.subject, diagnosis.rows
     # One wrong of n measurements shifts its star by 1/n; its other residuals have 1/n of the chi2.
     carried = _MARGIN * leads.gain * len(np.unique(rows.source)) / max(rows.n, 1)
 
@@ -118,6 +108,8 @@ def _of_their_own(found: list[Found], rows: Rows) -> list[Found]:
         is_pattern = one.test.subject in _PATTERNS
         if is_pattern and subject in _PATTERNS:
             return True
+        if one.test.subject == "prior" and subject in SCATTER:
+            return is_beyond_noise(one, diagnosis.scale, limit_of(diagnosis))
         is_weak = one.test.sigma <= _OF_ITS_OWN * leads.test.sigma
         if is_weak or _is_of_tails(one.test.subject, subject):
             return False
@@ -135,12 +127,7 @@ def _is_of_tails(subject: str, leads: str) -> bool:
     Whatever spoils some residuals more than others gives all of them tails, and noise with tails
     makes groups scatter.
     """
-    return subject == "kurtosis" or (leads == "kurtosis" and subject in _SCATTER)
-
-
-def _limit(diagnosis: Diagnosis) -> float:
-    """Return the logarithm of the chance below which a single test is named as a cause."""
-    return float(np.log(CARE_RATE / len(diagnosis.tests)))
+    return subject == "kurtosis" or (leads == "kurtosis" and subject in SCATTER)
 
 
 def _patterns(diagnosis: Diagnosis) -> tuple[list[Found], float]:
@@ -148,7 +135,7 @@ def _patterns(diagnosis: Diagnosis) -> tuple[list[Found], float]:
     projection: Projection = diagnosis.projection
     families, scale = list(diagnosis.patterns.families), diagnosis.scale
     courses, taken, found = Courses(diagnosis), list[Family](), list[Found]()
-    explained, limit = 0.0, _limit(diagnosis)
+    explained, limit = 0.0, limit_of(diagnosis)
     while len(found) < _MOST_PATTERNS:
         tests = [(family, pattern_test(projection, family, scale)) for family in families]
         tests = [one for one in tests if one[1].log_chance < limit]
@@ -200,7 +187,7 @@ def _of_exposures(diagnosis: Diagnosis, explained: float) -> tuple[list[Found], 
     tests = [one for one in diagnosis.tests if one.subject in _OF_EXPOSURES]
     gained = [(*gains.of_each_exposure(diagnosis, one.subject), one) for one in tests]
     gain, of_each, best = max(gained, key=lambda one: one[0])
-    if best.log_chance > _limit(diagnosis) or best.statistic - best.expected < explained:
+    if best.log_chance > limit_of(diagnosis) or best.statistic - best.expected < explained:
         return [], 0.0
     return [Found(best, gain)], of_each - explained
 
@@ -208,7 +195,7 @@ def _of_exposures(diagnosis: Diagnosis, explained: float) -> tuple[list[Found], 
 def wrong_identifications(diagnosis: Diagnosis) -> list[Found]:
     """Return measurements with each other's identification as a cause, if there are any."""
     pairs = diagnosis.swapped
-    if pairs.log_chance > _limit(diagnosis):
+    if pairs.log_chance > limit_of(diagnosis):
         return []
     test = next(one for one in diagnosis.tests if one.subject == "swapped")
     gain = gains.of_outliers(diagnosis)
@@ -222,7 +209,7 @@ def _of_outliers(diagnosis: Diagnosis) -> list[Found]:
     if swapped and diagnosis.swapped.chi2 > _OF_OUTLIERS * far:
         return swapped
     test = next(one for one in diagnosis.tests if one.subject == "outliers")
-    if test.log_chance > _limit(diagnosis):
+    if test.log_chance > limit_of(diagnosis):
         return []
     return [Found(test, gains.of_outliers(diagnosis), size=float(rows.is_far.sum()))]
 
@@ -232,7 +219,7 @@ def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
 
     The tails of their distribution are a cause of their own.
     """
-    limit, noise = _limit(diagnosis), scatter[0]
+    limit, noise = limit_of(diagnosis), scatter[0]
     tests = {one.subject: one for one in diagnosis.tests}
     found = []
     for one in scatter:
@@ -261,40 +248,3 @@ def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
     chance = min(best.test.log_chance, noise.log_chance)
     best = best._replace(test=best.test._replace(log_chance=chance, sigma=sigmas(chance)))
     return [best, *tails]
-
-
-def _of_references(diagnosis: Diagnosis) -> list[Found]:
-    """Return whether some, or all, of the reference stars are wrong."""
-    ids, chi2, factor, rescaled = diagnosis.references
-    if not len(chi2):
-        return []
-    limit = _limit(diagnosis)
-    tests = [one for one in diagnosis.tests if one.subject in ("references", "reference")]
-    worst = min(tests, key=lambda one: one.log_chance)
-    if worst.log_chance > limit:
-        return []
-    # Wrong stars pull the frame, and so all others; only those that are far beyond are wrong.
-    far = rescaled > chdtri(2.0, -np.expm1(np.log1p(-_REFERENCE_LIMIT) / len(chi2)))
-    if not far.any():
-        typical = max(float(np.median(chi2)) / MEDIAN_CHI2, 1.0)
-        gain = gains.of_scale(typical, 2.0 * len(chi2))
-        return [Found(worst._replace(subject="references"), gain, size=factor)]
-    order = np.argsort(-chi2[far])
-    named = tuple(int(one) for one in ids[far][order])
-    gain = float(np.sum(chi2[far] - 2.0 * gains.PER_PARAMETER))
-    return [Found(worst._replace(subject="reference"), gain, named, float(far.sum()))]
-
-
-def _of_priors(diagnosis: Diagnosis) -> list[Found]:
-    """Return the prior that contradicts the values of its parameters, as a cause.
-
-    One that was set for this fit is the first suspect: whatever it keeps the calibration from
-    following is left in the residuals, and looks like something else.
-    """
-    limit = _limit(diagnosis)
-    against = [one for one in diagnosis.priors if one.log_chance < limit]
-    if not against:
-        return []
-    worst = min(against, key=lambda one: (not one.is_set, one.log_chance))
-    gain = np.inf if worst.is_set else gains.of_scale(worst.rms**2, 1.0)
-    return [Found(prior_test(worst), gain, size=worst.rms)]

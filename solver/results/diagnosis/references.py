@@ -1,4 +1,4 @@
-"""Tests of the reference stars: the catalogue against the measurements.
+"""Tests of the stars' catalogue positions against the measurements.
 
 The estimate minus the catalogue position of a star has the covariance P - C, with P of the
 catalogue and C of the estimate. Its chi2 is that of the catalogue position against the fit
@@ -21,8 +21,8 @@ MEDIAN_CHI2 = 1.3863
 _LARGEST_FACTOR = 1e6
 
 
-class ReferenceChi2(NamedTuple):
-    """The catalogue position of each reference star against the fit without it.
+class CatalogueChi2(NamedTuple):
+    """The catalogue position of each star of a kind against the fit without it.
 
     Attributes
     ----------
@@ -39,14 +39,15 @@ class ReferenceChi2(NamedTuple):
     rescaled: np.ndarray
 
 
-def reference_chi2(sources: pd.DataFrame) -> ReferenceChi2:
-    """Return the chi2 of each reference star.
+def catalogue_chi2(rows: pd.DataFrame) -> CatalogueChi2:
+    """Return the chi2 of the catalogue positions of stars.
 
     Parameters
     ----------
-    sources : `schema.SOURCES`
+    rows : of `schema.SOURCES`
     """
-    rows = sources[sources["is_reference"].to_numpy(bool)]
+    used = rows[["prior_sigma_ra", "prior_sigma_dec", "sigma_ra_marginal", "sigma_dec_marginal"]]
+    rows = rows[np.isfinite(used.to_numpy(dtype=float)).all(axis=1)]
     prior = covariance(rows, "prior_sigma_ra", "prior_sigma_dec", "prior_corr")
     marginal = covariance(rows, "sigma_ra_marginal", "sigma_dec_marginal", "corr_marginal")
     offset = rows[["offset_ra", "offset_dec"]].to_numpy(dtype=float)
@@ -57,7 +58,7 @@ def reference_chi2(sources: pd.DataFrame) -> ReferenceChi2:
     shares, axes = np.linalg.eigh(share[known])
     along = np.square(np.einsum("nik,ni->nk", axes, scaled))
     factor = _error_factor(along, shares)
-    return ReferenceChi2(
+    return CatalogueChi2(
         rows["source_id"].to_numpy()[known],
         _chi2(along, shares, 1.0),
         factor,

@@ -15,11 +15,18 @@ from solver.results.diagnosis.patterns import Family, Patterns
 from solver.results.diagnosis.priors import PriorRms, prior_rms
 from solver.results.diagnosis.products import products
 from solver.results.diagnosis.projection import Projection, covariance_of_products
-from solver.results.diagnosis.rate import discoveries, log_chance, of_many, sigmas
+from solver.results.diagnosis.rate import (
+    discoveries,
+    log_chance,
+    log_chance_binomial,
+    of_many,
+    sigmas,
+)
 from solver.results.diagnosis.references import (
-    ReferenceChi2,
+    MEDIAN_CHI2,
+    CatalogueChi2,
+    catalogue_chi2,
     deviation_chance,
-    reference_chi2,
 )
 from solver.results.diagnosis.rows import Camera, Rows, camera_rows
 from solver.results.diagnosis.scatter import scatter_tests
@@ -84,7 +91,7 @@ class Diagnosis(NamedTuple):
     scale : chi2 per degree of freedom without outliers and exposures that swing, at least 1
     exposures : chi2 of patterns of each exposure
     swinging : indices of the exposures whose pointing changed while they were read
-    references : chi2 of each reference star
+    references, others : chi2 of each reference star, and of each other star
     swapped : measurements with each other's identification
     priors : chi2 of the values of each group of parameters against their prior
     """
@@ -99,7 +106,8 @@ class Diagnosis(NamedTuple):
     scale: float
     exposures: ExposureChi2
     swinging: np.ndarray
-    references: ReferenceChi2
+    references: CatalogueChi2
+    others: CatalogueChi2
     swapped: Swapped
     priors: list[PriorRms]
 
@@ -128,7 +136,11 @@ def diagnose(result: FitResult) -> Diagnosis:
         scale = max(scatter[0].value, 1.0)
         still = np.isin(rows.exposure, swinging, invert=True)
         rows = rows._replace(residual=rows.residual * still[:, None])
-        references, pairs = reference_chi2(result.sources), swapped(result)
+        pairs = swapped(result)
+        is_reference = result.sources["is_reference"].to_numpy(bool)
+        references, others = (
+            catalogue_chi2(result.sources[chosen]) for chosen in (is_reference, ~is_reference)
+        )
         along, weight = products(patterns, rows), float(rows.weight.sum())
         projection = Projection(along, *covariance.result(), weight)
     priors = prior_rms(result)
@@ -139,6 +151,7 @@ def diagnose(result: FitResult) -> Diagnosis:
         *_of_exposures(exposures, swinging),
         swings,
         *_of_references(result, references),
+        *_of_others(others),
         *(prior_test(one) for one in sorted(priors, key=lambda one: one.log_chance)[:1]),
     ]
     # A test that the fit itself adjusts counts, but never alarms.
@@ -158,6 +171,7 @@ def diagnose(result: FitResult) -> Diagnosis:
         exposures,
         swinging,
         references,
+        others,
         pairs,
         priors,
     )
@@ -251,7 +265,7 @@ def _induced(swing: np.ndarray, field: np.ndarray) -> np.ndarray:
     return np.square(others / count[field])
 
 
-def _of_references(result: FitResult, found: ReferenceChi2) -> list[Test]:
+def _of_references(result: FitResult, found: CatalogueChi2) -> list[Test]:
     """Return the tests of the reference stars."""
     tests = []
     for number, axis in enumerate(("ra", "dec")):
@@ -259,8 +273,26 @@ def _of_references(result: FitResult, found: ReferenceChi2) -> list[Test]:
         numbers = value, expected, scatter, chance, sigmas(chance)
         tests.append(Test("reference stars, all", "references", (number,), *numbers))
     if len(found.chi2):
-        largest, n = float(found.chi2.max()), len(found.chi2)
-        chance = of_many(-0.5 * largest, n)
-        numbers = largest, 2.0 * float(np.log(n / np.log(2.0))), 2.6, chance, sigmas(chance)
-        tests.append(Test("reference star that is furthest off", "reference", (), *numbers))
+        tests.append(_of_furthest("reference star that is furthest off", "reference", found))
     return tests
+
+
+def _of_others(found: CatalogueChi2) -> list[Test]:
+    """Return the tests of the other stars, whose catalogue errors may be no more than bounds."""
+    n = len(found.chi2)
+    if not n:
+        return []
+    many = int((found.chi2 > MEDIAN_CHI2).sum())
+    chance = log_chance_binomial(many, n, 0.5)
+    numbers = many / n, 0.5, float(np.sqrt(0.25 / n)), chance, sigmas(chance)
+    return [
+        Test("other stars beyond the median of their errors", "others", (), *numbers),
+        _of_furthest("other star that is furthest off", "other", found),
+    ]
+
+
+def _of_furthest(name: str, subject: str, found: CatalogueChi2) -> Test:
+    largest, n = float(found.chi2.max()), len(found.chi2)
+    chance = of_many(-0.5 * largest, n)
+    numbers = largest, 2.0 * float(np.log(n / np.log(2.0))), 2.6, chance, sigmas(chance)
+    return Test(name, subject, (), *numbers)

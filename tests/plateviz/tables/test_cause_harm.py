@@ -10,7 +10,8 @@ import pytest
 from plateviz.tables import cause_harm
 from plateviz.tables.cause_case import Case
 from plateviz.tables.cause_harm import harm
-from solver.results.diagnosis.causes import Found, find_causes
+from solver.results.diagnosis.causes import find_causes
+from solver.results.diagnosis.found import Found
 from solver.results.diagnosis.table import Diagnosis, diagnose
 
 
@@ -127,3 +128,20 @@ def test_prior_spoils_much_where_the_residuals_show_it(monkeypatch, fit_result):
     found = [SimpleNamespace(subject="drift", size_um=1e-6)]
     monkeypatch.setattr(Diagnosis, "found", lambda *_: found)
     assert not harm_of(fit_result, "prior")[1]
+
+
+def test_catalogue_position_spoils_its_star_by_its_weight_beside_the_measurements(fit_result):
+    sources = fit_result.sources.copy()
+    star = int(np.flatnonzero(~sources["is_reference"])[2])
+    source_id = int(sources.loc[star, "source_id"])
+    both = [(f"sigma_{axis}_marginal", f"prior_sigma_{axis}") for axis in ("ra", "dec")]
+    for sigma, prior in both:
+        sources.loc[star, [sigma, prior]] = 0.5, 10.0
+    large = []
+    for offset in (40.0, 400.0):
+        sources.loc[star, ["offset_ra", "offset_dec"]] = offset
+        spoils, is_large = harm_of(replace(fit_result, sources=sources), "other", source_id)
+        assert number_after(spoils, "these stars, by ") == pytest.approx(offset / 400.0)
+        assert "where their uncertainty is 0.5 mas" in spoils
+        large.append(is_large)
+    assert large == [False, True]

@@ -40,3 +40,51 @@ def test_noise_that_is_not_normal_has_more_or_fewer_large_errors(kurtosis, title
     assert f"is {kurtosis:+.3f}" in said.words
     # Small outliers, which a robust fit keeps, make large errors and no small ones.
     assert ("outliers" in said.words) == (robust and kurtosis > 0.0)
+
+
+def said_of_stars(subject, size, items=(), statistic=9.0, **settings):
+    """Return what is said of stars that are not where the catalogue has them."""
+    test = Test("stars", subject, (), statistic, 1.0, 0.1, -400.0, 30.0)
+    found = SimpleNamespace(test=test, size=size, items=items)
+    result = SimpleNamespace(settings=FitSettings(**settings))
+    return said_of(SimpleNamespace(found=found, result=result))
+
+
+@pytest.mark.parametrize(
+    ("size", "settings", "options"),
+    [
+        (3.0, {}, ("--reference-scale",)),
+        (3.0, {"reference_scale": True}, ("--prior sources=3.00",)),
+        (53.0, {}, ()),
+        (53.0, {"reference_scale": True}, ()),
+        (5.0, {"reference_scale": True, "prior_widths": {"sources": 12.0}}, ()),
+    ],
+    ids=["some", "scaled", "many", "many, scaled", "many, widened"],
+)
+def test_no_option_makes_a_catalogue_right_that_is_far_off(size, settings, options):
+    said = said_of_stars("references", size, **settings)
+    assert said.options == options
+    assert said.name == ("reference-errors" if options else "wrong-catalogue")
+    assert ("check the epochs" in said.action) == (not options)
+
+
+def test_reference_stars_that_are_too_near_the_catalogue_are_not_said_to_be_far():
+    said = said_of_stars("references", 1.0, statistic=0.12)
+    assert said.title == "the reference stars are nearer the catalogue than it states"
+    assert "rms deviation is 0.12 of its errors, where 1 is expected" in said.words
+    assert said.options == ("--reference-scale",)
+
+
+@pytest.mark.parametrize(("count", "has_options"), [(1, True), (20, True), (21, False)])
+def test_few_stars_are_to_be_left_out_and_many_corrected(count, has_options):
+    said = said_of_stars("other", float(count), tuple(range(1, count + 1)))
+    assert said.title.startswith("1 star is not" if count == 1 else f"{count} stars are not")
+    assert len(said.options) == (count if has_options else 0)
+    assert ("out" in said.action) == has_options
+    assert ("..." in said.words) == (count > 8)
+
+
+def test_catalogue_that_states_too_small_errors_is_to_be_checked():
+    said = said_of_stars("others", 18.2)
+    assert said.words == "Its errors are about 18.2 times those stated."
+    assert "check the units and epochs" in said.action

@@ -35,6 +35,17 @@ def test_usual_prior_is_to_be_wide_enough_for_the_values(name):
     assert wider.width(name) == pytest.approx(16.0 * BY_NAME[name].width, rel=0.3)
 
 
+def test_value_that_no_instrument_has_points_to_wrong_units():
+    place = PARAMETERS.index(BY_NAME["pitch_x"])
+    actions = []
+    for rms in (8.0, 90.0):
+        test = Test("values against their prior", "prior", (place,), rms, 1.0, 0.6, -30.0, 7)
+        result = SimpleNamespace(settings=FitSettings())
+        actions.append(said_of(SimpleNamespace(found=SimpleNamespace(test=test), result=result)))
+    assert [one.action.startswith("check the instrument") for one in actions] == [False, True]
+    assert all(one.action.endswith("widen it") for one in actions)
+
+
 def test_shifted_prior_is_to_be_where_it_was():
     said = said_with("detector_x", prior_shifts={"detector_x[2]": 50.0})
     assert "shifted" in said.words

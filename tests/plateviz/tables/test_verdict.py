@@ -89,6 +89,18 @@ def test_catalogue_whose_errors_had_to_be_multiplied_by_much_is_not_trusted(
     assert ("nowhere near the catalogue" in found.headline) == (state != "good")
 
 
+def test_noise_that_could_not_be_estimated_is_not_said_to_be_in_the_fit(fit_result):
+    even = fit_result.exposure_index % 2 == 0
+    residuals = fit_result.residuals.copy()
+    residuals.loc[even, ["residual_x", "residual_y"]] *= 4.0
+    settings = fit_result.settings.with_(noise_by_exposure=True)
+    noisy = replace(fit_result, residuals=residuals, settings=settings)
+    first = orbit_verdict(noisy).causes[0]
+    assert first.name == "noise-of-exposures"
+    assert "--noise-by-exposure, but could not estimate the noise" in first.action
+    assert not first.options
+
+
 def test_fit_that_does_not_converge_says_what_helps(fit_result):
     stuck = stuck_with(fit_result, slice(None, None, 100), 1000.0)
     judged = orbit_verdict(stuck)

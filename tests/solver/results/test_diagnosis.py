@@ -358,6 +358,48 @@ def test_wrong_reference_star_is_named(clean):
     assert found[0].items == (int(sources.loc[wrong, "source_id"]),)
 
 
+def test_other_star_that_is_not_where_the_catalogue_has_it_is_named(clean):
+    sources = clean.sources.copy()
+    wrong = int(np.flatnonzero(~sources["is_reference"])[3])
+    sources.loc[wrong, "offset_ra"] += 12.0 * sources.loc[wrong, "prior_sigma_ra"]
+    found = find_causes(diagnose(replace(clean, sources=sources))).found
+    assert [one.test.subject for one in found] == ["other"]
+    assert found[0].items == (int(sources.loc[wrong, "source_id"]),)
+
+
+def test_catalogue_that_states_too_small_errors_of_the_other_stars_is_named(clean):
+    sources = clean.sources.copy()
+    others = ~sources["is_reference"]
+    sources.loc[others, ["offset_ra", "offset_dec"]] *= 8.0
+    found = find_causes(diagnose(replace(clean, sources=sources))).found
+    assert [one.test.subject for one in found] == ["others"]
+    assert found[0].size == pytest.approx(8.0, rel=0.15)
+
+
+def test_catalogue_errors_of_the_other_stars_may_be_bounds(clean):
+    sources = clean.sources.copy()
+    sources.loc[~sources["is_reference"], ["offset_ra", "offset_dec"]] *= 0.01
+    assert not diagnose(replace(clean, sources=sources)).found(CARE_RATE)
+
+
+def test_stars_without_a_catalogue_position_are_not_compared_with_one(clean):
+    sources = clean.sources.copy()
+    sources.loc[~sources["is_reference"], ["prior_sigma_ra", "prior_sigma_dec"]] = np.inf
+    diagnosis = diagnose(replace(clean, sources=sources))
+    assert not len(diagnosis.others.chi2)
+    assert not {"other", "others"} & {one.subject for one in diagnosis.tests}
+
+
+def test_prior_is_named_beside_noise_that_does_not_explain_it(clean):
+    residuals, calibration = clean.residuals.copy(), clean.calibration.copy()
+    residuals[["residual_x", "residual_y"]] *= 3.0
+    pitch = calibration["group"] == "pitch_x"
+    for widths, named in ((6.0, ["noise"]), (60.0, ["noise", "prior"])):
+        calibration.loc[pitch, "offset"] = widths * calibration.loc[pitch, "prior_sigma"]
+        noisy = replace(clean, residuals=residuals, calibration=calibration)
+        assert [one.test.subject for one in find_causes(diagnose(noisy)).found] == named
+
+
 def test_measurements_in_each_others_place_are_found(clean):
     residuals = clean.residuals.copy()
     model = residuals[["nx", "ny"]].to_numpy() - residuals[["residual_x", "residual_y"]].to_numpy()

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy.special import chdtri
 
-from solver.results.diagnosis.references import reference_chi2
+from solver.results.diagnosis.references import catalogue_chi2
 
 STARS = 4000
 
@@ -38,24 +38,24 @@ def solution(factor, measured, seed=1):
 @pytest.mark.parametrize("measured", [0.1, 1.0, 3.0])
 @pytest.mark.parametrize("factor", [2.0, 15.0])
 def test_factor_on_the_errors_is_found_however_good_the_measurements_are(factor, measured):
-    assert reference_chi2(solution(factor, measured)).factor == pytest.approx(factor, rel=0.1)
+    assert catalogue_chi2(solution(factor, measured)).factor == pytest.approx(factor, rel=0.1)
 
 
 def test_good_catalogue_needs_no_factor():
-    found = reference_chi2(solution(1.0, 1.0))
+    found = catalogue_chi2(solution(1.0, 1.0))
     assert found.factor == pytest.approx(1.0, abs=0.1)
     assert np.mean(found.chi2) == pytest.approx(2.0, rel=0.05)
 
 
 def test_no_reference_star_needs_no_factor():
     rows = solution(1.0, 1.0).assign(is_reference=False)
-    assert reference_chi2(rows).factor == 1.0
+    assert catalogue_chi2(rows).factor == 1.0
 
 
 def test_errors_beyond_all_measure_end_at_a_limit():
     rows = solution(1.0, 1.0)
     rows[["offset_ra", "offset_dec"]] *= 1e12
-    assert reference_chi2(rows).factor == 1e6
+    assert catalogue_chi2(rows).factor == 1e6
 
 
 # What the largest of so many chi2 exceeds in one of a thousand cases.
@@ -64,7 +64,7 @@ LIMIT = chdtri(2.0, 1e-3 / STARS)
 
 @pytest.mark.parametrize("measured", [0.3, 3.0])
 def test_no_star_stands_out_where_all_errors_are_larger(measured):
-    found = reference_chi2(solution(5.0, measured))
+    found = catalogue_chi2(solution(5.0, measured))
     assert found.chi2.max() > LIMIT
     assert found.rescaled.max() < LIMIT
     assert np.mean(found.rescaled) == pytest.approx(2.0, rel=0.1)
@@ -74,6 +74,6 @@ def test_wrong_stars_stand_out_though_they_make_the_errors_of_all_look_larger():
     rows = solution(2.0, 1.0)
     wrong = rows.index[::10]
     rows.loc[wrong, "offset_ra"] += 40.0 * rows.loc[wrong, "prior_sigma_ra"]
-    far = reference_chi2(rows).rescaled > LIMIT
+    far = catalogue_chi2(rows).rescaled > LIMIT
     assert far[wrong].all()
     assert far.sum() == len(wrong)

@@ -1,0 +1,73 @@
+"""Causes in what a fit was told: catalogue positions and priors against the measurements."""
+
+import numpy as np
+from scipy.special import chdtri
+
+from solver.results.diagnosis import gains
+from solver.results.diagnosis.found import Found, limit_of
+from solver.results.diagnosis.rate import log_chance
+from solver.results.diagnosis.references import MEDIAN_CHI2, CatalogueChi2
+from solver.results.diagnosis.table import Diagnosis, prior_test
+
+_STAR_LIMIT = 0.01
+# If the errors of the other stars are so much larger than stated, no single ones are named.
+_ALL_ARE_OFF = 3.0
+# The tests of all stars of a kind, and of the one that is furthest off.
+_REFERENCES, _OTHERS = ("references", "reference"), ("others", "other")
+
+
+def of_references(diagnosis: Diagnosis) -> list[Found]:
+    """Return whether some, or all, of the reference stars are wrong."""
+    return _of_stars(diagnosis, diagnosis.references, *_REFERENCES)
+
+
+def of_others(diagnosis: Diagnosis) -> list[Found]:
+    """Return whether some, or all, of the other stars are wrong."""
+    return _of_stars(diagnosis, diagnosis.others, *_OTHERS)
+
+
+def _of_stars(diagnosis: Diagnosis, stars: CatalogueChi2, of_all: str, of_one: str) -> list[Found]:
+    ids, chi2, factor, rescaled = stars
+    if not len(chi2):
+        return []
+    tests = [one for one in diagnosis.tests if one.subject in (of_all, of_one)]
+    worst = min(tests, key=lambda one: one.log_chance)
+    if worst.log_chance > limit_of(diagnosis):
+        return []
+    # Wrong stars pull the frame, and so all others; only those that are far beyond are wrong.
+    far = rescaled > chdtri(2.0, -np.expm1(np.log1p(-_STAR_LIMIT) / len(chi2)))
+    # Catalogue errors of other stars may be mere bounds: a few that are further are no news then.
+    if not far.any() or (of_all == "others" and factor > _ALL_ARE_OFF):
+        typical = max(float(np.median(chi2)) / MEDIAN_CHI2, 1.0)
+        gain = gains.of_scale(typical, 2.0 * len(chi2))
+        return [Found(worst._replace(subject=of_all), gain, size=factor)]
+    order = np.argsort(-chi2[far])
+    named = tuple(int(one) for one in ids[far][order])
+    gain = float(np.sum(chi2[far] - 2.0 * gains.PER_PARAMETER))
+    return [Found(worst._replace(subject=of_one), gain, named, float(far.sum()))]
+
+
+def of_priors(diagnosis: Diagnosis) -> list[Found]:
+    """Return the prior that contradicts the values of its parameters, as a cause.
+
+    One that was set for this fit is the first suspect: whatever it keeps the calibration from
+    following is left in the residuals, and looks like something else.
+    """
+    limit = limit_of(diagnosis)
+    against = [one for one in diagnosis.priors if one.log_chance < limit]
+    if not against:
+        return []
+    worst = min(against, key=lambda one: (not one.is_set, one.log_chance))
+    gain = np.inf if worst.is_set else gains.of_scale(worst.rms**2, 1.0)
+    return [Found(prior_test(worst), gain, size=worst.rms)]
+
+
+def is_beyond_noise(prior: Found, scale: float, limit: float) -> bool:
+    """Return whether a prior contradicts its values more than noise larger than stated explains.
+
+    Parameters
+    ----------
+    scale : chi2 per degree of freedom of the residuals
+    limit : logarithm of the chance below which it is named
+    """
+    return log_chance(prior.size**2 / scale, 1.0) < limit

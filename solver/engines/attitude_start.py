@@ -64,8 +64,9 @@ def attitude_start(
     exposure, frame = problem.measurements.index.exposure, problem.geometry.source_frame
     seen = displaced(frame[: problem.n_src], *(RAD_PER_MAS * sources).T)
     seen = seen[problem.measurements.index.source]
-    looking = _looking(problem, theta)
-    theta = _with_turned_detectors(problem, theta, detector_turns(problem, looking, seen))
+    # By the instrument: a start from something else may have anything.
+    nominal = _looking(problem, np.zeros_like(theta))
+    theta = _with_turned_detectors(problem, theta, detector_turns(problem, nominal, seen))
     looking = _looking(problem, theta)
     aligned = np.zeros_like(axes)
     for i, j in np.ndindex(3, 3):
@@ -123,7 +124,7 @@ def _with_turned_detectors(
     columns = problem.layout.columns(BY_NAME["detector_rotation"])
     turned = abs(turns) > _LARGE_TURN * RAD_PER_ARCSEC
     moved = theta.copy()
-    moved[columns] += np.where(turned, turns / RAD_PER_ARCSEC, 0.0)
+    moved[columns] = np.where(turned, turns / RAD_PER_ARCSEC, theta[columns])
     refused = turned & (abs(moved[columns]) > _MOST_WIDTHS * problem.priors.width[columns])
     if refused.any():
         called = [problem.elements["det"][number].name for number in np.flatnonzero(refused)]

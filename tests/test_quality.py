@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from jaxtyping import TypeCheckError
 
-from solver.model.aberration import lorentz_factor
+from solver.model.aberration import inverse_lorentz_factor
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 CODE = ("solver", "plateviz")
@@ -166,7 +166,7 @@ def test_functions_of_the_tests_are_short():
 
 def test_shapes_are_checked_while_tests_run():
     with pytest.raises(TypeCheckError):
-        lorentz_factor(np.zeros((2, 5)))
+        inverse_lorentz_factor(np.zeros((2, 5)))
 
 
 def test_shapes_are_checked_in_every_module_that_annotates_them(pytestconfig):

@@ -134,8 +134,8 @@ class Positive(Setting):
     """A positive number."""
 
     def check(self, name: str, value: float) -> None:
-        """Raise `InputError` for zero, negative numbers and NaN."""
-        if not value > 0.0:
+        """Raise `InputError` for zero, negative numbers, NaN and infinity."""
+        if not 0.0 < value < math.inf:
             raise InputError(f"expected a positive {name}, found {value!r}")
 
 

@@ -30,16 +30,11 @@ def conform(raw: RawTable, schema: Table, where: str) -> pd.DataFrame:
     Raises
     ------
     InputError
-        If the table has any of `problems`.
+        If the table does not conform to `schema`.
     """
     frame, found = examine(raw, schema, where)
     refuse(found)
     return frame
-
-
-def problems(raw: RawTable, schema: Table, where: str) -> list[str]:
-    """Return one message for each reason why `raw` does not conform to `schema`."""
-    return examine(raw, schema, where)[1]
 
 
 def refuse(found: list[str]) -> None:

@@ -22,8 +22,6 @@ from solver.problem.problem import Problem
 from solver.problem.source_blocks import SourceBlocks
 from solver.units import RAD_PER_MAS
 
-_OPTIONAL_AXES: tuple[Axis, ...] = ("drift", "breathing", "field", "own", "motion")
-
 
 def update_equations(
     equations: NormalEquations, old: Problem, new: Problem
@@ -89,7 +87,10 @@ def _same_causes(old: Problem, new: Problem) -> bool:
         return names[0] == names[1]
     if old.layout.n_walk != new.layout.n_walk:
         return False
-    if any(old.elements[axis] != new.elements[axis] for axis in _OPTIONAL_AXES):
+    # The elements of a walk are exposures, of which some may be left out.
+    axes: set[Axis] = {BY_NAME[name].axis for name in names[0]}
+    axes -= set(EXPOSURE_AXES)
+    if any(old.elements[axis] != new.elements[axis] for axis in axes):
         return False
     # The exposures of the new problem are among the old ones.
     kept = _kept_exposures(old, new)

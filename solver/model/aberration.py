@@ -37,6 +37,6 @@ def aberrate(
     return x, y, z
 
 
-def lorentz_factor(velocity: Float[Array, "exp 3"]) -> Float[Array, " exp"]:
+def inverse_lorentz_factor(velocity: Float[Array, "exp 3"]) -> Float[Array, " exp"]:
     """Return sqrt(1 - v^2), the inverse of the Lorentz factor, for velocities in c."""
     return jnp.sqrt(1.0 - jnp.sum(velocity**2, axis=-1))

@@ -18,7 +18,7 @@ from jaxtyping import Array, Float, Int
 
 from solver.data.distortion_terms import terms
 from solver.data.parameters import OPTIONAL_GROUPS
-from solver.model.aberration import Components, aberrate, lorentz_factor
+from solver.model.aberration import Components, aberrate, inverse_lorentz_factor
 from solver.model.causes import (
     Causes,
     anisotropic,
@@ -236,7 +236,7 @@ def _apparent(seen: Directions, geometry: Geometry, index: Index) -> Components:
         (x, y, z),
         _take(jnp.sum(seen.axes * geometry.velocity[:, None, :], axis=-1), m),
         _dot(_take(geometry.velocity, m), source),
-        lorentz_factor(geometry.velocity)[m],
+        inverse_lorentz_factor(geometry.velocity)[m],
         geometry.sun_distance[m],
     )
 

@@ -22,8 +22,6 @@ PER_COEFFICIENT = groups_on("coef")
 PER_DETECTOR = groups_on("det")
 # A NumPy or JAX array.
 AnyArray = Any
-# Groups of every fit of which a measurement depends on one element each.
-LOCAL_GROUPS = PER_EXPOSURE + PER_DETECTOR
 _LOCAL_AXES: tuple[Axis, ...] = ("exp", "det", "motion")
 
 

@@ -47,8 +47,8 @@ def test_flat_prior_is_allowed_on_the_calibration_and_not_on_the_sources():
         FitSettings(prior_widths={"sources": np.inf})
 
 
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan")], ids=str)
-def test_tolerance_that_is_not_positive_is_refused(tolerance):
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")], ids=str)
+def test_tolerance_that_is_not_positive_and_finite_is_refused(tolerance):
     with pytest.raises(InputError, match="tolerance"):
         FitSettings(tolerance=tolerance)
 

@@ -9,7 +9,7 @@ from astropy.time import Time
 
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
 from solver.errors import InputError
-from solver.io.table_check import conform, problems
+from solver.io.table_check import conform, examine
 from tests.solver.io_samples import FIRST_ID, catalogue, environment, measurement
 
 WHERE = "OBS.fits, HDU X"
@@ -218,7 +218,7 @@ def test_unknown_unit():
 def test_unknown_unit_of_an_unused_column_is_ignored():
     table = measurement()
     table["flux"] = Column(np.ones(len(table)), unit=u.Unit("pxl", parse_strict="silent"))
-    assert problems(table, MEASUREMENT, WHERE) == []
+    assert examine(table, MEASUREMENT, WHERE)[1] == []
 
 
 def test_julian_date_for_mjd():
@@ -274,13 +274,13 @@ def test_every_problem_is_listed():
     table["source_id"][1] = table["source_id"][0]
     table["detector_id"][1] = table["detector_id"][0]
     table.remove_column("ny")
-    found = problems(table, MEASUREMENT, WHERE)
+    found = examine(table, MEASUREMENT, WHERE)[1]
     assert len(found) == 5
     assert all(message.startswith(WHERE) for message in found)
 
 
 def test_no_problem_in_a_good_table():
-    assert problems(measurement(), MEASUREMENT, WHERE) == []
+    assert examine(measurement(), MEASUREMENT, WHERE)[1] == []
 
 
 def test_message_of_many_problems_counts_the_rest():

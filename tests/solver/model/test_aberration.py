@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.model.aberration import aberrate, lorentz_factor
+from solver.model.aberration import aberrate, inverse_lorentz_factor
 
 HUNDREDTH_UAS = np.radians(0.01e-6 / 3600.0)
 
@@ -13,7 +13,7 @@ HUNDREDTH_UAS = np.radians(0.01e-6 / 3600.0)
 def apparent(direction, velocity, sun_distance):
     direction, velocity = np.atleast_2d(direction), np.atleast_2d(velocity)
     along = np.sum(direction * velocity, axis=-1)
-    lorentz = lorentz_factor(jnp.asarray(velocity))
+    lorentz = inverse_lorentz_factor(jnp.asarray(velocity))
     moved = aberrate(
         tuple(jnp.asarray(direction.T)),
         tuple(jnp.asarray(velocity.T)),
@@ -48,5 +48,5 @@ def test_aberration_is_the_speed_times_the_sine_to_first_order():
     assert moved[0] == pytest.approx(1e-4, rel=1e-6)
 
 
-def test_lorentz_factor_is_the_inverse():
-    np.testing.assert_allclose(lorentz_factor(jnp.array([[0.6, 0.0, 0.0]])), 0.8)
+def test_factor_is_the_inverse_of_the_lorentz_factor():
+    np.testing.assert_allclose(inverse_lorentz_factor(jnp.array([[0.6, 0.0, 0.0]])), 0.8)

@@ -105,8 +105,7 @@ def _harm_of_parts(case: Case, total: int) -> tuple[str, bool]:
     count = len(found.items) or int(found.size)
     is_large = count > _LARGE_PARTS.get(subject, 0.0) * total
     if subject == "reference":
-        both = [float(case.result.summary[f"mean_error_{axis}"]) for axis in ("ra", "dec")]
-        shared = float(np.linalg.norm(both))
+        shared = _shared_error(case.result)
         return (
             f"It spoils all positions alike, by about {_frame_shift(case):.2g} mas where the error "
             f"that they share is {shared:.2g} mas: the frame follows the reference stars.",
@@ -132,13 +131,35 @@ def _harm_of_others(case: Case) -> tuple[str, bool]:
         for name in ("sigma_{}_marginal", "prior_sigma_{}", "offset_{}")
     )
     shift = float(np.sqrt(np.nanmean(np.square(offset * (sigma / prior) ** 2))))
-    typical, frame = float(np.nanmedian(sigma)), _references_off(case.result)
-    also = ", and the frame with them: the reference stars deviate, too" if frame else ""
-    return (
-        f"It spoils the positions of these stars, by {shift:.2g} mas rms where their uncertainty "
-        f"is {typical:.2g} mas{also}.",
-        frame or shift > _LARGE_SHARE * typical,
+    typical = float(np.nanmedian(sigma))
+    frame, shared = _pull_on_frame(rows, offset, prior), _shared_error(case.result)
+    words = (
+        f"these positions by {shift:.2g} mas rms, where their uncertainty is {typical:.2g} mas, "
+        f"and the frame by about {frame:.2g} mas, where the error that all positions share is "
+        f"{shared:.2g} mas."
     )
+    is_large = shift > _LARGE_SHARE * typical or frame > _LARGE_SHARE * shared
+    if not items:
+        return f"It shifts {words}", is_large
+    is_large |= len(items) > _LARGE_PARTS["outliers"] * len(rows)
+    return (
+        "If the identification is wrong, these positions are wrong altogether; if the catalogue "
+        f"is, it shifts {words}",
+        is_large,
+    )
+
+
+def _pull_on_frame(rows: pd.DataFrame, offset: np.ndarray, prior: np.ndarray) -> float:
+    """Return by how much some stars pull the mean of all, against the reference stars, mas."""
+    names = ["prior_sigma_ra", "prior_sigma_dec"]
+    references = rows.loc[rows["is_reference"].astype(bool), names].to_numpy(dtype=float)
+    weight = np.maximum(np.sum(references**-2.0, axis=0), np.finfo(float).tiny)
+    return float(np.linalg.norm(np.nansum(offset / prior**2, axis=0) / weight))
+
+
+def _shared_error(result: FitResult) -> float:
+    """Return the error that all positions share, mas."""
+    return float(np.linalg.norm([result.summary[f"mean_error_{axis}"] for axis in ("ra", "dec")]))
 
 
 def _noise_error(case: Case) -> tuple[float, str]:

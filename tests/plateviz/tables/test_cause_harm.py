@@ -141,7 +141,23 @@ def test_catalogue_position_spoils_its_star_by_its_weight_beside_the_measurement
     for offset in (40.0, 400.0):
         sources.loc[star, ["offset_ra", "offset_dec"]] = offset
         spoils, is_large = harm_of(replace(fit_result, sources=sources), "other", source_id)
-        assert number_after(spoils, "these stars, by ") == pytest.approx(offset / 400.0)
+        assert number_after(spoils, "these positions by ") == pytest.approx(offset / 400.0)
         assert "where their uncertainty is 0.5 mas" in spoils
         large.append(is_large)
     assert large == [False, True]
+
+
+def test_many_wrong_catalogue_positions_pull_the_frame(fit_result):
+    sources = fit_result.sources.copy()
+    others = ~sources["is_reference"]
+    references = float((sources.loc[~others, "prior_sigma_ra"] ** -2.0).sum())
+    sources.loc[others, ["prior_sigma_ra", "prior_sigma_dec"]] = 1000.0
+    sources.loc[others, ["offset_ra", "offset_dec"]] = 0.0
+    shared = np.hypot(fit_result.summary["mean_error_ra"], fit_result.summary["mean_error_dec"])
+    offset = shared * references * 1e6 / others.sum()
+    sources.loc[others, "offset_ra"] = offset
+    spoils, is_large = harm_of(replace(fit_result, sources=sources), "others")
+    assert number_after(spoils, "the frame by about ") == pytest.approx(shared, rel=0.05)
+    assert is_large
+    sources.loc[others, "offset_ra"] = 0.1 * offset
+    assert not harm_of(replace(fit_result, sources=sources), "others")[1]

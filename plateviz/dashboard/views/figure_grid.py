@@ -28,6 +28,7 @@ class FigureGrid(pn.viewable.Viewer):
         *,
         columns: int = 2,
         columns_if_wide: int | None = None,
+        first: Sequence[Part] = (),
         others: Sequence[Part] = (),
         **params: object,
     ) -> None:
@@ -38,16 +39,17 @@ class FigureGrid(pn.viewable.Viewer):
         wake : called when a figure comes near the screen, leaves it, or gets another size
         columns : at most, where there is room
         columns_if_wide : on a large screen; None for `columns`
-        others : cards after those of the figures
+        first, others : cards before and after those of the figures
         """
         super().__init__(**params)
         self._views = list(views)
         for view in self._views:
             view.visibility.param.watch(wake, ["is_near", "room"])
-        n_places = len(self._views) + len(others)
+        n_places = len(first) + len(self._views) + len(others)
         if columns == 2 and n_places % 2:
             next((v for v in self._views if v.is_wide), self._views[-1]).take_row()
         self._box = pmui.FlexBox(
+            *first,
             *self._views,
             *others,
             sx={

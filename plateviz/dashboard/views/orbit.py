@@ -116,11 +116,12 @@ class OrbitPage(pn.viewable.Viewer):
             return explore.__panel__()
         is_first = one is OrbitWorkspace.VERDICT
         views = {d: self._figure_view(d) for d in figures_of(self._session, one)}
-        others, above = [], []
+        first, others, above = [], [], []
         if one is OrbitWorkspace.ORDERS:
             views = {BOTH: self._figure_view(BOTH), **views}
             self._compare = CompareView(self._navigation, lambda: self._change_figure(views[BOTH]))
-            others = [card(self._compare, "changes")]
+            # What two solutions differ in, and which two, before the pictures of it.
+            first = [card(self._compare, "changes")]
         if one is OrbitWorkspace.CALIBRATION:
             others = [card(CalibrationView(self._session), "tables")]
         self._following += [view for d, view in views.items() if d.follows_shown]
@@ -133,6 +134,7 @@ class OrbitPage(pn.viewable.Viewer):
             self._wake,
             columns=3 if is_first else 2,
             columns_if_wide=3 if are_six else None,
+            first=first,
             others=others,
         )
         self._grids[one] = grid

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from plateviz.figures.figure import MARGIN, MESSAGE, Axis, Frame, Glyphs
-from plateviz.figures.text_width import text_width, wrapped
+from plateviz.figures.text_width import cut_to, text_width, wrapped
 from plateviz.figures.theme import TITLE_SIZE
 
 # Texts in cells that are fewer may overlap in a few places, such as numbers of fields.
@@ -14,7 +14,7 @@ _MOST_OVERLAPPING = 0.1
 
 
 def with_fitting_texts(frame: Frame) -> Frame:
-    """Return a frame with its message wrapped, and without centred texts that would overlap.
+    """Return a frame with its message wrapped, long texts cut, and no centred ones that overlap.
 
     The hover of the glyphs below such texts still has the numbers.
     """
@@ -27,9 +27,29 @@ def _fitting(glyphs: Glyphs, frame: Frame) -> Glyphs:
     if glyphs.name == MESSAGE:
         lines = wrapped(str(texts[0]), frame.width - 2 * MARGIN, TITLE_SIZE)
         return _with_texts(glyphs, ["\n".join(lines)])
+    # A single text is a key, whose number and unit belong together.
+    if len(glyphs) > 1 and glyphs.looks.get("text_align") == "left":
+        return _cut(glyphs, frame)
     if len(glyphs) > _FEW and _overlapping(glyphs, frame) > _MOST_OVERLAPPING:
         return _with_texts(glyphs, [""] * len(glyphs))
     return glyphs
+
+
+def _cut(glyphs: Glyphs, frame: Frame) -> Glyphs:
+    """Return texts that begin at their point, cut where the frame ends."""
+    pixels = _pixels(glyphs)
+    if pixels is None:
+        return glyphs
+    rooms = frame.width - _places(frame.x, glyphs.values("x"), frame.width)
+    texts = [str(text) for text in glyphs.values("text")]
+    cut = [cut_to(text, room, pixels) for text, room in zip(texts, rooms, strict=True)]
+    return glyphs if cut == texts else _with_texts(glyphs, cut)
+
+
+def _pixels(glyphs: Glyphs) -> int | None:
+    """Return the size of the font, screen pixels; None if the texts differ in it."""
+    size = glyphs.looks.get("text_font_size")
+    return int(size.removesuffix("px")) if isinstance(size, str) else None
 
 
 def _with_texts(glyphs: Glyphs, texts: list[str]) -> Glyphs:
@@ -39,10 +59,9 @@ def _with_texts(glyphs: Glyphs, texts: list[str]) -> Glyphs:
 
 def _overlapping(glyphs: Glyphs, frame: Frame) -> float:
     """Return the share of centred texts that overlap the next one to the right."""
-    size = glyphs.looks.get("text_font_size")
-    if glyphs.looks.get("text_align") != "center" or not isinstance(size, str):
+    pixels = _pixels(glyphs)
+    if glyphs.looks.get("text_align") != "center" or pixels is None:
         return 0.0
-    pixels = int(size.removesuffix("px"))
     widths = np.array([text_width(str(text), pixels) for text in glyphs.values("text")])
     x = _places(frame.x, glyphs.values("x"), frame.width)
     y = _places(frame.y, glyphs.values("y"), frame.frame_height)

@@ -53,6 +53,18 @@ def wrapped(text: str, width: float, size: int, *, is_bold: bool = False) -> lis
     ]
 
 
+def cut_to(text: str, width: float, size: int) -> str:
+    """Return text that is no wider than `width`: whole, or its first words and an ellipsis."""
+    if text_width(text, size) <= width:
+        return text
+    words = text.split(" ")
+    for count in range(len(words) - 1, 0, -1):
+        shorter = " ".join(words[:count]).rstrip(",") + " ..."
+        if text_width(shorter, size) <= width:
+            return shorter
+    return text
+
+
 def has_room_for_words(text: str, width: float, size: int, *, is_bold: bool = False) -> bool:
     """Return whether no word has to be broken, except after a hyphen; parameters as `wrapped`."""
     return size * _widest_part(text) * (_BOLD if is_bold else 1.0) <= width

@@ -25,6 +25,9 @@ _CELL_HOVER = [
 _SMALL = "10px"
 # Cells with a smaller share have no text.
 _LEAST_LABELLED_SHARE = 0.005
+# Where the shift of the sources stands, in cells beyond those of the groups: it has no cell that
+# it has to fit.
+_SHIFT_AT = 0.35
 
 
 def plot_eigenmode_groups(table: pd.DataFrame, *, width: int = _PAGE_WIDTH) -> Figure:
@@ -40,14 +43,15 @@ def plot_eigenmode_groups(table: pd.DataFrame, *, width: int = _PAGE_WIDTH) -> F
     groups, modes = list(table["group"].unique()), table["mode"].unique()
     moves = [_amount(move, unit) for move, unit in zip(table["move"], table["unit"], strict=True)]
     cells = table.assign(column=table["group"].map(groups.index), move_text=moves)
-    columns = [(float(i), name) for i, name in enumerate([*groups, "shift of sources"])]
+    columns = [(float(i), name) for i, name in enumerate(groups)]
+    columns.append((len(groups) + _SHIFT_AT, "shift of sources"))
     rows = [(float(mode), str(mode)) for mode in modes]
     return framed(
         [_cells(cells), *_cell_labels(cells), *_shifts(cells, len(groups))],
         title=_TITLE,
         subtitle="Upper number: the group's share of squared moves over conditional sigmas; lower "
         "number: the rms move of its elements per sigma along the direction",
-        x=Axis(_XLABEL, (-0.5, len(groups) + 0.5), ticks=columns, rotation=30.0),
+        x=Axis(_XLABEL, (-0.5, len(groups) + 2.0 * _SHIFT_AT + 0.5), ticks=columns, rotation=30.0),
         y=Axis(_YLABEL, (int(modes.max()) + 0.5, 0.5), ticks=rows),
         width=width,
         height=32 * len(modes) + 8,
@@ -84,14 +88,14 @@ def _shifts(cells: pd.DataFrame, column: int) -> list[Glyphs]:
     modes = cells.drop_duplicates("mode")
     ground = {
         "left": [column - 0.48],
-        "right": [column + 0.5],
+        "right": [column + 2.0 * _SHIFT_AT + 0.5],
         "bottom": [float(modes["mode"].min()) - 0.5],
         "top": [float(modes["mode"].max()) + 0.5],
     }
     shifts = [angle_text(shift) for shift in modes["shift_mas"]]
     return [
         rectangles(ground, name="ground of shifts", color="background"),
-        texts(np.full(len(modes), float(column)), modes["mode"], shifts, name="shifts"),
+        texts(np.full(len(modes), column + _SHIFT_AT), modes["mode"], shifts, name="shifts"),
     ]
 
 

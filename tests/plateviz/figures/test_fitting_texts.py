@@ -38,3 +38,18 @@ def test_a_message_is_wrapped_to_its_frame():
     assert len(lines) > 1
     assert all(text_width(line, 13) <= 200 for line in lines)
     assert " ".join(lines) == figure.message
+
+
+def test_text_that_is_longer_than_its_frame_ends_with_an_ellipsis():
+    names = ["gradient of focal length with distortion A(0,2), A(2,0)", "common pointing"]
+    labels = texts([0.0, 0.0], [1.0, 2.0], names, name="names", align="left")
+    axes = {"x": Axis("x", (0.0, 1.0)), "y": Axis("y", (0.5, 2.5))}
+    cut = {}
+    for width in (900, 250, 20):
+        (frame,) = framed([labels], title="Names", **axes, width=width, height=100)
+        cut[width] = list(with_fitting_texts(frame)["names"].columns["text"])
+    assert cut[900] == names
+    assert cut[250] == ["gradient of focal length with distortion ...", "common pointing"]
+    assert text_width(cut[250][0], 11) <= 250
+    # Nothing is left to cut.
+    assert cut[20] == names

@@ -46,10 +46,11 @@ class Growth:
             return ""
         if is_over and written.is_gathered:
             return _OPEN if written.grows else ""
+        counts = f"{done:,} of {written.n_orbits:,} orbits are done"
         if is_over:
-            words = f"All {done:,} orbits are done; the tables over all of them are missing yet."
+            words = f"{counts}; the tables over all of them are missing yet."
         else:
-            words = f"{done:,} of {written.n_orbits:,} orbits are done{self._rest(now, written)}."
+            words = f"{counts}{self._rest(now, written)}."
         if now - self._last[0] > _PATIENCE:
             command = f"`plateviz {'watch' if written.grows else 'survey'} {self._arguments}`"
             return f"{words} Nothing has been added for some minutes: {command} continues it."

@@ -57,7 +57,7 @@ def test_command_is_given_if_nothing_is_added(growth, clock):
 
 
 def test_tables_are_the_last_to_be_written(growth):
-    assert growth.look(written(53, 1)).startswith("All 54 orbits are done; the tables over all")
+    assert growth.look(written(53, 1)).startswith("54 of 54 orbits are done; the tables over all")
 
 
 @pytest.mark.parametrize(

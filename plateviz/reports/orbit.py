@@ -79,6 +79,7 @@ def orbit_report(
         facts={
             **facts,
             "Settings": plain(result.settings.to_dict()),
+            "Instrument": _camera(instrument),
             "Inputs (SHA-256)": dict(result.provenance),
         },
     )
@@ -109,6 +110,15 @@ def failed_orbit_report(data: OrbitData, message: str, facts: Facts) -> Report:
         tables=tables,
         facts={**facts, "Inputs (SHA-256)": dict(data.provenance)},
     )
+
+
+def _camera(instrument: Instrument) -> dict[str, str]:
+    """Return what tells an instrument from others."""
+    return {
+        "name": instrument.name,
+        "nominal focal length": f"{instrument.focal_length_um:g} um",
+        "detectors": ", ".join(map(str, instrument.detector_ids)),
+    }
 
 
 def _figure(diagnostic: Diagnostic, whole: Chosen, has_choices: bool) -> ReportFigure:

@@ -34,6 +34,7 @@ def test_result_file_is_reported_on_one_page(run, fit_result, tmp_path):
     assert page.endswith("</html>") or page.endswith("</html>\n")
     assert "Values (CSV)" in page
     assert "<dt>jax</dt>" in page[page.index("Versions that solved it") :]
+    assert "<dd>JASMINE mini-mock</dd>" in page[page.index(">Instrument<") :]
 
 
 def test_failed_orbit_has_a_report(run, run_dir, tmp_path):

@@ -116,7 +116,7 @@ def _camera(instrument: Instrument) -> dict[str, str]:
     """Return what tells an instrument from others."""
     return {
         "name": instrument.name,
-        "nominal focal length": f"{instrument.focal_length_um:g} um",
+        "nominal focal length": f"{instrument.focal_length_um:,.12g} um",
         "detectors": ", ".join(map(str, instrument.detector_ids)),
     }
 

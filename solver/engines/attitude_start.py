@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from solver.data.parameters import BY_NAME
-from solver.engines.detector_axes import detector_turns
+from solver.engines.detector_axes import DetectorAxes, detector_axes
 from solver.errors import InputError
 from solver.model.astrometry import sky_position
 from solver.model.directions import displaced, tangent_frame
@@ -27,6 +27,8 @@ _SUSPICIOUS = 1e6
 _WEIGHT_OF_START = 1e-12
 # Smallest cosine of the angle between two pointings that their tangent plane can express well.
 _NEAREST_TO_HORIZON = 0.1
+# Correlation of the detectors' places with those of the instrument below which some are exchanged.
+_LEAST_AGREEMENT = 0.9
 # Smallest turn of a detector that is not left to the fit, and most widths of its prior, arcsec.
 _LARGE_TURN, _MOST_WIDTHS = 30.0 * 3600.0, 5.0
 _TURN = 2.0 * np.pi
@@ -56,7 +58,7 @@ def attitude_start(
     ------
     InputError
         If these are, and the pixel axes of a detector are mirrored, or turned by an angle that
-        the prior of its rotation does not allow.
+        the prior of its rotation does not allow, or detectors are exchanged.
     """
     if not chi2 > _SUSPICIOUS * 2 * problem.n_obs:
         return theta
@@ -66,7 +68,7 @@ def attitude_start(
     seen = seen[problem.measurements.index.source]
     # By the instrument: a start from something else may have anything.
     nominal = _looking(problem, np.zeros_like(theta))
-    theta = _with_turned_detectors(problem, theta, detector_turns(problem, nominal, seen))
+    theta = _with_turned_detectors(problem, theta, detector_axes(problem, nominal, seen))
     looking = _looking(problem, theta)
     aligned = np.zeros_like(axes)
     for i, j in np.ndindex(3, 3):
@@ -118,9 +120,10 @@ def _looking(problem: Problem, theta: Float[np.ndarray, " calib"]) -> Float[np.n
 
 
 def _with_turned_detectors(
-    problem: Problem, theta: Float[np.ndarray, " calib"], turns: Float[np.ndarray, " det"]
+    problem: Problem, theta: Float[np.ndarray, " calib"], found: DetectorAxes
 ) -> Float[np.ndarray, " calib"]:
     """Return the calibration with the detectors turned that are far from their rotation."""
+    turns = found.turn
     columns = problem.layout.columns(BY_NAME["detector_rotation"])
     turned = abs(turns) > _LARGE_TURN * RAD_PER_ARCSEC
     moved = theta.copy()
@@ -134,6 +137,12 @@ def _with_turned_detectors(
             f"instrument, found detector {', '.join(called)} turned by about {angles} deg against "
             "it: check the ids, the signs of nx and ny and rotation_deg of the instrument, or "
             "widen the prior, such as --prior detector_rotation=180deg"
+        )
+    if found.agreement < _LEAST_AGREEMENT:
+        raise InputError(
+            "column detector_id of the measurements: expected detectors where the instrument has "
+            f"them, found the sky elsewhere on them (correlation {found.agreement:.2f}, expected "
+            "1): check the ids, and x_um and y_um of the instrument"
         )
     return moved
 

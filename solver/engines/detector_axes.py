@@ -19,8 +19,9 @@ from solver.problem.problem import Problem
 _FEWEST = 5
 # How much better the conjugate has to correlate than w does, of 1.
 _CLEAR = 0.5
-# Share of the largest correlation from which an angle is known; wrong identifications have none.
-_COHERENT = 0.5
+# Share of the exposures' angles that has to agree, and correlation from which the stars are those
+# of the catalogue: with wrong identifications, nothing can be said of the detectors.
+_COHERENT, _SURE = 0.5, 0.9
 
 
 class _Groups(NamedTuple):
@@ -37,23 +38,43 @@ class _Groups(NamedTuple):
         )
         return real + 1j * imaginary
 
+    def correlation(
+        self, first: Complex[np.ndarray, " obs"], second: Complex[np.ndarray, " obs"]
+    ) -> Complex[np.ndarray, " group"]:
+        """Return the correlation over each group, of size 1 where one is the other, turned."""
+        squares = [np.real(self.sums(one * one.conj())) for one in (first, second)]
+        scale = np.sqrt(np.maximum(np.prod(squares, axis=0), np.finfo(float).tiny))
+        return self.sums(first * second.conj()) / scale
+
     def centred(self, values: Complex[np.ndarray, " obs"]) -> Complex[np.ndarray, " obs"]:
         """Return the differences to the mean of each group."""
         many = np.bincount(self.number, minlength=self.count)
         return values - (self.sums(values) / np.maximum(many, 1))[self.number]
 
 
-def detector_turns(
-    problem: Problem, looking: Float[np.ndarray, "obs 3"], seen: Float[np.ndarray, "obs 3"]
-) -> Float[np.ndarray, " det"]:
-    """Return by how much each detector is turned against its rotation in `looking`, rad.
+class DetectorAxes(NamedTuple):
+    """How the detectors lie on the sky, against the instrument.
 
-    The places of the detectors on the sky give the angle from which it counts. It is 0 where it is
-    not known.
+    Attributes
+    ----------
+    turn : of each detector, rad, counted from the angle at which their places lie; 0 where it is
+        not known
+    agreement : of their places with those of the instrument, 1 if they are as they should be up to
+        a turn of all; NaN if it is not known
+    """
+
+    turn: Float[np.ndarray, " det"]
+    agreement: float
+
+
+def detector_axes(
+    problem: Problem, looking: Float[np.ndarray, "obs 3"], seen: Float[np.ndarray, "obs 3"]
+) -> DetectorAxes:
+    """Return how the detectors lie on the sky.
 
     Parameters
     ----------
-    looking : directions of the measured pixels along the axes of their exposure
+    looking : directions of the measured pixels along the axes of their exposure, by the instrument
     seen : directions to their sources; any error of the pointings is harmless
 
     Raises
@@ -68,20 +89,22 @@ def detector_turns(
     z = exposures.centred(looking[:, 0] + 1j * looking[:, 1])
     w = exposures.centred(_on_the_sky(exposures, seen))
     z_here, w_here = groups.centred(z), groups.centred(w)
-    along, mirrored = groups.sums(z_here * w_here.conj()), groups.sums(z_here * w_here)
     many = np.bincount(groups.number, minlength=groups.count) >= _FEWEST
-    squares = (groups.sums(one * one.conj()) for one in (z_here, w_here))
-    scale = np.prod(np.real(list(squares)), axis=0)
-    handedness = np.full(groups.count, np.nan)
-    np.divide(abs(along) ** 2 - abs(mirrored) ** 2, scale, out=handedness, where=many & (scale > 0))
-    _require_handedness(problem, handedness.reshape(n_exp, n_det))
-    of_places = exposures.sums((z - z_here) * (w - w_here).conj())
-    of_places = of_places[:, None].conj()
-    turned = np.where(many, along, 0.0).reshape(n_exp, n_det) * of_places
-    possible = np.where(many, np.sqrt(scale), 0.0).reshape(n_exp, n_det) * abs(of_places)
-    total, is_known = turned.sum(axis=0), possible.sum(axis=0) > 0.0
-    is_known &= abs(total) > _COHERENT * possible.sum(axis=0)
-    return np.where(is_known, np.angle(total), 0.0)
+    along, mirrored = (
+        np.where(many, one, np.nan).reshape(n_exp, n_det)
+        for one in (groups.correlation(z_here, w_here), groups.correlation(z_here, w_here.conj()))
+    )
+    _require_handedness(problem, abs(along) ** 2 - abs(mirrored) ** 2)
+    of_places = exposures.correlation(z - z_here, w - w_here)
+    several = (~np.isnan(along)).sum(axis=1) > 1
+    if not several.any():
+        return DetectorAxes(np.zeros(n_det), np.nan)
+    angle = along[several] * of_places[several, None].conj()
+    total, possible = np.nansum(angle, axis=0), np.nansum(abs(angle), axis=0)
+    is_known = abs(total) > _COHERENT * np.maximum(possible, np.finfo(float).tiny)
+    are_stars = np.nanmedian(abs(along)) > _SURE
+    agreement = float(np.median(abs(of_places[several]))) if are_stars else np.nan
+    return DetectorAxes(np.where(is_known & are_stars, np.angle(total), 0.0), agreement)
 
 
 def _on_the_sky(

@@ -76,6 +76,12 @@ def test_detectors_are_turned_where_the_prior_allows_it(problem_of):
     assert np.abs((turned.sources - as_it_is.sources) / sigma).max() < 1e-2
 
 
+def test_detectors_that_are_exchanged_are_told_whatever_their_turns_may_be(problem_of):
+    settings = FitSettings(prior_widths={"detector_rotation": 648_000.0})
+    with pytest.raises(InputError, match="found the sky elsewhere on them .*check the ids"):
+        find_mode(problem_of(exchanged, settings), settings)
+
+
 def test_wrong_identifications_are_not_taken_for_turned_detectors(problem_of):
     def shuffled(rows):
         return {"source_id": np.random.default_rng(1).permutation(rows["source_id"])}

@@ -29,9 +29,8 @@ def said_of_prior(case: Case) -> Said:
     wider = float(f"{2.0 * rms * width:.1g}")
     action = "widen it"
     if rms > _NOT_BY_CHANCE:
-        action = (
-            "check the instrument and the units of the measurements; if they are right, widen it"
-        )
+        checked = "check the instrument, and the units and origin of the measurements"
+        action = f"{checked}; if they are right, {action}"
     return Said("prior", title, words, action, (_option(group.name, wider),))
 
 

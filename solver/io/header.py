@@ -11,7 +11,8 @@ from solver.data.text_setting import Texts
 from solver.runtime.versions import versions_of
 
 ORIGIN = "plateviz"
-FORMAT = 1
+# 2: SUMMARY has the instrument, which readers of 1 do not know.
+FORMAT = 2
 
 _VERSIONS = {"PLATEVIZ": "plateviz", "JAX": "jax", "NUMPY": "numpy", "ASTROPY": "astropy"}
 

@@ -279,7 +279,7 @@ def _edited(path, change):
 
 def test_newer_format_is_refused(written):
     path = _edited(written, lambda hdus: hdus[0].header.set("FORMAT", header.FORMAT + 1))
-    with pytest.raises(InputError, match=r"edited\.fits: expected a result of format 1 or older"):
+    with pytest.raises(InputError, match=r"edited\.fits: expected a result of format 2 or older"):
         read_result(path)
 
 

@@ -15,7 +15,7 @@ from plateviz.dashboard.session import Session
 from plateviz.dashboard.views.markup import markup_pane, paragraph
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices
-from plateviz.dashboard.views.state_text import missing_text, outdated_text
+from plateviz.dashboard.views.state_text import empty_text, outdated_text
 from plateviz.dashboard.views.table import TABLE_STYLE
 from plateviz.tables import calibration_tables, outlier_list
 
@@ -70,7 +70,7 @@ class CalibrationView(pn.viewable.Viewer):
     def _say(self, *_: object) -> None:
         session = self._session
         is_missing = session.shown is None
-        text = missing_text(session) if is_missing else outdated_text(session)
+        text = empty_text(session) if is_missing else outdated_text(session)
         self._words.object = paragraph(text, "empty" if is_missing else "outdated", session.theme)
         self._words.visible = bool(text)
         self._tabs.visible = self._save.visible = not is_missing

@@ -24,7 +24,7 @@ from plateviz.dashboard.views.remedies import RemediesView
 from plateviz.dashboard.views.save_choices import Saved
 from plateviz.dashboard.views.selection import SelectionView
 from plateviz.dashboard.views.stack import Stack
-from plateviz.dashboard.views.state_text import missing_text
+from plateviz.dashboard.views.state_text import empty_text
 from plateviz.dashboard.views.summary import HeadView, StripView
 from plateviz.dashboard.views.unit_selector import unit_selector
 from plateviz.dashboard.views.workspace import workspace
@@ -110,7 +110,7 @@ class OrbitPage(pn.viewable.Viewer):
                 OrbitRows(self._navigation),
                 self._session,
                 self._wake,
-                partial(missing_text, self._session),
+                partial(empty_text, self._session),
             )
             self._grids[one] = explore.grid
             return explore.__panel__()
@@ -145,7 +145,7 @@ class OrbitPage(pn.viewable.Viewer):
         return FigureView(
             diagnostic,
             partial(self._plot, diagnostic),
-            waiting=partial(missing_text, self._session),
+            waiting=partial(empty_text, self._session),
             actions=session_actions(self._session),
             saved=Saved(self._session.selection.subject),
             theme=self._session.theme,

@@ -1,16 +1,23 @@
-"""The state of the solution on the screen in words, the same in every pane."""
+"""The state of the solution on the screen in words: its reasons above, in short on the cards."""
 
 from plateviz.dashboard.session import Session
 from plateviz.dashboard.stage import Stage
 
 _WHAT_TO_DO = "Change the settings on the left and press Fit, or choose another orbit."
 
+_BEGUN = "The first solution is being computed."
+
 
 def missing_text(session: Session) -> str:
     """Return why there is no solution yet, and what to do about it."""
     if session.stage is Stage.FAILED:
-        return f"There is no solution. {_sentence(session.message)} {_WHAT_TO_DO}"
-    return "The first solution is being computed."
+        return f"There is no solution: {_sentence(session.message)} {_WHAT_TO_DO}"
+    return _BEGUN
+
+
+def empty_text(session: Session) -> str:
+    """Return that there is no solution yet, on a card below the reason."""
+    return "There is no solution." if session.stage is Stage.FAILED else _BEGUN
 
 
 def outdated_text(session: Session) -> str:

@@ -184,9 +184,13 @@ def instrument_text(instrument: Instrument | None) -> str | None:
     return None if instrument is None else write_instrument(instrument)
 
 
-def instrument_from(text: str | None, path: Path | str) -> Instrument | None:
-    """Return the instrument of a text, None if there is none; otherwise as `parse_instrument`."""
-    return None if text is None else parse_instrument(text, path)
+def instrument_from(text: object, path: Path | str) -> Instrument | None:
+    """Return the instrument of what was stored, None if none was; errors as `parse_instrument`."""
+    if text is None:
+        return None
+    if not isinstance(text, str):
+        raise InputError(f"{path}: expected the text of an instrument, found {text!r}")
+    return parse_instrument(text, path)
 
 
 def _detector(path: Path | str, number: int, table: dict) -> Detector:

@@ -138,13 +138,22 @@ def _with_turned_detectors(
             "it: check the ids, the signs of nx and ny and rotation_deg of the instrument, or "
             "widen the prior, such as --prior detector_rotation=180deg"
         )
-    if found.agreement < _LEAST_AGREEMENT:
+    if found.agreement < _LEAST_AGREEMENT and _are_places_known(problem):
         raise InputError(
             "column detector_id of the measurements: expected detectors where the instrument has "
             f"them, found the sky elsewhere on them (correlation {found.agreement:.2f}, expected "
             "1): check the ids, and x_um and y_um of the instrument"
         )
     return moved
+
+
+def _are_places_known(problem: Problem) -> bool:
+    """Return whether the priors of the detectors' places tell the detectors apart."""
+    values = _values(problem, np.zeros(problem.layout.size))
+    names = ("detector_x", "detector_y")
+    columns = np.concatenate([problem.layout.columns(BY_NAME[name]) for name in names])
+    apart = np.linalg.norm([values[name].std() for name in names])
+    return bool(_MOST_WIDTHS * problem.priors.width[columns].min() < apart)
 
 
 def _with_axes(

@@ -23,7 +23,7 @@ import pandas as pd
 import pyarrow as pa
 
 from solver.data.columns import Column
-from solver.data.instrument import Instrument, parse_instrument
+from solver.data.instrument import Instrument, instrument_from
 from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
 from solver.data.toml import parse_toml, toml_text
@@ -191,10 +191,10 @@ def _header_text(content: Mapping[str, object]) -> str:
 def read_survey_instrument(directory: Path) -> Instrument:
     """Return the instrument that took the orbits of a survey; raises as `read_header`."""
     path = Path(directory) / HEADER
-    text = read_header(directory).get("instrument")
-    if not isinstance(text, str):
-        raise InputError(f"{path}: expected the text of an instrument, found {text!r}")
-    return parse_instrument(text, path)
+    found = instrument_from(read_header(directory).get("instrument"), path)
+    if found is None:
+        raise InputError(f"{path}: expected the text of an instrument, found None")
+    return found
 
 
 def read_survey_table(path: Path, schema: Table) -> pd.DataFrame:

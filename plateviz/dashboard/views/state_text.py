@@ -4,7 +4,6 @@ from plateviz.dashboard.session import Session
 from plateviz.dashboard.stage import Stage
 
 _WHAT_TO_DO = "Change the settings on the left and press Fit, or choose another orbit."
-
 _BEGUN = "The first solution is being computed."
 
 

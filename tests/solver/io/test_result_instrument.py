@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from solver.data.instrument import MINI_MOCK, write_instrument
+from solver.data.instrument import MINI_MOCK, instrument_from, write_instrument
 from solver.errors import InputError
 from solver.io.result import read_result, write_result
 from solver.io.result_instrument import instrument_of
@@ -40,3 +40,9 @@ def test_result_of_an_older_version_takes_what_is_given(tmp_path, camera):
     assert instrument_of(old) == MINI_MOCK
     assert instrument_of(old, otherwise=_OTHER) == _OTHER
     assert instrument_of(old, camera) == _OTHER
+
+
+@pytest.mark.parametrize("stored", [5, ["a"], {"a": 1}, "x = 1"], ids=str)
+def test_what_is_no_instrument_is_refused(stored):
+    with pytest.raises(InputError, match=r"^R\.fits: expected the (text of an instrument|keys)"):
+        instrument_from(stored, "R.fits")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from plateviz.notebook.figures import FigureSpec
-from plateviz.runs.load_tables import compared_run, survey_tables
+from plateviz.runs.load_tables import compared_run, require_same_catalogue, survey_tables
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run_tests import read_run_tables
 from plateviz.tables import run_changes
@@ -24,7 +24,14 @@ if TYPE_CHECKING:
 
 
 def changes_of(a: SurveyRun, b: SurveyRun) -> pd.DataFrame:
-    """Return `tables.run_changes` of two runs; InputError if one cannot be read."""
+    """Return `tables.run_changes` of two runs.
+
+    Raises
+    ------
+    InputError
+        If one cannot be read, or they cannot be compared.
+    """
+    require_same_catalogue(a, b)
     return run_changes(_compared(a), _compared(b))
 
 
@@ -49,7 +56,10 @@ def _compared(run: SurveyRun) -> ComparedRun:
 
 
 def _tables(other: SurveyRun | None, run: SurveyRun) -> SurveyTables:
-    compared = None if other is None else survey_tables(other)
+    if other is None:
+        return survey_tables(run)
+    require_same_catalogue(other, run)
+    compared = survey_tables(other)
     return replace(survey_tables(run), other=compared)
 
 

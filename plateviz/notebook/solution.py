@@ -28,6 +28,7 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.result import write_result
+from solver.io.result_instrument import require_comparable
 from solver.simulate.settings import SurveySettings
 
 if TYPE_CHECKING:
@@ -162,10 +163,11 @@ class OpenSolution(HasFigures, Explores):
         Raises
         ------
         InputError
-            If `other` is not a solution.
+            If `other` is no solution, or has another instrument.
         """
         if not isinstance(other, OpenSolution):
             raise InputError(f"expected a solution to compare with, found {other!r}")
+        require_comparable(self.result, other.result)
         return replace(self, other=other)
 
     @takes_settings
@@ -258,7 +260,7 @@ class OpenSolution(HasFigures, Explores):
         numbers = [one.detector_id for one in self.instrument.detectors]
         if detector is not None and detector not in numbers:
             raise InputError(f"detector: expected one of {numbers}, found {detector!r}")
-        selected = available if exposures is None else _pairs(exposures)
+        selected = tuple(available if exposures is None else _pairs(exposures))
         absent = [pair for pair in selected if pair not in available]
         if absent or not selected:
             raise InputError(
@@ -267,12 +269,7 @@ class OpenSolution(HasFigures, Explores):
             )
         other = None if self.other is None else self.other.result
         return Chosen(
-            self.result,
-            self.instrument,
-            tuple(selected),
-            detector,
-            other,
-            simulation=self.simulation,
+            self.result, self.instrument, selected, detector, other, simulation=self.simulation
         )
 
     def _report(self, facts: "Facts") -> "Report":

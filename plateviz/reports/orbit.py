@@ -23,6 +23,7 @@ from plateviz.tables.verdict import Verdict, orbit_verdict
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.result import FitResult
+from solver.io.result_instrument import require_comparable
 from solver.simulate.settings import SurveySettings
 
 # Number of exposures that a reader can select: those with the chi2 farthest from its expectation.
@@ -54,8 +55,10 @@ def orbit_report(
     Raises
     ------
     InputError
-        If one of `more` cannot be drawn.
+        If one of `more` cannot be drawn, or `other` has another instrument.
     """
+    if other is not None:
+        require_comparable(result, other)
     date = dates(pd.Series([result.summary["epoch_mjd"]])).iloc[0]
     exposures = _exposures(result.exposures)
     whole = Chosen(result, instrument, exposures, other=other, simulation=simulation)

@@ -8,7 +8,7 @@ from plateviz.plots.survey_figure import SourceFigure, SurveyFigure
 from plateviz.reports.more_figures import NO_MORE, MoreFigures, more_of_run
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.report import SOLVED, Facts, Report, ReportFigure, plain
-from plateviz.runs.load_tables import compared_run, survey_tables
+from plateviz.runs.load_tables import compared_run, require_same_catalogue, survey_tables
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run_tests import RunTables
 from plateviz.solving.origin import SurveyFolder
@@ -53,6 +53,7 @@ def survey_report(
     orbits, motions = tables.orbits, tables.motions
     subtitle = f"Run {run.name} of {len(orbits):,} orbits"
     if other is not None:
+        require_same_catalogue(other, run)
         subtitle += f", compared with run {other.name}"
         of_other = _whole(other)
         both = _compared(other, of_other), _compared(run, tables)
@@ -99,7 +100,8 @@ def survey_orbit_report(
         raise InputError(f"{run.survey}: expected an orbit {orbit}, found none of that number")
     facts = {**facts, SOLVED: _of_run(run)[SOLVED]}
     message = run.failures().get(orbit)
-    if message is not None:
+    # A process that was killed may have left why the orbit failed before it was fitted.
+    if message is not None and not run.has_fitted(orbit):
         return failed_orbit_report(folder.read(orbit), message, facts)
     result, instrument = run.result(orbit), folder.read_instrument()
     simulation = folder.read_simulation()

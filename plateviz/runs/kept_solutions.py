@@ -25,7 +25,7 @@ from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import flush
 from solver.io.disk import writing
-from solver.io.result_instrument import instrument_of
+from solver.io.result_instrument import require_instrument
 from solver.io.scratch import scratch_beside
 from solver.io.survey import HEADER, read_survey_instrument
 from solver.simulate.settings import SurveySettings
@@ -103,11 +103,8 @@ class KeptSolutions:
     def read(self, kept: KeptSolution) -> FitResult:
         """Read one of them; InputError if it is damaged, or of another instrument."""
         result = kept.read()
-        if instrument_of(result, otherwise=self._instrument) != self._instrument:
-            raise InputError(
-                f"kept solution {kept.name!r}: expected one with the instrument that is open, "
-                "found another, with other values; `plateviz report` shows it with its own"
-            )
+        remedy = "`plateviz report` shows it with its own"
+        require_instrument(result, self._instrument, f"kept solution {kept.name!r}", remedy)
         return result
 
     def keep(self, name: str, orbit: int | None, is_step: bool, result: FitResult) -> KeptSolution:

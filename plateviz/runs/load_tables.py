@@ -67,6 +67,19 @@ def compared_run(run: SurveyRun, read: RunTables, verdict: Verdict) -> ComparedR
     return ComparedRun(run.name, settings, *read, verdict)
 
 
+def require_same_catalogue(a: SurveyRun, b: SurveyRun) -> None:
+    """Raise InputError if the catalogue was another when one of two runs was made.
+
+    The motions of a run are relative to its catalogue.
+    """
+    found = [section(dict(run.header()), "inputs").get(REFERENCE) for run in (a, b)]
+    if None not in found and found[0] != found[1]:
+        raise InputError(
+            f"runs {a.name!r} and {b.name!r}: expected fits with the same catalogue, found that "
+            f"{REFERENCE} has changed between them; fit the orbits again in another run"
+        )
+
+
 def _pair(survey: Path, name: str) -> tuple[float, float] | None:
     """Return two numbers of the settings of a survey, or None."""
     found = section(read_header(survey), "settings").get(name)

@@ -5,7 +5,6 @@ gathered into one file sorted by source, from which one source can be read witho
 """
 
 from collections.abc import Hashable, Mapping
-from functools import cached_property
 from pathlib import Path
 
 import duckdb
@@ -20,16 +19,11 @@ from plateviz.runs.run import ERRORS_FILE, HISTORY_FILE, MOTIONS_FILE, Run, Writ
 from solver.data.result import FitResult
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from solver.errors import InputError
-from solver.io.atomic import write_atomically
 from solver.io.failures import in_words, reading
 from solver.io.manifest import UnchangedFiles
-from solver.io.parquet import count_rows, read_frame, write_batches
-from solver.io.survey import survey_orbits
-
-# Row groups of the gathered file. Small groups are fast to read, because a source is in one or
-# two of them; many groups are slow, because the statistics of all groups are read first.
-_SMALLEST_GROUP = 8192
-_MOST_GROUPS = 1000
+from solver.io.parquet import read_frame
+from solver.io.result_instrument import require_instrument
+from solver.io.survey import read_survey_instrument, survey_orbits
 
 # The classes are those of `plateviz.tables.sources`.
 _CLASSES = """
@@ -55,7 +49,7 @@ class SurveyRun:
     def __init__(self, run: Run, cache: OrbitCache | None = None) -> None:
         """Open a run, complete or not; `cache` is of its fitted orbits."""
         self._run, self._cache = run, cache
-        self._unchanged = UnchangedFiles()
+        self._unchanged, self._had_history = UnchangedFiles(), False
 
     @property
     def name(self) -> str:
@@ -151,7 +145,7 @@ class SurveyRun:
 
     def history(self, source_id: int) -> pd.DataFrame:
         """Return `survey_schema.HISTORY` of one source by epoch; no rows if it is unknown."""
-        if not self._has_history:
+        if not self._has_history():
             return pd.DataFrame(columns=HISTORY.names)
         rows = col("source_id") == int(source_id)
         parts = [read_frame(Path(file), HISTORY.names, rows) for file in self.history_files()]
@@ -166,7 +160,7 @@ class SurveyRun:
         names = ["source_id", "is_reference", "is_artificial", "n_orbits", "n_obs"]
         if self.is_gathered:
             return self._table(MOTIONS_FILE, names)
-        if not self._has_history:
+        if not self._has_history():
             kinds = {"is_reference": bool, "is_artificial": bool}
             return pd.DataFrame(columns=names).astype(dict.fromkeys(names, np.int64) | kinds)
         return self._ask(
@@ -192,25 +186,30 @@ class SurveyRun:
         """
         return self._ask(_CLASSES, self.history_files(), often).set_index("source_class")
 
-    def exposure_residuals(self, orbit: int, field: int, plate: int) -> pd.DataFrame:
-        """Return `schema.RESIDUALS` of one exposure."""
-        rows = (col("field_id") == field) & (col("plate_id") == plate)
-        path = kept_table(self._run.orbit_directory(orbit), "residuals", self._unchanged)
-        return read_frame(path, rows=rows)
-
     def result(self, orbit: int) -> FitResult:
-        """Return one fitted orbit; InputError if it does not exist."""
+        """Return one fitted orbit.
+
+        Raises
+        ------
+        InputError
+            If it does not exist, or the survey has another instrument now.
+        """
         read = read_fitted_orbit if self._cache is None else self._cache.read
-        return read(self._run.orbit_directory(orbit))
+        result, where = read(self._run.orbit_directory(orbit)), f"{self.directory}: orbit {orbit}"
+        expected, remedy = read_survey_instrument(self.survey), "fit the orbits in another run"
+        require_instrument(result, expected, where, remedy)
+        return result
 
     def expect(self, orbit: int | None) -> None:
         """Read a fitted orbit ahead, which is likely to be asked for next, if it exists."""
         if orbit is not None and self._cache is not None and self.has_fitted(orbit):
             self._cache.expect(self._run.orbit_directory(orbit))
 
-    @cached_property
     def _has_history(self) -> bool:
-        return (self.directory / HISTORY_FILE).is_file() or bool(self._run.complete_orbits())
+        """Return whether the run has a history, or had one before it was removed."""
+        is_there = (self.directory / HISTORY_FILE).is_file() or bool(self._run.complete_orbits())
+        self._had_history |= is_there
+        return self._had_history
 
     def history_files(self) -> list[str]:
         """Return the gathered history, or its parts; InputError if a file is damaged.
@@ -269,29 +268,6 @@ def open_run(survey: Path, name: str) -> SurveyRun:
     raise InputError(
         f"{survey}: expected a run {name!r}, found {names}; `plateviz survey` creates one"
     )
-
-
-def rows_of_a_group(n_rows: int) -> int:
-    """Return the number of rows per row group in a gathered history of `n_rows` rows."""
-    return max(_SMALLEST_GROUP, n_rows // _MOST_GROUPS)
-
-
-def gather_history(run: Run) -> Path:
-    """Write the history of all fitted orbits sorted by source and epoch; return its path."""
-    target = run.directory / HISTORY_FILE
-    parts = [str(run.orbit_directory(orbit) / HISTORY_FILE) for orbit in run.complete_orbits()]
-    group = rows_of_a_group(sum(map(count_rows, parts)))
-    # With one thread the written bytes are reproducible.
-    with write_atomically(target) as temporary, duckdb.connect(config={"threads": 1}) as connection:
-        # Where memory does not suffice; by default it is a folder in the working directory.
-        connection.execute("SET temp_directory = ?", [str(temporary.parent / "sorting")])
-        ordered = connection.sql(
-            "SELECT * FROM read_parquet(?, hive_partitioning = false) ORDER BY source_id, epoch",
-            params=[parts],
-        )
-        # DuckDB writes no checksums.
-        write_batches(ordered.to_arrow_reader(group), temporary)
-    return target
 
 
 def _typed(table: pd.DataFrame) -> pd.DataFrame:

@@ -4,9 +4,10 @@ from collections import OrderedDict
 from collections.abc import Hashable
 from concurrent.futures import Executor, Future
 
-from plateviz.runs.load_tables import survey_tables
+from plateviz.runs.load_tables import compared_run, survey_tables
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run_tests import RunTables, read_run_tables
+from plateviz.tables.run_changes import ComparedRun
 from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.survey_tables import SurveyTables
 from plateviz.tables.verdict import Verdict
@@ -23,6 +24,7 @@ class ReadRun:
     run : that was read
     tables : from which it is judged
     verdict : on it
+    compared : what of it is compared with another run
     """
 
     def __init__(self, run: SurveyRun) -> None:
@@ -30,6 +32,7 @@ class ReadRun:
         self.run = run
         self.tables: RunTables = read_run_tables(run)
         self.verdict: Verdict = run_verdict(*self.tables)
+        self.compared: ComparedRun = compared_run(run, self.tables, self.verdict)
         self._whole: Future[SurveyTables] | None = None
 
     def whole(self, executor: Executor) -> Future[SurveyTables]:

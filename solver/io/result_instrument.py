@@ -1,4 +1,4 @@
-"""The instrument of a result that was read from disk."""
+"""The instrument of a result that was read from disk, and whether two results have the same."""
 
 from pathlib import Path
 
@@ -32,3 +32,32 @@ def instrument_of(
             "no file is needed"
         )
     return given
+
+
+def require_instrument(result: FitResult, expected: Instrument, where: str, remedy: str) -> None:
+    """Raise InputError if a result was computed with another instrument than expected.
+
+    A result that keeps none passes.
+
+    Parameters
+    ----------
+    where, remedy : what the result is, and what to do: the begin and the end of the message
+    """
+    if result.instrument not in (None, expected):
+        raise InputError(
+            f"{where}: expected a solution with the instrument of the measurements, "
+            f"{expected.name!r}, found {result.instrument.name!r} with other values; {remedy}"
+        )
+
+
+def require_comparable(result: FitResult, other: FitResult) -> None:
+    """Raise InputError if two results keep different instruments.
+
+    Coefficients of the distortion, and places of detectors, mean different things then.
+    """
+    a, b = result.instrument, other.instrument
+    if a is not None and b is not None and a != b:
+        raise InputError(
+            "expected two solutions with the same instrument to compare, found "
+            f"{a.name!r} and {b.name!r}, whose values differ"
+        )

@@ -21,7 +21,8 @@ import pandas as pd
 import pyarrow as pa
 from pyarrow import parquet
 
-from plateviz.runs.queries import HISTORY_FILE, MOTIONS_FILE, SurveyRun, rows_of_a_group
+from plateviz.runs.gathered_history import rows_of_a_group
+from plateviz.runs.queries import HISTORY_FILE, MOTIONS_FILE, SurveyRun
 from plateviz.runs.run import Run
 from solver.data.survey_schema import HISTORY, MOTIONS
 from tests.benchmarks.machine import machine, time_of, write

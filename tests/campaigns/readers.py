@@ -277,7 +277,6 @@ _RUN_READERS: dict[str, Callable[[Path], Values]] = {
     "errors": lambda folder: {"errors": _run(folder).errors_by_count()},
     "classes": lambda folder: {"classes": _run(folder).classes(1).reset_index()},
     "sources": _one_by_one,
-    "exposure": lambda folder: {"residuals": _run(folder).exposure_residuals(0, 0, 1)},
     "failures": lambda folder: {"failures": _run(folder).failures()},
     "gathered": lambda folder: {"gathered": Run(folder, RUN).gathered_orbits()},
     "survey tables": _read_survey_tables,

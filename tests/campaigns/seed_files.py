@@ -11,8 +11,8 @@ import pyarrow as pa
 from astropy.io import fits
 from astropy.table import Table as RawTable
 
+from plateviz.runs.gathered_history import gather_history
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.queries import gather_history
 from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run
 from solver.data.columns import Table
 from solver.data.instrument import MINI_MOCK, write_instrument

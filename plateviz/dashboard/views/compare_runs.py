@@ -19,7 +19,7 @@ from plateviz.figures.figure import Figure
 from plateviz.plots.both_runs import BOTH_RUNS, comparable_survey_figures, figure_of_both_runs
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
-from plateviz.runs.load_tables import compared_run
+from plateviz.runs.load_tables import require_same_catalogue
 from plateviz.solving.run_reader import ReadRun
 from plateviz.tables import run_changes
 from plateviz.tables.headings import CHANGES, in_words
@@ -152,7 +152,8 @@ class CompareRunsView(pn.viewable.Viewer):
         if run is None or (before is not None and before.run.name != run.name):
             self._other = None
         try:
-            if run is not None:
+            if run is not None and navigation.run is not None:
+                require_same_catalogue(run, navigation.run)
                 self._being_read = self._session.store.run_reader.read(run)
         except InputError as error:
             self._fail(error)
@@ -163,7 +164,7 @@ class CompareRunsView(pn.viewable.Viewer):
             self._change()
 
     def _fail(self, error: InputError) -> None:
-        self._other, self._failure = None, f"The other run cannot be read: {error}."
+        self._other, self._failure = None, f"The runs cannot be compared: {error}."
 
     def _offer(self, chosen: str | None) -> None:
         others = [one for one in self._navigation.known_runs if one != self._navigation.run_name]
@@ -219,12 +220,7 @@ class CompareRunsView(pn.viewable.Viewer):
     def _compare(self, a: ReadRun, b: ReadRun) -> str:
         """Take what differs between two runs, once; return what is to be said of it."""
         if self._compared != (a, b):
-            self._compared, self._changes = None, pd.DataFrame()
-            try:
-                both = [compared_run(one.run, one.tables, one.verdict) for one in (a, b)]
-            except InputError as error:
-                return f"The settings of a run cannot be read: {error}."
-            self._compared, self._changes = (a, b), run_changes(*both)
+            self._compared, self._changes = (a, b), run_changes(a.compared, b.compared)
         return " ".join(_growth(one) for one in (a, b) if one.tables.motions.empty)
 
 

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import astropy.units as u
 import numpy as np
@@ -216,3 +217,10 @@ def test_public_names_are_listed_and_no_others_found():
     assert {"open", "simulate", "InputError"} <= set(dir(plateviz))
     with pytest.raises(AttributeError, match="no attribute 'opened'"):
         plateviz.opened  # noqa: B018
+
+
+def test_solution_of_another_instrument_is_not_compared(solution, instrument):
+    result = replace(solution.result, instrument=replace(instrument, distortion_scale_um=4.2e4))
+    other = replace(solution, result=result)
+    with pytest.raises(InputError, match="two solutions with the same instrument to compare"):
+        solution.compared_with(other)

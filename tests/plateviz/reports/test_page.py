@@ -13,6 +13,7 @@ from plateviz.reports.page import page_of
 from plateviz.reports.report import Report
 from plateviz.tables.verdict import Verdict
 from solver.data.orbit import OrbitData
+from solver.errors import InputError
 
 OF_COMPARISON = {"comparison", "distortion-comparison", "distortion-truth", "orders"}
 FACTS = {"Report": {"Command": "plateviz report <b>here</b>"}}
@@ -114,3 +115,9 @@ def test_report_of_a_failed_orbit_has_the_reason(made_survey):
     assert "This orbit has no solution." in page
     assert "orbit 1: singular" in page
     assert f"{len(data.measurements):,} measurements" in page
+
+
+def test_solution_of_another_instrument_is_not_compared(fit_result, instrument):
+    other = replace(fit_result, instrument=replace(instrument, distortion_scale_um=4.2e4))
+    with pytest.raises(InputError, match="two solutions with the same instrument to compare"):
+        orbit_report(fit_result, instrument, {}, other=other)

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +10,17 @@ import pytest
 from plateviz.runs.fit_survey import fit_survey
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run import Run
+from solver.data.instrument import write_instrument
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.io.survey import measurement_path, read_survey_orbit, survey_orbits
+from solver.io.survey import (
+    measurement_path,
+    read_header,
+    read_survey_instrument,
+    read_survey_orbit,
+    survey_orbits,
+    write_header,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -195,3 +204,24 @@ def test_run_of_an_older_version_without_manifests_is_read(survey):
     read_all(run)
     assert survey_orbits(survey) == [0, 1, 2]
     assert run.changes() == []
+
+
+def test_survey_with_another_instrument_now_shows_none_of_its_solutions(survey):
+    header = dict(read_header(survey))
+    camera = replace(read_survey_instrument(survey), focal_length_um=2e6)
+    (survey / "manifest.sha256").unlink()
+    write_header(survey, {**header, "instrument": write_instrument(camera)})
+    with pytest.raises(InputError, match="orbit 0: expected a solution with the instrument of the"):
+        SurveyRun(Run(survey, "default")).result(0)
+
+
+def test_source_is_found_once_its_orbit_is_fitted(survey):
+    run, history = Run(survey, "default"), survey / "hidden"
+    source = SurveyRun(run).motions()["source_id"].iloc[0]
+    run.directory.rename(history)
+    opened = SurveyRun(run)
+    run.directory.mkdir()
+    assert opened.history(source).empty
+    run.directory.rmdir()
+    history.rename(run.directory)
+    assert not opened.history(source).empty

@@ -221,15 +221,6 @@ def test_columns_with_exchanged_names_are_refused(survey, state):
     assert any("history.parquet" in message for message in Run(survey, RUN).changes())
 
 
-def test_changed_residuals_of_an_exposure_are_refused(survey):
-    run = _run(survey)
-    path = run.directory / "orbit=0000" / "residuals.parquet"
-    assert not run.exposure_residuals(0, 0, 1).empty
-    path.write_bytes(path.read_bytes().replace(b"residual_x", b"residual_y"))
-    with pytest.raises(InputError, match=r"residuals\.parquet: expected the file that was written"):
-        run.exposure_residuals(0, 0, 1)
-
-
 def test_run_of_an_older_version_lists_orbits_only(survey):
     run = _run(survey)
     (run.directory / "COMPLETE").unlink()

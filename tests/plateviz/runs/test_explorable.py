@@ -11,8 +11,9 @@ from pyarrow import parquet
 from plateviz.runs import explorable
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
+from plateviz.runs.gathered_history import gather_history
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.queries import SurveyRun, gather_history
+from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run import Run
 from plateviz.tables.explore import EXPLORABLE, explorable_measurements
 from solver.data.settings import FitSettings

@@ -220,14 +220,6 @@ def test_paper_is_reproduced_from_an_existing_run(run, fitted_survey):
     assert contents(Run(fitted_survey, run.name)) == before
 
 
-def test_residuals_of_an_exposure_are_found(run):
-    whole = run.result(0).residuals
-    field, plate = (int(whole[name].iloc[0]) for name in ("field_id", "plate_id"))
-    part = run.exposure_residuals(0, field, plate)
-    here = whole[(whole["field_id"] == field) & (whole["plate_id"] == plate)]
-    assert len(part) == len(here) > 0
-
-
 def test_runs_are_found_by_name(run, fitted_survey):
     assert open_run(fitted_survey, "one").directory == run.directory
     assert "one" in [found.name for found in survey_runs(fitted_survey)]

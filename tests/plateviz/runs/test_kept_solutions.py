@@ -32,7 +32,7 @@ def test_solution_of_another_instrument_is_refused(kept, fit_result):
     made = kept.keep("a", None, False, fit_result)
     assert kept.read(made).instrument == fit_result.instrument
     other = KeptSolutions(kept.folder, replace(MINI_MOCK, focal_length_um=2e6))
-    with pytest.raises(InputError, match="kept solution 'a': expected one with the instrument"):
+    with pytest.raises(InputError, match="kept solution 'a': expected a solution with the"):
         other.read(other.find("a"))
 
 

@@ -7,7 +7,7 @@ import pytest
 from solver.data.instrument import MINI_MOCK, instrument_from, write_instrument
 from solver.errors import InputError
 from solver.io.result import read_result, write_result
-from solver.io.result_instrument import instrument_of
+from solver.io.result_instrument import instrument_of, require_comparable
 from tests.solver.io_samples import small_result
 
 _OTHER = replace(MINI_MOCK, name="another", focal_length_um=2e6)
@@ -46,3 +46,13 @@ def test_result_of_an_older_version_takes_what_is_given(tmp_path, camera):
 def test_what_is_no_instrument_is_refused(stored):
     with pytest.raises(InputError, match=r"^R\.fits: expected the (text of an instrument|keys)"):
         instrument_from(stored, "R.fits")
+
+
+def test_results_of_two_instruments_are_not_compared():
+    one, other, old = (
+        replace(small_result(), instrument=camera) for camera in (MINI_MOCK, _OTHER, None)
+    )
+    with pytest.raises(InputError, match="same instrument to compare, found 'JASMINE"):
+        require_comparable(one, other)
+    for pair in ((one, one), (one, old), (old, other)):
+        require_comparable(*pair)

@@ -231,7 +231,7 @@ def test_other_run_that_is_removed_is_told_and_not_exchanged(navigation, page, r
     both, _ = drawn(page)
     runs[1].is_lost = True
     look_for_run(navigation)
-    assert "The other run cannot be read: runs/low: expected a run" in words(page)
+    assert "The runs cannot be compared: runs/low: expected a run" in words(page)
     assert not page._compare._save.visible
     drawn(page)
     assert "No other run has been read." in both._body[0].object
@@ -265,7 +265,7 @@ def test_settings_that_cannot_be_read_are_told(navigation, page, runs):
     navigation.session.run_comparison.state = "written since"
     page._compare._compared = None
     page._compare._fill()
-    assert "The settings of a run cannot be read: run.toml" in words(page)
+    assert "The runs cannot be compared: run.toml" in words(page)
 
 
 def test_other_run_is_read_elsewhere(fit_result, navigation, runs):
@@ -293,3 +293,14 @@ def test_command_and_python_compare_both_runs(navigation, page):
     assert "survey.figure('motion-differences')" in code.python
     report = "plateviz report sky --run default --survey --other low --both orbit-health"
     assert code.command.startswith(report)
+
+
+def test_runs_of_different_catalogues_are_not_compared(navigation, page, runs):
+    runs[0].header, runs[1].header = (
+        lambda name=name: {**ComparedRun.header(runs[0]), "inputs": {"reference.parquet": name}}
+        for name in ("a", "b")
+    )
+    navigation.session.run_comparison.state = "written since"
+    assert "The runs cannot be compared: runs" in words(page)
+    assert "found that reference.parquet has changed between them" in words(page)
+    assert not page._compare._save.visible

@@ -3,13 +3,16 @@
 import math
 from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
 
 from plateviz.tables.changes import COLUMNS, Row, merit, setting_changes
 from plateviz.tables.comparison import comparison
 from plateviz.tables.verdict import orbit_verdict
 from solver.data.result import FitResult
+from solver.data.schema import MEASURED
 
+_EVIDENCE = "log_evidence"
 # Key of the summary -> label and number of decimals.
 _FIGURES: Mapping[str, tuple[str, int]] = {
     "n_measurements": ("Measurements", 0),
@@ -23,8 +26,10 @@ _FIGURES: Mapping[str, tuple[str, int]] = {
     "normalised_deviation_dec": ("Reference sources, rms deviation / σ in δ", 3),
     "mean_error_ra": ("Common error in α cos δ (mas)", 4),
     "mean_error_dec": ("Common error in δ (mas)", 4),
-    "log_evidence": ("Log evidence", 1),
+    _EVIDENCE: ("Log evidence", 1),
 }
+# Whose equality makes the data of two fits the same.
+_DATA = [*(column.name for column in MEASURED), "nx", "ny", "sx", "sy"]
 _MARGINAL = {"sigma_ra_marginal": "α cos δ", "sigma_dec_marginal": "δ"}
 
 
@@ -51,12 +56,35 @@ def _merits(a: FitResult, b: FitResult) -> list[Row]:
     orbits = tuple(str(one.summary.get("orbit", "")) for one in (a, b))
     if orbits[0] != orbits[1]:
         rows.insert(0, ("Orbit", orbits[0], orbits[1], ""))
+    elif changed := _changed_files(a, b):
+        rows.insert(0, ("Input files with other contents", "", "", ", ".join(changed)))
     for key, (label, decimals) in _FIGURES.items():
-        rows.append(merit(label, a.summary.get(key), b.summary.get(key), decimals))
+        row = merit(label, a.summary.get(key), b.summary.get(key), decimals)
+        rows.append(row if key != _EVIDENCE or _has_one_evidence(a, b) else (*row[:3], ""))
     for column, symbol in _MARGINAL.items():
         of_a, of_b = (float(one.sources[column].median()) for one in (a, b))
         rows.append(merit(f"Median marginal σ in {symbol} (mas)", of_a, of_b, 4))
     return [*rows, *_from_truth(a, b), *_positions(a, b)]
+
+
+def _changed_files(a: FitResult, b: FitResult) -> list[str]:
+    """Return the input files that two fits of an orbit have found with different contents."""
+    common = [name for name in a.provenance if name in b.provenance]
+    return [name for name in common if a.provenance[name] != b.provenance[name]]
+
+
+def _has_one_evidence(a: FitResult, b: FitResult) -> bool:
+    """Return whether the evidences of two solutions can be compared.
+
+    That of other data says nothing, and a flat prior has no density: each more of them changes
+    the evidence by an amount that depends on the unit.
+    """
+    flat_a, flat_b = (
+        one.calibration.loc[np.isinf(one.calibration["prior_sigma"]), ["group", "element"]]
+        for one in (a, b)
+    )
+    is_same_data = a.residuals[_DATA].equals(b.residuals[_DATA])
+    return is_same_data and flat_a.reset_index(drop=True).equals(flat_b.reset_index(drop=True))
 
 
 def _from_truth(a: FitResult, b: FitResult) -> list[Row]:

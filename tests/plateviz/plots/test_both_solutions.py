@@ -110,3 +110,26 @@ def test_table_without_shared_sources_says_so(fit_result):
     table = solution_changes(fit_result, replace(fit_result, sources=moved)).set_index("what")
     assert table.loc["Sources in both", "change"] == "0"
     assert not any(name.startswith("Rms difference") for name in table.index)
+
+
+def test_evidences_of_other_data_or_other_flat_priors_are_not_compared(fit_result):
+    one = replace(fit_result, summary={**fit_result.summary, "log_evidence": -20.0})
+
+    def change(**tables):
+        changes = solution_changes(one, replace(one, **tables)).set_index("what")
+        return changes.loc["Log evidence", "change"]
+
+    residuals, calibration = one.residuals, one.calibration
+    narrow = calibration.assign(prior_sigma=0.1 * calibration["prior_sigma"])
+    assert change(calibration=narrow) == "+0.0"
+    assert change(calibration=narrow.assign(prior_sigma=np.inf)) == ""
+    assert change(residuals=residuals.iloc[1:]) == ""
+    assert change(residuals=residuals.assign(sx=2.0 * residuals["sx"])) == ""
+
+
+def test_input_files_that_were_changed_between_two_fits_are_named(fit_result):
+    one = replace(fit_result, provenance={"obs.fits": "a", "ref.fits": "b"})
+    other = replace(fit_result, provenance={"obs.fits": "c", "ref.fits": "b"})
+    table = solution_changes(one, other)
+    assert table.iloc[0].tolist() == ["Input files with other contents", "", "", "obs.fits"]
+    assert not solution_changes(one, one)["what"].str.startswith("Input").any()

@@ -24,7 +24,7 @@ def chosen_of(session: Session) -> Chosen | None:
         return None
     return Chosen(
         result=shown.result,
-        instrument=session.store.instrument,
+        instrument=shown.result.instrument or session.store.instrument,
         exposures=tuple(session.selection.exposures_of(shown.result)),
         detector=session.selection.detector_id,
         other=session.other.result if session.other else None,

@@ -37,16 +37,16 @@ class Fitters:
 
     def of(self, request: Request) -> OrbitFitter:
         """Return the fitter of the orbit of a request; InputError if the orbit cannot be read."""
-        key = json.dumps([request["origin"], request["orbit"]], sort_keys=True)
+        origin, orbit = origin_from_dict(request["origin"]), request["orbit"]
+        # Before they are read: what is written meanwhile is read next time.
+        key = json.dumps([request["origin"], orbit, origin.state(orbit)], sort_keys=True)
         if key in self._kept:
             self._kept.move_to_end(key)
         else:
             # Forgotten first, so that the new one finds their memory.
             while len(self._kept) >= self._most:
                 self._kept.popitem(last=False)
-            origin = origin_from_dict(request["origin"])
-            data = origin.read(request["orbit"])
-            self._kept[key] = OrbitFitter(data, origin.read_instrument())
+            self._kept[key] = OrbitFitter(origin.read(orbit), origin.read_instrument())
         for older in list(self._kept.values())[:-_WITH_LOWER_ORDERS]:
             older.forget_precomputed()
         return self._kept[key]

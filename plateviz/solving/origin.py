@@ -12,9 +12,19 @@ from plateviz.runs.kept_solutions import FOLDER
 from solver.data.instrument import MINI_MOCK, Instrument, read_instrument
 from solver.data.orbit import OrbitData
 from solver.io.read_orbit import observation_files, read_orbit
-from solver.io.survey import read_survey_instrument, read_survey_orbit, survey_orbits
+from solver.io.survey import (
+    HEADER,
+    REFERENCE,
+    TRUTH_FILE,
+    measurement_path,
+    read_survey_instrument,
+    read_survey_orbit,
+    survey_orbits,
+)
 from solver.simulate.settings import SurveySettings
 from solver.simulate.simulated import simulation_of
+
+FileStates = list[tuple[int, int, int]]
 
 
 @dataclass(frozen=True)
@@ -50,6 +60,10 @@ class OrbitFiles:
         files = [Path(path) for path in given if path]
         return [*observation_files(Path(self.observations)), *files]
 
+    def state(self, orbit: int | None) -> FileStates:
+        """Return what differs once a file of the orbit has been changed."""
+        return _states(self.inputs())
+
     def orbits(self) -> list[int | None]:
         """Return the orbit_id of all orbits."""
         return [self.orbit]
@@ -84,6 +98,12 @@ class SurveyFolder:
         """Directory of the kept solutions, which need not exist."""
         return Path(self.directory) / FOLDER
 
+    def state(self, orbit: int | None) -> FileStates:
+        """Return what differs once a file of an orbit has been changed; orbits may be added."""
+        folder = Path(self.directory)
+        own = [] if orbit is None else [measurement_path(folder, orbit)]
+        return _states([*own, folder / REFERENCE, folder / TRUTH_FILE, folder / HEADER])
+
     def orbits(self) -> list[int | None]:
         """Return the orbit_id of all orbits."""
         return list(survey_orbits(Path(self.directory)))
@@ -104,6 +124,12 @@ class SurveyFolder:
 
 
 Origin = OrbitFiles | SurveyFolder
+
+
+def _states(paths: list[Path]) -> FileStates:
+    """Return number, size and time of writing (ns) of the files that exist."""
+    found = [path.stat() for path in paths if path.is_file()]
+    return [(one.st_ino, one.st_size, one.st_mtime_ns) for one in found]
 
 
 def origin_to_dict(origin: Origin) -> dict[str, object]:

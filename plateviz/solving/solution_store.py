@@ -251,6 +251,8 @@ class SolutionStore:
         return None
 
     def _directory(self, orbit: int | None, settings: FitSettings, what_if: bool) -> Path:
-        request = json.dumps([orbit, settings.to_dict(), what_if], sort_keys=True)
+        # A solution of files that have been changed since is none of what is there now.
+        state = self.origin.state(orbit)
+        request = json.dumps([orbit, settings.to_dict(), what_if, state], sort_keys=True)
         name = hashlib.sha256(request.encode()).hexdigest()[:16]
         return self._scratch / f"orbit={'file' if orbit is None else f'{orbit:04d}'}-{name}"

@@ -9,6 +9,7 @@ from functools import partial
 
 import pandas as pd
 import pytest
+from astropy.io import fits
 
 from plateviz.runs.fitted_orbit import write_fitted_orbit
 from plateviz.runs.new_run import begin_run
@@ -338,3 +339,25 @@ def test_closed_solver_removes_what_ended_workers_left_only(tmp_path, monkeypatc
         SolverQueue().close()
         assert not left.exists()
         assert of_another_survey.path.is_dir()
+
+
+def test_files_that_are_replaced_are_read_again(tmp_path, sample_orbit_dir):
+    files = OrbitFiles(*(str(tmp_path / f"sample_{name}.fits") for name in ("obs", "ref")))
+    for name in ("sample_obs.fits", "sample_ref.fits"):
+        shutil.copy(sample_orbit_dir / name, tmp_path / name)
+    store, settings = SolutionStore(files, SolverQueue()), FitSettings(order=3)
+    try:
+        assert store.request(None, settings).wait(LONG) is JobStatus.DONE
+        before = store.result(None, settings)
+        with fits.open(files.reference) as tables:
+            tables[1].data["ra_error"] *= 2.0
+            tables.writeto(tmp_path / "new.fits")
+        (tmp_path / "new.fits").replace(files.reference)
+        assert store.result(None, settings) is None
+        assert store.request(None, settings).wait(LONG) is JobStatus.DONE
+        after = store.result(None, settings)
+        assert after.provenance != before.provenance
+        widest = (one.sources["prior_sigma_ra"].max() for one in (before, after))
+        assert next(widest) < 0.6 * next(widest)
+    finally:
+        store.close()

@@ -104,8 +104,8 @@ class Navigation(param.Parameterized):
             self._growth = run, Growth(run.survey, run.name)
         try:
             written = run.written()
-        except InputError:
-            # A file is being replaced, or the run is: the next look tells.
+        except InputError as error:  # While a file is replaced, or the run: the next look tells.
+            self.message = str(error) if self.written is None else self.message
             return True
         with param.parameterized.batch_call_watchers(self):
             self.growth = self._growth[1].look(written)
@@ -285,7 +285,8 @@ class Navigation(param.Parameterized):
         self.session.note(problems)
 
     def _begin_run(self, *_: object) -> None:
-        self.written = None
+        # Nothing of the run before is shown under the name of this one, even if it is unreadable.
+        self.param.update(written=None, growth="", found=None, message="")
         self.look_again()
 
     def _look(self) -> None:

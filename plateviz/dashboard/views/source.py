@@ -185,6 +185,7 @@ class SourcePage(pn.viewable.Viewer):
                 sources = source_list(run.counts())
             except InputError as error:
                 self._invitation = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
+                self._list.show(pd.DataFrame(columns=list(SOURCES_OF_RUN)))
                 return
             self._invitation = _NO_SOURCES if sources.empty else _INVITATION
             self._list.show(sources)

@@ -15,7 +15,8 @@ from plateviz.dashboard.views.survey import SurveyPage
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import survey_runs
 from solver.data.settings import FitSettings
-from tests.plateviz.dashboard.test_navigation import SurveyStore
+from solver.errors import InputError
+from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
 
 
 def test_removed_run_is_said_until_it_is_there_again(fit_result, survey_folder):
@@ -75,3 +76,25 @@ def test_run_that_begins_is_offered_and_the_first_one_shown(fit_result, survey_f
     assert navigation.run is shown
     selector.value = "another"
     assert navigation.run.name == "another"
+
+
+def test_source_of_one_run_is_not_shown_under_the_name_of_another(fit_result, survey):
+    runs = [FakeRun(name, survey, fit_result) for name in ("damaged", "default")]
+    navigation = Navigation(Session(SurveyStore(fit_result, runs)))
+    navigation.run_name = "default"
+    page = SourcePage(navigation, lambda *_: None)
+    source = survey.history["source_id"].iloc[0]
+    navigation.find_source(str(source))
+    assert navigation.found is not None
+
+    def fail():
+        raise InputError("gathered.json: expected the file that was written")
+
+    runs[0].written = runs[0].counts = fail
+    navigation.run_name = "damaged"
+    assert navigation.found is None
+    assert navigation.message == "gathered.json: expected the file that was written"
+    assert "gathered.json" in page._head.object
+    assert page._list._table.value.empty
+    navigation.run_name = "default"
+    assert navigation.found is not None

@@ -1,7 +1,7 @@
 """Exclusions: sources, exposures and detectors whose measurements a fit does not use."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,29 +57,36 @@ class Exclusions:
         if not self:
             return data
         rows = data.measurements
-        is_excluded = np.zeros(len(rows), dtype=bool)
-        for kind, excluded, index in (
-            ("source", self.sources, lambda: pd.Index(rows["source_id"])),
-            ("exposure", self.exposures, lambda: pd.MultiIndex.from_frame(rows[_EXPOSURE])),
-            ("detector", self.detectors, lambda: pd.Index(rows["detector_id"])),
-        ):
-            if not excluded:
-                continue
-            measured = index()
-            removed = measured.isin(list(excluded))
-            missing = excluded.difference(measured[removed].tolist())
+        for kind, excluded, keys in self._of_rows(rows):
+            missing = excluded.difference(keys[keys.isin(list(excluded))].tolist())
             if missing:
                 raise InputError(
                     f"excluded {kind} {_text(min(missing))}: expected one with measurements in "
                     f"orbit {data.orbit_id}, found none"
                 )
-            is_excluded |= removed
+        is_excluded = self.excludes(rows)
         if is_excluded.all():
             raise InputError(
                 f"exclusions: expected some measurements of orbit {data.orbit_id} to remain, "
                 f"found that all {len(rows)} are excluded"
             )
         return of_rows(data, ~is_excluded)
+
+    def excludes(self, rows: pd.DataFrame) -> np.ndarray:
+        """Return which rows of a table of measurements are excluded."""
+        is_excluded = np.zeros(len(rows), dtype=bool)
+        for _, excluded, keys in self._of_rows(rows):
+            is_excluded |= keys.isin(list(excluded))
+        return is_excluded
+
+    def _of_rows(self, rows: pd.DataFrame) -> Iterator[tuple[str, frozenset, pd.Index]]:
+        """Yield each kind that something is excluded of, what it is, and that of each row."""
+        if self.sources:
+            yield "source", self.sources, pd.Index(rows["source_id"])
+        if self.exposures:
+            yield "exposure", self.exposures, pd.MultiIndex.from_frame(rows[_EXPOSURE])
+        if self.detectors:
+            yield "detector", self.detectors, pd.Index(rows["detector_id"])
 
     def names(self) -> list[str]:
         """Return the excluded items as text, sorted."""

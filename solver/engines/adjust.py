@@ -45,11 +45,15 @@ def find_adjustments(
 
 
 def with_adjustments(result: FitResult, found: Adjustments) -> FitResult:
-    """Return a result with what was adjusted in its summary."""
+    """Return a result with what was adjusted in its summary.
+
+    Outliers among what a what-if excludes are not its own.
+    """
     summary, outliers = dict(result.summary), result.outliers
     if found.outliers is not None:
-        summary["n_outliers"] = len(found.outliers)
-        outliers = found.outliers.reset_index(drop=True)
+        outliers = found.outliers[~result.settings.exclusions.excludes(found.outliers)]
+        outliers = outliers.reset_index(drop=True)
+        summary["n_outliers"] = len(outliers)
     if found.moves:
         summary["detector_moves"] = [move._asdict() for move in found.moves]
     if found.noise is not None:

@@ -132,6 +132,11 @@ def test_what_if_leaves_out_the_same_outliers(small_orbit):
     changed = fitter.what_if(ROBUST.with_(exclusions=Exclusions(sources=frozenset([source]))))
     pd.testing.assert_frame_equal(changed.outliers, fitted.outliers)
     assert changed.summary["n_measurements"] < fitted.summary["n_measurements"]
+    detector = int(fitted.outliers["detector_id"].iloc[0])
+    others = fitted.outliers[fitted.outliers["detector_id"] != detector]
+    fewer = fitter.what_if(ROBUST.with_(exclusions=Exclusions(detectors=frozenset([detector]))))
+    assert fewer.summary["n_outliers"] == len(others) < len(fitted.outliers)
+    pd.testing.assert_frame_equal(fewer.outliers, others.reset_index(drop=True))
     assert fitter.what_if(FitSettings()) is None
 
 

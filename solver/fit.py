@@ -105,13 +105,19 @@ class OrbitFitter:
         settings: FitSettings,
         progress: Callable[[Iteration], None] = lambda _: None,
         resumption: Resumption | None = None,
+        beside: Callable[[Iteration], None] | None = None,
     ) -> FitResult:
         """Fit the orbit; parameters and exceptions as those of `fit_orbit`.
 
         A fit of the svi engine that was stopped continues where it stopped.
+
+        Parameters
+        ----------
+        beside : called after every iteration of the Gauss-Newton fits before and after that of the
+            engine, which find outliers and compare orders; as `progress` if None
         """
-        start = time.perf_counter()
-        adjustments = find_adjustments(self._cache, self._instrument, settings, progress)
+        start, beside = time.perf_counter(), beside or progress
+        adjustments = find_adjustments(self._cache, self._instrument, settings, beside)
         data, problem = self._cache.get(settings, adjustments)
         prepared = time.perf_counter()
         estimate = run_engine(problem, settings, progress, resumption or self._resumption(settings))
@@ -121,7 +127,7 @@ class OrbitFitter:
         result = found.whole()
         self._stopped = None
         fitted = time.perf_counter()
-        orders = self._compare_orders(problem, settings, progress)
+        orders = self._compare_orders(problem, settings, beside)
         if estimate.mode.status.is_solution:
             covariance = found.solution.covariance
             self._start_from(

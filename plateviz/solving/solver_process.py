@@ -42,7 +42,7 @@ from plateviz.solving.fitters import Base, Fitters, Request, base_of, base_setti
 from plateviz.solving.preparation import Preparation, prepare
 from plateviz.solving.put_off import PutOff, judge
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
-from solver.data.settings import COUNTED, FitSettings
+from solver.data.settings import COUNTED, ENGINES, FitSettings
 from solver.engines.gauss_newton import Iteration
 from solver.errors import CancelledError, FitError, InputError
 from solver.fit import OrbitFitter
@@ -208,15 +208,17 @@ def _fit(request: Request, progress: Callable[..., None], kept: _Kept) -> Prepar
     settings = FitSettings.from_dict(request["settings"])
 
     def on_iteration(iteration: Iteration) -> None:
-        stage = f"{COUNTED[settings.engine]} {iteration.iteration}"
-        progress(stage=stage, **iteration._asdict())
+        progress(stage=f"{COUNTED[settings.engine]} {iteration.iteration}", **iteration._asdict())
+
+    def beside(iteration: Iteration) -> None:
+        progress(stage=f"{COUNTED[ENGINES[0]]} {iteration.iteration}")
 
     progress(stage="linearising")
     found = _what_if(fitter, request, on_iteration) if request["what_if"] else None
     if found is None:
         # A fit may take long, and a page waits for the verdict.
         put_off.finish_verdicts()
-    result = fitter.fit(settings, on_iteration) if found is None else found.result
+    result = found.result if found else fitter.fit(settings, on_iteration, beside=beside)
     progress(stage="writing the result")
     directory = Path(request["directory"])
     put_off.write(directory, result, is_partial=found is not None)

@@ -233,3 +233,12 @@ def test_mirrored_gradient_does_not_depend_on_the_draw(svi_problem, exact):
     )
     np.testing.assert_allclose(mirrored, 1.0, atol=0.01)
     assert np.abs(single[0] - single[1]).max() > 1.9
+
+
+def test_steps_are_told_apart_from_the_iterations_that_find_outliers(small_orbit):
+    settings = replace(SETTINGS, robust=True, svi=SviSettings(steps=50, patience=25, max_steps=50))
+    fitter, steps, others = OrbitFitter(small_orbit.data, small_orbit.instrument), [], []
+    fitter.fit(settings, lambda row: steps.append(row.iteration), beside=others.append)
+    assert steps == [25, 50]
+    assert len(others) > 1
+    assert max(row.iteration for row in others) < 25

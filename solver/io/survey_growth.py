@@ -1,5 +1,7 @@
 """Growth of a survey: an orbit is added so that readers see it as a whole or not at all."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
@@ -60,32 +62,35 @@ def append_orbit(directory: Path, orbit: OrbitData) -> Path:
         with writing(path.parent, "to make the folder"):
             path.parent.mkdir(exist_ok=True)
         write_survey_table(orbit.measurements, MEASUREMENT, path)
-        write_survey_table(exposures.reset_index(drop=True), ENVIRONMENT, directory / EXPOSURES)
-        _list(directory, [path, directory / EXPOSURES])
+        with _replaced(directory, path) as of_all:
+            write_survey_table(exposures.reset_index(drop=True), ENVIRONMENT, of_all)
     return path
 
 
 def _other_exposures(directory: Path, orbit_id: int) -> pd.DataFrame:
     """Return the exposures of a survey without those of an orbit; none before its first orbit."""
-    path = directory / EXPOSURES
-    if not path.is_file() and EXPOSURES not in listed_files(directory):
+    path, listed = directory / EXPOSURES, listed_files(directory).get(EXPOSURES)
+    if not path.is_file() and listed is None:
         return pd.DataFrame(columns=ENVIRONMENT.names)
-    try:
-        return _without(read_survey_table(path, ENVIRONMENT), orbit_id)
-    except InputError:
-        others = _before_a_kill(directory, orbit_id)
-        if others is None:
-            raise
-        return others
+    if path.is_file() and listed not in (None, sha256_of(path)):
+        others = _before_a_kill(directory)
+        if others is not None:
+            return _without(others, orbit_id)
+    return _without(read_survey_table(path, ENVIRONMENT), orbit_id)
 
 
-def _before_a_kill(directory: Path, orbit_id: int) -> pd.DataFrame | None:
-    """Return the exposures that the manifest lists, if a killed call added only this orbit's."""
-    path = directory / EXPOSURES
-    others = _without(conform(find_catalogue(path).table, ENVIRONMENT, str(path)), orbit_id)
+def _before_a_kill(directory: Path) -> pd.DataFrame | None:
+    """Return the exposures that the manifest lists, if killed calls have only added others."""
+    path, listed = directory / EXPOSURES, listed_files(directory)
+    exposures = conform(find_catalogue(path).table, ENVIRONMENT, str(path))
+    is_listed = {
+        orbit: measurement_path(directory, orbit).relative_to(directory).as_posix() in listed
+        for orbit in exposures["orbit_id"].unique().tolist()
+    }
+    others = exposures[exposures["orbit_id"].map(is_listed)].reset_index(drop=True)
     with scratch_beside(path) as old:
         write_survey_table(others, ENVIRONMENT, old)
-        return others if sha256_of(old) == listed_files(directory).get(EXPOSURES) else None
+        return others if sha256_of(old) == listed.get(EXPOSURES) else None
 
 
 def _without(exposures: pd.DataFrame, orbit_id: int) -> pd.DataFrame:
@@ -108,11 +113,21 @@ def _check(directory: Path, orbit: OrbitData) -> None:
     refuse(found)
 
 
-def _list(directory: Path, changed: list[Path]) -> None:
-    """Write the lines of changed files into the manifest, if the survey has one."""
-    manifest = directory / MANIFEST
+@contextmanager
+def _replaced(directory: Path, added: Path) -> Iterator[Path]:
+    """Yield a path for new exposures; then put them in place, and at once their manifest, if any.
+
+    Parameters
+    ----------
+    added : file of the measurements, which is listed in the manifest, too
+    """
+    exposures, manifest = directory / EXPOSURES, directory / MANIFEST
     if not manifest.is_file():
+        with write_atomically(exposures) as new:
+            yield new
         return
-    names = {path.relative_to(directory).as_posix(): sha256_of(path) for path in changed}
-    with write_atomically(manifest) as path:
-        path.write_text(manifest_text(listed_files(directory) | names), encoding="utf-8")
+    with write_atomically(manifest) as listing, write_atomically(exposures) as new:
+        yield new
+        names = {added.relative_to(directory).as_posix(): sha256_of(added)}
+        text = manifest_text(listed_files(directory) | names | {EXPOSURES: sha256_of(new)})
+        listing.write_text(text, encoding="utf-8")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
+from solver.io.lock import locked
 from solver.io.manifest import changes, read_manifest, require_digest, require_unchanged
 
 MANIFEST = "manifest.sha256"
@@ -12,8 +13,9 @@ REMEDY = (
     f"restore it from a copy, or simulate the survey again; if it was changed on purpose, delete "
     f"{MANIFEST}"
 )
-# An orbit that is added replaces the exposures a moment before the manifest.
-_ADDING_SECONDS = 0.1
+# An orbit that is added replaces the exposures a moment before the manifest: less than one of
+# these times, or on a slow disk as long as whoever adds it has the folder locked.
+_MOMENT_S, _MOST_S = 0.1, 3.0
 
 
 def listed_files(directory: Path) -> dict[str, str]:
@@ -39,8 +41,20 @@ def require_unchanged_files(directory: Path, paths: list[Path]) -> dict[str, str
     try:
         return _unchanged(directory, paths)
     except InputError:
-        time.sleep(_ADDING_SECONDS)
+        end = time.monotonic() + _MOST_S
+        time.sleep(_MOMENT_S)
+        while _is_growing(directory) and time.monotonic() < end:
+            time.sleep(_MOMENT_S)
         return _unchanged(directory, paths)
+
+
+def _is_growing(directory: Path) -> bool:
+    """Return whether another process adds an orbit."""
+    try:
+        with locked(directory) as is_free:
+            return not is_free
+    except OSError:
+        return False
 
 
 def _unchanged(directory: Path, paths: list[Path]) -> dict[str, str]:

@@ -99,3 +99,19 @@ def test_exposures_that_are_others_are_refused(growing, small_survey):
         InputError, match="expected the file that was written, found other contents"
     ):
         growing.append(1)
+
+
+def test_killed_call_keeps_no_other_orbit_out(growing, small_survey):
+    old = (growing.directory / MANIFEST).read_bytes()
+    growing.append(1)
+    # As if the exposures were replaced and the manifest were not.
+    (growing.directory / MANIFEST).write_bytes(old)
+    one = read_survey_orbit(small_survey, 1)
+    third = {name: getattr(one, name).assign(orbit_id=2) for name in ("measurements", "exposures")}
+    append_orbit(growing.directory, replace(one, **third))
+    assert survey_changes(growing.directory) == []
+    exposures = read_survey_table(growing.directory / EXPOSURES, ENVIRONMENT)
+    assert exposures["orbit_id"].unique().tolist() == [0, 2]
+    growing.append(1)
+    assert survey_changes(growing.directory) == []
+    assert read_survey_orbit(growing.directory, 1).orbit_id == 1

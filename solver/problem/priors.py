@@ -12,8 +12,13 @@ from jaxtyping import Bool, Float
 
 from solver.data.parameters import BY_NAME, SOURCES
 from solver.data.settings import FitSettings
+from solver.errors import InputError
 from solver.problem.parameter_vector import VectorLayout
 from solver.problem.walks import NO_WALKS, Walks
+
+# Widths in the centre of a gamma prior. With fewer, its mode is more than a ninth below the centre,
+# and with one or less it has none.
+_LEAST_CENTRE = 3
 
 
 class Priors(NamedTuple):
@@ -138,8 +143,14 @@ def priors_of(
     ----------
     covariance : of the catalogue's (alpha*, delta) of each source, mas^2
     centres : group name -> absolute values at offset zero, in the group's unit
+
+    Raises
+    ------
+    InputError
+        If a gamma prior is so wide that its mode is far from its centre.
     """
     widths = group_widths(settings, centres)
+    _require_narrow(widths, centres)
     # A flat prior has no shape.
     is_gamma = {
         name: np.isfinite(width) & (BY_NAME[name].family == "gamma")
@@ -170,3 +181,18 @@ def group_widths(
             width * np.abs(centre) if group.relative else np.full_like(centre, width)
         )
     return widths
+
+
+def _require_narrow(
+    widths: dict[str, Float[np.ndarray, " _"]], centres: dict[str, Float[np.ndarray, " _"]]
+) -> None:
+    for name, width in widths.items():
+        if BY_NAME[name].family != "gamma" or not np.isfinite(width).all():
+            continue
+        widest = float(np.min(np.abs(centres[name]), initial=np.inf)) / _LEAST_CENTRE
+        if (width > widest).any():
+            raise InputError(
+                f"prior of {name}: expected a width of {widest:.6g} {BY_NAME[name].unit} or less, "
+                f"which is one part in {_LEAST_CENTRE} of the value, found {width.max():.6g}; "
+                "'flat' lets it be anything"
+            )

@@ -4,7 +4,9 @@ from scipy import stats
 
 from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS
 from solver.data.settings import FitSettings
+from solver.errors import InputError
 from solver.problem.priors import Priors, group_widths
+from solver.problem.problem import build_problem
 
 CENTRE, WIDTH = 4.86e6, 5729.6
 
@@ -115,3 +117,12 @@ def test_absolute_width_comes_from_the_settings_or_the_table():
     np.testing.assert_array_equal(widths["detector_x"], 7.0)
     np.testing.assert_array_equal(widths["detector_y"], BY_NAME["detector_y"].width)
     assert np.isinf(widths["position_angle"]).all()
+
+
+def test_gamma_prior_without_a_mode_near_its_centre_is_refused(small_orbit):
+    orbit = small_orbit.data, small_orbit.instrument
+    widest = r"prior of focal_length: expected a width of 1\.\d+e\+06 um or less"
+    with pytest.raises(InputError, match=widest):
+        build_problem(*orbit, FitSettings(prior_widths={"focal_length": 1e7}))
+    flat = FitSettings(prior_widths={"focal_length": np.inf})
+    assert np.isinf(build_problem(*orbit, flat).priors.width).any()

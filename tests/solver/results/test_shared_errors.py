@@ -96,3 +96,14 @@ def test_history_has_the_columns_of_the_schema(small_orbit):
     assert list(history.columns) == [*HISTORY.names, *SHARED_ERRORS.names[1:]]
     deviation = history["offset_ra"] - history["true_offset_ra"]
     assert (np.abs(deviation) < 6.0 * history["sigma_ra_marginal"]).all()
+
+
+def test_history_is_relative_to_the_catalogue_where_the_priors_are_shifted(small_orbit):
+    """All positions follow a shift of the catalogue; the truth stays where it is."""
+    fitter = OrbitFitter(small_orbit.data, small_orbit.instrument)
+    shifted = FitSettings(prior_shifts={"sources[ra]": 5.0})
+    plain, moved = (fitter.history(fitter.fit(one)) for one in (FitSettings(), shifted))
+    change = moved["offset_ra"] - plain["offset_ra"]
+    assert change.median() == pytest.approx(5.0, abs=0.1)
+    for name in ("true_offset_ra", "true_offset_dec"):
+        np.testing.assert_allclose(moved[name], plain[name], atol=1e-3)

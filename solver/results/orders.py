@@ -32,7 +32,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from solver.data.distortion_terms import terms
 from solver.data.result import FitResult
@@ -112,9 +112,10 @@ def with_orders(result: FitResult, orders: pd.DataFrame | None, seconds: float) 
 
 
 def at_order(problem: Problem, order: int) -> Problem:
-    """Return the problem with the distortion terms above an order fixed at zero."""
+    """Return the problem with the terms above an order, and their walks, fixed at zero."""
     width = problem.priors.width.copy()
     width[_above(problem, order)] = _FIXED_WIDTH
+    width[_walks_above(problem, order)] = _FIXED_WIDTH
     return replace(problem, priors=problem.priors._replace(width=width))
 
 
@@ -161,6 +162,15 @@ def _above(problem: Problem, order: int) -> Int[np.ndarray, " above"]:
     return np.concatenate([layout.columns(group)[kept:] for group in PER_COEFFICIENT])
 
 
+def _walks_above(problem: Problem, order: int) -> Int[np.ndarray, " above"]:
+    """Return the columns of the walks of coefficients above an order, which that order lacks."""
+    layout, kept = problem.layout, len(terms(order))
+    walked = layout.walked(np.arange(layout.n_exp))
+    return np.concatenate(
+        [walked[:, kept : layout.n_walk].ravel(), walked[:, layout.n_walk + kept :].ravel()]
+    )
+
+
 def _solve_from(
     mode: Mode,
     solved: Problem,
@@ -192,7 +202,7 @@ def _log_evidence(problem: Problem, mode: Mode) -> float:
 def _numbers(problem: Problem, mode: Mode, settings: FitSettings) -> dict[str, object]:
     """Return the columns of `schema.ORDERS` that describe the fit of all measurements."""
     numbers: dict[str, object] = {
-        "n_terms": int(2 * problem.layout.n_coef - _n_fixed(problem.priors.width)),
+        "n_terms": int(2 * problem.layout.n_coef - _n_fixed(problem)),
         "converged": mode.status.is_solution,
         **dict.fromkeys(("chi2", "dof", "effective_parameters", "log_evidence"), np.nan),
     }
@@ -211,8 +221,10 @@ def _numbers(problem: Problem, mode: Mode, settings: FitSettings) -> dict[str, o
     return numbers
 
 
-def _n_fixed(width: Float[np.ndarray, " calib"]) -> int:
-    return int((width == _FIXED_WIDTH).sum())
+def _n_fixed(problem: Problem) -> int:
+    """Return the number of coefficients that are fixed at zero."""
+    columns = np.concatenate([problem.layout.columns(group) for group in PER_COEFFICIENT])
+    return int((problem.priors.width[columns] == _FIXED_WIDTH).sum())
 
 
 def _columns(held_out: HeldOut) -> dict[str, object]:

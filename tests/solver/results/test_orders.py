@@ -249,6 +249,16 @@ def test_flat_distortion_prior_gives_predictions_without_evidence(short_orbit):
     assert orders["held_out_log_density"].notna().all()
 
 
+def test_walk_of_a_term_ends_with_the_term(short_orbit):
+    walking = FitSettings(order=2, drift_walk=2)
+    problem = build_problem(short_orbit.data, short_orbit.instrument, walking)
+    orders = compare_orders(problem, walking).set_index("order")
+    lower = fit_orbit(short_orbit.data, short_orbit.instrument, walking.with_(order=1)).summary
+    for name in ("chi2", "effective_parameters", "log_evidence"):
+        assert orders.loc[1, name] == pytest.approx(lower[name], rel=1e-4)
+    assert orders["n_terms"].tolist() == [0, 0, 6]
+
+
 def test_comparison_can_be_cancelled(short_orbit):
     def cancel(row):
         raise CancelledError("now")

@@ -48,10 +48,7 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
         ("chi2 per degree of freedom", _chi2(summary)),
         ("residual rms", _milli_pixels(summary)),
         ("normalised deviation", _deviations(summary)),
-        (
-            "common error",
-            _pair(summary, "mean_error_{}", "mas, of the mean of all non-reference sources"),
-        ),
+        *_common_error_row(summary),
         *_truth_rows(summary.get("truth", {})),
         ("time", ", ".join(f"{k} {v:.2f} s" for k, v in summary["seconds"].items())),
         ("written", str(output)),
@@ -63,6 +60,13 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
     if summary["verdict"]["state"] != "good":
         for sentence in summary["verdict"]["reasons"]:
             typer.echo(f"- {sentence}")
+
+
+def _common_error_row(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    if summary["n_reference"] == summary["n_sources"]:
+        return []
+    words = "mas, of the mean of all non-reference sources"
+    return [("common error", _pair(summary, "mean_error_{}", words))]
 
 
 def print_orders(rows: Iterable[Mapping[str, Any]], verdict: str) -> None:

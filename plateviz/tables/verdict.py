@@ -122,7 +122,7 @@ def _judge(result: FitResult) -> Verdict:
     items = summary_strip(result)
     reasons = [_converged(result), *(cause.sentence() for cause in causes)]
     reasons += [discoveries_in_words(diagnosis.tests, found), *map(_sentence, _judged(items))]
-    reasons += [*noise_sentences(result), _common_error(result), *unseen_sentences(result)]
+    reasons += [*noise_sentences(result), *_common_error(result), *unseen_sentences(result)]
     faults = [] if converged else [_converged(result)]
     faults += [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
     if found and not causes:
@@ -191,12 +191,14 @@ def _judgement(item: SummaryItem) -> str:
     return f"{item.label}: {item.value}, {meaning}."
 
 
-def _common_error(result: FitResult) -> str:
+def _common_error(result: FitResult) -> list[str]:
+    if result.summary["n_reference"] == result.summary["n_sources"]:
+        return []
     errors = " and ".join(
         f"{float(result.summary[f'mean_error_{axis}']):.3f} mas in {name}"
         for axis, name in (("ra", "α cos δ"), ("dec", "δ"))
     )
-    return (
+    return [
         f"All sources except reference sources share an error of {errors} (one sigma), which "
         "comes from the reference catalogue and does not decrease with more measurements."
-    )
+    ]

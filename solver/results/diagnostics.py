@@ -114,12 +114,14 @@ def log_evidence(mode: Mode, priors: Priors, log_sigma_sum: float, n_coordinates
 def mean_covariance(
     reduced: ReducedSystem, members: Bool[np.ndarray, " src"]
 ) -> Float[np.ndarray, "2 2"]:
-    """Return the covariance of the mean position error of some sources, mas^2.
+    """Return the covariance of the mean position error of some sources, mas^2; NaN of none.
 
     The errors share those of the calibration, and with them those of the reference sources, so
     this does not fall with the number of sources.
     """
-    count = max(int(members.sum()), 1)
+    count = int(members.sum())
+    if count == 0:
+        return np.full((2, 2), np.nan)
     conditional = reduced.conditional_covariance()[members].sum(axis=0) / count**2
     # Mean shift of the members, along each axis.
     mean_shift = np.eye(2)[:, :, None] * (members / count)

@@ -229,6 +229,12 @@ def test_mean_error_of_the_sources_matches_its_covariance(mocks):
     assert 0.001 < stats.chi2(2 * len(mocks)).cdf(total) < 0.999
 
 
+def test_mean_error_of_no_source_is_unknown(mocks):
+    _, solution = mocks[0]
+    nobody = np.zeros(solution.problem.n_src, dtype=bool)
+    assert np.isnan(mean_covariance(solution.reduced, nobody)).all()
+
+
 def test_pulls_with_conditional_sigmas_scatter_by_more(mocks):
     """Marginal sigmas are needed: conditional ones omit the errors of the calibration."""
     ratios = [

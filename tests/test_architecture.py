@@ -42,6 +42,20 @@ FOLDERS = {
         "cli",
     ),
 }
+# Folders and modules of the dashboard, too; each imports those before it.
+DASHBOARD = (
+    "serving",
+    "address_parts",
+    "selection",
+    "session",
+    "navigation",
+    "saving",
+    "views",
+    "at_rest",
+    "ticker",
+    "app",
+    "server",
+)
 # Modules at the top of a package: everybody's, and the front door.
 LOOSE = {"solver.errors", "solver.units", "solver.fit", "plateviz.cache"}
 
@@ -54,10 +68,10 @@ NEVER = {
     "plateviz.figures": ("panel", "param"),
     "plateviz.figures.figure": ("pandas", *USER_INTERFACE),
     "plateviz.plots": ("panel", "param", "holoviews", "bokeh"),
-    "plateviz.dashboard.state": ("panel",),
-    "plateviz.dashboard.fit_choices": ("panel",),
-    "plateviz.dashboard.session": ("panel", "holoviews", "bokeh", "datashader"),
-    "plateviz.dashboard.navigation": ("panel", "holoviews", "bokeh", "datashader"),
+    "plateviz.dashboard.selection.selection": ("panel",),
+    "plateviz.dashboard.session.fit_choices": ("panel",),
+    "plateviz.dashboard.session.session": ("panel", "holoviews", "bokeh", "datashader"),
+    "plateviz.dashboard.navigation.navigation": ("panel", "holoviews", "bokeh", "datashader"),
 }
 
 # The web process, the command line that starts it and all that they load stay free of JAX.
@@ -179,6 +193,15 @@ def test_every_folder_says_in_one_sentence_what_it_holds_and_imports(folder):
 def test_no_import_points_up(module):
     known = [name for name in _imports(module) if name in PLACED]
     assert not {name for name in known if _height(name) > _height(module)}
+
+
+@pytest.mark.parametrize("module", [m for m in PLACED if m.startswith("plateviz.dashboard.")])
+def test_no_import_within_the_dashboard_points_up(module):
+    def height(name):
+        return DASHBOARD.index(name.split(".")[2])
+
+    inside = [name for name in _imports(module) if _within(name, ("plateviz.dashboard",))]
+    assert not {name for name in inside if name.count(".") > 1 and height(name) > height(module)}
 
 
 @pytest.mark.parametrize("module", sorted(MODULES))

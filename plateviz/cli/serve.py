@@ -109,8 +109,8 @@ def open_endpoint(
     port: int, address: str, password_file: Path | None, no_password: bool
 ) -> "Endpoint":
     """Return where to serve, and with which password; `InputError` if it cannot or must not be."""
-    from plateviz.dashboard.password import read_password, require_password
     from plateviz.dashboard.server import Endpoint, check_address
+    from plateviz.dashboard.serving.password import read_password, require_password
 
     password = None if password_file is None else read_password(password_file)
     require_password(address, password, no_password)

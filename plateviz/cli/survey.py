@@ -64,7 +64,7 @@ def run_survey(
     report = fit_and_report(survey, name, settings, orbits, workers, scheduler, repair)
     # Imported here, because it takes a while, and a mistake in the request should be told at once.
     from plateviz.runs.queries import SurveyRun
-    from plateviz.runs.run_tests import read_run_verdict
+    from plateviz.runs.run_tables import read_run_verdict
 
     verdict = read_run_verdict(SurveyRun(report.run))
     if as_json:

@@ -10,10 +10,10 @@ from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
 from param.parameterized import Watcher
 
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.page_request import WINDOW
-from plateviz.dashboard.rooms import Rooms, Window, window_from
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.serving.page_request import WINDOW
+from plateviz.dashboard.serving.rooms import Rooms, Window, window_from
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.ticker import Ticker
 from plateviz.dashboard.views.accessible_names import AccessibleNames
 from plateviz.dashboard.views.address_bar import AddressBar

@@ -16,18 +16,18 @@ import panel_material_ui as pmui
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.app import build_app, empty_page
-from plateviz.dashboard.closed_pages import silence_closed_pages
-from plateviz.dashboard.headers import NotebookHeaders, SecurityHeaders
-from plateviz.dashboard.limits import Limits, PageLimit
-from plateviz.dashboard.page_request import send_empty_pages
-from plateviz.dashboard.password import PasswordLogin
-from plateviz.dashboard.quick_components import make_components_quick
-from plateviz.dashboard.quick_models import make_models_quick
-from plateviz.dashboard.refused_requests import refuse_floods, refuse_paths
-from plateviz.dashboard.returned_memory import ReturnedMemory, keep_no_first_page
-from plateviz.dashboard.rooms import Rooms
-from plateviz.dashboard.waiting_messages import send_waiting_messages
-from plateviz.dashboard.websocket import LIMITS, check_websockets
+from plateviz.dashboard.serving.closed_pages import silence_closed_pages
+from plateviz.dashboard.serving.headers import NotebookHeaders, SecurityHeaders
+from plateviz.dashboard.serving.limits import Limits, PageLimit
+from plateviz.dashboard.serving.page_request import send_empty_pages
+from plateviz.dashboard.serving.password import PasswordLogin
+from plateviz.dashboard.serving.quick_components import make_components_quick
+from plateviz.dashboard.serving.quick_models import make_models_quick
+from plateviz.dashboard.serving.refused_requests import refuse_floods, refuse_paths
+from plateviz.dashboard.serving.returned_memory import ReturnedMemory, keep_no_first_page
+from plateviz.dashboard.serving.rooms import Rooms
+from plateviz.dashboard.serving.waiting_messages import send_waiting_messages
+from plateviz.dashboard.serving.websocket import LIMITS, check_websockets
 from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 

@@ -10,11 +10,11 @@ from param.parameterized import Event
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.at_rest import AtRest
-from plateviz.dashboard.expected_what_ifs import ExpectedWhatIfs
-from plateviz.dashboard.lost_run import look_for_run
-from plateviz.dashboard.model_search import one_search
-from plateviz.dashboard.navigation import WORKSPACES, Navigation
-from plateviz.dashboard.selected import KINDS
+from plateviz.dashboard.navigation.lost_run import look_for_run
+from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
+from plateviz.dashboard.selection.selected import KINDS
+from plateviz.dashboard.serving.model_search import one_search
+from plateviz.dashboard.session.expected_what_ifs import ExpectedWhatIfs
 from plateviz.dashboard.views.pages import Pages
 from plateviz.solving.job import Job
 

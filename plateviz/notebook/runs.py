@@ -13,7 +13,7 @@ import pandas as pd
 from plateviz.notebook.figures import FigureSpec
 from plateviz.runs.load_tables import compared_run, require_same_catalogue, survey_tables
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run_tests import read_run_tables
+from plateviz.runs.run_tables import read_run_tables
 from plateviz.tables import run_changes
 from plateviz.tables.run_changes import ComparedRun
 from plateviz.tables.run_verdict import run_verdict

@@ -25,7 +25,7 @@ from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
 from plateviz.runs.run import DEFAULT_RUN
-from plateviz.runs.run_tests import read_run_verdict
+from plateviz.runs.run_tables import read_run_verdict
 from plateviz.solving.job import Job
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import SummaryItem, run_strip, source_list

@@ -10,7 +10,7 @@ from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.report import SOLVED, Facts, Report, ReportFigure, plain
 from plateviz.runs.load_tables import compared_run, require_same_catalogue, survey_tables
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run_tests import RunTables
+from plateviz.runs.run_tables import RunTables
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import (
     motion_table,

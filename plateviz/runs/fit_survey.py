@@ -17,8 +17,8 @@ from pyarrow import parquet
 
 from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
 from plateviz.runs.fitted_orbit import read_summary
+from plateviz.runs.gathered_diagnosis import write_test_tables
 from plateviz.runs.gathered_history import gather_history
-from plateviz.runs.gathered_tests import write_test_tables
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run
 from plateviz.runs.worker_scratch import remove_worker_scratch

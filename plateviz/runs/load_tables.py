@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run_tests import RunTables, read_run_tables
+from plateviz.runs.run_tables import RunTables, read_run_tables
 from plateviz.tables.run_changes import ComparedRun
 from plateviz.tables.survey_tables import SurveyTables
 from plateviz.tables.verdict import Verdict

@@ -6,7 +6,7 @@ from concurrent.futures import Executor, Future
 
 from plateviz.runs.load_tables import compared_run, survey_tables
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run_tests import RunTables, read_run_tables
+from plateviz.runs.run_tables import RunTables, read_run_tables
 from plateviz.tables.run_changes import ComparedRun
 from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.survey_tables import SurveyTables

@@ -17,7 +17,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from plateviz.cli.main import main
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.figures.bokeh_figure import BokehFigure

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from tornado.escape import parse_qs_bytes
 
-from plateviz.dashboard.navigation import Navigation, View
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.navigation.navigation import Navigation, View
+from plateviz.dashboard.session.session import Session
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.runs.load_tables import survey_tables
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs

@@ -32,7 +32,7 @@ from plateviz.runs.dask_workers import fit_survey_orbit
 from plateviz.runs.fit_survey import gather
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run_tests import read_run_tests
+from plateviz.runs.run_tables import read_run_tests
 from plateviz.tables.run_diagnosis import RunTests
 from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.verdict import Verdict

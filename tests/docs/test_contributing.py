@@ -35,8 +35,8 @@ _PATH = re.compile(r"`((?:plateviz|solver)/[\w/]+\.py|[\w.]+\.toml)`")
 GROUP_FILES = {"solver/data/parameters.py", "solver/model/forward.py"}
 # What the dashboard and the notebook make of the setting of the example.
 CONTROLS = """
-from plateviz.dashboard.session import Session
-from plateviz.dashboard.fit_choices import ANSWERED_AT_ONCE, FitChoices
+from plateviz.dashboard.session.session import Session
+from plateviz.dashboard.session.fit_choices import ANSWERED_AT_ONCE, FitChoices
 from plateviz.dashboard.views.refit import RefitView
 from plateviz.notebook.keywords import settings_with
 from solver.data.settings import FitSettings

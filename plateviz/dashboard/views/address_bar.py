@@ -5,8 +5,8 @@ from urllib.parse import parse_qs, urlencode
 import panel as pn
 import param
 
-from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
-from plateviz.dashboard.selected import KINDS
+from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.selection.selected import KINDS
 
 # Parts of an address whose change is a step of the browser's history; others replace the last one.
 _STEPS = ("view", "workspace", "run", "orbit", "source")

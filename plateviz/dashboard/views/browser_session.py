@@ -2,7 +2,7 @@
 
 import panel as pn
 
-from plateviz.dashboard.journal import Journal
+from plateviz.dashboard.session.journal import Journal
 
 
 class BrowserSession(pn.custom.JSComponent):

@@ -9,9 +9,9 @@ import panel_material_ui as pmui
 import param
 from astropy.table import Table
 
-from plateviz.dashboard.calibration_files import calibration_files
-from plateviz.dashboard.selected import KINDS
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.saving.calibration_files import calibration_files
+from plateviz.dashboard.selection.selected import KINDS
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.markup import markup_pane, paragraph
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices

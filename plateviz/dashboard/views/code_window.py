@@ -4,8 +4,8 @@ from html import escape
 
 import panel as pn
 
-from plateviz.dashboard.navigation import WORKSPACES, Navigation
-from plateviz.dashboard.page_code import page_code
+from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
+from plateviz.dashboard.saving.page_code import page_code
 from plateviz.dashboard.views.markup import markup_pane, paragraph, themed
 from plateviz.dashboard.views.window import window, window_button
 from solver.errors import InputError

@@ -7,9 +7,9 @@ import panel as pn
 import panel_material_ui as pmui
 from astropy.table import Table
 
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.solution import Request
-from plateviz.dashboard.solution_list import Entry, SolutionList, by_label, label_of
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.navigation.solution_list import Entry, SolutionList, by_label, label_of
+from plateviz.dashboard.session.solution import Request
 from plateviz.dashboard.views.markup import markup_pane, numbers, paragraph, themed
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices

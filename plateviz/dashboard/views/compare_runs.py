@@ -9,9 +9,9 @@ import panel as pn
 import panel_material_ui as pmui
 from astropy.table import Table
 
-from plateviz.dashboard.growth import how_to_make_another_run
-from plateviz.dashboard.latest_answer import PENDING, Pending
-from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.navigation.growth import how_to_make_another_run
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.session.latest_answer import PENDING, Pending
 from plateviz.dashboard.views.markup import markup_pane, numbers, paragraph, themed
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices

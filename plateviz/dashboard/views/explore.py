@@ -13,11 +13,11 @@ import panel_material_ui as pmui
 import param
 from astropy.table import Table
 
-from plateviz.dashboard.explored_file import explored_file
-from plateviz.dashboard.latest_answer import PENDING, LatestAnswer, Pending
-from plateviz.dashboard.row_origins import RowsOrigin, TableRequest
-from plateviz.dashboard.selected import KINDS, Selected
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.navigation.row_origins import RowsOrigin, TableRequest
+from plateviz.dashboard.saving.explored_file import explored_file
+from plateviz.dashboard.selection.selected import KINDS, Selected
+from plateviz.dashboard.session.latest_answer import PENDING, LatestAnswer, Pending
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.markup import markup_pane, paragraph

@@ -8,9 +8,9 @@ import panel as pn
 import panel_material_ui as pmui
 from bokeh.events import Event, RangesUpdate, Reset
 
-from plateviz.dashboard.latest_answer import Pending
-from plateviz.dashboard.page_request import has_own_scripts
-from plateviz.dashboard.selected import NO_IDS, SelectedIds
+from plateviz.dashboard.selection.selected import NO_IDS, SelectedIds
+from plateviz.dashboard.serving.page_request import has_own_scripts
+from plateviz.dashboard.session.latest_answer import Pending
 from plateviz.dashboard.views.card_tools import CardTools
 from plateviz.dashboard.views.figure_text import FigureText
 from plateviz.dashboard.views.markup import markup_pane, paragraph

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.model_search import one_search
-from plateviz.dashboard.rooms import Room
-from plateviz.dashboard.selected import SelectedIds
+from plateviz.dashboard.selection.selected import SelectedIds
+from plateviz.dashboard.serving.model_search import one_search
+from plateviz.dashboard.serving.rooms import Room
 from plateviz.dashboard.views.figure import FigureView, Part
 
 # Figures that are drawn for the first time at once; after each batch, Bokeh goes through all models

@@ -4,7 +4,7 @@ import panel as pn
 import panel_material_ui as pmui
 from param.parameterized import Event
 
-from plateviz.dashboard.fit_choices import CONTROLS, FitChoices
+from plateviz.dashboard.session.fit_choices import CONTROLS, FitChoices
 from plateviz.dashboard.views.at_once import taken_at_once
 from solver.data.parameter_group import Group
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole

@@ -5,8 +5,8 @@ from html import escape
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.selection_actions import SelectionActions, look_for_kept
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.views.window import window
 from solver.errors import InputError
 

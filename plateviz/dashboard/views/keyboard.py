@@ -3,8 +3,8 @@
 import panel as pn
 import param
 
-from plateviz.dashboard.keys import DIGITS, KEYS, press
-from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.navigation.keys import DIGITS, KEYS, press
+from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.views.bar_style import BAR_STYLE
 
 

@@ -5,7 +5,7 @@ from html import escape
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.session.session import Session
 
 
 class NoticeView(pn.viewable.Viewer):

@@ -6,12 +6,12 @@ from functools import partial
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.latest_answer import PENDING, Pending
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.orbit_figures import chosen_of, figures_of
-from plateviz.dashboard.row_origins import OrbitRows
-from plateviz.dashboard.selected import KINDS
-from plateviz.dashboard.stage import Stage
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.navigation.row_origins import OrbitRows
+from plateviz.dashboard.selection.selected import KINDS
+from plateviz.dashboard.session.latest_answer import PENDING, Pending
+from plateviz.dashboard.session.orbit_figures import chosen_of, figures_of
+from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.compare import CompareView
 from plateviz.dashboard.views.explore import ExploreView

@@ -6,8 +6,8 @@ from functools import partial
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.navigation import WORKSPACES, Navigation, View
-from plateviz.dashboard.rooms import Rooms, Window
+from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.serving.rooms import Rooms, Window
 from plateviz.dashboard.views.figure_grid import FigureGrid
 from plateviz.dashboard.views.notice import NoticeView
 from plateviz.dashboard.views.orbit import OrbitPage

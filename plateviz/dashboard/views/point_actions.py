@@ -10,9 +10,9 @@ import numpy as np
 from bokeh import models
 from bokeh.events import Event, PanStart, SelectionGeometry
 
-from plateviz.dashboard.drawn_area import DrawnArea
-from plateviz.dashboard.selected import NO_IDS, SelectedIds
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.selection.selected import NO_IDS, SelectedIds
+from plateviz.dashboard.session.drawn_area import DrawnArea
+from plateviz.dashboard.session.session import Session
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.bokeh_frame import BokehFrame
 from plateviz.figures.bokeh_glyphs import SELECTED_BY, BokehGlyphs

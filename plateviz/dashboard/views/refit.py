@@ -6,10 +6,10 @@ from html import escape
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.prior_widths import default_widths
-from plateviz.dashboard.solution import Solution
-from plateviz.dashboard.stage import Stage
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.session.prior_widths import default_widths
+from plateviz.dashboard.session.solution import Solution
+from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.fit_controls import TIGHT, controls, width_input
 from plateviz.dashboard.views.solution_window import SolutionWindow

@@ -5,8 +5,8 @@ from html import escape
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.remedies import Remedy, remedies, try_settings
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.session.remedies import Remedy, remedies, try_settings
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.markup import markup_pane, themed
 from plateviz.tables.causes import Cause
 from plateviz.tables.verdict import orbit_verdict

@@ -2,8 +2,8 @@
 
 from functools import partial
 
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.page_report import page_report
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.saving.page_report import page_report
 from plateviz.dashboard.views.save_button import SaveButton
 
 

@@ -3,7 +3,7 @@
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.navigation.navigation import Navigation
 
 
 def run_selector(navigation: Navigation) -> list[pn.viewable.Viewable]:

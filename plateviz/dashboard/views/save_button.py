@@ -10,7 +10,7 @@ import panel as pn
 import param
 from bokeh.document import Document
 
-from plateviz.dashboard.downloads import Download, Later
+from plateviz.dashboard.saving.downloads import Download, Later
 from plateviz.dashboard.views.bar_style import BAR_STYLE
 from solver.errors import InputError
 

@@ -8,7 +8,7 @@ from astropy.table import Table
 from bokeh.core.enums import OutputBackendType
 from bokeh.embed import json_item
 
-from plateviz.dashboard.downloads import FORMATS, Download, as_file, file_name
+from plateviz.dashboard.saving.downloads import FORMATS, Download, as_file, file_name
 from plateviz.dashboard.views.save_button import Choices, Picture
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import Figure

@@ -5,7 +5,7 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.views.at_once import taken_at_once
 
 

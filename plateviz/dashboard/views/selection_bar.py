@@ -8,18 +8,18 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.downloads import Done, Later
-from plateviz.dashboard.navigation import WORKSPACES, Navigation
-from plateviz.dashboard.same_machine import is_same_machine
-from plateviz.dashboard.selected import KINDS, Selected
-from plateviz.dashboard.selected_tables import (
+from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
+from plateviz.dashboard.saving.downloads import Done, Later
+from plateviz.dashboard.saving.same_machine import is_same_machine
+from plateviz.dashboard.saving.selected_tables import (
     is_of_orbit,
     selected_places,
     selected_tables,
     selection_name,
 )
-from plateviz.dashboard.selection_actions import SelectionActions, look_for_kept
-from plateviz.dashboard.table_sender import TableSender
+from plateviz.dashboard.saving.table_sender import TableSender
+from plateviz.dashboard.selection.selected import KINDS, Selected
+from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.views.bar_style import IN_BAR
 from plateviz.dashboard.views.kept_selections import KeptSelections
 from plateviz.dashboard.views.save_button import SaveButton

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import pandas as pd
 import panel as pn
 
-from plateviz.dashboard.navigation import Navigation
+from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.views.markup import heading
 from plateviz.dashboard.views.table import DataTable
 from plateviz.dashboard.views.window import window

@@ -9,9 +9,9 @@ import panel as pn
 import panel_material_ui as pmui
 from astropy.table import Table
 
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.solution import Request
-from plateviz.dashboard.solution_list import Entry, SolutionList, by_label
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.navigation.solution_list import Entry, SolutionList, by_label
+from plateviz.dashboard.session.solution import Request
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.dashboard.views.window import window

@@ -8,9 +8,9 @@ import panel as pn
 import panel_material_ui as pmui
 from astropy.table import Table
 
-from plateviz.dashboard.downloads import described
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.source_in_orbit import open_source_in_orbit
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.navigation.source_in_orbit import open_source_in_orbit
+from plateviz.dashboard.saving.downloads import described
 from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.figure_grid import FigureGrid

@@ -1,7 +1,7 @@
 """The state of the solution on the screen in words: its reasons above, in short on the cards."""
 
-from plateviz.dashboard.session import Session
-from plateviz.dashboard.stage import Stage
+from plateviz.dashboard.session.session import Session
+from plateviz.dashboard.session.stage import Stage
 
 _WHAT_TO_DO = "Change the settings on the left and press Fit, or choose another orbit."
 _BEGUN = "The first solution is being computed."

@@ -3,10 +3,10 @@
 import panel as pn
 import panel_material_ui as pmui
 
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.session import Session
-from plateviz.dashboard.solution import Solution
-from plateviz.dashboard.stage import Stage
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.session.session import Session
+from plateviz.dashboard.session.solution import Solution
+from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.markup import judged, markup_pane, paragraph, titled
 from plateviz.dashboard.views.state_text import missing_text, outdated_text
 from plateviz.plots.workspace import OrbitWorkspace

@@ -9,12 +9,12 @@ import panel as pn
 import panel_material_ui as pmui
 from astropy.table import Table
 
-from plateviz.dashboard.downloads import described
-from plateviz.dashboard.drawn_area import DrawnArea
-from plateviz.dashboard.latest_answer import PENDING, Pending
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.row_origins import RunRows
-from plateviz.dashboard.selected import KINDS
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.navigation.row_origins import RunRows
+from plateviz.dashboard.saving.downloads import described
+from plateviz.dashboard.selection.selected import KINDS
+from plateviz.dashboard.session.drawn_area import DrawnArea
+from plateviz.dashboard.session.latest_answer import PENDING, Pending
 from plateviz.dashboard.views.code_window import code_button
 from plateviz.dashboard.views.compare_runs import CompareRunsView
 from plateviz.dashboard.views.explore import ExploreView

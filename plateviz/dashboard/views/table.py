@@ -9,7 +9,7 @@ import panel as pn
 import panel_material_ui as pmui
 from bokeh.models.widgets.tables import NumberFormatter
 
-from plateviz.dashboard.units import OWN, Units
+from plateviz.dashboard.session.units import OWN, Units
 from plateviz.tables.headings import Heading
 from plateviz.tables.summary import State
 

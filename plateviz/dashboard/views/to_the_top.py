@@ -3,7 +3,7 @@
 import panel as pn
 import param
 
-from plateviz.dashboard.navigation import WORKSPACES, Navigation
+from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
 
 
 class ToTheTop(pn.custom.JSComponent):

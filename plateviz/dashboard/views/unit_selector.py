@@ -2,8 +2,8 @@
 
 import panel_material_ui as pmui
 
-from plateviz.dashboard.session import Session
-from plateviz.dashboard.units import NAMES
+from plateviz.dashboard.session.session import Session
+from plateviz.dashboard.session.units import NAMES
 
 
 def unit_selector(session: Session) -> pmui.Select:

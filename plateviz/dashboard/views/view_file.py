@@ -3,9 +3,9 @@
 import panel as pn
 import param
 
-from plateviz.dashboard.downloads import file_name
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.saved_view import MOST_BYTES, open_view, view_text
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.navigation.saved_view import MOST_BYTES, open_view, view_text
+from plateviz.dashboard.saving.downloads import file_name
 from plateviz.dashboard.views.bar_style import BAR_STYLE
 from solver.errors import InputError
 

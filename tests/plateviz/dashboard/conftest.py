@@ -2,9 +2,9 @@
 
 import pytest
 
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.session import Session
-from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.session.session import Session
+from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
 
 
 @pytest.fixture

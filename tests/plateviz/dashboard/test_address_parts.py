@@ -3,12 +3,12 @@
 import pytest
 
 from plateviz.dashboard.address_parts import unknown_parts
-from plateviz.dashboard.navigation import View
-from plateviz.dashboard.selected import Selected
+from plateviz.dashboard.navigation.navigation import View
+from plateviz.dashboard.selection.selected import Selected
 from plateviz.plots.explored_rows import Columns
 from plateviz.plots.explored_text import parts_of
 from plateviz.plots.workspace import OrbitWorkspace
-from tests.plateviz.dashboard.test_navigation import again
+from tests.plateviz.dashboard.navigation.test_navigation import again
 
 
 @pytest.mark.parametrize(

@@ -21,13 +21,13 @@ from panel.io import document as panel_document
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
-from plateviz.dashboard import limits
 from plateviz.dashboard.app import empty_page
-from plateviz.dashboard.limits import Rate
-from plateviz.dashboard.rooms import Rooms
 from plateviz.dashboard.server import Endpoint, begin, check_address
-from plateviz.dashboard.websocket import CheckedWebsocket
-from tests.plateviz.dashboard.test_navigation import SurveyStore
+from plateviz.dashboard.serving import limits
+from plateviz.dashboard.serving.limits import Rate
+from plateviz.dashboard.serving.rooms import Rooms
+from plateviz.dashboard.serving.websocket import CheckedWebsocket
+from tests.plateviz.dashboard.navigation.test_navigation import SurveyStore
 
 
 @pytest.fixture(autouse=True)

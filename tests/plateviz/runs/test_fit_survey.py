@@ -17,7 +17,7 @@ from plateviz.runs.fit_survey import fit_survey
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
 from plateviz.runs.run import Run
-from plateviz.runs.run_tests import read_run_tests, read_run_verdict
+from plateviz.runs.run_tables import read_run_tests, read_run_verdict
 from plateviz.solving.reproduction import reproduced
 from solver.data.run_schema import RUN_TABLES
 from solver.data.settings import FitSettings

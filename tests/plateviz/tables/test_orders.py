@@ -8,11 +8,11 @@ import pytest
 
 from plateviz import plots, tables
 from plateviz.cli.output import print_orders
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.refit import RefitView
 from plateviz.tables.orders import preferred_order
-from tests.plateviz.dashboard.test_navigation import SurveyStore
+from tests.plateviz.dashboard.navigation.test_navigation import SurveyStore
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from plateviz.dashboard.fit_choices import FitChoices
+from plateviz.dashboard.session.fit_choices import FitChoices
 from plateviz.dashboard.views.fit_controls import controls, width_input
 from plateviz.dashboard.views.selection import SelectionView
 from solver.data.parameters import BY_NAME

@@ -4,12 +4,12 @@ import json
 
 import pytest
 
-from plateviz.dashboard.keys import press
-from plateviz.dashboard.lost_run import look_for_run
-from plateviz.dashboard.navigation import Navigation, View
-from plateviz.dashboard.page_code import page_code
-from plateviz.dashboard.saved_view import open_view, view_text
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.navigation.keys import press
+from plateviz.dashboard.navigation.lost_run import look_for_run
+from plateviz.dashboard.navigation.navigation import Navigation, View
+from plateviz.dashboard.navigation.saved_view import open_view, view_text
+from plateviz.dashboard.saving.page_code import page_code
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.address_bar import AddressBar
 from plateviz.dashboard.views.survey import SurveyPage
 from plateviz.plots.workspace import SurveyWorkspace
@@ -18,7 +18,7 @@ from plateviz.solving.run_reader import RunReader
 from plateviz.tables.survey_tables import SurveyTables
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
 from tests.plateviz.solving.waiting import Waiting
 
 CARDS = ["both-runs", "motion-differences"]

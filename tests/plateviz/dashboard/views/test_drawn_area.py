@@ -3,12 +3,12 @@
 import pytest
 from bokeh.events import PanStart, SelectionGeometry
 
-from plateviz.dashboard.selected import Selected
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.selection.selected import Selected
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.figure import FigureView
 from plateviz.dashboard.views.point_actions import session_actions
 from plateviz.plots.gallery import diagnostics
-from tests.plateviz.dashboard.test_session import FakeStore
+from tests.plateviz.dashboard.session.test_session import FakeStore
 from tests.plateviz.dashboard.views.test_figure import come_near, figure_of, plot
 
 EMPTY = {"type": "rect", "x0": 5.0, "x1": 6.0, "y0": 0.0, "y1": 2.0}

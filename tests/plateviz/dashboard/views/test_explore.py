@@ -8,11 +8,12 @@ import pandas as pd
 import pytest
 from bokeh.events import RangesUpdate, SelectionGeometry
 
-from plateviz.dashboard import explored_file, row_origins
-from plateviz.dashboard.navigation import Navigation, View
-from plateviz.dashboard.row_origins import OrbitRows, RunRows
-from plateviz.dashboard.selected import KINDS
-from plateviz.dashboard.session import Session
+from plateviz.dashboard.navigation import row_origins
+from plateviz.dashboard.navigation.navigation import Navigation, View
+from plateviz.dashboard.navigation.row_origins import OrbitRows, RunRows
+from plateviz.dashboard.saving import explored_file
+from plateviz.dashboard.selection.selected import KINDS
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views import explore
 from plateviz.dashboard.views.explore import ExploreView
 from plateviz.plots.style import ROW_LIMIT
@@ -22,8 +23,8 @@ from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.tables.explore import ExplorableTable, explorable
 from solver.data.schema import RESIDUALS
 from solver.errors import InputError
-from tests.plateviz.dashboard.test_latest_answer import Executor
-from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.session.test_latest_answer import Executor
 
 SIZE = 30_000
 

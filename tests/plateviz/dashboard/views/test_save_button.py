@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import panel as pn
 import pytest
 
-from plateviz.dashboard.downloads import Download, Later
+from plateviz.dashboard.saving.downloads import Download, Later
 from plateviz.dashboard.views.save_button import Picture, SaveButton
 from plateviz.solving.turns import Turns
 from solver.errors import InputError

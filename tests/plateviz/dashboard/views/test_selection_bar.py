@@ -8,12 +8,12 @@ import pytest
 from bokeh.document import Document
 from panel.io.state import set_curdoc
 
-from plateviz.dashboard.drawn_area import DrawnArea
-from plateviz.dashboard.navigation import View
-from plateviz.dashboard.saved_view import view_text
-from plateviz.dashboard.selected import NOTHING, Selected
-from plateviz.dashboard.selected_tables import selected_tables
-from plateviz.dashboard.table_sender import TableSender
+from plateviz.dashboard.navigation.navigation import View
+from plateviz.dashboard.navigation.saved_view import view_text
+from plateviz.dashboard.saving.selected_tables import selected_tables
+from plateviz.dashboard.saving.table_sender import TableSender
+from plateviz.dashboard.selection.selected import NOTHING, Selected
+from plateviz.dashboard.session.drawn_area import DrawnArea
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.selection_bar import SelectionBar, is_read_here, words
 from plateviz.dashboard.views.selection_list import SelectionList

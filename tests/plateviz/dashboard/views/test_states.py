@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from plateviz.dashboard.navigation import Navigation
-from plateviz.dashboard.session import Session
-from plateviz.dashboard.stage import Stage
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.session.session import Session
+from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.address_bar import AddressBar
 from plateviz.dashboard.views.calibration import CalibrationView
 from plateviz.dashboard.views.figure import FigureView
@@ -24,8 +24,8 @@ from plateviz.runs.scratch_result import (
 )
 from plateviz.solving.run_reader import RunReader
 from solver.errors import InputError
-from tests.plateviz.dashboard.test_navigation import FakeRun, SurveyStore
-from tests.plateviz.dashboard.test_session import finish
+from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.session.test_session import finish
 from tests.plateviz.solving.waiting import Waiting
 
 LOADING = "The first solution is being computed."

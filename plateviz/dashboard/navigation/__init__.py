@@ -1,0 +1,1 @@
+"""What is on the screen of a session: view, run, orbit, source and axes, without Panel."""

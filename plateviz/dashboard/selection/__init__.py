@@ -1,0 +1,1 @@
+"""The selection of a session: sources, exposures and detectors, and its part of an address."""

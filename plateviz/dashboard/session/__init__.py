@@ -1,0 +1,1 @@
+"""The solutions of a browser session and their rules, without Panel; views watch it."""

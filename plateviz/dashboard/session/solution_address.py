@@ -1,0 +1,132 @@
+"""Solutions in an address: by the run that has them, or by their settings in words.
+
+    solution=order=3 prior=distortion_x=0.5um what-if
+    solution=kept=NAME
+    against=run=other orbit=7
+
+Without `solution`, an address means that of its run, or a fit with the settings of the run or the
+paper.
+"""
+
+import re
+from collections.abc import Mapping
+
+from plateviz.dashboard.session.solution import Request, Solution
+from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
+from plateviz.runs.queries import SurveyRun
+from solver.data.setting_words import parse_setting_words, setting_words
+from solver.data.settings import FitSettings
+from solver.errors import InputError
+from solver.io.settings import parse_settings
+
+WHAT_IF = "what-if"
+TOO_LONG = "too-long"
+"""Stands for a solution with more settings than an address has room for."""
+# Browsers and proxies take addresses of eight thousand characters and more.
+_MOST_CHARACTERS = 4000
+# Of a solution in a saved view, which has no such limit.
+_MOST_READ = 400_000
+_KEPT = "kept="
+_OF_RUN = re.compile(r"run=(?P<run>[^ ]+)(?: orbit=(?P<orbit>-?[0-9]{1,9}))?")
+
+
+def solution_query(
+    shown: Solution, other: Solution | None, run: str | None, is_whole: bool = False
+) -> dict[str, str]:
+    """Return a solution, and the one that it is compared with, as parts of an address.
+
+    Parameters
+    ----------
+    run : name of the run in the address
+    is_whole : whether settings that are too long for an address are written, too
+    """
+    most = _MOST_READ if is_whole else _MOST_CHARACTERS
+    query = {"solution": _text(shown, shown.orbit, most)}
+    is_default = run is None and not (shown.is_step or shown.kept)
+    is_default = is_default and shown.settings == FitSettings()
+    if is_default or (run is not None and shown.run == run):
+        query = {}
+    if other is not None:
+        query["against"] = _text(other, shown.orbit, most)
+    return query
+
+
+def find_solution(
+    text: str | None,
+    orbit: int | None,
+    run: SurveyRun | None,
+    runs: Mapping[str, SurveyRun],
+    kept: KeptSolutions,
+) -> Solution | Request:
+    """Return the solution that a part of an address names.
+
+    Parameters
+    ----------
+    text : as `solution_query` writes it; None for the solution of the run
+    orbit : orbit of the address
+    run : run of the address
+    runs : all runs of the survey, by name
+    kept : solutions that are kept beside the runs
+
+    Raises
+    ------
+    InputError
+        If a word is no setting, its value is invalid, there is no such run or orbit, or it
+        cannot be read.
+    """
+    if text is None:
+        found = solution_of_run(run, orbit)
+        return found or Request(orbit, FitSettings() if run is None else run_settings(run))
+    if text == TOO_LONG:
+        raise InputError("the settings were too many for the address")
+    if len(text) > _MOST_READ:
+        raise InputError(f"expected {_MOST_READ:,} characters or fewer, found {len(text):,}")
+    if match := _OF_RUN.fullmatch(text):
+        number = orbit if match["orbit"] is None else int(match["orbit"])
+        found = solution_of_run(runs.get(match["run"]), number)
+        if found is None:
+            raise InputError(f"expected a run that has orbit {number}, found {match['run'][:40]!r}")
+        return found
+    if text.startswith(_KEPT):
+        return read_kept(kept, kept.find(text.removeprefix(_KEPT)))
+    words = text.split()
+    settings = parse_setting_words(word for word in words if word != WHAT_IF)
+    is_what_if = WHAT_IF in words
+    if not is_what_if and run is not None and run_settings(run) == settings:
+        return solution_of_run(run, orbit) or Request(orbit, settings)
+    return Request(orbit, settings, is_what_if)
+
+
+def in_words(solution: Solution) -> str:
+    """Return the settings of a solution, and whether it is a what-if, in words."""
+    return " ".join([*setting_words(solution.settings), *([WHAT_IF] if solution.is_step else [])])
+
+
+def read_kept(kept: KeptSolutions, one: KeptSolution) -> Solution:
+    """Return a kept solution; InputError if it is damaged, or of another instrument."""
+    result = kept.read(one)
+    return Solution(one.orbit, result.settings, result, is_step=one.is_step, kept=one.name)
+
+
+def solution_of_run(run: SurveyRun | None, orbit: int | None) -> Solution | None:
+    """Return the solution of an orbit in a run, None if it has none; InputError if damaged."""
+    if run is None or orbit is None or not run.has_fitted(orbit):
+        return None
+    result = run.result(orbit)
+    return Solution(orbit, result.settings, result, run=run.name)
+
+
+def run_settings(run: SurveyRun) -> FitSettings:
+    """Return the settings of a run; InputError if they cannot be read."""
+    return parse_settings(run.header().get("settings"), f"run {run.name}")
+
+
+def _text(solution: Solution, orbit: int | None, most: int) -> str:
+    """Return a solution as text, in an address of an orbit."""
+    if solution.kept:
+        return f"{_KEPT}{solution.kept}"
+    if solution.run:
+        of_orbit = "" if solution.orbit == orbit else f" orbit={solution.orbit}"
+        return f"run={solution.run}{of_orbit}"
+    text = in_words(solution)
+    return text if len(text) <= most else TOO_LONG

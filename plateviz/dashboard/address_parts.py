@@ -13,7 +13,7 @@ _MOST_NAMED = 3
 _OF_OTHERS = re.compile("bokeh-.*|theme")
 
 
-def in_words(value: object) -> str:
+def quoted(value: object) -> str:
     """Return a value of an address for a message."""
     text = repr(value)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
@@ -32,7 +32,7 @@ def chosen(
         return default
     if value in options:
         return value
-    problems.append(f"{name}: expected {', '.join(options) or 'none'}, found {in_words(value)}")
+    problems.append(f"{name}: expected {', '.join(options) or 'none'}, found {quoted(value)}")
     return default
 
 
@@ -41,6 +41,6 @@ def unknown_parts(address: Mapping[str, str], known: Collection[str]) -> list[st
     names = [one for one in address if one not in known and not _OF_OTHERS.fullmatch(one)]
     if not names:
         return []
-    told = ", ".join(map(in_words, names[:_MOST_NAMED]))
+    told = ", ".join(map(quoted, names[:_MOST_NAMED]))
     more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
     return [f"unknown parts, as of another version: {told}{more}"]

@@ -29,6 +29,7 @@ from plateviz.runs.run_tables import read_run_verdict
 from plateviz.solving.job import Job
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import SummaryItem, run_strip, source_list
+from plateviz.tables.counts import orbits_text
 from plateviz.tables.explore import ExplorableTable
 from plateviz.tables.verdict import Verdict
 from solver.data.schema import CATALOGUE, TRUTH
@@ -262,8 +263,7 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
 
     def _titles(self) -> tuple[str, str]:
         state = "not fitted as a whole" if self.run_name is None else f"run {self.run_name}"
-        plural = "" if len(self._numbers) == 1 else "s"
-        return f"Survey {self.directory.name}", f"{len(self._numbers):,} orbit{plural}, {state}"
+        return f"Survey {self.directory.name}", f"{orbits_text(len(self._numbers))}, {state}"
 
     def _call(self) -> str:
         return f"plateviz.open({str(self.directory)!r}, run={self.run_name!r})"

@@ -8,8 +8,9 @@ from plateviz.figures.glyphs import line, points, segments
 from plateviz.plots.style import CLASS_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.ticks import log_ticks
-from plateviz.plots.units import angle_text, orbits_text
+from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import SurveyWorkspace
+from plateviz.tables.counts import orbits_text
 from plateviz.tables.sources import ARTIFICIAL, REFERENCE
 from plateviz.tables.survey_tables import SurveyTables
 

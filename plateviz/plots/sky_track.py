@@ -8,8 +8,9 @@ from plateviz.figures.glyphs import line, points
 from plateviz.plots.points import error_bars
 from plateviz.plots.style import SERIES_COLOURS
 from plateviz.plots.survey_figure import SourceFigure
-from plateviz.plots.units import angle_text, orbits_text
+from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import SourceWorkspace
+from plateviz.tables.counts import orbits_text
 from plateviz.tables.sky_track import TrackStatistics, sky_track_of, track_statistics
 from plateviz.tables.survey_tables import SourceTables
 

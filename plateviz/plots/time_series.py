@@ -8,8 +8,8 @@ from plateviz.figures.glyphs import band, horizontal, line, points, strip
 from plateviz.plots.points import error_bars
 from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS
 from plateviz.plots.survey_figure import SourceFigure
-from plateviz.plots.units import orbits_text
 from plateviz.plots.workspace import SourceWorkspace
+from plateviz.tables.counts import orbits_text
 from plateviz.tables.labels import short_id
 from plateviz.tables.survey_tables import SourceTables
 from plateviz.tables.time_series import series_of

@@ -37,11 +37,6 @@ def finer_unit(size: float, unit: str) -> tuple[str, float]:
     return units[step], 1000.0**step
 
 
-def orbits_text(number: int) -> str:
-    """Return a number of orbits as text: "1 orbit", "83 orbits"."""
-    return f"{number:,} orbit{'' if number == 1 else 's'}"
-
-
 def power_text(value: float, digits: int) -> str:
     """Return a number to so many digits, a very small or large one with a power of ten.
 

@@ -22,6 +22,7 @@ from plateviz.runs.gathered_history import gather_history
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run
 from plateviz.runs.worker_scratch import remove_worker_scratch
+from plateviz.tables.counts import orbits_are
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, MOTIONS
 from solver.errors import DiskError, InputError
@@ -177,8 +178,7 @@ def _needed(run: Run, missing: list[int]) -> str:
         return ""
     files = [path for one in complete for path in run.orbit_directory(one).iterdir()]
     size = sum(path.stat().st_size for path in files) / len(complete) * len(left)
-    counted = "1 orbit is" if len(left) == 1 else f"{len(left):,} orbits are"
-    return f"; {counted} left, for about {size_text(size)} more"
+    return f"; {orbits_are(len(left))} left, for about {size_text(size)} more"
 
 
 def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:

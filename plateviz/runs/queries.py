@@ -19,7 +19,7 @@ from plateviz.runs.run import ERRORS_FILE, HISTORY_FILE, MOTIONS_FILE, Run, Writ
 from solver.data.result import FitResult
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from solver.errors import InputError
-from solver.io.failures import in_words, reading
+from solver.io.failures import reading, reason_of
 from solver.io.manifest import UnchangedFiles
 from solver.io.parquet import read_frame
 from solver.io.result_instrument import require_instrument
@@ -244,7 +244,7 @@ class SurveyRun:
             with duckdb.connect() as connection:
                 return connection.execute(question, list(values)).df()
         except duckdb.Error as error:
-            message = f"{self.directory}: expected the tables of a run, found {in_words(error)}"
+            message = f"{self.directory}: expected the tables of a run, found {reason_of(error)}"
             raise InputError(message) from error
 
 

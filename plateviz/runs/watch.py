@@ -17,6 +17,7 @@ from plateviz.runs.fit_survey import Progress, close_run, fit_missing
 from plateviz.runs.fitted_orbit import read_summary
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.run import Run
+from plateviz.tables.counts import orbits_are, orbits_text
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.lock import locked
@@ -119,8 +120,7 @@ class Watch:
         """Say that the watch has ended, and what it did, if it began."""
         if not self.has_begun:
             return
-        counted = "1 orbit" if len(self.fitted) == 1 else f"{len(self.fitted)} orbits"
-        words = f"ended; {counted} fitted"
+        words = f"ended; {orbits_text(len(self.fitted))} fitted"
         words += f", {len(self.failed)} without a solution" if self.failed else ""
         figures = {"fitted": self.fitted, "failed": sorted(self.failed)}
         self._say("ended", words, **figures, distrusted=self.distrusted)
@@ -158,8 +158,7 @@ class Watch:
         begin_run(self.survey, self.name, self.settings, grows=True)
         arrivals.try_orbits(orbits)
         if orbits:
-            counted = "1 orbit is" if len(orbits) == 1 else f"{len(orbits)} orbits are"
-            self._say("fitting", f"{counted} being fitted", orbits=orbits)
+            self._say("fitting", f"{orbits_are(len(orbits))} being fitted", orbits=orbits)
 
         def tell(progress: Progress) -> None:
             if progress.last is not None:
@@ -208,5 +207,4 @@ def _require_nothing_new(run: Run) -> None:
 
 
 def _beginning(run: Run, there: list[int]) -> str:
-    counted = "1 orbit is" if len(there) == 1 else f"{len(there)} orbits are"
-    return f"watching {run.survey} for the run {run.name}; {counted} fitted already"
+    return f"watching {run.survey} for the run {run.name}; {orbits_are(len(there))} fitted already"

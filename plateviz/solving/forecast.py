@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from plateviz.solving.job import Job, JobStatus
+from plateviz.tables.counts import duration_text
 from solver.data.settings import ENGINES
 
 # Number of jobs of a kind that are remembered.
@@ -32,7 +33,9 @@ class Forecast(NamedTuple):
         text = "waiting for the solver"
         if self.ahead:
             text += f", {self.ahead} fit{'s' if self.ahead > 1 else ''} before it"
-        return text if self.seconds is None else f"{text}, begins in about {about(self.seconds)}"
+        if self.seconds is not None:
+            text += f", begins in about {duration_text(self.seconds)}"
+        return text
 
 
 class JobTimes:
@@ -58,13 +61,6 @@ class JobTimes:
         with self._lock:
             before = list(self._seconds[_kind(job.request)])
         return max(statistics.median(before) - job.seconds_running, 0.0) if before else None
-
-
-def about(seconds: float) -> str:
-    """Return a rough time in words."""
-    if seconds < 100.0:
-        return f"{max(seconds, 1.0):.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000.0 else f"{seconds / 3600:.0f} h"
 
 
 def is_long(request: Mapping[str, Any]) -> bool:

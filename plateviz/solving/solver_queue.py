@@ -19,8 +19,9 @@ from typing import IO
 
 from plateviz.cache import keep_compilations
 from plateviz.runs.worker_scratch import remove_worker_scratch
-from plateviz.solving.forecast import Forecast, JobTimes, about
+from plateviz.solving.forecast import Forecast, JobTimes
 from plateviz.solving.job import Job
+from plateviz.tables.counts import duration_text
 from solver.io.scratch import temporary_folder
 
 # A fit checks for a cancellation between iterations, which take well under a second; but the first
@@ -76,7 +77,9 @@ class SolverQueue:
         if place == 0:
             left = self._times.left(job)
             # A fit that is nearly over needs no forecast.
-            return "" if left is None or left < _SHORT_SECONDS else f", about {about(left)} left"
+            if left is None or left < _SHORT_SECONDS:
+                return ""
+            return f", about {duration_text(left)} left"
         before = [self._times.left(one) for one in jobs[:place]]
         known = [seconds for seconds in before if seconds is not None]
         return Forecast(place, sum(known) if len(known) == place else None).words()

@@ -1,13 +1,13 @@
 """Fit of a whole survey with a line of progress."""
 
 import time
-from collections.abc import Sized
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
 from plateviz.cache import keep_compilations
 from plateviz.solving.progress import reporting
+from plateviz.tables.counts import duration_text, orbits_text
 from plateviz.tables.verdict import Verdict
 from solver.data.settings import FitSettings
 from solver.errors import DistrustError, FitError
@@ -48,13 +48,7 @@ def _progress_text(progress: "Progress", elapsed: float) -> str:
     text = "" if last is None else f"orbit {last.orbit}"
     text += " failed" if last is not None and last.message else ""
     left = elapsed / progress.done * (progress.total - progress.done)
-    return f"{text}, {_duration(left)} left"
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 100.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
+    return f"{text}, {duration_text(left)} left"
 
 
 def require_all(report: "Report") -> None:
@@ -70,8 +64,8 @@ def require_trust(report: "Report", verdict: Verdict) -> None:
         listed = ", ".join(orbits[:_MAX_LISTED])
         listed += f" and {len(orbits) - _MAX_LISTED} more" if len(orbits) > _MAX_LISTED else ""
         raise DistrustError(
-            f"the solutions of {_counted(orbits)} should not be trusted as they are: {listed}; "
-            f"they are written. `plateviz report {quote(str(report.run.survey))} "
+            f"the solutions of {orbits_text(len(orbits))} should not be trusted as they are: "
+            f"{listed}; they are written. `plateviz report {quote(str(report.run.survey))} "
             f"--run {report.run.name} --orbit {orbits[0]}` says why, and --accept ends with exit "
             "code 0"
         )
@@ -86,8 +80,4 @@ def _failure_message(failed: dict[int, str]) -> str:
     lines = [f"  {message}" for _, message in sorted(failed.items())[:_MAX_LISTED]]
     more = len(failed) - len(lines)
     lines += [f"  and {more} more"] if more > 0 else []
-    return "\n".join([f"{_counted(failed)} failed; what else is fitted is kept:", *lines])
-
-
-def _counted(orbits: Sized) -> str:
-    return "1 orbit" if len(orbits) == 1 else f"{len(orbits)} orbits"
+    return "\n".join([f"{orbits_text(len(failed))} failed; what else is fitted is kept:", *lines])

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from solver.data.result import FitResult
-from solver.results.diagnosis.causes import Causes
+from solver.results.diagnosis.causes import FoundCauses
 from solver.results.diagnosis.found import Found
 from solver.results.diagnosis.table import Diagnosis
 
@@ -12,7 +12,7 @@ class Case(NamedTuple):
     """A cause that was found, and the solution that it was found in."""
 
     found: Found
-    causes: Causes
+    causes: FoundCauses
     diagnosis: Diagnosis
     result: FitResult
 

@@ -14,7 +14,7 @@ from plateviz.tables.labels import exposure_labels, id_strings
 from plateviz.tables.prior_words import narrowed_priors, usual_priors
 from plateviz.tables.remedy import remedied
 from solver.data.result import FitResult
-from solver.results.diagnosis.causes import SCATTER, Causes, wrong_identifications
+from solver.results.diagnosis.causes import SCATTER, FoundCauses, wrong_identifications
 from solver.results.diagnosis.table import Diagnosis
 
 # Share of chi2 from which the measurements that are far off explain why a fit does not converge.
@@ -57,7 +57,7 @@ class Cause(NamedTuple):
         )
 
 
-def causes_in_words(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> list[Cause]:
+def causes_in_words(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> list[Cause]:
     """Return the causes of a solution's flaws in words, the most likely first."""
     if not result.summary["converged"]:
         return [_stuck(result, diagnosis, causes)]
@@ -80,7 +80,7 @@ def wrong_catalogue(result: FitResult) -> list[Cause]:
     return [Cause(said.name, said.title, said.words, significance, spoils, said.action, (), True)]
 
 
-def _stuck(result: FitResult, diagnosis: Diagnosis, causes: Causes) -> Cause:
+def _stuck(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> Cause:
     """Return what keeps a fit from converging: patterns about a wrong point say nothing."""
     spoils = "It spoils everything: these numbers are those of the last iteration."
     swapped = wrong_identifications(diagnosis)

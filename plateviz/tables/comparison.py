@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import id_strings
-from plateviz.tables.sky import mean_direction, offsets_arcmin, offsets_mas
 from plateviz.tables.sources import ordered_by_class
 from solver.data.result import FitResult
+from solver.model.directions import mean_direction, offsets_arcmin, offsets_mas
 
 
 def comparison(result_a: FitResult, result_b: FitResult) -> pd.DataFrame:

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import element_labels, id_strings, unit_text
-from plateviz.tables.sky import mean_direction, offsets_arcmin
 from solver.data.parameters import BY_NAME, PARAMETERS
 from solver.data.result import FitResult
+from solver.model.directions import mean_direction, offsets_arcmin
 
 DATA, REFERENCES, SOURCES, CALIBRATION = (
     "measurements",

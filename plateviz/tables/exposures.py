@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 
 from solver.data.result import FitResult
+from solver.units import MINUTES_PER_DAY
 
 ExposureKey = tuple[int, int]
 """field_id and plate_id."""
-_MINUTES_PER_DAY = 1440.0
 
 
 def is_shown(
@@ -35,4 +35,4 @@ def is_shown(
 def minutes_since_first(exposures: pd.DataFrame) -> np.ndarray:
     """Return the time of each exposure since the first one of the orbit, min."""
     times = exposures["obstime"].to_numpy(dtype=float)
-    return (times - times.min(initial=np.inf)) * _MINUTES_PER_DAY
+    return (times - times.min(initial=np.inf)) * MINUTES_PER_DAY

@@ -4,10 +4,11 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import id_strings
-from plateviz.tables.sky import mean_direction, offsets_arcmin, offsets_deg, sky_of_focal_plane
+from plateviz.tables.sky import sky_of_focal_plane
 from plateviz.tables.sources import ordered_by_class
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
+from solver.model.directions import mean_direction, offsets_arcmin, offsets_deg
 
 
 def footprint_sources(result: FitResult) -> pd.DataFrame:

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import id_strings
-from plateviz.tables.sky import offsets_mas
 from solver.model.apparent_motion import mjd_of, parallax_factors
+from solver.model.directions import offsets_mas
 from solver.model.ephemeris import observer_at
 
 EPOCH = 2029.0

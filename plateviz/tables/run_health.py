@@ -8,7 +8,7 @@ import pandas as pd
 
 from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.tables.labels import dates
-from plateviz.tables.summary import State, SummaryItem, deviation_state, verdict
+from plateviz.tables.summary import State, SummaryItem, deviation_state, state_of
 
 COMPLETE, FAILED, MISSING = "complete", "failed", "missing"
 _OF_STATUS: Mapping[str, State] = MappingProxyType(
@@ -53,7 +53,7 @@ def orbit_states(orbits: pd.DataFrame) -> pd.DataFrame:
 
 def _verdicts(values: pd.Series, expected: pd.Series | float, variance: pd.Series) -> list[State]:
     table = pd.DataFrame({"value": values, "expected": expected, "scatter": np.sqrt(variance)})
-    return [verdict(*row) for row in table.itertuples(index=False)]
+    return [state_of(*row) for row in table.itertuples(index=False)]
 
 
 def _positive(numbers: pd.Series) -> pd.Series:

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import id_strings
-from plateviz.tables.sky import ARCMIN_PER_DEG
 from plateviz.tables.sources import ordered_by_class
 from solver.simulate.sky import icrs_to_galactic
+from solver.units import ARCMIN_PER_DEG
 
 _SOURCES_PER_CELL = 4.0
 _MOST_CELLS = 2500.0

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import id_strings
-from plateviz.tables.sky import offsets_mas
 from plateviz.tables.sources import ordered_by_class
 from solver.data.survey_schema import MOTION_PARAMETERS
 from solver.model.apparent_motion import N_PARAMETERS, julian_year, mjd_of, motion_design
+from solver.model.directions import offsets_mas
 from solver.units import MAS_PER_DEG
 
 SERIES = ("catalogue", "true", "fit")

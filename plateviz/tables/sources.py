@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import id_strings
-from plateviz.tables.sky import offsets_mas
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
+from solver.model.directions import offsets_mas
 from solver.units import RAD_PER_MAS
 
 REFERENCE = "reference"

@@ -65,7 +65,7 @@ def _number(result: FitResult, key: str) -> float:
     return float(result.summary[key])  # type: ignore[arg-type]
 
 
-def verdict(value: float, expected: float, scatter: float) -> State:
+def state_of(value: float, expected: float, scatter: float) -> State:
     """Return the state of a number by the rule of `summary_strip`; "neutral" if not finite."""
     if not (math.isfinite(value) and math.isfinite(expected) and scatter >= 0):
         return "neutral"
@@ -120,7 +120,7 @@ def _chi2(result: FitResult) -> SummaryItem:
         "χ² per degree of freedom",
         f"{value:.3f}",
         _rule(1.0, scatter, origin),
-        verdict(value, 1.0, scatter),
+        state_of(value, 1.0, scatter),
     )
 
 

@@ -82,10 +82,10 @@ def refusing(where: str, expected: str) -> Iterator[None]:
     except InputError:
         raise
     except _RAISED_ON_DAMAGE as error:
-        raise InputError(f"{where}: expected {expected}, found {in_words(error)}") from error
+        raise InputError(f"{where}: expected {expected}, found {reason_of(error)}") from error
 
 
-def in_words(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     """Return what a library found, in one line, without names of exceptions."""
     if isinstance(error, MemoryError):
         return "a size that does not fit into the memory"

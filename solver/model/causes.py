@@ -42,7 +42,7 @@ class TermFamily(eqx.Module):
     scale: Float[AnyArray, " det"]
 
 
-class Causes(eqx.Module):
+class ModelledCauses(eqx.Module):
     """Inputs of the causes that are not parameters.
 
     Attributes
@@ -115,7 +115,7 @@ def moved_detector(
     centre: Pair,
     rotation: Float[Array, "*#obs"],
     values: Values,
-    causes: Causes | None,
+    causes: ModelledCauses | None,
     exposure: Int[AnyArray, "*#obs"],
     detector: Int[AnyArray, "*#obs"],
 ) -> tuple[Pair, Float[Array, "*#obs"]]:
@@ -134,7 +134,7 @@ def moved_detector(
 def shifted_on_detector(
     pixel: Pair,
     values: Values,
-    causes: Causes | None,
+    causes: ModelledCauses | None,
     source: Int[AnyArray, "*obs"],
     detector: Int[AnyArray, "*#obs"],
 ) -> Pair:

@@ -5,6 +5,11 @@ NumPy only, so that code which must not load JAX can use it.
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from solver.units import ARCMIN_PER_DEG, MAS_PER_DEG
+
+Degrees = ArrayLike | float
 
 
 def tangent_frame(
@@ -72,7 +77,9 @@ def unproject(
 def mean_direction(
     ra_deg: Float[np.ndarray, " n"], dec_deg: Float[np.ndarray, " n"]
 ) -> tuple[float, float]:
-    """Return right ascension and declination of the mean of some directions, deg."""
+    """Return right ascension and declination of the mean of some directions, deg; 0 of none."""
+    if len(ra_deg) == 0:
+        return 0.0, 0.0
     x, y, z = tangent_frame(ra_deg, dec_deg)[:, 0].mean(axis=0)
     ra, dec = np.degrees([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))]).tolist()
     return ra % 360.0, dec
@@ -85,3 +92,40 @@ def places_about(
     axes = tangent_frame(np.array([centre[0]]), np.array([centre[1]]))[0]
     along, east, north = (tangent_frame(ra_deg, dec_deg)[:, 0] @ axes.T).T
     return np.degrees(np.stack([east, north], axis=1) / along[:, None])
+
+
+def offsets_deg(
+    ra: Degrees, dec: Degrees, ra_0: Degrees, dec_0: Degrees
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the offsets in ra cos(dec) and dec of positions from an origin.
+
+    Parameters
+    ----------
+    ra, dec, ra_0, dec_0 : deg; the right ascensions may lie on both sides of 0
+
+    Returns
+    -------
+    deg, with the cosine of `dec`; the differences are taken before they are scaled
+    """
+    difference = np.atleast_1d(np.asarray(ra, dtype=float)) - np.asarray(ra_0, dtype=float)
+    # Subtracting whole turns keeps a difference near zero exact; the usual
+    # (x + 180) % 360 - 180 would round it to the precision of 180 deg.
+    difference = difference - 360.0 * np.round(difference / 360.0)
+    north = np.atleast_1d(np.asarray(dec, dtype=float))
+    return difference * np.cos(np.radians(north)), north - np.asarray(dec_0, dtype=float)
+
+
+def offsets_mas(
+    ra: Degrees, dec: Degrees, ra_0: Degrees, dec_0: Degrees
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the offsets of `offsets_deg` in mas."""
+    d_ra, d_dec = offsets_deg(ra, dec, ra_0, dec_0)
+    return d_ra * MAS_PER_DEG, d_dec * MAS_PER_DEG
+
+
+def offsets_arcmin(
+    ra: Degrees, dec: Degrees, ra_0: Degrees, dec_0: Degrees
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the offsets of `offsets_deg` in arcmin."""
+    d_ra, d_dec = offsets_deg(ra, dec, ra_0, dec_0)
+    return d_ra * ARCMIN_PER_DEG, d_dec * ARCMIN_PER_DEG

@@ -20,7 +20,7 @@ from solver.data.distortion_terms import terms
 from solver.data.parameters import OPTIONAL_GROUPS
 from solver.model.aberration import Components, aberrate, inverse_lorentz_factor
 from solver.model.causes import (
-    Causes,
+    ModelledCauses,
     anisotropic,
     moved_detector,
     shifted_on_detector,
@@ -61,7 +61,7 @@ class Geometry(eqx.Module):
     sun_distance: Float[AnyArray, " exp"]
     distortion_scale: Float[AnyArray, ""]
     order: int = eqx.field(static=True)
-    causes: Causes | None = None
+    causes: ModelledCauses | None = None
 
     @property
     def sizes(self) -> dict[str, int]:

@@ -13,16 +13,15 @@ from solver.data.instrument import Instrument
 from solver.data.magnitudes import faintness
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.model.causes import Causes, TermFamily
+from solver.model.causes import ModelledCauses, TermFamily
 from solver.problem.elements import field_numbers
 from solver.problem.padding import pad
-
-_MINUTES_PER_DAY = 1440.0
+from solver.units import MINUTES_PER_DAY
 
 
 def causes_of(
     exposures: pd.DataFrame, sources: pd.DataFrame, instrument: Instrument, settings: FitSettings
-) -> Causes | None:
+) -> ModelledCauses | None:
     """Return the inputs of the causes that the settings include, or None if they include none.
 
     Raises
@@ -35,7 +34,7 @@ def causes_of(
     span, n_det = span_numbers(exposures), len(instrument.detectors)
     n_moved = max(int(span.max()), 1)
     moves = np.repeat((span > 0).astype(float)[:, None], n_det, axis=1)
-    return Causes(
+    return ModelledCauses(
         families=_families(exposures, instrument, settings),
         element=n_moved * np.arange(n_det) + np.maximum(span - 1, 0)[:, None],
         moves=moves,
@@ -51,7 +50,7 @@ def _families(
     n_exp, n_det = len(exposures), len(instrument.detectors)
     field = field_numbers(exposures)
     time = exposures["obstime"].to_numpy()
-    angle = 2.0 * np.pi * _MINUTES_PER_DAY * (time - _middle(time)) / settings.breathing_period
+    angle = 2.0 * np.pi * MINUTES_PER_DAY * (time - _middle(time)) / settings.breathing_period
     by_exposure = {
         "drift": (settings.drift, _polynomials(time, settings.drift_in_time)),
         "breathing": (settings.breathing, np.array([np.cos(angle), np.sin(angle)])),
@@ -112,7 +111,7 @@ def _faintness(sources: pd.DataFrame, settings: FitSettings) -> Float[np.ndarray
     return faintness(magnitude)
 
 
-def padded(causes: Causes, sizes: Mapping[str, int]) -> Causes:
+def padded(causes: ModelledCauses, sizes: Mapping[str, int]) -> ModelledCauses:
     """Return the inputs of the causes padded along exp and src."""
     families = (
         replace(family, factor=pad(family.factor.swapaxes(0, 1), "exp", sizes).swapaxes(0, 1))

@@ -19,7 +19,7 @@ from solver.data.parameters import BY_NAME, SOURCES
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import InputError
 from solver.model.astrometry import propagate, sky_position
-from solver.model.causes import Causes
+from solver.model.causes import ModelledCauses
 from solver.model.directions import displaced, tangent_frame
 from solver.model.ephemeris import observer_at
 from solver.model.forward import Geometry
@@ -243,7 +243,7 @@ def _geometry(
     centres: dict[str, Float[np.ndarray, " _"]],
     instrument: Instrument,
     settings: FitSettings,
-    causes: Causes | None,
+    causes: ModelledCauses | None,
     layout: VectorLayout,
 ) -> Geometry:
     satellite = exposures[[f"satellite_v{axis}" for axis in "xyz"]].to_numpy()

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from solver.data.settings import FitSettings
+from solver.model.directions import offsets_mas
 from solver.results.diagnostics import (
     deviation_freedom,
     effective_parameters,
@@ -68,12 +69,9 @@ def truth_summary(sources: pd.DataFrame, places: pd.DataFrame) -> dict[str, dict
     joined = sources.loc[sources["n_obs"] >= MIN_OBS, _DEVIATING].merge(
         places, on="source_id", suffixes=("", "_true")
     )
-    cos_dec = np.cos(np.radians(joined["dec"]))
-    # Wrapped, because a field may extend across 0h.
-    joined["deviation_ra"] = (
-        ((joined["ra"] - joined["ra_true"] + 180.0) % 360.0 - 180.0) * cos_dec * 3.6e6
+    joined["deviation_ra"], joined["deviation_dec"] = offsets_mas(
+        *(joined[name].to_numpy() for name in ("ra", "dec", "ra_true", "dec_true"))
     )
-    joined["deviation_dec"] = (joined["dec"] - joined["dec_true"]) * 3.6e6
     return {
         name: _deviation_numbers(joined[member])
         for name, member in class_members(joined).items()

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.sky import offsets_mas
 from solver.data import schema, survey_schema
 from solver.data.survey_schema import MOTION_PARAMETERS
 from solver.model.apparent_motion import julian_year, motion_design
 from solver.model.astrometry import frames_at, sky_position
+from solver.model.directions import offsets_mas
 from solver.model.ephemeris import observer_at
 from solver.simulate.sky import galactic_to_icrs
 from solver.units import MAS_PER_DEG
@@ -250,7 +250,8 @@ def _fit(
     ).reshape(-1, 5)
     offset = history[["offset_ra", "offset_dec"]].to_numpy().reshape(-1)
     years = EPOCH - 2016.0
-    d_ra, d_dec = offsets_mas(truth["ra"], truth["dec"], catalogue["ra"], catalogue["dec"])
+    places = (one[name] for one in (truth, catalogue) for name in ("ra", "dec"))
+    d_ra, d_dec = (offset.item() for offset in offsets_mas(*places))
     d_plx, d_pmra, d_pmdec = (float(truth[n] - catalogue[n]) for n in _ASTROMETRY[2:])
     true = np.array([d_ra + years * d_pmra, d_dec + years * d_pmdec, d_plx, d_pmra, d_pmdec])
     fit, sigma_noise, chi2 = np.full(5, np.nan), np.full(5, np.nan), np.nan

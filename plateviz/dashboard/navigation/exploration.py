@@ -7,7 +7,7 @@ from typing import Any
 
 import param
 
-from plateviz.dashboard.address_parts import chosen, in_words
+from plateviz.dashboard.address_parts import chosen, quoted
 from plateviz.dashboard.selection.selected import KINDS
 from plateviz.plots.explored_rows import Columns
 from plateviz.plots.explored_text import parts_of, read_parts, text_of
@@ -75,7 +75,7 @@ class Exploration(param.Parameterized):
             found = wanted[name] if wanted[name] in options else default
             self.param.update(**{name: found})
         problems = [
-            f"{name}: expected a column of the {self.table}, found {in_words(requested[name])}"
+            f"{name}: expected a column of the {self.table}, found {quoted(requested[name])}"
             for name in defaults
             if name in requested and getattr(self, name) != requested[name]
         ]

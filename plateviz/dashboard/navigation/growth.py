@@ -7,6 +7,7 @@ from shlex import quote
 
 from plateviz.runs.queries import Written
 from plateviz.solving.origin import Origin, SurveyFolder
+from plateviz.tables.counts import duration_text
 
 # After so many seconds without another orbit, nobody seems to fit the rest.
 _PATIENCE = 120.0
@@ -64,8 +65,7 @@ class Growth:
             return ""
         per_second = (done - before) / (self._last[0] - started)
         seconds = (written.n_orbits - done) / per_second
-        left = f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
-        return f", {60 * per_second:.2g} per minute, about {left} left"
+        return f", {60 * per_second:.2g} per minute, about {duration_text(seconds)} left"
 
 
 def how_to_make_a_run(origin: Origin) -> str:

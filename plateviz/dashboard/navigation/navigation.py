@@ -240,8 +240,8 @@ class Navigation(param.Parameterized):
             session.show_orbit(orbit)
         elif last is None or last.settings == found.settings:
             session.show_result(found)
-        elif last.is_what_if:
-            session.open(Request(orbit, last.settings, is_what_if=True), found)
+        elif last.is_replaceable:
+            session.open(Request(orbit, last.settings, is_step=True), found)
         else:
             session.show_orbit(orbit)
 
@@ -255,7 +255,7 @@ class Navigation(param.Parameterized):
         try:
             solution = self._find("solution", orbit) or self._solution(None, orbit)
             other = self._find("against", orbit)
-            if other is None and isinstance(solution, Request) and solution.is_what_if:
+            if other is None and isinstance(solution, Request) and solution.is_step:
                 # It is a change of that solution, to which the controls lead back.
                 other = self._solution(None, orbit)
         except InputError as error:

@@ -12,10 +12,10 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from plateviz.dashboard.address_parts import in_words
+from plateviz.dashboard.address_parts import quoted
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.selection.selected import KINDS, Selected
-from plateviz.dashboard.session.solution_address import in_words as settings_in_words
+from plateviz.dashboard.session.solution_address import settings_text
 from solver.errors import InputError
 
 _FORMAT, _VERSION = "plateviz view", 1
@@ -46,7 +46,7 @@ def view_text(navigation: Navigation) -> str:
         "version": _VERSION,
         "of": session.store.title,
         "address": navigation.address(is_whole=True),
-        "settings": "" if session.shown is None else settings_in_words(session.shown),
+        "settings": "" if session.shown is None else settings_text(session.shown),
         "sources": sources,
         "exposures": sorted(session.selection.exposures),
         "detectors": sorted(session.selection.detectors),
@@ -78,7 +78,7 @@ def open_view(navigation: Navigation, text: str) -> None:
     session.selection.select(selected)
     title = session.store.title
     if content.get("of") != title:
-        session.note([f"the view is of {in_words(content.get('of'))}, and this page of {title!r}"])
+        session.note([f"the view is of {quoted(content.get('of'))}, and this page of {title!r}"])
 
 
 def _read(text: str) -> Mapping[str, Any]:
@@ -93,7 +93,7 @@ def _read(text: str) -> Mapping[str, Any]:
     version = content.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or not 1 <= version <= _VERSION:
         raise InputError(
-            f"expected a saved view of version {_VERSION} or older, found {in_words(version)}"
+            f"expected a saved view of version {_VERSION} or older, found {quoted(version)}"
         )
     return content
 

@@ -125,7 +125,7 @@ class SolutionList:
     def _what_if(self) -> MadeSolution | None:
         """Return the what-if on the screen, unless it is among the solutions of the session."""
         shown = self._session.shown
-        if shown is None or not shown.is_what_if:
+        if shown is None or not shown.is_replaceable:
             return None
         made = MadeSolution(shown.orbit, shown.settings, shown.is_step)
         return None if any(one.is_of(made) for one in self._session.journal.made) else made

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from plateviz.dashboard.address_parts import in_words
+from plateviz.dashboard.address_parts import quoted
 from plateviz.tables.labels import exposure_label
 from solver.data.exclusions import Exclusions
 from solver.errors import InputError
@@ -182,7 +182,7 @@ def parsed(address: Mapping[str, str], find: Find = lambda *_: None) -> tuple[Se
             )
         else:
             items = read(text) if text.count(",") < FEW else None
-            problem = f"{kind}: expected {FEW} ids or fewer, found {in_words(text)}"
+            problem = f"{kind}: expected {FEW} ids or fewer, found {quoted(text)}"
         if items is None:
             problems.append(problem)
         else:

@@ -5,7 +5,7 @@ from typing import Any
 
 import param
 
-from plateviz.dashboard.address_parts import in_words
+from plateviz.dashboard.address_parts import quoted
 from plateviz.dashboard.selection.large_selections import LargeSelections
 from plateviz.dashboard.selection.selected import KINDS, Selected, SelectedIds
 from plateviz.dashboard.selection.selection_address import restored
@@ -97,7 +97,7 @@ class Selection(param.Parameterized):
             "plates": f"exposures from {plates[0]} to {plates[1]}",
         }
         return [
-            f"{name}: expected {options[name]}, found {in_words(value)}"
+            f"{name}: expected {options[name]}, found {quoted(value)}"
             for name, value in requested.items()
             if found[name] != value
         ]
@@ -128,9 +128,7 @@ class Selection(param.Parameterized):
             return self.orbit
         orbits = {str(orbit): orbit for orbit in self.param["orbit"].objects}
         if address["orbit"] not in orbits:
-            raise InputError(
-                f"orbit: expected one of this page, found {in_words(address['orbit'])}"
-            )
+            raise InputError(f"orbit: expected one of this page, found {quoted(address['orbit'])}")
         return orbits[address["orbit"]]
 
     def address(self) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from plateviz.dashboard.address_parts import in_words
+from plateviz.dashboard.address_parts import quoted
 from plateviz.dashboard.selection.selected import (
     KINDS,
     NOTHING,
@@ -51,9 +51,9 @@ def restored(address: Mapping[str, str], find: Find, kept: Mapping[str, Selected
     problems += invalid
     if name in kept:
         if of_name != selected:
-            problems.append(f"selection: something else is kept under {in_words(name)} by now")
+            problems.append(f"selection: something else is kept under {quoted(name)} by now")
     elif name and (selected.keys or invalid or not selected):
-        problems.append(f"selection: nothing is kept under {in_words(name)}")
+        problems.append(f"selection: nothing is kept under {quoted(name)}")
     is_new = bool(name) and name not in kept and bool(selected) and not problems
     return Restored(selected, name if is_new else "", problems)
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from plateviz.dashboard.address_parts import in_words
+from plateviz.dashboard.address_parts import quoted
 
 SHOWN = ("field", "plates", "detector")
 _PLATES = re.compile(r"(-?[0-9]{1,9})-(-?[0-9]{1,9})")
@@ -28,5 +28,5 @@ def read_shown(address: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
         return shown, []
     plates = _PLATES.fullmatch(address["plates"])
     if not plates:
-        return shown, [f"plates: expected FIRST-LAST, found {in_words(address['plates'])}"]
+        return shown, [f"plates: expected FIRST-LAST, found {quoted(address['plates'])}"]
     return shown | {"plates": tuple(sorted(int(number) for number in plates.groups()))}, []

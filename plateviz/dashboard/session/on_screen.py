@@ -34,7 +34,7 @@ class OnScreen(RequestState):
     @property
     def fitted(self) -> Solution | None:
         """The solution on the screen, or the one before the what-ifs on the screen."""
-        return self._fitted if self.shown is not None and self.shown.is_what_if else self.shown
+        return self._fitted if self.shown is not None and self.shown.is_replaceable else self.shown
 
     def restore_both(self, address: Mapping[str, str]) -> list[str]:
         """Draw of both solutions what an address requests; return what is invalid, in words."""

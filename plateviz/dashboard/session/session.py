@@ -59,7 +59,7 @@ class Session(OnScreen):
     @property
     def is_fitting(self) -> bool:
         """Whether there is a job that is no what-if."""
-        return self.job is not None and not self._requested.is_what_if
+        return self.job is not None and not self._requested.is_step
 
     @property
     def is_opening(self) -> bool:
@@ -175,18 +175,18 @@ class Session(OnScreen):
             return
         known = next((s for s in self.solutions if s.settings == settings), None)
         if self.job is not None:
-            self._next_what_if = settings if self._requested.is_what_if else None
+            self._next_what_if = settings if self._requested.is_step else None
         elif self.shown is not None and settings == self.shown.settings:
             return
         elif known is not None:
             self._return_to(known)
         else:
-            self._request(Request(self.selection.orbit, settings, is_what_if=True))
+            self._request(Request(self.selection.orbit, settings, is_step=True))
 
     def list_what_if(self) -> None:
         """Add the what-if on the screen to the list, so that the next one does not replace it."""
-        if self.shown is not None and self.shown.is_what_if:
-            listed = self.shown._replace(is_what_if=False)
+        if self.shown is not None and self.shown.is_replaceable:
+            listed = self.shown._replace(is_replaceable=False)
             self.param.update(solutions=[*self.solutions, listed], shown=listed)
             self.journal.add(listed)
 
@@ -249,7 +249,7 @@ class Session(OnScreen):
             self.chosen = shown
         if shown.orbit != other.orbit:
             self._cancel_job()
-            self.param.update(solutions=[] if other.is_what_if else [other])
+            self.param.update(solutions=[] if other.is_replaceable else [other])
             self.selection.orbit = other.orbit
         self.param.update(shown=other, other=shown)
         self.choices.load(other.settings)
@@ -282,7 +282,7 @@ class Session(OnScreen):
         self._fitted = before or solution
         kept = [s for s in self.solutions if s.settings != solution.settings]
         self.param.update(
-            solutions=self.solutions if solution.is_what_if else [*kept, solution],
+            solutions=self.solutions if solution.is_replaceable else [*kept, solution],
             other=self._beside(solution, before),
             shown=solution,
             stage=Stage.READY,

@@ -15,12 +15,12 @@ class Request(NamedTuple):
     ----------
     orbit : orbit_id, or None for files of one orbit
     settings : of the fit
-    is_what_if : whether a step from the last fit is enough
+    is_step : whether a step from the last fit is enough
     """
 
     orbit: int | None
     settings: FitSettings
-    is_what_if: bool = False
+    is_step: bool = False
 
 
 class Solution(NamedTuple):
@@ -30,7 +30,7 @@ class Solution(NamedTuple):
     ----------
     orbit, settings : as of `Request`
     result : of the fit
-    is_what_if : whether the next what-if replaces it
+    is_replaceable : whether the next what-if replaces it
     is_step : whether it was computed by a step from a fit, listed or not
     run : name of the run that it was read from; empty for none
     kept : name of the kept solution that it was read from; empty for none
@@ -39,7 +39,7 @@ class Solution(NamedTuple):
     orbit: int | None
     settings: FitSettings
     result: FitResult
-    is_what_if: bool = False
+    is_replaceable: bool = False
     is_step: bool = False
     run: str = ""
     kept: str = ""
@@ -50,7 +50,7 @@ class Solution(NamedTuple):
         text = self.settings.describe()
         if self.kept:
             return f"{self.kept}: {text}"
-        return _OF_WHAT_IF.format(text) if self.is_what_if else text
+        return _OF_WHAT_IF.format(text) if self.is_replaceable else text
 
     def equals(self, other: "Solution") -> bool:
         """Whether both are the same solution of the same orbit."""

@@ -97,7 +97,7 @@ def find_solution(
     return Request(orbit, settings, is_what_if)
 
 
-def in_words(solution: Solution) -> str:
+def settings_text(solution: Solution) -> str:
     """Return the settings of a solution, and whether it is a what-if, in words."""
     return " ".join([*setting_words(solution.settings), *([WHAT_IF] if solution.is_step else [])])
 
@@ -128,5 +128,5 @@ def _text(solution: Solution, orbit: int | None, most: int) -> str:
     if solution.run:
         of_orbit = "" if solution.orbit == orbit else f" orbit={solution.orbit}"
         return f"run={solution.run}{of_orbit}"
-    text = in_words(solution)
+    text = settings_text(solution)
     return text if len(text) <= most else TOO_LONG

@@ -173,8 +173,8 @@ class RefitView(pn.viewable.Viewer):
     def _show_solutions(self, *_: object) -> None:
         shown, listed = self._session.shown, list(self._session.solutions)
         self._reproduce.visible = shown is not None
-        self._add.visible = shown is not None and shown.is_what_if
-        if shown is not None and shown.is_what_if:
+        self._add.visible = shown is not None and shown.is_replaceable
+        if shown is not None and shown.is_replaceable:
             listed.append(shown)
         solutions: dict[str, Solution] = {}
         for solution in listed:

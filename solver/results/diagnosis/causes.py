@@ -57,7 +57,7 @@ _MOST_LINEAR = 0.5
 SCATTER = ("noise", "exposures", "sources", "detectors", "magnitudes")
 
 
-class Causes(NamedTuple):
+class FoundCauses(NamedTuple):
     """The causes of a solution's flaws.
 
     Attributes
@@ -71,7 +71,7 @@ class Causes(NamedTuple):
     left: Scatter | None
 
 
-def find_causes(diagnosis: Diagnosis) -> Causes:
+def find_causes(diagnosis: Diagnosis) -> FoundCauses:
     """Return the causes that explain the tests of a solution."""
     patterns, explained = _patterns(diagnosis)
     of_exposures, of_each = _of_exposures(diagnosis, explained)
@@ -88,7 +88,7 @@ def find_causes(diagnosis: Diagnosis) -> Causes:
     found.sort(key=lambda one: (spoils and one.test.subject == "kurtosis", -one.gain))
     if left is None and found[:1] == patterns[:1]:
         found = patterns
-    return Causes(tuple(_of_their_own(found, diagnosis)), left)
+    return FoundCauses(tuple(_of_their_own(found, diagnosis)), left)
 
 
 def _of_their_own(found: list[Found], diagnosis: Diagnosis) -> list[Found]:

@@ -8,13 +8,12 @@ import pandas as pd
 
 from solver.data.detector_spans import Move, span_numbers, with_moves
 from solver.data.result import FitResult
-from solver.units import RAD_PER_MAS
+from solver.units import MINUTES_PER_DAY, RAD_PER_MAS
 
 # Sigmas beyond which a residual is an outlier: one good one in five hundred million is.
 FAR = 6.0
 # Median of the larger of two chi2 with one degree of freedom each.
 _MEDIAN_OF_LARGER = 1.1063
-_MINUTES_PER_DAY = 1440.0
 # Residuals of which the fit leaves less than this share are rounding errors.
 _LEAST_LEFT = 1e-6
 
@@ -208,7 +207,7 @@ def _camera(
     span = max(float(np.ptp(days)), 1e-12)
     start = exposures.groupby("field_id")["obstime"].transform("min")
     roll = np.radians(fitted["position_angle"].to_numpy())
-    period = result.settings.breathing_period / _MINUTES_PER_DAY
+    period = result.settings.breathing_period / MINUTES_PER_DAY
     return Camera(
         turn,
         pitch,

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from plateviz.solving.forecast import JobTimes, about, is_long
+from plateviz.solving.forecast import JobTimes, is_long
 from plateviz.solving.job import Job
 from plateviz.solving.solver_pool import SolverPool
 from plateviz.solving.solver_queue import SolverQueue, _give_way
+from plateviz.tables.counts import duration_text
 from solver.data.settings import FitSettings
 
 
@@ -163,10 +164,10 @@ def test_time_left_is_that_of_earlier_jobs_of_the_kind(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("seconds", "words"), [(0.2, "1 s"), (80.4, "80 s"), (400.0, "7 min"), (9000.0, "2 h")]
+    ("seconds", "words"), [(0.2, "1 s"), (80.4, "80 s"), (400.0, "7 min"), (9000.0, "2.5 h")]
 )
 def test_times_are_rough(seconds, words):
-    assert about(seconds) == words
+    assert duration_text(seconds) == words
 
 
 def test_survey_and_slow_engines_are_long():

@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 
 from plateviz import tables
-from plateviz.tables.sky import offsets_mas
 from solver.data import survey_schema
 from solver.model.apparent_motion import julian_year, mjd_of, motion_design, parallax_factors
 from solver.model.astrometry import frames_at, sky_position
+from solver.model.directions import offsets_mas
 from solver.model.ephemeris import observer_at
 from tests.plateviz.survey_tables import EPOCH, places
 

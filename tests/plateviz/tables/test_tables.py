@@ -10,8 +10,8 @@ from numpy.polynomial import legendre
 from plateviz import tables
 from plateviz.tables.calibration import displacement_um
 from plateviz.tables.labels import element_labels
-from plateviz.tables.sky import offsets_mas
 from solver.data import schema
+from solver.model.directions import offsets_mas
 
 BEYOND_DOUBLE = 2**53
 

@@ -408,7 +408,7 @@ def test_address_of_a_what_if_shows_a_what_if_of_the_same_solution(navigation):
     opened = again(navigation)
     end_job(opened)
     shown = opened.session.shown
-    assert (shown.is_what_if, shown.settings.order) == (True, 4)
+    assert (shown.is_replaceable, shown.settings.order) == (True, 4)
     assert opened.address() == address
     opened.session.choices.order = 5
     assert opened.session.shown.run == "default"

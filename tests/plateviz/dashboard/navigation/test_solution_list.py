@@ -58,13 +58,13 @@ def test_what_if_of_another_orbit_follows_the_solution_of_the_run(page, run, mon
     session = page.session
     session.choices.order = 3
     end_job(page)
-    assert session.shown.is_what_if
+    assert session.shown.is_replaceable
     page.choose_orbit(1)
     assert (session.shown.run, session.shown.orbit) == ("default", 1)
     assert session.job is not None
     end_job(page)
     shown = session.shown
-    assert (shown.orbit, shown.is_what_if, shown.settings.order) == (1, True, 3)
+    assert (shown.orbit, shown.is_replaceable, shown.settings.order) == (1, True, 3)
     assert (session.other.run, session.choices.order) == ("default", 3)
 
 
@@ -88,7 +88,7 @@ def test_what_if_on_the_screen_is_listed_and_stays_once_it_has_a_name(page):
     assert SolutionList(page).load(entry(page, label)).settings.order == 3
     SolutionList(page).rename(entry(page, label), "low")
     assert labels(page)[0] == "orbit 0: low: order 3 (what-if)"
-    assert not session.shown.is_what_if
+    assert not session.shown.is_replaceable
     session.choices.order = 2
     end_job(page)
     assert labels(page)[:2] == [
@@ -101,7 +101,7 @@ def test_what_if_on_the_screen_that_an_earlier_page_has_listed_is_there_once(pag
     page.session.journal.rename(MadeSolution(0, FitSettings(order=3), is_step=True), "low")
     page.session.choices.order = 3
     end_job(page)
-    assert page.session.shown.is_what_if
+    assert page.session.shown.is_replaceable
     assert [label for label in labels(page) if "order 3" in label] == [
         "orbit 0: low: order 3 (what-if)"
     ]
@@ -131,13 +131,13 @@ def test_solution_of_the_session_is_shown_again_in_its_orbit(page):
     page.session.open_listed(found)
     assert (page.session.shown.orbit, page.session.shown.settings.order) == (0, 4)
     assert page.session.shown.is_step
-    assert not page.session.shown.is_what_if
+    assert not page.session.shown.is_replaceable
 
 
 def test_solution_that_the_store_has_lost_is_computed_again(page, monkeypatch):
     monkeypatch.setattr(page.session.store, "result", lambda *_: None)
     found = SolutionList(page).load(entry(page, "orbit 0: order 4 (what-if)"))
-    assert found == Request(0, FitSettings(order=4), is_what_if=True)
+    assert found == Request(0, FitSettings(order=4), is_step=True)
 
 
 def test_named_solution_is_there_again_after_a_reload(page):

@@ -55,7 +55,7 @@ def test_report_of_a_what_if_is_named_and_compared(navigation):
     fitted = session.shown
     settings = fitted.settings.with_(order=3)
     what_if = fitted._replace(
-        settings=settings, is_what_if=True, result=session.store.result(0, settings)
+        settings=settings, is_replaceable=True, result=session.store.result(0, settings)
     )
     session.param.update(shown=what_if, other=fitted)
     later = page_report(navigation)

@@ -241,7 +241,7 @@ def test_change_requests_a_what_if(live):
     assert live.stage is Stage.STALE
     assert live.job.request["what_if"]
     finish(live)
-    assert (live.shown.settings.order, live.shown.is_what_if) == (4, True)
+    assert (live.shown.settings.order, live.shown.is_replaceable) == (4, True)
     assert live.shown.label == "what if: order 4"
     assert live.other is first
     assert live.solutions == [first]
@@ -286,7 +286,7 @@ def test_what_if_can_be_listed(live):
     live.choices.order = 4
     finish(live)
     live.list_what_if()
-    assert not live.shown.is_what_if
+    assert not live.shown.is_replaceable
     assert [s.settings.order for s in live.solutions] == [5, 4]
     live.choices.order = 3
     finish(live)
@@ -300,7 +300,7 @@ def test_fit_replaces_a_what_if(live):
     live.refit()
     assert not live.job.request["what_if"]
     finish(live)
-    assert (live.shown.is_what_if, live.other) == (False, first)
+    assert (live.shown.is_replaceable, live.other) == (False, first)
     assert len(live.solutions) == 2
 
 

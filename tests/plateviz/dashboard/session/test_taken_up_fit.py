@@ -191,7 +191,7 @@ def test_what_if_is_taken_up_and_not_listed(store):
     first.close()
     job.take({"event": "done"})
     again = opened(store)
-    assert again.shown.is_what_if
+    assert again.shown.is_replaceable
     assert again.shown.settings.order == 3
     assert all(one.order != 3 for one in listed(again))
 

@@ -19,6 +19,8 @@ _LEAST_SHARE, _LEAST_ORBITS = 0.1, 2
 _LARGE_SHARE = 0.5
 _MOST_NAMED = 8
 _MIN_ORBITS_OF_SOURCE = 4
+# χ² per degree of freedom of the motions from which their uncertainties are a fifth too small.
+_LARGE_SCATTER = 1.5
 # Tests of what orbits find, which say less than the causes that orbits name.
 _OF_ORBITS = ("together", "care", "bad", "orbit")
 
@@ -42,7 +44,12 @@ def run_causes(diagnosis: RunDiagnosis, tables: RunTests, motions: pd.DataFrame)
     """
     causes = [*_of_orbits(diagnosis, tables)]
     is_explained = bool(causes)
-    for test in diagnosis.found(CARE_RATE):
+    found = diagnosis.found(CARE_RATE)
+    most_scatter = any(test.subject == "motions" for test in found)
+    for test in found:
+        # Where most sources scatter, that which scatters most says nothing more.
+        if test.subject == "scatter" and most_scatter:
+            continue
         words = _WORDS.get(test.subject)
         # What orbits name themselves is also found in all of them together.
         if words is not None and not (test.subject in _OF_ORBITS and is_explained):
@@ -243,6 +250,35 @@ def _scatter(case: Case) -> Cause:
     )
 
 
+def _motions(case: Case) -> Cause:
+    ratio, states = case.test.statistic, case.diagnosis.states
+    bad = states.index[states == "bad"]
+    named = ", ".join(map(str, bad[:_MOST_NAMED])) + (" and more" if len(bad) > _MOST_NAMED else "")
+    orbits = f"orbit{'' if len(bad) == 1 else 's'} {named}"
+    words = f"χ² per degree of freedom of their motions is {ratio:.2f}, expected 1 or less. "
+    if len(bad):
+        words += (
+            f"The solutions of {orbits} should not be trusted, and each is part of all motions."
+        )
+        action = f"read the verdict of {orbits}; correct what is wrong there, or leave it out"
+    else:
+        words += (
+            "No orbit shows it alone: a time that is wrong in a whole orbit moves its positions."
+        )
+        action = "compare the times of the orbits with another source, and their origins"
+    return Cause(
+        "scattered-motions",
+        f"most sources scatter about their motions by {np.sqrt(ratio):.2g} times their noise",
+        words,
+        float(case.test.sigma),
+        f"It spoils all motions, by about {np.sqrt(ratio):.2g} times the uncertainties of a good "
+        "run.",
+        action,
+        (),
+        ratio > _LARGE_SCATTER,
+    )
+
+
 _WORDS: dict[str, Callable[[Case], Cause]] = {
     "zonal": _zonal,
     "trend": _against_time,
@@ -253,4 +289,5 @@ _WORDS: dict[str, Callable[[Case], Cause]] = {
     "bad": _share,
     "orbit": _orbit,
     "scatter": _scatter,
+    "motions": _motions,
 }

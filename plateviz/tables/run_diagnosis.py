@@ -19,9 +19,12 @@ from solver.results.diagnosis.rate import (
 from solver.results.diagnosis.survey.trends import Series, Trend, all_series, trend_tests
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Test, discovered
 
-# Orbits share the errors of the reference stars, so that these tests are not independent.
-_SHARED = "reference star"
+# Orbits share the catalogue and the distortion, so that these tests are not independent.
+_SHARED = ("reference star", "other star", "against their prior")
 _LEAST_ORBITS = 2
+# chi2 per degree of freedom of all motions that is no discovery yet: what orbits share is not all
+# known.
+_USUAL = 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +89,7 @@ def diagnose_run(motions: pd.DataFrame, tables: RunTests) -> RunDiagnosis:
         *(trend.test for trend in trends),
         *_zonal(tables.zonal),
         *_sources(motions),
+        *_most_sources(motions),
     ]
     return RunDiagnosis(tuple(tests), {trend.test.name: trend for trend in trends}, states)
 
@@ -109,15 +113,15 @@ def _share(name: str, subject: str, count: int, total: int, rate: float) -> Test
 def _together(orbit_tests: pd.DataFrame) -> list[Test]:
     """Return each test of the orbits for all orbits together.
 
-    Minus twice the sum of the logarithms of the chances is a chi2 (Fisher). Tests of reference
-    stars, which orbits share, count with the most extreme orbit only.
+    Minus twice the sum of the logarithms of the chances is a chi2 (Fisher). Tests of what orbits
+    share count with the most extreme orbit only.
     """
     tests = []
     for name, rows in orbit_tests.groupby("name", sort=False):
         if len(rows) < _LEAST_ORBITS:
             continue
         chances = np.array([log_chance_normal(float(sigma)) for sigma in rows["sigma"]])
-        if _SHARED in str(name):
+        if any(shared in str(name) for shared in _SHARED):
             chance, dof = of_many(float(chances.min()), len(chances)), 2.0
             statistic = -2.0 * float(chances.min())
             expected = float(chdtri(dof, 0.5 / len(chances)))
@@ -188,3 +192,19 @@ def _sources(motions: pd.DataFrame) -> list[Test]:
             )
         )
     return tests
+
+
+def _most_sources(motions: pd.DataFrame) -> list[Test]:
+    """Return the test of how much sources, but reference stars, scatter about their motions."""
+    if motions.empty:
+        return []
+    rows = motions[(motions["dof"] > 0) & ~motions["is_reference"].astype(bool)]
+    # Without the tenth that scatters most, which may be double.
+    rows = rows.loc[(rows["chi2"] / rows["dof"]).nsmallest(int(0.9 * len(rows))).index]
+    if rows.empty:
+        return []
+    chi2, dof = float(rows["chi2"].sum()), float(rows["dof"].sum())
+    chance = log_chance(chi2 / _USUAL, dof)
+    scatter = float(np.sqrt(2.0 / dof))
+    name = "scatter of most sources between orbits"
+    return [Test(name, "motions", (), chi2 / dof, 1.0, scatter, chance, sigmas(chance))]

@@ -37,9 +37,9 @@ def test_good_run_is_trusted_with_all_its_tests(good):
     verdict = judged(good)
     assert (verdict.state, verdict.headline) == ("good", "This run can be trusted.")
     assert not verdict.causes
-    # Two shares, five tests of the orbits and the furthest, trend and jump, smooth errors, and two
-    # kinds of source.
-    assert len(verdict.tests) == 13
+    # Two shares, five tests of the orbits and the furthest, trend and jump, smooth errors, two
+    # kinds of source, and most sources.
+    assert len(verdict.tests) == 14
     assert not any(test.is_found for test in verdict.tests)
     assert any("0.15 mas along each axis" in sentence for sentence in verdict.reasons)
 
@@ -200,6 +200,34 @@ def test_source_that_scatters_is_named(good):
     verdict = run_verdict(orbits, motions, tables())
     assert verdict.causes[0].name == "source-scatters"
     assert str(motions.loc[row, "source_id"]) in verdict.causes[0].title
+
+
+@pytest.mark.parametrize(("share", "state"), [(1.0, "good"), (1.45, "warn"), (2.5, "bad")])
+def test_most_sources_that_scatter_are_a_fault_of_the_run(good, share, state):
+    orbits, motions = good
+    noise = np.random.default_rng(3).chisquare(motions["dof"].clip(lower=1))
+    states = causes(1)
+    verdict = run_verdict(orbits, motions.assign(chi2=share * noise), tables(orbit_causes=states))
+    assert verdict.state == state
+    if state != "good":
+        assert verdict.causes[0].name == "scattered-motions"
+        assert "source-scatters" not in {cause.name for cause in verdict.causes}
+        assert "The solutions of orbit 0 should not be trusted" in verdict.causes[0].words
+
+
+def test_what_orbits_share_is_not_multiplied(good):
+    """The other stars of the catalogue and the distortion are the same in all orbits."""
+    names = (
+        "other stars beyond the median of their errors",
+        "values of pitch_x against their prior",
+    )
+    rows = [
+        pd.DataFrame({"orbit_id": range(N_ORBITS), "name": name, "sigma": 2.0}) for name in names
+    ]
+    shared = pd.concat([orbit_tests(), *rows], ignore_index=True)
+    diagnosis = diagnose_run(good[1], tables(orbit_tests=shared))
+    found = {test.name: test.sigma for test in diagnosis.tests}
+    assert all(found[f"all orbits: {name}"] < 0.5 for name in names)
 
 
 def test_weaker_cause_that_the_first_may_bring_about_is_not_named(good):

@@ -7,6 +7,8 @@ from solver.units import RAD_PER_MAS
 
 # Sigmas beyond which the deviation of the reference stars is a discovery among all tests.
 _NOTICED = 3.0
+# Share of reference stars that are left out from which the others are in doubt, too.
+_MANY = 0.1
 # Measurements that represent the places of all, within a per cent.
 _MOST_PLACES = 50_000
 
@@ -33,6 +35,23 @@ def unseen_sentences(result: FitResult) -> list[str]:
             "before they are noticed: the catalogue decides their positions, not the measurements."
         )
     return sentences
+
+
+def references_left_out(result: FitResult) -> list[str]:
+    """Return a title and a sentence if many reference stars are left out; else nothing."""
+    summary = result.summary
+    # Results of older versions lack it.
+    left_out = int(summary.get("n_reference_excluded", 0))
+    total = left_out + int(summary["n_reference"])
+    if left_out < _MANY * max(total, 1):
+        return []
+    return [
+        f"{left_out} of its {total} reference stars are left out",
+        f"Where {left_out} of {total} reference stars are left out because they are wrong, others "
+        "are likely to be off by less than a test can see: all positions may be wrong by more "
+        "than the error that they share. Use another catalogue, or state larger errors "
+        "(`--prior sources=2`).",
+    ]
 
 
 def quadratic_mas(result: FitResult) -> float:

@@ -13,7 +13,7 @@ from plateviz.tables.notable_in_orbit import notable_sentences
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
 from plateviz.tables.tests_in_words import TestInWords, discoveries_in_words, tests_in_words
-from plateviz.tables.unseen import unseen_sentences
+from plateviz.tables.unseen import references_left_out, unseen_sentences
 from solver.data.result import FitResult, FitStatus
 from solver.data.settings import COUNTED
 from solver.results.diagnosis.causes import find_causes
@@ -116,15 +116,17 @@ def _judge(result: FitResult) -> Verdict:
     if not converged or (certain and is_large) or catalogue:
         state = "bad"
     causes = [*catalogue, *causes]
-    headline = _HEADLINES[state]
-    if causes:
-        headline = f"{headline[:-1]}: {causes[0].title}."
+    left_out = references_left_out(result)
+    state = worst([state, "warn" if left_out else "good"])
+    titles = [*(cause.title for cause in causes), *left_out[:1]]
+    headline = f"{_HEADLINES[state][:-1]}: {titles[0]}." if titles else _HEADLINES[state]
     items = summary_strip(result)
-    reasons = [_converged(result), *(cause.sentence() for cause in causes)]
+    reasons = [_converged(result), *(cause.sentence() for cause in causes), *left_out[1:]]
     reasons += [discoveries_in_words(diagnosis.tests, found), *map(_sentence, _judged(items))]
     reasons += [*noise_sentences(result), *_common_error(result), *unseen_sentences(result)]
     faults = [] if converged else [_converged(result)]
     faults += [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
+    faults += left_out[1:]
     if found and not causes:
         faults.append(discoveries_in_words(diagnosis.tests, found))
     tests = tests_in_words(diagnosis)

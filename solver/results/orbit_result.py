@@ -101,7 +101,8 @@ def partial_result(
         "fit": solved - prepared,
         "diagnose": time.perf_counter() - solved,
     }
-    summary = {**numbers, "seconds": seconds, **estimate.entries}
+    of_catalogue = {"n_reference_excluded": _n_reference_excluded(data, settings)}
+    summary = {**numbers, **of_catalogue, "seconds": seconds, **estimate.entries}
     if places is not None:
         summary["truth"] = truth_summary(sources, places)
     result = FitResult(
@@ -112,3 +113,11 @@ def partial_result(
         instrument=instrument,
     )
     return PartialResult(result, solution, instrument)
+
+
+def _n_reference_excluded(data: OrbitData, settings: FitSettings) -> int:
+    """Return how many measured reference stars the settings exclude by their ids."""
+    catalogue = data.catalogue
+    is_reference = catalogue["is_reference"].to_numpy(bool)
+    excluded = catalogue["source_id"].isin(settings.exclusions.sources).to_numpy()
+    return int((is_reference & excluded).sum())

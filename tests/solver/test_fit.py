@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import CancelledError, FitError
@@ -292,3 +293,13 @@ def test_wrong_position_angle_is_solved(small_orbit, result, fit, with_tables, t
     for axis in ("ra", "dec"):
         moved = found.sources[f"offset_{axis}"] - result.sources[f"offset_{axis}"]
         assert (moved.abs() < 1e-3 * result.sources[f"sigma_{axis}_conditional"]).all()
+
+
+def test_excluded_reference_stars_are_counted(small_orbit, fit):
+    measured = small_orbit.data.measurements["source_id"]
+    known = small_orbit.data.catalogue[small_orbit.data.catalogue["source_id"].isin(measured)]
+    of_kind = [known.loc[known["is_reference"] == kind, "source_id"] for kind in (True, False)]
+    chosen = frozenset([*of_kind[0].head(2).tolist(), *of_kind[1].head(3).tolist()])
+    summary = fit(small_orbit, exclusions=Exclusions(sources=chosen)).summary
+    assert summary["n_reference_excluded"] == 2
+    assert summary["n_reference"] == len(of_kind[0]) - 2

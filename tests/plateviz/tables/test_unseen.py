@@ -56,3 +56,15 @@ def test_verdict_says_what_it_cannot_see(fit_result):
     reasons = orbit_verdict(fit_result).reasons
     assert any("smooth errors of the reference catalogue" in sentence for sentence in reasons)
     assert any("times as large as stated before they are noticed" in one for one in reasons)
+
+
+def test_many_reference_stars_that_are_left_out_need_care(fit_result):
+    whole, n_left = orbit_verdict(fit_result), int(fit_result.summary["n_reference"])
+    few = with_summary(fit_result, n_reference_excluded=n_left // 20)
+    many = with_summary(fit_result, n_reference_excluded=n_left // 4)
+    of_few, of_many = map(orbit_verdict, (few, many))
+    assert (of_few.state, of_few.headline) == (whole.state, whole.headline)
+    assert of_many.state != "good"
+    total = n_left + n_left // 4
+    assert any(f"{n_left // 4} of {total} reference stars are" in one for one in of_many.reasons)
+    assert of_many.faults

@@ -20,6 +20,7 @@ def inspect(
     Of a survey, every file of it and of its runs is compared with its SHA-256.
     """
     from plateviz.cli.output import print_inspection, print_json
+    from plateviz.runs.changed_inputs import changed_inputs
     from plateviz.runs.run import runs_of
     from solver.io.inspect import inspect_files
 
@@ -28,7 +29,7 @@ def inspect(
         if one["kind"] == "survey":
             one["runs"] = []
             for run in runs_of(path):
-                one["problems"] += run.changes()
+                one["problems"] += [*run.changes(), *changed_inputs(run).values()]
                 one["runs"].append({"name": run.name, "orbits": len(run.complete_orbits())})
     if as_json:
         print_json(found)

@@ -104,6 +104,8 @@ def _print_json(event: "Event") -> None:
 
 def _judge(watcher: "Watch", accept: bool) -> None:
     """Raise the error that stands for orbits without a solution, or with one not to be trusted."""
+    if watcher.unread:
+        raise FitError(f"what could not be read at the last look: {'; '.join(watcher.unread)}")
     if watcher.failed:
         raise FitError(f"orbits without a solution: {_listed(watcher.failed)}")
     if watcher.distrusted and not accept:

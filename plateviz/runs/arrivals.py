@@ -5,7 +5,6 @@ is whole if it did not change between two looks and has the end of a Parquet fil
 orbit's measurements except to compute their SHA-256, and that once for each time they are written.
 """
 
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +15,7 @@ from plateviz.runs.run import Run
 from solver.data.schema import ENVIRONMENT
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
+from solver.io.consistency import repeated_orbits
 from solver.io.parquet import count_rows
 from solver.io.survey import (
     EXPOSURES,
@@ -27,8 +27,7 @@ from solver.io.survey import (
     survey_orbits,
 )
 from solver.io.survey_manifest import MANIFEST, listed_files
-
-_NUMBERED = re.compile(r"orbit=(\d+)\.parquet")
+from solver.io.survey_problems import misnamed_orbits
 
 
 class Remark(NamedTuple):
@@ -45,6 +44,11 @@ class Remark(NamedTuple):
     kind: str
     orbit: int | None
     message: str
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether somebody has to mend what is there, or cannot be read."""
+        return self.kind == "damaged" or (self.kind == "waiting" and self.orbit is None)
 
 
 class Look(NamedTuple):
@@ -96,6 +100,8 @@ class Arrivals:
         self._digests: dict[Path, tuple[_State | None, str]] = {}
         self._exposures: dict[int, str] = {}
         self._exposures_read: object = None
+        # Orbit -> the one whose exposures it has as well.
+        self._copies: dict[int, int] = {}
         self._fitted_exposures = FittedExposures(run.directory)
         # Of fitted orbits: the SHA-256 of the files that were fitted, and the state of the
         # measurements at the first look.
@@ -160,6 +166,7 @@ class Arrivals:
         if state != self._exposures_read and state != (None, None):
             table = read_survey_table(path, ENVIRONMENT)
             self._exposures = {int(one): digest_of(rows) for one, rows in table.groupby("orbit_id")}
+            self._copies = {one: group[0] for group in repeated_orbits(table) for one in group[1:]}
             self._exposures_read = state
         return survey_orbits(self._survey)
 
@@ -168,7 +175,8 @@ class Arrivals:
         path = measurement_path(self._survey, orbit)
         name = _name_of(path)
         if self._states[path] is None:
-            return Remark("waiting", orbit, f"{MANIFEST} lists {name}, which is not there yet")
+            why = f"{MANIFEST} lists {name}, which" if name in self._listed else name
+            return Remark("waiting", orbit, f"{why} is not there yet")
         damage = self._damage(path)
         if damage and not self._has_settled(path):
             return Remark("waiting", orbit, f"{name} is being written")
@@ -178,6 +186,9 @@ class Arrivals:
             return Remark("waiting", orbit, f"{MANIFEST} does not list {name} yet")
         if orbit not in self._exposures:
             return Remark("waiting", orbit, f"{EXPOSURES} has no exposures of it yet")
+        if orbit in self._copies:
+            words = f"its exposures have the times and pointings of orbit {self._copies[orbit]}"
+            return Remark("damaged", orbit, words)
         return None
 
     def _damage(self, path: Path) -> str:
@@ -229,15 +240,8 @@ class Arrivals:
         self._fitted_exposures.record({one: there[one] for one in orbits if one in there})
 
     def _misnamed(self) -> list[Remark]:
-        folder = self._survey / MEASUREMENTS
-        found = []
-        for path in sorted(folder.glob("orbit=*.parquet")):
-            match = _NUMBERED.fullmatch(path.name)
-            wanted = measurement_path(self._survey, int(match[1])) if match else path
-            if wanted != path:
-                message = f"{_name_of(path)} is not read, since its name is not {wanted.name}"
-                found.append(Remark("damaged", None, message))
-        return found
+        messages = misnamed_orbits(self._survey)
+        return [Remark("damaged", None, message) for message in messages]
 
     def _has_settled(self, path: Path) -> bool:
         """Return whether a file has not been written since the look before."""

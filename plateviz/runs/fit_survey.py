@@ -15,6 +15,7 @@ import pandas as pd
 import pyarrow as pa
 from pyarrow import parquet
 
+from plateviz.runs.changed_inputs import changed_inputs
 from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
 from plateviz.runs.fitted_orbit import read_summary
 from plateviz.runs.gathered_diagnosis import write_test_tables
@@ -32,6 +33,7 @@ from solver.io.lock import locked
 from solver.io.parquet import write_parquet
 from solver.io.survey import orbit_ranges, survey_orbits
 from solver.io.survey_manifest import survey_changes
+from solver.io.survey_problems import copied_orbits
 from solver.io.table_check import refuse
 from solver.model.apparent_motion import julian_year
 from solver.results.time_series import errors_by_count, motion_table
@@ -109,12 +111,14 @@ def fit_survey(
             )
         # Another process may have begun a run of that name at the same time.
         begin_run(survey, name, settings)
+        refuse(copied_orbits(survey))
+        changed = changed_inputs(run)
         if repair:
             # An orbit that could not be fitted again is not removed.
             refuse(survey_changes(survey))
-            run.remove_damaged()
+            run.remove_damaged(changed)
         else:
-            refuse(run.changes())
+            refuse([*run.changes(), *changed.values()])
         return fit_missing(run, wanted, workers, scheduler, progress)
 
 

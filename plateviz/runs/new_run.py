@@ -24,7 +24,7 @@ from solver.runtime.versions import versions_of
 
 # Their versions belong to a run: results may differ between versions.
 PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
 def begin_run(survey: Path, name: str, settings: FitSettings, grows: bool = False) -> Run:
@@ -44,7 +44,8 @@ def begin_run(survey: Path, name: str, settings: FitSettings, grows: bool = Fals
     survey_orbits(survey)
     if not _NAME.fullmatch(name):
         raise InputError(
-            f"--run: expected a name of letters, digits, '.', '-' and '_', found {name!r}"
+            f"--run: expected a name of up to 100 letters, digits, '.', '-' and '_' that "
+            f"begins with a letter or digit, found {name[:60]!r}"
         )
     run = Run(Path(survey), name)
     path = run.directory / RUN_FILE

@@ -19,7 +19,7 @@ continued with the missing orbits, and only with the settings with which it was 
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -179,16 +179,19 @@ class Run:
         ]
         return found + self._table_changes()
 
-    def remove_damaged(self) -> list[int]:
-        """Remove the orbits and the tables over all orbits that are not as they were written.
+    def remove_damaged(self, also: Collection[int] = ()) -> list[int]:
+        """Remove orbits and tables over all orbits that are not as they were written.
+
+        Parameters
+        ----------
+        also : orbits to be removed as well
 
         Returns
         -------
         The removed orbits, which have to be fitted again.
         """
-        damaged = [
-            orbit for orbit in self.complete_orbits() if orbit_changes(self.orbit_directory(orbit))
-        ]
+        there = self.complete_orbits()
+        damaged = [o for o in there if o in also or orbit_changes(self.orbit_directory(o))]
         if damaged or self._table_changes():
             for name in (_COMPLETE, _GATHERED):
                 (self.directory / name).unlink(missing_ok=True)

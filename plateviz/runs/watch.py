@@ -74,6 +74,7 @@ class Watch:
     failed : reasons why orbits have no solution, by orbit
     distrusted : orbits fitted so far whose solutions should not be trusted
     has_begun : whether the run is locked and found whole
+    unread : why orbits, or all of them, could not be read at the last look
     """
 
     survey: Path
@@ -85,6 +86,7 @@ class Watch:
     failed: dict[int, str] = field(default_factory=dict)
     distrusted: list[int] = field(default_factory=list)
     has_begun: bool = False
+    unread: list[str] = field(default_factory=list)
 
     def run(self, interval: float, ends: Ends) -> None:
         """Fit orbits as they arrive, until the watch ends or is interrupted.
@@ -134,6 +136,7 @@ class Watch:
         while True:
             look = arrivals.look()
             standing = self._remark(look.remarks, standing)
+            self.unread = [one.message for one in look.remarks if one.is_fault]
             self._fit(run, arrivals, look.ready)
             if ends.until is not None and self._done(run) >= ends.until:
                 self._close(run)

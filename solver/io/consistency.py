@@ -6,6 +6,8 @@ _MAX_LISTED = 5
 # An orbit about the Earth takes hours; one about L2 may be cut into days.
 _LONGEST_ORBIT_D = 2.0
 _EXPOSURE = ["orbit_id", "field_id", "plate_id"]
+# No two exposures of a telescope have all of these in common.
+_ATTITUDE = ["obstime", "ra_est", "dec_est", "pa_est"]
 
 
 def exposure_problems(
@@ -23,6 +25,32 @@ def exposure_problems(
         return []
     is_measured = pd.MultiIndex.from_frame(exposures[_EXPOSURE]).isin(measured)
     return _time_problems(exposures[is_measured], where_exposures)
+
+
+def repeated_orbit_problems(exposures: pd.DataFrame, where: str) -> list[str]:
+    """Return a message if orbits have the same exposures; parameters as of `repeated_orbits`."""
+    copies = repeated_orbits(exposures)
+    if not copies:
+        return []
+    return [
+        f"{where}: expected no exposure in two orbits, found the same times and pointings in "
+        f"{_listed(copies)}; a copied orbit would count as an independent one"
+    ]
+
+
+def repeated_orbits(exposures: pd.DataFrame) -> list[tuple[int, ...]]:
+    """Return the groups of orbits with exposures of the same time and attitude.
+
+    Parameters
+    ----------
+    exposures : of a survey; columns may be missing, and rows without values
+    """
+    if not {"orbit_id", *_ATTITUDE} <= set(exposures):
+        return []
+    distinct = exposures.drop_duplicates(["orbit_id", *_ATTITUDE]).dropna(subset=_ATTITUDE)
+    shared = distinct[distinct.duplicated(_ATTITUDE, keep=False)]
+    groups = shared.groupby(_ATTITUDE)["orbit_id"]
+    return sorted({tuple(sorted(set(orbits))) for _, orbits in groups})
 
 
 def _time_problems(exposures: pd.DataFrame, where: str) -> list[str]:

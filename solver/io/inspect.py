@@ -22,6 +22,7 @@ from solver.io.read_orbit import names_of
 from solver.io.result import is_result, to_result
 from solver.io.survey import measurement_path, read_header, section, survey_orbits
 from solver.io.survey_manifest import survey_changes
+from solver.io.survey_problems import survey_problems
 from solver.io.table_check import examine, matched_names
 
 _INPUTS = (MEASUREMENT, ENVIRONMENT, CATALOGUE, TRUTH)
@@ -103,7 +104,7 @@ def _inspect_folder(finding: _Finding) -> None:
             if path.name in _SURVEY_TABLES:
                 _inspect_in_folder(finding, path, _SURVEY_TABLES[path.name])
         finding.kind = "survey"
-        finding.problems += survey_changes(finding.path)
+        finding.problems += [*survey_changes(finding.path), *survey_problems(finding.path)]
         finding.defects = _defects_of(finding.path)
         finding.counts = _counts_of(finding.path)
         return

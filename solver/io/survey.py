@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 
@@ -36,7 +37,7 @@ from solver.io.manifest import (
 from solver.io.parquet import write_parquet
 from solver.io.read_orbit import find_catalogue
 from solver.io.survey_manifest import MANIFEST, listed_files, require_unchanged_files
-from solver.io.table_check import conform, refuse
+from solver.io.table_check import conform, matched_names, refuse
 
 FORMAT = 1
 HEADER = "survey.toml"
@@ -99,7 +100,7 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
     if has_survey_table(directory, TRUTH_FILE):
         paths.append(directory / TRUTH_FILE)
     provenance = require_unchanged_files(directory, paths)
-    measurements, exposures = _read_table(paths[0], MEASUREMENT), _read_table(paths[2], ENVIRONMENT)
+    measurements, exposures = _read_table(paths[0], MEASUREMENT), _exposures_of(paths[2], orbit_id)
     catalogue = _table_of_sources(paths[1], provenance[REFERENCE], CATALOGUE)
     _check_orbit(measurements, orbit_id, paths[0])
     where, where_catalogue, where_exposures = map(str, paths[:3])
@@ -227,6 +228,16 @@ def _table_of_sources(path: Path, digest: str, schema: Table) -> pd.DataFrame:
 
 def _read_table(path: Path, schema: Table) -> pd.DataFrame:
     return conform(find_catalogue(path).table, schema, str(path))
+
+
+def _exposures_of(path: Path, orbit_id: int) -> pd.DataFrame:
+    """Read the exposures of an orbit; those of others may be wrong."""
+    raw = find_catalogue(path).table
+    name = matched_names(raw.colnames, ENVIRONMENT).get("orbit_id")
+    if name is not None:
+        is_of_orbit = np.asarray(raw[name] == orbit_id, dtype=bool)
+        raw = raw[is_of_orbit] if is_of_orbit.any() else raw
+    return conform(raw, ENVIRONMENT, str(path))
 
 
 def write_survey_table(frame: pd.DataFrame, schema: Table, path: Path) -> None:

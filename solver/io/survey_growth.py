@@ -10,7 +10,7 @@ from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
-from solver.io.consistency import catalogue_problems, exposure_problems
+from solver.io.consistency import catalogue_problems, exposure_problems, repeated_orbit_problems
 from solver.io.disk import writing
 from solver.io.lock import locked
 from solver.io.manifest import manifest_text
@@ -58,6 +58,7 @@ def append_orbit(directory: Path, orbit: OrbitData) -> Path:
         others = _other_exposures(directory, orbit.orbit_id)
         _check(directory, orbit)
         exposures = pd.concat([others, orbit.exposures[ENVIRONMENT.names]])
+        refuse(repeated_orbit_problems(exposures, f"{directory} with orbit {orbit.orbit_id}"))
         exposures = exposures.sort_values(list(ENVIRONMENT.key))
         with writing(path.parent, "to make the folder"):
             path.parent.mkdir(exist_ok=True)
@@ -107,6 +108,8 @@ def _check(directory: Path, orbit: OrbitData) -> None:
             f"{directory}: expected an orbit that the survey does not have, found {orbit.orbit_id}"
         )
     where = f"orbit {orbit.orbit_id}"
+    if orbit.orbit_id < 0:
+        raise InputError(f"{where}: expected an orbit_id of 0 or more")
     found = exposure_problems(orbit.measurements, orbit.exposures, where, f"{where}, exposures")
     catalogue = read_survey_table(reference, CATALOGUE)
     found += catalogue_problems(orbit.measurements, catalogue, where, str(reference))

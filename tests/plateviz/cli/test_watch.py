@@ -98,3 +98,13 @@ def test_interval_and_ends_are_those_of_the_options(run, monkeypatch):
     monkeypatch.setattr(watch.Watch, "run", lambda _, *arguments: seen.append(arguments))
     run("watch", "DIR", "--interval", "60", "--once", "--until", "9")
     assert seen == [(60.0, watch.Ends(at_once=True, until=9))]
+
+
+def test_what_could_not_be_read_at_the_last_look_is_a_failure(run, watching):
+    def look(watcher):
+        watcher.unread = ["orbit=0001.parquet is no table"]
+
+    watching([FITTED], look)
+    code, _, err = run("watch", "DIR", "--once")
+    assert code == 1
+    assert "could not be read at the last look: orbit=0001.parquet is no table" in err

@@ -5,21 +5,26 @@ import shutil
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from plateviz.runs.fit_survey import fit_survey
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run import Run
 from solver.data.instrument import write_instrument
+from solver.data.schema import ENVIRONMENT, MEASUREMENT
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.survey import (
+    EXPOSURES,
     measurement_path,
     read_header,
     read_survey_instrument,
     read_survey_orbit,
+    read_survey_table,
     survey_orbits,
     write_header,
+    write_survey_table,
 )
 
 pytestmark = pytest.mark.slow
@@ -225,3 +230,25 @@ def test_source_is_found_once_its_orbit_is_fitted(survey):
     run.directory.rmdir()
     history.rename(run.directory)
     assert not opened.history(source).empty
+
+
+def test_orbit_whose_measurements_were_changed_is_fitted_again_by_a_repair(survey):
+    path = measurement_path(survey, 1)
+    measurements = read_survey_table(path, MEASUREMENT)
+    write_survey_table(measurements.iloc[:-1], MEASUREMENT, path)
+    (survey / "manifest.sha256").unlink()
+    settings = FitSettings(order=3)
+    with pytest.raises(InputError, match=r"0001\.parquet: expected the measurements that run"):
+        fit_survey(survey, "default", settings, workers=1)
+    report = fit_survey(survey, "default", settings, workers=1, repair=True)
+    assert report.fitted == [1]
+    assert len(SurveyRun(report.run).result(1).residuals) == len(measurements) - 1
+
+
+def test_copied_orbit_is_refused(survey):
+    (survey / "manifest.sha256").unlink()
+    exposures = read_survey_table(survey / EXPOSURES, ENVIRONMENT)
+    copy = exposures[exposures["orbit_id"] == 0].assign(orbit_id=7)
+    write_survey_table(pd.concat([exposures, copy]), ENVIRONMENT, survey / EXPOSURES)
+    with pytest.raises(InputError, match=r"expected no exposure in two orbits, .*\(0, 7\)"):
+        fit_survey(survey, "another", FitSettings(order=3), workers=1)

@@ -39,7 +39,7 @@ def test_run_with_other_inputs_is_refused(survey_folder):
         begin_run(survey_folder, "inputs", FitSettings())
 
 
-@pytest.mark.parametrize("name", ["", "../up", ".hidden", "a b", "a/b"])
+@pytest.mark.parametrize("name", ["", "../up", ".hidden", "a b", "a/b", 101 * "a"])
 def test_invalid_folder_name_is_refused(survey_folder, name):
     with pytest.raises(InputError, match="--run: expected a name"):
         begin_run(survey_folder, name, FitSettings())

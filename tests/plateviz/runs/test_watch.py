@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 
 from plateviz.runs import dask_workers, fit_survey, watch
@@ -21,6 +22,7 @@ from solver.io.lock import locked
 from solver.io.survey import (
     EXPOSURES,
     REFERENCE,
+    measurement_path,
     read_survey_orbit,
     read_survey_table,
     write_survey_table,
@@ -387,3 +389,18 @@ def test_watched_run_has_the_tables_of_a_run_of_all_orbits(growing, watched):
     for name in ("history.parquet", "motions.parquet", "orbit=0001/sources.parquet"):
         assert (run.directory / name).read_bytes() == (whole.directory / name).read_bytes()
     assert json.loads((run.directory / "gathered.json").read_text())["orbits"] == [0, 1, 2]
+
+
+@pytest.mark.usefixtures("fits")
+def test_copy_of_an_orbit_is_told_and_not_fitted(growing, watched):
+    def step():
+        growing.append(1)
+        table = read_survey_table(growing.directory / EXPOSURES, ENVIRONMENT)
+        copied = table[table["orbit_id"] == 0].assign(orbit_id=2)
+        shutil.copy(measurement_path(growing.whole, 2), growing.file(2))
+        write_survey_table(pd.concat([table, copied]), ENVIRONMENT, growing.directory / EXPOSURES)
+        growing.write_manifest()
+
+    said = watched(step)
+    assert kinds(said) == [("fitted", 0), ("damaged", 2), ("fitted", 1)]
+    assert "times and pointings of orbit 0" in message(said, "damaged")

@@ -154,7 +154,7 @@ def test_instrument(tmp_path):
 
 
 def test_survey(tmp_path):
-    (tmp_path / "survey.toml").write_text("")
+    (tmp_path / "survey.toml").write_text("format = 1")
     write_table(catalogue(), tmp_path / "reference.parquet")
     write_table(environment(), tmp_path / "exposures.parquet")
     (found,) = _inspect(tmp_path)

@@ -30,6 +30,13 @@ def assert_equal(one, other):
         pd.testing.assert_frame_equal(getattr(one, name), getattr(other, name))
 
 
+def renumbered(orbit, number, days=0.0):
+    """Return an orbit under another id, some days later."""
+    exposures = orbit.exposures.assign(orbit_id=number, obstime=orbit.exposures["obstime"] + days)
+    measurements = orbit.measurements.assign(orbit_id=number)
+    return replace(orbit, measurements=measurements, exposures=exposures)
+
+
 def test_added_orbit_is_read_as_in_the_survey_that_it_comes_from(growing, small_survey):
     growing.append(1)
     assert survey_orbits(growing.directory) == [0, 1]
@@ -107,11 +114,31 @@ def test_killed_call_keeps_no_other_orbit_out(growing, small_survey):
     # As if the exposures were replaced and the manifest were not.
     (growing.directory / MANIFEST).write_bytes(old)
     one = read_survey_orbit(small_survey, 1)
-    third = {name: getattr(one, name).assign(orbit_id=2) for name in ("measurements", "exposures")}
-    append_orbit(growing.directory, replace(one, **third))
+    append_orbit(growing.directory, renumbered(one, 2, days=3.0))
     assert survey_changes(growing.directory) == []
     exposures = read_survey_table(growing.directory / EXPOSURES, ENVIRONMENT)
     assert exposures["orbit_id"].unique().tolist() == [0, 2]
     growing.append(1)
     assert survey_changes(growing.directory) == []
     assert read_survey_orbit(growing.directory, 1).orbit_id == 1
+
+
+def test_copy_of_an_orbit_is_refused(growing, small_survey):
+    copy = renumbered(read_survey_orbit(small_survey, 0), 7)
+    with pytest.raises(InputError, match=r"expected no exposure in two orbits, .*\(0, 7\)"):
+        append_orbit(growing.directory, copy)
+    with pytest.raises(InputError, match="orbit -1: expected an orbit_id of 0 or more"):
+        append_orbit(growing.directory, renumbered(copy, -1, days=3.0))
+    assert survey_orbits(growing.directory) == [0]
+
+
+def test_exposures_of_other_orbits_may_be_wrong(small_survey, tmp_path):
+    survey = tmp_path / "survey"
+    shutil.copytree(small_survey, survey)
+    (survey / MANIFEST).unlink()
+    exposures = pd.read_parquet(survey / EXPOSURES)
+    exposures.loc[exposures["orbit_id"] == 1, "ra_est"] = float("nan")
+    exposures.to_parquet(survey / EXPOSURES, index=False)
+    assert_equal(read_survey_orbit(survey, 0), read_survey_orbit(small_survey, 0))
+    with pytest.raises(InputError, match="column 'ra_est': expected"):
+        read_survey_orbit(survey, 1)

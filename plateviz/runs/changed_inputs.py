@@ -1,0 +1,36 @@
+"""Whether the measurements of the orbits of a run are still those that were fitted."""
+
+from plateviz.runs.fitted_orbit import read_provenance
+from plateviz.runs.run import Run
+from solver.errors import InputError
+from solver.io.atomic import sha256_of
+from solver.io.survey import measurement_path
+from solver.io.survey_manifest import listed_files
+
+
+def changed_inputs(run: Run) -> dict[int, str]:
+    """Return a message for each fitted orbit whose file of measurements is another one by now.
+
+    Raises
+    ------
+    InputError
+        If a file or the manifest of the survey cannot be read.
+    """
+    listed, found = listed_files(run.survey), {}
+    for orbit in run.complete_orbits():
+        path = measurement_path(run.survey, orbit)
+        name = path.relative_to(run.survey).as_posix()
+        try:
+            fitted = read_provenance(run.orbit_directory(orbit)).get(name)
+        except InputError:
+            # The orbit is damaged, which `Run.changes` says.
+            continue
+        # Whether the file is the one that is listed is checked when it is read.
+        there = listed.get(name) or (sha256_of(path) if path.is_file() else None)
+        if fitted is not None and there != fitted:
+            found[orbit] = (
+                f"{path}: expected the measurements that run {run.name} has fitted, found "
+                f"{'others' if there else 'none'}; `plateviz survey {run.survey} --run {run.name} "
+                "--repair` fits the orbit as it is now"
+            )
+    return found

@@ -150,7 +150,7 @@ def _write_page(request: ReportRequest, output: Path, pdf: bool, overwrite: bool
 
         page = page_of(content, reporter.step)
         with write_atomically(output, overwrite) as temporary:
-            temporary.write_text(page, encoding="utf-8")
+            temporary.write_text(page, encoding="utf-8", errors="replace")
         if pdf:
             reporter.say("printing")
             print_pdf(output, printed, overwrite)

@@ -12,6 +12,8 @@ from plateviz.tables.verdict import as_plain
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 
+# More than any survey has.
+_MOST_ORBITS = 1_000_000
 _RANGE = re.compile(r"(\d+)(?:-(\d+))?")
 
 
@@ -32,7 +34,10 @@ def parse_orbits(text: str | None) -> list[int] | None:
             raise InputError(
                 f"--orbits: expected numbers and ranges such as 0-9,12, found {text!r}"
             )
-        orbits.extend(range(int(found[1]), int(found[2] or found[1]) + 1))
+        first, last = int(found[1]), int(found[2] or found[1])
+        if last - first >= _MOST_ORBITS:
+            raise InputError(f"--orbits: expected fewer than {_MOST_ORBITS:,}, found {word!r}")
+        orbits.extend(range(first, last + 1))
     return orbits
 
 

@@ -48,7 +48,7 @@ def write_report(
         report = compose(facts_of(f"{call}.report({fspath(path)!r})", run))
         page = page_of(report, reporter.step)
         with write_atomically(target, overwrite) as temporary:
-            temporary.write_text(page, encoding="utf-8")
+            temporary.write_text(page, encoding="utf-8", errors="replace")
     return target
 
 

@@ -142,7 +142,7 @@ def _write(
 
 def _write_page(path: Path, report: Report) -> None:
     with write_atomically(path) as temporary:
-        temporary.write_text(page_of(report), encoding="utf-8")
+        temporary.write_text(page_of(report), encoding="utf-8", errors="replace")
 
 
 def _page(folder: Path, orbit: int) -> Path:

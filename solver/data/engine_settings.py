@@ -14,6 +14,10 @@ from solver.data.setting_kinds import (
 )
 from solver.errors import InputError
 
+# What every generator of random numbers takes.
+_LARGEST_SEED = 2**32 - 1
+_SEED = Whole(label="seed", help="Seed of the random draws.", low=0, high=_LARGEST_SEED)
+
 
 @dataclass(frozen=True)
 class SviSettings:
@@ -60,7 +64,7 @@ class SviSettings:
         10_000,
         Whole(label="maximum number of steps", help="Maximum number of steps, not below `steps`."),
     )
-    seed: int = setting(0, Whole(label="seed", help="Seed of the random draws.", low=0))
+    seed: int = setting(0, _SEED)
     conditioned: bool = setting(
         True, Switch(label="conditioned", help="Whether to step in whitened coordinates.")
     )
@@ -101,7 +105,7 @@ class NutsSettings:
     chains: int = setting(
         2, Whole(label="chains", help="Number of chains; they run one after the other.")
     )
-    seed: int = setting(0, Whole(label="seed", help="Seed of the random draws.", low=0))
+    seed: int = setting(0, _SEED)
 
     def __post_init__(self) -> None:
         """Raise `InputError`, which names the setting, if a value is invalid."""
@@ -126,6 +130,7 @@ ENGINE_OPTIONS: dict[str, Setting] = {
         label="seed",
         help="Seed of the random numbers of svi and nuts.",
         low=0,
+        high=_LARGEST_SEED,
         keyword="seed",
         option="seed",
     ),

@@ -7,6 +7,8 @@ from solver.data.parameters import BY_NAME, Group
 from solver.data.quantity_text import QUANTITY, shortest, unit_factor
 from solver.errors import InputError
 
+# Widths that can be squared, inverted and added to what the measurements say.
+_NARROWEST, _WIDEST = 1e-9, 1e9
 _WIDTH = re.compile(rf"(?P<flat>flat|inf)|{QUANTITY}")
 _SHIFT = re.compile(QUANTITY)
 _SHIFTED = re.compile(r"(?P<group>\w+)\s*(?:\[\s*(?P<element>[^\[\]\s]+)\s*\])?")
@@ -30,6 +32,12 @@ def check_width(name: str, width: float) -> None:
     group_named(name)
     if not width > 0 or math.isnan(width):
         raise InputError(f"expected a positive prior width for {name}, found {width!r}")
+    if not _NARROWEST <= width <= _WIDEST and not math.isinf(width):
+        unit = BY_NAME[name].width_unit
+        raise InputError(
+            f"expected a prior width from {_NARROWEST:g} to {f'{_WIDEST:g} {unit}'.strip()} or "
+            f"'flat' for {name}, found {width!r}"
+        )
     if name == "sources" and math.isinf(width):
         raise InputError(
             "expected a finite factor on the catalogue's uncertainties for sources, found inf; "
@@ -89,6 +97,8 @@ def parse_width(name: str, text: str) -> float:
         width = math.inf
     else:
         width = float(match["number"]) * unit_factor(f"prior of {name}", match["unit"], unit)
+        if math.isinf(width):
+            raise InputError(f"prior of {name}: expected a finite width or 'flat', found {text!r}")
     check_width(name, width)
     return width
 

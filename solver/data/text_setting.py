@@ -59,7 +59,10 @@ class PriorWidths(Texts):
             group, found, width = text.partition("=")
             if not found:
                 raise InputError(f"--{self.option}: expected {self.metavar}, found {text!r}")
-            widths[group.strip()] = parse_width(group.strip(), width)
+            name = group.strip()
+            if name in widths:
+                raise InputError(f"--{self.option}: expected one width for {name}, found two")
+            widths[name] = parse_width(name, width)
         return widths
 
     def texts(self, value: Mapping[str, float]) -> list[str]:
@@ -89,7 +92,13 @@ class PriorShifts(Texts):
 
     def parse(self, texts: Iterable[str]) -> dict[str, float]:
         """Read texts such as "focal_length=100um" or "detector_x[2]=-5um"."""
-        return dict(map(parse_shift, texts))
+        shifts: dict[str, float] = {}
+        for text in texts:
+            name, shift = parse_shift(text)
+            if name in shifts:
+                raise InputError(f"--{self.option}: expected one shift for {name}, found two")
+            shifts[name] = shift
+        return shifts
 
     def texts(self, value: Mapping[str, float]) -> list[str]:
         """Return a text per shift."""

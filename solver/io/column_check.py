@@ -13,6 +13,7 @@ from solver.data.columns import Column
 
 # Units in which float32 is too coarse: 110 mas at 266 deg, minutes in MJD.
 _UNITS_IN_FLOAT64 = ("deg", "d")
+_SCALES = ("utc", "tai", "tt", "tcg", "tdb", "tcb")
 _TIME_FORMAT = {"d": "mjd", "yr": "jyear"}
 _LOGICALS = {"t": True, "true": True, "f": False, "false": False}
 
@@ -90,6 +91,9 @@ def _from_time(raw: Time, column: Column, where: str) -> Converted:
     missing = np.asarray(raw.mask)
     if missing.any():
         return _refused(where, "a time in every row", _rows(missing, "without one"))
+    # Others need the rotation of the Earth, of which astropy would download the latest table.
+    if raw.scale not in _SCALES:
+        return _refused(where, f"a time scale out of {', '.join(_SCALES)}", f"{raw.scale!r}")
     with warnings.catch_warnings():
         # ERFA warns of UTC years beyond its leap-second table.
         warnings.simplefilter("ignore")

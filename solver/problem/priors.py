@@ -193,6 +193,6 @@ def _require_narrow(
         if (width > widest).any():
             raise InputError(
                 f"prior of {name}: expected a width of {widest:.6g} {BY_NAME[name].unit} or less, "
-                f"which is one part in {_LEAST_CENTRE} of the value, found {width.max():.6g}; "
-                "'flat' lets it be anything"
+                f"which is one part in {_LEAST_CENTRE} of the smallest value, found "
+                f"{width.max():.6g}; check the values' unit; 'flat' lets them be anything"
             )

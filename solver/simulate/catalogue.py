@@ -127,6 +127,8 @@ def reference_catalogue(truth: pd.DataFrame, settings: SurveySettings) -> pd.Dat
         sigma = np.where(is_reference, truth[f"{name}_error"].to_numpy(), vague)
         catalogue[f"{name}_error"] = sigma
         catalogue[name] += sigma * pulls[name] * _per_mas(name, truth)
+    # An error may lead across 0h.
+    catalogue["ra"] %= 360.0
     for column in CATALOGUE:
         if column.name not in catalogue:
             catalogue[column.name] = column.default

@@ -272,6 +272,11 @@ def test_orbits_are_parsed_from_ranges(text, orbits):
     assert parse_orbits(text) == orbits
 
 
+def test_range_that_no_survey_has_is_refused():
+    with pytest.raises(InputError, match="--orbits: expected fewer than 1,000,000, found '0-99999"):
+        parse_orbits("3,0-99999999999999")
+
+
 @pytest.mark.parametrize("text", ["", "a", "3-1", "1-2-3", "1,,2"])
 def test_text_that_is_not_a_range_is_refused(text):
     with pytest.raises(InputError, match="--orbits: expected numbers and ranges"):

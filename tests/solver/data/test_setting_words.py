@@ -47,7 +47,7 @@ def test_words_are_those_of_the_command_line_and_have_what_differs():
     ]
 
 
-@given(st.floats(1e-12, 1e12))
+@given(st.floats(1e-9, 1e9))
 def test_every_digit_of_a_width_is_kept(width):
     settings = FitSettings(prior_widths={"detector_x": width})
     (read,) = parse_setting_words(setting_words(settings)).prior_widths.values()
@@ -88,3 +88,15 @@ def test_nonsense_is_refused_or_read(words):
     except InputError:
         return
     assert isinstance(settings, FitSettings)
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (("prior=distortion_x=1um", "prior=distortion_x=2um"), "one width for distortion_x"),
+        (("centre=pitch_x=1um", "centre=pitch_x=2um"), "one shift for pitch_x"),
+    ],
+)
+def test_group_has_one_prior(words, found):
+    with pytest.raises(InputError, match=f"expected {found}, found two"):
+        parse_setting_words(words)

@@ -87,7 +87,7 @@ def test_prior_widths_are_copied():
         (lambda: SviSettings(last_rate=1e5), "positive svi learning rates that fall"),
         (lambda: SviSettings(last_rate=0.0), "positive svi learning rates that fall"),
         (lambda: SviSettings(tolerance=0.0), "positive svi tolerance, found 0.0"),
-        (lambda: SviSettings(seed=-1), "svi seed to be 0 or more, found -1"),
+        (lambda: SviSettings(seed=-1), "seed from 0 to 4294967295, found -1"),
         (lambda: NutsSettings(chains=0), "nuts chains to be 1 or more, found 0"),
         (lambda: NutsSettings(samples=3), "nuts samples to be 4 or more, found 3"),
         (lambda: FitSettings(thin=0), "thin to be 1 or more, found 0"),

@@ -121,6 +121,14 @@ def test_times_become_mjd_in_tcb(scale, seconds):
     np.testing.assert_allclose((frame["obstime"] - 61822.0) * 86400.0, seconds, atol=0.1)
 
 
+@pytest.mark.parametrize("scale", ["local", "ut1"])
+def test_times_that_need_the_rotation_of_the_earth_are_refused(scale):
+    table = environment()
+    table["obstime"] = Time(np.full(len(table), 61822.0), format="mjd", scale=scale)
+    with pytest.raises(InputError, match=f"expected a time scale out of utc, .*, found '{scale}'"):
+        conform(table, ENVIRONMENT, WHERE)
+
+
 def test_ref_epoch_as_a_time_is_a_julian_year():
     table = catalogue()
     table["ref_epoch"] = Time(np.full(len(table), 2016.0), format="jyear", scale="tcb")

@@ -80,6 +80,9 @@ def sha256_of(path: Path) -> str:
     InputError
         If the file cannot be read.
     """
+    # A pipe would be waited for.
+    if Path(path).exists() and not Path(path).is_file():
+        raise InputError(f"{path}: expected a file, found something that is not a file")
     try:
         with Path(path).open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -34,6 +34,9 @@ def write_parquet(table: pa.Table, path: Path) -> None:
 
 def count_rows(path: str) -> int:
     """Return the number of rows of a table; InputError if it cannot be read."""
+    # A pipe would be waited for.
+    if Path(path).exists() and not Path(path).is_file():
+        raise InputError(f"{path}: expected a table of plateviz, found something that is no file")
     with refusing(path, "a table of plateviz"):
         return int(parquet.read_metadata(path).num_rows)
 

@@ -96,3 +96,9 @@ def test_sha256_of(tmp_path):
 def test_sha256_of_missing_file(tmp_path):
     with pytest.raises(InputError, match="expected a readable file"):
         sha256_of(tmp_path / "a")
+
+
+def test_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe: expected a file, found something that is not"):
+        sha256_of(tmp_path / "pipe")

@@ -165,7 +165,12 @@ def make_survey(folder: Path, orbit: OrbitData) -> None:
     for number in ORBITS:
         rows = orbit.measurements.assign(orbit_id=number)
         write_survey_table(rows, MEASUREMENT, measurement_path(folder, number))
-    exposures = pd.concat([orbit.exposures.assign(orbit_id=number) for number in ORBITS])
+    exposures = pd.concat(
+        [
+            orbit.exposures.assign(orbit_id=number, obstime=orbit.exposures["obstime"] + number)
+            for number in ORBITS
+        ]
+    )
     write_survey_table(exposures, ENVIRONMENT, folder / EXPOSURES)
     write_survey_table(orbit.catalogue, CATALOGUE, folder / REFERENCE)
     write_survey_table(orbit.truth, TRUTH, folder / TRUTH_FILE)
@@ -196,7 +201,8 @@ def make_run(folder: Path, orbit: OrbitData, complete: bool = True) -> Run:
             source_id=FIRST_ID + np.arange(N_SOURCES), orbit_id=number
         )
         summary = {**result.summary, "epoch_mjd": 62000.0 + number, "iterations": 3}
-        run.keep(number, replace(result, settings=settings, summary=summary), {"history": history})
+        changed = {"settings": settings, "summary": summary, "instrument": MINI_MOCK}
+        run.keep(number, replace(result, **changed), {"history": history})
     if complete:
         _gather(run, random)
         run.mark_complete()

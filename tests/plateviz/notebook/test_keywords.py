@@ -74,7 +74,7 @@ def test_steps_and_seed_are_settings_of_the_engines():
         ({"exclude": "detector 2"}, "what to leave out: expected source=ID"),
         ({"exclude": 2}, "exclude: expected texts such as 'detector=2', found 2"),
         ({"steps": 2.5}, "svi steps to be 1 or more, found 2.5"),
-        ({"seed": -1}, "svi seed to be 0 or more"),
+        ({"seed": -1}, "seed from 0 to 4294967295"),
     ],
     ids=lambda value: str(value)[:40],
 )

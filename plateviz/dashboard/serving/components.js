@@ -12,8 +12,9 @@
 // together: those that are in another one with it, except for cards, which have layouts of their
 // own (see `own_layout.py`).
 //
-// A component of React is drawn first and follows its model a moment later. What the server changed
-// in between, Panel would not show until it changes again; here it is read again then.
+// A component of React is drawn first and follows its model, and the list of its parts, a moment
+// later. What the server changed in between, Panel would not show until it changes again; here it is
+// read again then.
 //
 // Columns of texts arrive packed.
 //
@@ -42,6 +43,12 @@ document.addEventListener("DOMContentLoaded", () => {
     if (isState) callback()
   }
   const container = Bokeh.Models.get("panel.models.esm.ReactComponent").prototype.default_view
+  const { on_child_render } = container.prototype
+  container.prototype.on_child_render = function (name, callback) {
+    on_child_render.call(this, name, callback)
+    // Without new parts, what follows the list of all parts reads it again, and the rest does nothing.
+    callback([])
+  }
   const views = Object.getPrototypeOf(container.prototype)
   const { compute_layout, invalidate_layout } = views
   // View -> whether its style sheets have to be written before.

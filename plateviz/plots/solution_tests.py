@@ -32,7 +32,8 @@ def plot_solution_tests(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Fig
     if table.empty:
         return message(_TITLE, "No tests", width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     total = int(table["total"].iloc[0])
-    limit, count = largest_by_chance(total), int(table["is_found"].sum())
+    limit, count = largest_by_chance(total), int(table["total_found"].iloc[0])
+    cut = f"; the first {len(table)} are shown" if len(table) < total else ""
     most = max(1.08 * float(table["sigma"].max()), _LEAST_RANGE)
     low, high = len(table) - 0.4, -0.6
     shown = {
@@ -55,8 +56,8 @@ def plot_solution_tests(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Fig
             *shown.values(),
         ],
         title=_TITLE,
-        subtitle=f"{count} of {total} find more than chance; band: the largest of all by chance, "
-        f"{limit:.1f} σ",
+        subtitle=f"{count} of {total} find more than chance{cut}; band: the largest of all by "
+        f"chance, {limit:.1f} σ",
         x=Axis(_XLABEL, (0.0, most)),
         y=Axis(_YLABEL, (low, high), ticks=ticks),
         width=width,

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy.special import chdtri
 
+from plateviz.plots.solution_tests import plot_solution_tests
 from plateviz.tables import verdict
+from plateviz.tables.solution_tests import solution_tests
 from plateviz.tables.verdict import (
     is_judged,
     orbit_verdict,
@@ -226,3 +228,14 @@ def test_source_is_judged_by_its_scatter_about_the_motion(survey, chi2, state):
 def test_source_without_a_motion_cannot_be_judged(survey):
     history, _ = survey.source("other")
     assert source_verdict(history, None).state == "warn"
+
+
+def test_table_of_the_tests_counts_those_that_are_cut_off(monkeypatch, fit_result):
+    judged = orbit_verdict(fit_result)
+    found = [one._replace(is_found=True) for one in judged.tests]
+    monkeypatch.setitem(fit_result.derived, "verdict", judged._replace(tests=found))
+    table = solution_tests(fit_result, most=5)
+    assert len(table) == 5
+    assert (table[["total", "total_found"]] == len(found)).all(axis=None)
+    subtitle = plot_solution_tests(table).frames[0].subtitle
+    assert subtitle.startswith(f"{len(found)} of {len(found)} find more than chance; the first 5 ")

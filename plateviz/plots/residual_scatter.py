@@ -47,13 +47,18 @@ def plot_residual_scatter(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> F
         data, colour = [_points(table)], "line"
     return framed(
         [*data, *_expected(expected, colour)],
-        title=_TITLE,
+        title=_title(table),
         subtitle=_subtitle(statistics),
         x=Axis(_XLABEL, (-half, half)),
         y=Axis(_YLABEL, (-half, half)),
         width=width,
         legend_columns=3,
     )
+
+
+def _title(table: pd.DataFrame) -> str:
+    detectors = table["detector_id"].unique()
+    return _TITLE if len(detectors) > 1 else f"Residuals on detector {detectors[0]}, x against y"
 
 
 def _points(table: pd.DataFrame) -> Glyphs:

@@ -41,7 +41,7 @@ MOTION: Mapping[str, Heading] = {
     "value": Heading("fitted", "0.000"),
     "fit": Heading("fitted − catalogue", "0.000"),
     "sigma_noise": Heading("σ noise", "0.000"),
-    "sigma_catalogue": Heading("σ catalogue", "0.000"),
+    "sigma_catalogue": Heading("σ from references", "0.000"),
     "sigma": Heading("σ", "0.000"),
     "true": Heading("truth − catalogue", "0.000"),
     "pull": Heading("pull", "0.000"),

@@ -10,6 +10,7 @@ from plateviz.plots.units import finer_unit, number_text
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.calibration_trends import calibration_trends
 from plateviz.tables.survey_tables import SurveyTables
+from solver.results.diagnosis.survey.trends import LEAST_ORBITS
 from solver.units import ARCSEC_PER_DEG
 
 _TITLE = "Trends of the calibration"
@@ -27,7 +28,7 @@ def plot_calibration_trends(table: pd.DataFrame, *, width: int = PANEL_WIDTH) ->
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        text, label = "No calibration of enough orbits", f"{_YLABEL} (µm)"
+        text, label = f"No calibration of {LEAST_ORBITS} orbits", f"{_YLABEL} (µm)"
         return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=label)
     panels = [_panel(rows, str(name), width) for name, rows in table.groupby("group", sort=False)]
     return side_by_side(panels, columns=3)

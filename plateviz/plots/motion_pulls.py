@@ -33,7 +33,7 @@ def plot_motion_pulls(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figur
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        text = "No source with enough orbits"
+        text = f"No source in {LEAST_ORBITS} orbits"
         return message(_TITLE, text, width=width, xlabel=_PULL, ylabel=_YLABEL)
     panels = [
         _panel(rows, str(name), width) for name, rows in table.groupby("parameter", sort=False)

@@ -100,8 +100,8 @@ class Arrivals:
         self._digests: dict[Path, tuple[_State | None, str]] = {}
         self._exposures: dict[int, str] = {}
         self._exposures_read: object = None
-        # Orbit -> the one whose exposures it has as well.
-        self._copies: dict[int, int] = {}
+        # Orbit -> those that have the same exposures, itself among them.
+        self._copies: dict[int, tuple[int, ...]] = {}
         self._fitted_exposures = FittedExposures(run.directory)
         # Of fitted orbits: the SHA-256 of the files that were fitted, and the state of the
         # measurements at the first look.
@@ -132,7 +132,10 @@ class Arrivals:
         self._before, self._states = self._states, {p: _state_of(p) for p in files.values()}
         ready, remarks = [], self._misnamed()
         for orbit in orbits:
-            found = self._changed(orbit) if orbit in fitted else self._unfit(orbit)
+            if orbit in fitted:
+                found = self._changed(orbit)
+            else:
+                found = self._unfit(orbit) or self._copied(orbit, fitted)
             if found is not None:
                 remarks.append(found)
             elif orbit not in fitted and self._tried.get(orbit) != self._signature(orbit):
@@ -166,7 +169,7 @@ class Arrivals:
         if state != self._exposures_read and state != (None, None):
             table = read_survey_table(path, ENVIRONMENT)
             self._exposures = {int(one): digest_of(rows) for one, rows in table.groupby("orbit_id")}
-            self._copies = {one: group[0] for group in repeated_orbits(table) for one in group[1:]}
+            self._copies = {one: group for group in repeated_orbits(table) for one in group}
             self._exposures_read = state
         return survey_orbits(self._survey)
 
@@ -186,10 +189,16 @@ class Arrivals:
             return Remark("waiting", orbit, f"{MANIFEST} does not list {name} yet")
         if orbit not in self._exposures:
             return Remark("waiting", orbit, f"{EXPOSURES} has no exposures of it yet")
-        if orbit in self._copies:
-            words = f"its exposures have the times and pointings of orbit {self._copies[orbit]}"
-            return Remark("damaged", orbit, words)
         return None
+
+    def _copied(self, orbit: int, fitted: set[int]) -> Remark | None:
+        """Return of which orbit that is fitted, or comes before it, one is a copy; None if none."""
+        group = self._copies.get(orbit, ())
+        others = [one for one in group if one < orbit or (one in fitted and one != orbit)]
+        if not others:
+            return None
+        words = f"its exposures have the times and pointings of orbit {others[0]}"
+        return Remark("damaged", orbit, words)
 
     def _damage(self, path: Path) -> str:
         """Return why a file is not known to be whole; empty if it is."""

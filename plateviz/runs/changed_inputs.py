@@ -11,6 +11,8 @@ from solver.io.survey_manifest import listed_files
 def changed_inputs(run: Run) -> dict[int, str]:
     """Return a message for each fitted orbit whose file of measurements is another one by now.
 
+    An orbit whose file is gone keeps its solution, which nothing could replace.
+
     Raises
     ------
     InputError
@@ -25,12 +27,13 @@ def changed_inputs(run: Run) -> dict[int, str]:
         except InputError:
             # The orbit is damaged, which `Run.changes` says.
             continue
+        if fitted is None or not path.is_file():
+            continue
         # Whether the file is the one that is listed is checked when it is read.
-        there = listed.get(name) or (sha256_of(path) if path.is_file() else None)
-        if fitted is not None and there != fitted:
+        if (listed.get(name) or sha256_of(path)) != fitted:
             found[orbit] = (
-                f"{path}: expected the measurements that run {run.name} has fitted, found "
-                f"{'others' if there else 'none'}; `plateviz survey {run.survey} --run {run.name} "
-                "--repair` fits the orbit as it is now"
+                f"{path}: expected the measurements that run {run.name} has fitted, found others; "
+                f"`plateviz survey {run.survey} --run {run.name} --repair` fits the orbit as it is "
+                "now"
             )
     return found

@@ -31,7 +31,7 @@ from solver.io.atomic import write_atomically
 from solver.io.disk import size_text
 from solver.io.lock import locked
 from solver.io.parquet import write_parquet
-from solver.io.survey import orbit_ranges, survey_orbits
+from solver.io.survey import orbit_ranges, read_survey_orbit, survey_orbits
 from solver.io.survey_manifest import survey_changes
 from solver.io.survey_problems import copied_orbits
 from solver.io.table_check import refuse
@@ -116,6 +116,8 @@ def fit_survey(
         if repair:
             # An orbit that could not be fitted again is not removed.
             refuse(survey_changes(survey))
+            for orbit in changed:
+                read_survey_orbit(survey, orbit)
             run.remove_damaged(changed)
         else:
             refuse([*run.changes(), *changed.values()])

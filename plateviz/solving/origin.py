@@ -5,6 +5,7 @@ send it to the solver process, which does.
 """
 
 import os
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -128,8 +129,14 @@ Origin = OrbitFiles | SurveyFolder
 
 def _states(paths: list[Path]) -> FileStates:
     """Return number, size and time of writing (ns) of the files that exist."""
-    found = [path.stat() for path in paths if path.is_file()]
-    return [(one.st_ino, one.st_size, one.st_mtime_ns) for one in found]
+    found = []
+    for path in paths:
+        # One may vanish meanwhile.
+        with suppress(OSError):
+            if path.is_file():
+                one = path.stat()
+                found.append((one.st_ino, one.st_size, one.st_mtime_ns))
+    return found
 
 
 def origin_to_dict(origin: Origin) -> dict[str, object]:

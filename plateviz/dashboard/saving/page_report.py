@@ -19,6 +19,7 @@ from plateviz.solving.as_code import as_command, report_of_run
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.turns import Turns
 from solver.errors import InputError
+from solver.io.result_instrument import instrument_of
 
 
 def page_report(navigation: Navigation) -> Later:
@@ -95,7 +96,7 @@ def _solution(
 ) -> Report:
     report = orbit_report(
         shown.result,
-        store.instrument,
+        instrument_of(shown.result, otherwise=store.instrument),
         facts,
         other.result if other else None,
         simulation=store.simulation,

@@ -4,6 +4,7 @@ from plateviz.dashboard.session.session import Session
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace
+from solver.io.result_instrument import instrument_of
 
 
 def figures_of(session: Session, workspace: OrbitWorkspace) -> list[Diagnostic]:
@@ -24,7 +25,7 @@ def chosen_of(session: Session) -> Chosen | None:
         return None
     return Chosen(
         result=shown.result,
-        instrument=shown.result.instrument or session.store.instrument,
+        instrument=instrument_of(shown.result, otherwise=session.store.instrument),
         exposures=tuple(session.selection.exposures_of(shown.result)),
         detector=session.selection.detector_id,
         other=session.other.result if session.other else None,

@@ -252,3 +252,17 @@ def test_copied_orbit_is_refused(survey):
     write_survey_table(pd.concat([exposures, copy]), ENVIRONMENT, survey / EXPOSURES)
     with pytest.raises(InputError, match=r"expected no exposure in two orbits, .*\(0, 7\)"):
         fit_survey(survey, "another", FitSettings(order=3), workers=1)
+
+
+def test_solution_is_not_removed_where_its_measurements_cannot_be_fitted_again(survey):
+    path, settings = measurement_path(survey, 1), FitSettings(order=3)
+    (survey / "manifest.sha256").unlink()
+    before = contents(survey / "runs")
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(InputError, match=r"orbit=0001\.parquet"):
+        fit_survey(survey, "default", settings, workers=1, repair=True)
+    path.unlink()
+    for repair in (False, True):
+        report = fit_survey(survey, "default", settings, workers=1, repair=repair)
+        assert (report.fitted, report.failed) == ([], {})
+    assert contents(survey / "runs") == before

@@ -404,3 +404,24 @@ def test_copy_of_an_orbit_is_told_and_not_fitted(growing, watched):
     said = watched(step)
     assert kinds(said) == [("fitted", 0), ("damaged", 2), ("fitted", 1)]
     assert "times and pointings of orbit 0" in message(said, "damaged")
+
+
+@pytest.mark.usefixtures("fits")
+def test_copy_that_comes_before_a_fitted_orbit_is_not_fitted(made_survey, tmp_path, watched):
+    growing = GrowingSurvey(made_survey, tmp_path / "other", 2)
+    table = read_survey_table(growing.directory / EXPOSURES, ENVIRONMENT)
+    later = table[table["orbit_id"] == 1]
+    write_survey_table(later, ENVIRONMENT, growing.directory / EXPOSURES)
+    growing.file(0).unlink()
+    growing.write_manifest()
+    said = []
+    watcher = Watch(growing.directory, "watched", FitSettings(), 1, said.append)
+    watcher.run(1.0, ONCE)
+    assert watcher.unread == []
+    both = pd.concat([later.assign(orbit_id=0), later])
+    write_survey_table(both, ENVIRONMENT, growing.directory / EXPOSURES)
+    shutil.copy(measurement_path(made_survey, 0), growing.file(0))
+    growing.write_manifest()
+    watcher.run(1.0, ONCE)
+    assert watcher.fitted == [1]
+    assert watcher.unread == ["its exposures have the times and pointings of orbit 1"]

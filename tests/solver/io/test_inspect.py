@@ -4,6 +4,7 @@ import json
 import shutil
 
 import numpy as np
+import pandas as pd
 import pytest
 from astropy.time import Time
 
@@ -231,3 +232,18 @@ def test_sample_orbit(sample_orbit_dir):
     found = _inspect(*(sample_orbit_dir / name for name in names))
     assert [item["kind"] for item in found] == ["observation", "catalogue", "truth"]
     assert [item["problems"] for item in found] == [[], [], []]
+
+
+def test_orbits_that_are_misnamed_unreadable_or_copies_are_named(small_survey, tmp_path):
+    survey = tmp_path / "survey"
+    shutil.copytree(small_survey, survey)
+    (survey / "manifest.sha256").unlink()
+    exposures = pd.read_parquet(survey / "exposures.parquet")
+    copy = exposures[exposures["orbit_id"] == 0].assign(orbit_id=5)
+    pd.concat([exposures, copy]).to_parquet(survey / "exposures.parquet", index=False)
+    shutil.copy(measurement_path(survey, 0), survey / "measurements" / "orbit=-005.parquet")
+    measurement_path(survey, 1).write_bytes(b"no")
+    problems = _inspect(survey)[0]["problems"]
+    assert any("orbit=-005.parquet is not read, since its name is" in one for one in problems)
+    assert any("orbit=0001.parquet: expected a table" in one for one in problems)
+    assert any("found the same times and pointings in (0, 5)" in one for one in problems)

@@ -1,10 +1,13 @@
+import os
+
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from solver.io.parquet import write_parquet
+from solver.errors import InputError
+from solver.io.parquet import count_rows, write_parquet
 
 
 @pytest.fixture
@@ -38,3 +41,9 @@ def test_floats_use_byte_stream_split_and_the_rest_a_dictionary(table, tmp_path)
 def test_table_without_columns_or_rows_is_written(tmp_path):
     write_parquet(pa.table({"x": pa.array([], pa.float64())}), tmp_path / "t.parquet")
     assert pd.read_parquet(tmp_path / "t.parquet").empty
+
+
+def test_pipe_is_no_table(tmp_path):
+    os.mkfifo(tmp_path / "pipe.parquet")
+    with pytest.raises(InputError, match="expected a table of plateviz, found something that is"):
+        count_rows(str(tmp_path / "pipe.parquet"))

@@ -29,6 +29,10 @@ class Texts(Setting):
         """Return the value that the texts give; `InputError` names an invalid one."""
         raise TypeError(f"{type(self).__name__} does not read texts")
 
+    def parse_line(self, line: str) -> Any:  # noqa: ANN401
+        """Return the value that the texts of a line give, with commas or spaces between them."""
+        return self.parse(line.replace(",", " ").split())
+
     def texts(self, value: Any) -> list[str]:  # noqa: ANN401
         """Return a value as texts that `parse` reads."""
         raise TypeError(f"{type(self).__name__} does not write {value!r}")

@@ -85,7 +85,7 @@ def _setting_value(one: Setting, control_value: Any, loaded: FitSettings) -> Any
     if isinstance(one, PriorWidths):
         return widths_of(control_value, loaded)
     if isinstance(one, Texts):
-        return one.parse(control_value.replace(",", " ").split())
+        return one.parse_line(control_value)
     return control_value
 
 

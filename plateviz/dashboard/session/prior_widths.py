@@ -1,9 +1,12 @@
 """Prior widths as the texts of their controls: short, and read back without a loss."""
 
+import re
 from collections.abc import Mapping
 
+from solver.data.parameter_group import Group
 from solver.data.parameters import BY_NAME, PARAMETERS
 from solver.data.prior_text import format_width, parse_width
+from solver.data.quantity_text import QUANTITY
 from solver.data.settings import FitSettings
 
 
@@ -21,6 +24,15 @@ def width_texts(settings: FitSettings) -> dict[str, str]:
             format_width(name, width) if short == found[name] and not is_default else short
         )
     return found
+
+
+def completed_width(group: Group, text: str) -> str:
+    """Return a text as a person means it: the paper's width if it is empty, and with a unit."""
+    text = text.strip()
+    if not text:
+        return default_widths()[group.name]
+    is_number = re.fullmatch(QUANTITY, text) and text[-1].isdigit()
+    return f"{text} {group.width_unit}".strip() if is_number else text
 
 
 def widths_of(texts: Mapping[str, str], shown: FitSettings) -> dict[str, float]:

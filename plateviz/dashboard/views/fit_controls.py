@@ -1,15 +1,21 @@
 """Controls of the settings of a fit, made from the table of settings and that of parameters."""
 
+from collections.abc import Callable
+from functools import partial
+
 import panel as pn
 import panel_material_ui as pmui
 from param.parameterized import Event
 
 from plateviz.dashboard.session.fit_choices import CONTROLS, FitChoices
+from plateviz.dashboard.session.prior_widths import completed_width
 from plateviz.dashboard.views.at_once import taken_at_once
 from solver.data.parameter_group import Group
+from solver.data.prior_text import parse_width
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
 from solver.data.settings import SETTINGS
 from solver.data.text_setting import Texts
+from solver.errors import InputError
 
 # Margin of a control close to the next one.
 TIGHT = (0, 10)
@@ -45,6 +51,10 @@ def width_input(choices: FitChoices, group: Group) -> pmui.TextInput:
     )
 
     def take(event: Event) -> None:
+        entry.value = completed_width(group, event.new)
+        if entry.value != event.new:
+            # Taken by then.
+            return
         choices.param.update(typed={}, prior_widths={**choices.prior_widths, group.name: event.new})
 
     def note(event: Event) -> None:
@@ -53,8 +63,26 @@ def width_input(choices: FitChoices, group: Group) -> pmui.TextInput:
 
     entry.param.watch(take, "value")
     entry.param.watch(note, "value_input")
+    _say_faults(entry, partial(parse_width, group.name))
     taken_at_once(entry)
     return entry
+
+
+def _say_faults(entry: pmui.TextInput, parse: Callable[[str], object]) -> None:
+    """Say below an entry what is wrong with its text, as `parse` finds it."""
+
+    def look(*_: object) -> None:
+        fault = ""
+        try:
+            parse(entry.value)
+        except InputError as error:
+            # What stands before the first colon is the name of the entry.
+            fault = str(error).split(": ", 1)[-1]
+            fault = f"{fault[0].upper()}{fault[1:]}."
+        entry.param.update(error_state=bool(fault), helper_text=fault)
+
+    entry.param.watch(look, "value")
+    look()
 
 
 def _control(choices: FitChoices, name: str) -> pn.viewable.Viewable:
@@ -84,7 +112,7 @@ def _control(choices: FitChoices, name: str) -> pn.viewable.Viewable:
         return pmui.Select.from_param(
             parameter, label=one.label, size="small", sizing_mode="stretch_width"
         )
-    return pmui.TextInput.from_param(
+    entry = pmui.TextInput.from_param(
         parameter,
         label=one.label,
         placeholder=one.example if isinstance(one, Texts) else "",
@@ -92,6 +120,9 @@ def _control(choices: FitChoices, name: str) -> pn.viewable.Viewable:
         size="small",
         sizing_mode="stretch_width",
     )
+    if isinstance(one, Texts):
+        _say_faults(entry, one.parse_line)
+    return entry
 
 
 def _explanation(group: Group) -> str:

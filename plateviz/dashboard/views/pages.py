@@ -94,13 +94,13 @@ class Pages(pn.viewable.Viewer):
     def is_pending(self) -> bool:
         """Whether another thread makes a part of what is on the screen."""
         page = self._page(self._navigation.view)
-        is_read = not (isinstance(page, SurveyPage) and page.is_pending)
+        is_read = isinstance(page, OrbitPage) or not page.is_pending
         return page.figures.is_pending or not is_read
 
     def draw_due(self) -> None:
         """Draw the first few figures that are due on the screen, and show a run that is read."""
         page = self._page(self._navigation.view)
-        if isinstance(page, SurveyPage):
+        if not isinstance(page, OrbitPage):
             page.look()
         self._figures.draw_due()
 

@@ -25,6 +25,7 @@ from plateviz.dashboard.views.markup import (
 )
 from plateviz.dashboard.views.notable_source import NotableSourceLink
 from plateviz.dashboard.views.point_actions import PointActions
+from plateviz.dashboard.views.run_remark import RunRemark
 from plateviz.dashboard.views.run_selector import run_selector
 from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import Saved, table_choices
@@ -80,7 +81,7 @@ class SourcePage(pn.viewable.Viewer):
         self._tables: SourceTables | None = None
         self._are_numbers_old = True
         self._head, self._strip, self._motion = markup_pane(), markup_pane(), markup_pane()
-        self._measurements = markup_pane()
+        self._measurements, self._remark = markup_pane(), RunRemark(navigation)
         self._orbits = DataTable(ORBITS_OF_SOURCE, self._open_row, units=self._session.units)
         self._save = SaveButton(
             "Orbits and motion", table_choices(self._subject, self._source_tables)
@@ -98,7 +99,7 @@ class SourcePage(pn.viewable.Viewer):
             NotableSourceLink(navigation), self._list, sizing_mode="stretch_width"
         )
         self._column = pmui.Column(
-            self._head, self._rest, self._choice, sizing_mode="stretch_width"
+            self._head, self._remark, self._rest, self._choice, sizing_mode="stretch_width"
         )
         self._entry = pmui.TextInput(
             label="Source id",
@@ -129,6 +130,15 @@ class SourcePage(pn.viewable.Viewer):
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the page without its sidebar."""
         return self._column
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether another thread reads and judges the run."""
+        return self._remark.is_pending
+
+    def look(self) -> None:
+        """Say how good the run is once it is judged; called again and again until then."""
+        self._remark.look()
 
     def _allow_entry(self, *_: object) -> None:
         self._entry.disabled = self._navigation.run is None

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.navigation.view import View
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.address_bar import AddressBar
@@ -269,6 +270,26 @@ def test_run_is_read_and_judged_elsewhere(fit_result, survey):
     page = SurveyPage(Navigation(Session(store)), wake)
     assert not page.is_pending
     assert "being read" not in page._head.object
+
+
+def test_page_of_a_source_says_that_its_run_is_bad(fit_result, survey):
+    store, waiting = SurveyStore(fit_result, [FakeRun("default", survey, fit_result)]), Waiting()
+    store.run_reader = RunReader(waiting)
+    navigation = Navigation(Session(store))
+    page = SourcePage(navigation, wake)
+    assert not page.is_pending
+    navigation.turn_to(View.SOURCE)
+    assert not page.is_pending
+    navigation.find_source(str(survey.motions["source_id"].iloc[0]))
+    assert page.is_pending
+    page.look()
+    assert page._remark._pane.object == ""
+    waiting.work()
+    page.look()
+    assert not page.is_pending
+    assert "This run should not be trusted as it is" in page._remark._pane.object
+    navigation.turn_to(View.SURVEY)
+    assert not page.is_pending
 
 
 def test_other_run_is_not_shown_with_the_verdict_on_the_one_before(fit_result, survey):

@@ -110,7 +110,7 @@ class BokehFrame:
         ----------
         words : of the frame, with as many lines as those of the other frames of the row
         """
-        self._write(words, theme)
+        self._write(words, frame.outdent, theme)
         self.plot.update(
             frame_width=frame.width,
             frame_height=frame.frame_height,
@@ -148,14 +148,16 @@ class BokehFrame:
         """Iterate over the glyphs, hidden ones among them."""
         return iter(self._glyphs.values())
 
-    def _write(self, words: Words, theme: Theme) -> None:
+    def _write(self, words: Words, outdent: int, theme: Theme) -> None:
         self._title.update(
             text="\n".join(words.title),
+            offset=-outdent,
             **_font("text", theme.text, TITLE_SIZE),
             text_font_style="bold",
         )
         self._subtitle.update(
             text="\n".join(words.subtitle),
+            offset=-outdent,
             visible=bool(words.subtitle),
             **_font("text", theme.muted, SMALL_SIZE),
             text_font_style="normal",
@@ -225,6 +227,7 @@ class BokehFrame:
         self._legend.update(
             visible=bool(labels),
             ncols=frame.legend_columns or 1,
+            styles={"left": f"{-frame.outdent}px"},
             background_fill_color=None,
             border_line_color=None,
             margin=0,

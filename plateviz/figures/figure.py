@@ -30,6 +30,8 @@ Kind = Literal[
 ]
 Link = Literal["", "x", "xy"]
 FRAME_WIDTH, MARGIN = 460, 14
+# To the left of words, screen pixels.
+_EDGE = 10
 MESSAGE = "message"
 """Name of the text of a figure that has nothing to show."""
 HANDLES = "handles"
@@ -147,13 +149,13 @@ class Frame:
     Attributes
     ----------
     glyphs : drawn in order, with unique names
-    title, subtitle : above the frame; the subtitle is wrapped to its width
+    title, subtitle : above the frame; wrapped to the width of it and of the room beside it
     x, y : the axes
     width : screen pixels
     height : screen pixels; None for equal scales of both axes
     legend_columns : columns of the legend, which is below the frame so that it covers no data;
         0 for no legend
-    margin : room to the right of the frame, over which its words may reach, screen pixels
+    margin : room to the right of the frame, screen pixels
     beside : room to the left of the frame for the axis, screen pixels
     indent : room to the left of that, screen pixels
     corner : width of what covers the right end of the title's room, screen pixels
@@ -181,6 +183,16 @@ class Frame:
     def names(self) -> list[str]:
         """Names of the glyphs."""
         return [glyphs.name for glyphs in self.glyphs]
+
+    @property
+    def outdent(self) -> int:
+        """How far to the left of the frame its words and its legend begin, screen pixels."""
+        return max(0, self.indent + self.beside - _EDGE)
+
+    @property
+    def words_width(self) -> int:
+        """Room for its words and its legend, screen pixels."""
+        return self.outdent + self.width + self.margin
 
     @property
     def frame_height(self) -> int:

@@ -10,7 +10,7 @@ from plateviz.figures.figure import MARGIN, Axis, Figure, Frame, Ramp
 from plateviz.figures.fitting_texts import with_fitting_texts
 from plateviz.figures.text_width import has_room_for_words, text_width, wrapped
 from plateviz.figures.theme import LABEL_SIZE, SMALL_SIZE, TITLE_SIZE
-from plateviz.figures.words import MENU, words_of_row
+from plateviz.figures.words import words_of_row
 
 # Screen pixels around a frame: label of the left axis, its shortest tick labels, margin on the
 # right, colour bar.
@@ -42,10 +42,9 @@ def resized(figure: Figure, width: int, height: int, *, corner: int = 0) -> Figu
     """Return the figure in a size that fills an area as far as the scales of its axes allow.
 
     Frames with equal scales of both axes keep them. Frames that share no x axis are arranged in
-    as many columns as leave them largest. Those that are narrower than the area are in its middle,
-    or to its left where their words need the room. Subtitles or legends are left out where they
-    would take much of the height. An axis has no label that the next frame to the left or below
-    repeats.
+    as many columns as leave them largest. Those that are narrower than the area are in its middle.
+    Subtitles or legends are left out where they would take much of the height. An axis has no label
+    that the next frame to the left or below repeats.
 
     Parameters
     ----------
@@ -69,50 +68,45 @@ def _free(figure: Figure, columns: int, corner: int) -> Figure:
 
 
 def _arranged(figure: Figure, columns: int, width: int, height: int) -> Figure:
-    frames = replace(figure, columns=columns)
-    best = _wordy(frames, width, height, is_leaning=False)
-    if any(frame.height is None for frame in figure):
-        leaning = _wordy(frames, width, height, is_leaning=True)
-        best = leaning if _is_better(leaning, best) else best
-    return best
-
-
-def _is_better(one: Figure, other: Figure) -> bool:
-    """Return whether a figure has more words than another, or as many and clearly larger frames."""
-    more = _words(one) - _words(other)
-    return more > 0 or (more == 0 and _least_height(one) > _GAIN * _least_height(other))
-
-
-def _words(figure: Figure) -> int:
-    """Return how many frames have a subtitle, and how many a legend."""
-    return sum(bool(frame.subtitle) + bool(frame.legend_columns) for frame in figure)
-
-
-def _wordy(figure: Figure, width: int, height: int, *, is_leaning: bool) -> Figure:
-    """Return the figure with its words above, without those that would take much of the height."""
+    """Return the figure with its words, without those that would take much of the height."""
+    figure = _with_one_legend(figure, columns)
     no_subtitle, no_legend = {"subtitle": ""}, {"legend_columns": 0}
     candidates = []
     for without in ({}, no_subtitle, no_legend, no_subtitle | no_legend):
         frames = tuple(replace(frame, **without) for frame in figure)
-        one = replace(figure, frames=frames)
-        candidates.append(_fitted(one, width, height, is_leaning=is_leaning))
+        candidates.append(_fitted(Figure(frames, columns, figure.linked), width, height))
     *wordy, bare = candidates
     enough = max(_ENOUGH, _SHARE * _least_height(bare))
     return next((one for one in wordy if _least_height(one) >= enough), bare)
 
 
-def _fitted(figure: Figure, width: int, height: int, *, is_leaning: bool) -> Figure:
+def _with_one_legend(figure: Figure, columns: int) -> Figure:
+    """Return the figure with a legend that all frames share below the first frame of the last row.
+
+    A legend of its own below each would say the same.
+    """
+    labels = {frozenset(_labels(frame)) for frame in figure}
+    if len(labels) > 1 or not all(frame.legend_columns for frame in figure):
+        return figure
+    last = (len(figure) - 1) // columns * columns
+    frames = [
+        frame if n == last else replace(frame, legend_columns=0) for n, frame in enumerate(figure)
+    ]
+    return replace(figure, frames=tuple(frames))
+
+
+def _fitted(figure: Figure, width: int, height: int) -> Figure:
     first = range(0, len(figure), figure.columns)
     rows = [list(figure.frames[number : number + figure.columns]) for number in first]
     labelled = _with_outer_labels(rows)
-    fitted = _fitted_rows(labelled, width, height, is_leaning=is_leaning)
+    fitted = _fitted_rows(labelled, width, height)
     # How long the label of a left axis may be follows from the height of its frame.
     wrapped_rows = [
         [replace(one, y=_with_lines(one.y, _y_room(row), _Y_LINES)) for one in frames]
         for frames, row in zip(labelled, fitted, strict=True)
     ]
     if any("\n" in frame.y.label for row in wrapped_rows for frame in row):
-        fitted = _fitted_rows(wrapped_rows, width, height, is_leaning=is_leaning)
+        fitted = _fitted_rows(wrapped_rows, width, height)
     return replace(figure, frames=tuple(with_fitting_texts(one) for row in fitted for one in row))
 
 
@@ -143,14 +137,8 @@ def _is_alike(some: Sequence[Frame | None], others: Sequence[Frame | None], axis
     )
 
 
-def _fitted_rows(rows: Rows, width: int, height: int, *, is_leaning: bool) -> Rows:
-    """Return frames of one height, those of a row with as many lines of words.
-
-    Parameters
-    ----------
-    is_leaning : whether all the room that is left is to the right of a frame, for its words, and
-        the frame is not in the middle
-    """
+def _fitted_rows(rows: Rows, width: int, height: int) -> Rows:
+    """Return frames of one height, those of a row with as many lines of words."""
     numbers = range(len(rows[0]))
     left, right = (
         [max(taken(row[n]) for row in rows if n < len(row)) for n in numbers]
@@ -167,13 +155,10 @@ def _fitted_rows(rows: Rows, width: int, height: int, *, is_leaning: bool) -> Ro
         around = sum(_above(row) + _below(row) for row in rows)
         high = max(1, (height - around) // len(rows))
         rows = [
-            [
-                _of_height(frame, high, column, is_leaning=is_leaning)
-                for frame, column in zip(row, columns, strict=False)
-            ]
+            [_of_height(frame, high, column) for frame, column in zip(row, columns, strict=False)]
             for row in rows
         ]
-    return [[_towards_the_middle(f) for f in row] for row in rows] if is_leaning else rows
+    return rows
 
 
 def _above(row: list[Frame]) -> int:
@@ -187,43 +172,28 @@ def _below(row: list[Frame]) -> int:
     return _BELOW + label + max(_rise(f.x) + _ROW * _legend_rows(f) for f in row)
 
 
-def _towards_the_middle(frame: Frame) -> Frame:
-    """Return a frame at the left of its room, moved as far to the middle as its words allow."""
-    (words,) = words_of_row([frame])
-    label = max(text_width(line, LABEL_SIZE) for line in frame.x.label.split("\n"))
-    needed = max(
-        *(text_width(line, TITLE_SIZE, is_bold=True) + frame.corner for line in words.title),
-        *(text_width(line, SMALL_SIZE) + MENU for line in words.subtitle),
-        frame.legend_columns * _legend_entry(frame),
-        (label + frame.width) / 2,
-    )
-    at_least = MARGIN + (frame.margin - MARGIN) // 2
-    margin = min(frame.margin, max(at_least, math.ceil(needed) - frame.width))
-    return replace(frame, margin=margin, indent=frame.margin - margin)
-
-
-def _of_height(frame: Frame, height: int, column: _Column, *, is_leaning: bool) -> Frame:
+def _of_height(frame: Frame, height: int, column: _Column) -> Frame:
     if frame.height is not None:
         return replace(frame, height=height)
     wide = max(1, round(height * frame.x.length / frame.y.length))
-    return _of_width(frame, min(column.width, wide), column, is_leaning=is_leaning)
+    return _of_width(frame, min(column.width, wide), column)
 
 
-def _of_width(frame: Frame, width: int, column: _Column, *, is_leaning: bool = False) -> Frame:
+def _of_width(frame: Frame, width: int, column: _Column) -> Frame:
     left = column.width - width
-    indent = 0 if is_leaning else left // 2
+    indent = left // 2
     margin = MARGIN + left - indent
     # A label is in the middle below the frame, and is cut off at either edge.
     reach = min(margin, column.left + indent)
-    return replace(
+    placed = replace(
         frame,
         x=_with_lines(frame.x, width + 2 * reach, _X_LINES),
         width=width,
         margin=margin,
         beside=column.left,
         indent=indent,
-        legend_columns=_legend_columns(frame, width + margin),
     )
+    return replace(placed, legend_columns=_legend_columns(placed))
 
 
 def _with_lines(axis: Axis, room: int, most: int) -> Axis:
@@ -236,14 +206,17 @@ def _with_lines(axis: Axis, room: int, most: int) -> Axis:
 
 def _y_room(row: list[Frame]) -> int:
     """Return the height for the label of a left axis, which is in the middle beside its frame."""
-    return row[0].frame_height + 2 * (min(_above(row), _below(row)) - _FREE)
+    # The words begin above the label.
+    (_, subtitle), *_ = words_of_row(row)
+    above = max(_TOOLBAR - _LINE * len(subtitle), _SPACE)
+    return row[0].frame_height + 2 * (min(above, _below(row)) - _FREE)
 
 
 def _quality(figure: Figure) -> float:
     """Return the shortest side of a frame, less where a place is empty or a word is broken."""
     least = min(min(frame.width, 2 * frame.frame_height) for frame in figure)
     is_whole = all(
-        has_room_for_words(frame.title, frame.width + frame.margin, TITLE_SIZE, is_bold=True)
+        has_room_for_words(frame.title, frame.words_width, TITLE_SIZE, is_bold=True)
         for frame in figure
     )
     places = figure.columns * math.ceil(len(figure) / figure.columns)
@@ -278,12 +251,12 @@ def _longest_tick(axis: Axis) -> float:
     return max((text_width(label, SMALL_SIZE) for _, label in axis.ticks or ()), default=0.0)
 
 
-def _legend_columns(frame: Frame, width: int) -> int:
+def _legend_columns(frame: Frame) -> int:
     labels = _labels(frame)
     if not frame.legend_columns or not labels:
         return frame.legend_columns
     # A label that is wider than this would be cut off.
-    return min(len(labels), int(width / _legend_entry(frame)))
+    return min(len(labels), int(frame.words_width / _legend_entry(frame)))
 
 
 def _legend_entry(frame: Frame) -> float:

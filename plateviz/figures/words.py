@@ -21,11 +21,11 @@ class Words(NamedTuple):
 
 
 def words_of(frame: Frame) -> Words:
-    """Return the words of a frame, wrapped to its width and its margin.
+    """Return the words of a frame, wrapped to their room.
 
     The toolbar takes what the subtitle leaves of the width, and covers it if that is nothing.
     """
-    width = frame.width + frame.margin
+    width = frame.words_width
     title, beside = (
         wrapped(frame.title, room, TITLE_SIZE, is_bold=True)
         for room in (width, width - frame.corner)

@@ -37,11 +37,12 @@ _BODY = {
     "height": f"calc(100% - {2 * _INSET}px)",
     "overflow": "auto",
 }
-_CENTRED = {
+# The titles of all figures begin at the same place of their cards.
+_AT_THE_TOP = {
     "overflow": "hidden",
     "display": "flex",
-    "align-items": "center",
-    "justify-content": "center",
+    "align-items": "flex-start",
+    "justify-content": "flex-start",
 }
 _WHAT_TO_DO = "The other figures do not depend on it; it is tried again with the next solution."
 _LOG = logging.getLogger(__name__)
@@ -96,7 +97,7 @@ class FigureView(pn.viewable.Viewer):
         self.visibility = Visibility()
         # A plain Panel column lays out a new figure at once. Other containers do so a moment later,
         # and the page may measure a figure without a layout.
-        self._body = pn.Column(margin=0, styles=_BODY | _CENTRED, css_classes=[FADING])
+        self._body = pn.Column(margin=0, styles=_BODY | _AT_THE_TOP, css_classes=[FADING])
         self._tools = CardTools(figure, self._text_tables)
         choices = figure_choices(figure.name, self._on_screen, saved or Saved())
         self._save = SaveButton(figure.title, choices, place="corner")
@@ -219,7 +220,7 @@ class FigureView(pn.viewable.Viewer):
         else:
             self._drawn.follow(figure, self._theme)
         if self._pane is None or self._pane.object is not self._drawn.model:
-            self._pane = pn.pane.Bokeh(self._drawn.model, align="center", margin=0)
+            self._pane = pn.pane.Bokeh(self._drawn.model, margin=0)
             self._follow_zoom(self._drawn)
         self._actions.follow(self._drawn)
         self._put(self._pane)

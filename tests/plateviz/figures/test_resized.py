@@ -125,7 +125,7 @@ def test_subtitle_leaves_the_menu_of_the_tools_free():
     for area in ((540, 290), (540, 420), (700, 300)):
         (fitted,) = resized(square, *area)
         longest = max(text_width(line, SMALL_SIZE) for line in words_of(fitted).subtitle)
-        assert longest <= fitted.width + fitted.margin - 20
+        assert longest <= fitted.words_width - 20
 
 
 def test_frames_above_one_another_with_one_x_axis_stay_so():
@@ -197,19 +197,19 @@ WORDS = "Field 0, exposure 0. 684 measurements, one arrow each. Arrows enlarged 
 @pytest.mark.parametrize("height", [None, 100])
 def test_no_word_is_wider_than_its_room(area, height):
     ((frame_of_area,), (words,)) = shown(frame(height=height, subtitle=WORDS), area)
-    room = frame_of_area.width + frame_of_area.margin
+    room = frame_of_area.words_width
     assert all(text_width(line, 13, is_bold=True) <= room for line in words.title)
     assert all(text_width(line, 11) <= room for line in words.subtitle)
     assert room <= area[0]
 
 
 def test_title_leaves_the_corner_free():
-    titled = replace(frame()[0], title="A title of a figure that fills a line")
+    titled = replace(frame()[0], title="A title of a figure that is longer than a line")
     row = Figure((titled,) * 4, 2)
     frames = resized(row, 740, 800, corner=76)
     assert [one.corner for one in frames] == [0, 76, 0, 0]
     first, second = (words_of(one) for one in frames.frames[:2])
-    room = frames[1].width + frames[1].margin
+    room = frames[1].words_width
     assert all(text_width(line, 13, is_bold=True) <= room - 76 for line in second.title)
     assert len(second.title) > len(first.title)
 
@@ -221,17 +221,35 @@ def test_title_is_below_the_corner_where_there_is_no_room_beside_it():
 
 
 @pytest.mark.parametrize("area", [(380, 350), (570, 235)])
-def test_a_narrow_frame_gives_its_words_the_room_that_they_need(area):
+def test_a_narrow_frame_is_in_the_middle_of_its_area_and_its_words_begin_at_the_left(area):
     square = replace(frame(height=None, y=(0.0, 10.0), subtitle=WORDS)[0], title=WORDS)
     (one,) = resized(Figure((square,)), *area, corner=76)
-    words = words_of(one)
-    assert one.indent < one.margin
-    widest = max(text_width(line, 13, is_bold=True) + 76 for line in words.title)
-    assert widest <= one.width + one.margin
-    assert one.indent + one.width + one.margin < area[0]
+    assert one.indent == pytest.approx(one.margin - MARGIN, abs=1)
+    assert one.indent + one.beside + one.width + one.margin < area[0]
+    assert one.outdent == one.indent + one.beside - 10
     assert one.frame_height > 0.35 * area[1]
-    (bare,) = resized(frame(height=None, y=(0.0, 10.0)), *area, corner=76)
-    assert bare.indent == pytest.approx(bare.margin - MARGIN, abs=1)
+
+
+def test_frames_share_a_legend_that_is_the_same():
+    first, other = (
+        frame(glyphs=[line([0, 1], [0, 1], name="l", color="mark", label=label)], legend_columns=1)
+        for label in ("a line", "another line")
+    )
+    alike, unlike = (
+        resized(side_by_side(four, columns=2), 900, 700)
+        for four in ([first] * 4, [first, other, first, other])
+    )
+    assert [bool(one.legend_columns) for one in alike] == [False, False, True, False]
+    assert all(one.legend_columns for one in unlike)
+
+
+def test_the_label_of_a_left_axis_ends_below_the_words():
+    long = Axis("root mean square error of the mean, in one coordinate (mas)", (0.0, 1.0))
+    wordy = framed([], title="Marks", subtitle=WORDS, x=X, y=long, width=200, height=100)
+    (one,) = resized(wordy, 330, 290)
+    lines = one.y.label.split("\n")
+    assert one.subtitle
+    assert max(text_width(text, 12) for text in lines) <= one.frame_height + 2 * 18
 
 
 def shown(figure, area):

@@ -50,8 +50,8 @@ _DECIDER_COLOURS: Mapping[str, str] = MappingProxyType(
 )
 _WEAK_COLOUR = CLASS_COLOURS[REFERENCE]
 _WEAK_BELOW = 0.5
-# Parts of a bar that are at least this long have room for text.
-_LEAST_LABELLED_SHARE = 0.16
+# Parts of a bar that are at least this long are named above it.
+_LEAST_NAMED_SHARE = 0.16
 _LEAST_VISIBLE_SHARE = 1e-3
 _MODE_LABEL, _SHARE_LABEL = "eigenmode, weakest first (number)", "share (0 to 1)"
 _PART_LABEL, _DIRECTION_LABEL = "share of the information (0 to 1)", "weak direction (number)"
@@ -124,7 +124,7 @@ def plot_eigenmode_deciders(table: pd.DataFrame, *, width: int = _PAGE_WIDTH) ->
     last = int(modes["mode"].max())
     ticks = [(float(mode), str(mode)) for mode in modes["mode"]]
     return framed(
-        [*_bars(table), _bar_labels(table), _names(modes)],
+        [*_bars(table), _names(table)],
         title=title,
         x=Axis(_PART_LABEL, (-0.005, 1.005)),
         y=Axis(_DIRECTION_LABEL, (last + 0.55, 0.35), ticks=ticks),
@@ -168,20 +168,21 @@ def _bars(table: pd.DataFrame) -> Iterator[Glyphs]:
         )
 
 
-def _bar_labels(table: pd.DataFrame) -> Glyphs:
-    rows = table[table["share"] >= _LEAST_LABELLED_SHARE]
+def _names(table: pd.DataFrame) -> Glyphs:
+    """Return what decides each direction, and its name, above its bar."""
+    modes = table.drop_duplicates("mode")
+    named = table[table["share"] >= _LEAST_NAMED_SHARE].sort_values("share", ascending=False)
     words = [
-        f"{what} {100.0 * s:.0f} %" for what, s in zip(rows["what"], rows["share"], strict=True)
+        ", ".join(
+            f"{what} {100.0 * share:.0f} %"
+            for what, share in named.loc[named["mode"] == mode, ["what", "share"]].to_numpy()
+        )
+        for mode in modes["mode"]
     ]
-    middle = 0.5 * (rows["left"] + rows["right"])
-    return texts(middle, rows["mode"] + 0.19, words, name="parts", color="#ffffff", size="10px")
-
-
-def _names(modes: pd.DataFrame) -> Glyphs:
     return texts(
         np.zeros(len(modes)),
         modes["mode"] - 0.02,
-        modes["name"],
+        [f"{of}: {name}" if of else name for of, name in zip(words, modes["name"], strict=True)],
         name="names",
         align="left",
         baseline="bottom",

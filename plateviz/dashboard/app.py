@@ -11,6 +11,7 @@ from panel.io.resources import get_dist_path
 from param.parameterized import Watcher
 
 from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.selection.large_selections import LargeSelections
 from plateviz.dashboard.serving.page_request import WINDOW
 from plateviz.dashboard.serving.rooms import Rooms, Window, window_from
 from plateviz.dashboard.session.session import Session
@@ -33,18 +34,21 @@ _SIDEBAR_WIDTH = 264
 _STYLED = ("Plot", "Title", "Axis", "Grid", "Legend", "ColorBar")
 
 
-def build_app(store: SolutionStore, rooms: Rooms | None = None) -> pmui.Page:
+def build_app(
+    store: SolutionStore, rooms: Rooms | None = None, large: LargeSelections | None = None
+) -> pmui.Page:
     """Return the page of one session over `store`.
 
     Parameters
     ----------
     rooms : of the cards of earlier pages, with which the first figures are drawn at once
+    large : selections of all sessions that are too large for an address
     """
     window = _window()
     if window is not None and window.is_dark:
         # The first component that the browser makes decides the theme of all.
         pn.config.theme = "dark"  # type: ignore[assignment]
-    navigation, ticker, pages = _pages(store, window, rooms)
+    navigation, ticker, pages = _pages(store, window, rooms, large)
     session = navigation.session
     bar, system = SelectionBar(navigation), SystemTheme()
     header = [
@@ -118,9 +122,12 @@ def build_part(store: SolutionStore) -> pn.Row:
 
 
 def _pages(
-    store: SolutionStore, window: Window | None = None, rooms: Rooms | None = None
+    store: SolutionStore,
+    window: Window | None = None,
+    rooms: Rooms | None = None,
+    large: LargeSelections | None = None,
 ) -> tuple[Navigation, Ticker, Pages]:
-    navigation, ticker = Navigation(Session(store)), Ticker()
+    navigation, ticker = Navigation(Session(store, large)), Ticker()
     navigation.begin(_arguments())
     pn.state.on_session_destroyed(lambda _: navigation.session.close())
     return navigation, ticker, Pages(navigation, ticker.wake, window, rooms)

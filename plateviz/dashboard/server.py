@@ -16,6 +16,7 @@ import panel_material_ui as pmui
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.app import build_app, empty_page
+from plateviz.dashboard.selection.large_selections import LargeSelections
 from plateviz.dashboard.serving.closed_pages import silence_closed_pages
 from plateviz.dashboard.serving.headers import NotebookHeaders, SecurityHeaders
 from plateviz.dashboard.serving.limits import Limits, PageLimit
@@ -108,12 +109,12 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
     send_waiting_messages()
     check_websockets()
     hosts = sorted({endpoint.address, "localhost", "127.0.0.1"})
-    rooms = Rooms()
+    rooms, large = Rooms(), LargeSelections()
     memory = ReturnedMemory(IOLoop.current())
 
     def make_page() -> pmui.Page:
         memory.follow()
-        return build_app(store, rooms)
+        return build_app(store, rooms, large)
 
     # A server, not a thread, because `threaded` is not set.
     server: Any = pn.serve(

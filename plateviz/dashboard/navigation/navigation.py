@@ -130,8 +130,7 @@ class Navigation(param.Parameterized):
         problems += unknown_parts(address, _KNOWN)
         is_survey = address.get("view") == View.SURVEY.value
         explored = self.survey_exploration if is_survey else self.exploration
-        problems += explored.restore(address)
-        problems += session.restore_both(address)
+        problems += explored.restore(address) + session.restore_both(address)
         units = session.units
         units.unit = chosen("unit", address, NAMES.values(), units.unit, problems)
         self.run_name = chosen("run", address, self.known_runs, self.run_name, problems)
@@ -188,7 +187,8 @@ class Navigation(param.Parameterized):
         session = self.session
         if session.shown is None or session.is_opening:
             return self._named
-        return solution_query(session.shown, session.other, self.run_name, is_whole)
+        shown, other, large = session.shown, session.other, session.selection.large
+        return solution_query(shown, other, self.run_name, large, is_whole)
 
     def turn_to(self, view: View) -> None:
         """Show a view; the Orbit view requests its orbit when it is first shown."""
@@ -265,7 +265,8 @@ class Navigation(param.Parameterized):
 
     def _solution(self, text: str | None, orbit: int | None) -> Solution | Request:
         """Return the solution of a text, None for that of the run; InputError if unreadable."""
-        return find_solution(text, orbit, self.run, self.known_runs, self.session.store.kept)
+        kept, large = self.session.store.kept, self.session.selection.large
+        return find_solution(text, orbit, self.run, self.known_runs, kept, large)
 
     def _find(self, name: str, orbit: int | None) -> Solution | Request | None:
         """Return a solution that the address names; a notice says why there is none."""

@@ -1,4 +1,4 @@
-"""LargeSelections: what a session has selected that is too large for an address, by its keys."""
+"""LargeSelections: what was selected that is too large for an address, by its keys."""
 
 from typing import Any
 
@@ -6,12 +6,15 @@ import numpy as np
 
 from plateviz.dashboard.selection.selected import KINDS, Selected
 
-# What is remembered at most, in 16 MB and less: back and forward go through a few dozens.
-_MOST, _MOST_IDS = 40, 1_000_000
+# What is remembered at most, in 16 MB and less: that of a few dozen pages.
+_MOST, _MOST_IDS = 400, 1_000_000
 
 
 class LargeSelections:
-    """The large selections of a session, so that its addresses can be opened again."""
+    """The large selections of a server's sessions, so that their addresses can be opened again.
+
+    The key of a selection follows from its ids: only who had these ids has it.
+    """
 
     def __init__(self) -> None:
         """Remember nothing yet."""

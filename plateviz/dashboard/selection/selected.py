@@ -25,7 +25,7 @@ NO_IDS: SelectedIds = MappingProxyType({})
 
 # Maximum number of items of a kind in an address.
 FEW = 20
-_MANY = "many:"
+MANY = "many:"
 """Stands, before their key, for more selected items of a kind than an address has room for."""
 Find = Callable[[str, str], frozenset[Any] | None]
 """Returns the items of a kind with a key, as of `Selected.keys`; None if they are not known."""
@@ -136,7 +136,7 @@ class Selected:
         """
         keys = self.keys
         return {
-            kind: _MANY + keys[kind] if kind in keys else ",".join(map(_text, sorted(items)))
+            kind: MANY + keys[kind] if kind in keys else ",".join(map(_text, sorted(items)))
             for kind, items in self.by_kind().items()
             if items
         }
@@ -174,8 +174,8 @@ def parsed(address: Mapping[str, str], find: Find = lambda *_: None) -> tuple[Se
         text = address.get(kind)
         if text is None:
             continue
-        if text.startswith(_MANY):
-            items = find(kind, text.removeprefix(_MANY))
+        if text.startswith(MANY):
+            items = find(kind, text.removeprefix(MANY))
             problem = (
                 f"{kind}: an address has room for {FEW}, and more were selected; "
                 "Keep gives them a name for the address, and Save view has all"

@@ -42,12 +42,17 @@ class Selection(param.Parameterized):
     )
     kept = param.Dict(default={}, doc="name -> `Selected` that is kept; replaced, not changed")
 
-    def __init__(self, **values: Any) -> None:  # noqa: ANN401 as param
-        """Start without options."""
+    def __init__(self, large: LargeSelections | None = None, **values: Any) -> None:  # noqa: ANN401
+        """Start without options.
+
+        Parameters
+        ----------
+        large : of the server; None for those of this session alone
+        """
         super().__init__(**values)
         self._requested, self._selected = dict[str, Any](), Selected()
-        self._large = LargeSelections()
-        self.param.watch(lambda *_: self._large.remember(self.selected), [*KINDS])
+        self.large = large or LargeSelections()
+        self.param.watch(lambda *_: self.large.remember(self.selected), [*KINDS])
         self.param.watch(self._forget_requested, [*SHOWN])
 
     def offer_orbits(self, orbits: Iterable[int | None]) -> None:
@@ -186,7 +191,7 @@ class Selection(param.Parameterized):
             self._requested.pop(event.name, None)
 
     def _restore_selected(self, address: Mapping[str, str]) -> list[str]:
-        found = restored(address, self._large.find, self.kept)
+        found = restored(address, self.large.find, self.kept)
         self.select(found.selected)
         if found.name:
             self.kept = {**self.kept, found.name: found.selected}

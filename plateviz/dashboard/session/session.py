@@ -5,6 +5,7 @@ The last solution stays on the screen until the next one is complete; then both 
 
 import param
 
+from plateviz.dashboard.selection.large_selections import LargeSelections
 from plateviz.dashboard.selection.selection import Selection
 from plateviz.dashboard.session.fit_choices import ANSWERED_AT_ONCE, FitChoices
 from plateviz.dashboard.session.held_job import HeldJob
@@ -28,11 +29,16 @@ class Session(OnScreen):
 
     theme = param.Selector(default="light", objects=["light", "dark"])
 
-    def __init__(self, store: SolutionStore) -> None:
-        """Begin with the first orbit and the paper's settings."""
+    def __init__(self, store: SolutionStore, large: LargeSelections | None = None) -> None:
+        """Begin with the first orbit and the paper's settings.
+
+        Parameters
+        ----------
+        large : selections of the server's sessions that are too large for an address
+        """
         super().__init__()
         self.store = store
-        self.selection = Selection()
+        self.selection = Selection(large)
         self.choices = FitChoices()
         self.units = Units(store.instrument)
         self.journal = Journal(store.made)

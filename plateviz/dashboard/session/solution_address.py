@@ -1,6 +1,7 @@
 """Solutions in an address: by the run that has them, or by their settings in words.
 
     solution=order=3 prior=distortion_x=0.5um what-if
+    solution=order=3 sources=many:KEY what-if
     solution=kept=NAME
     against=run=other orbit=7
 
@@ -11,6 +12,8 @@ paper.
 import re
 from collections.abc import Mapping
 
+from plateviz.dashboard.selection.large_selections import LargeSelections
+from plateviz.dashboard.selection.selected import KINDS, MANY, Selected, parsed
 from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.queries import SurveyRun
@@ -26,28 +29,38 @@ TOO_LONG = "too-long"
 _MOST_CHARACTERS = 4000
 # Of a solution in a saved view, which has no such limit.
 _MOST_READ = 400_000
+_TOO_MANY = "the settings were too many for the address"
 _KEPT = "kept="
+_OF_MANY = re.compile(rf"({'|'.join(KINDS)})={MANY}\w+")
 _OF_RUN = re.compile(r"run=(?P<run>[^ ]+)(?: orbit=(?P<orbit>-?[0-9]{1,9}))?")
 
 
 def solution_query(
-    shown: Solution, other: Solution | None, run: str | None, is_whole: bool = False
+    shown: Solution,
+    other: Solution | None,
+    run: str | None,
+    large: LargeSelections,
+    is_whole: bool = False,
 ) -> dict[str, str]:
     """Return a solution, and the one that it is compared with, as parts of an address.
 
     Parameters
     ----------
     run : name of the run in the address
+    large : remembers what is left out, where that is too long for an address
     is_whole : whether settings that are too long for an address are written, too
     """
-    most = _MOST_READ if is_whole else _MOST_CHARACTERS
-    query = {"solution": _text(shown, shown.orbit, most)}
+
+    def text(solution: Solution) -> str:
+        return _text(solution, shown.orbit, None if is_whole else large)
+
+    query = {"solution": text(shown)}
     is_default = run is None and not (shown.is_step or shown.kept)
     is_default = is_default and shown.settings == FitSettings()
     if is_default or (run is not None and shown.run == run):
         query = {}
     if other is not None:
-        query["against"] = _text(other, shown.orbit, most)
+        query["against"] = text(other)
     return query
 
 
@@ -57,6 +70,7 @@ def find_solution(
     run: SurveyRun | None,
     runs: Mapping[str, SurveyRun],
     kept: KeptSolutions,
+    large: LargeSelections,
 ) -> Solution | Request:
     """Return the solution that a part of an address names.
 
@@ -67,6 +81,7 @@ def find_solution(
     run : run of the address
     runs : all runs of the survey, by name
     kept : solutions that are kept beside the runs
+    large : what is left out of solutions, and too long for an address
 
     Raises
     ------
@@ -78,7 +93,7 @@ def find_solution(
         found = solution_of_run(run, orbit)
         return found or Request(orbit, FitSettings() if run is None else run_settings(run))
     if text == TOO_LONG:
-        raise InputError("the settings were too many for the address")
+        raise InputError(_TOO_MANY)
     if len(text) > _MOST_READ:
         raise InputError(f"expected {_MOST_READ:,} characters or fewer, found {len(text):,}")
     if match := _OF_RUN.fullmatch(text):
@@ -90,7 +105,7 @@ def find_solution(
     if text.startswith(_KEPT):
         return read_kept(kept, kept.find(text.removeprefix(_KEPT)))
     words = text.split()
-    settings = parse_setting_words(word for word in words if word != WHAT_IF)
+    settings = _settings([word for word in words if word != WHAT_IF], large)
     is_what_if = WHAT_IF in words
     if not is_what_if and run is not None and run_settings(run) == settings:
         return solution_of_run(run, orbit) or Request(orbit, settings)
@@ -121,12 +136,37 @@ def run_settings(run: SurveyRun) -> FitSettings:
     return parse_settings(run.header().get("settings"), f"run {run.name}")
 
 
-def _text(solution: Solution, orbit: int | None, most: int) -> str:
-    """Return a solution as text, in an address of an orbit."""
+def _settings(words: list[str], large: LargeSelections) -> FitSettings:
+    """Return the settings that words say, of which some may be keys of what is left out."""
+    many = [word for word in words if _OF_MANY.fullmatch(word)]
+    settings = parse_setting_words(word for word in words if word not in many)
+    if not many:
+        return settings
+    selected, problems = parsed(dict(word.split("=", 1) for word in many), large.find)
+    if problems:
+        raise InputError(_TOO_MANY)
+    return settings.with_(exclusions=settings.exclusions | selected.exclusions)
+
+
+def _text(solution: Solution, orbit: int | None, large: LargeSelections | None) -> str:
+    """Return a solution as text, in an address of an orbit.
+
+    Parameters
+    ----------
+    large : as of `solution_query`; None for a saved view, which has room for all
+    """
     if solution.kept:
         return f"{_KEPT}{solution.kept}"
     if solution.run:
         of_orbit = "" if solution.orbit == orbit else f" orbit={solution.orbit}"
         return f"run={solution.run}{of_orbit}"
     text = settings_text(solution)
-    return text if len(text) <= most else TOO_LONG
+    if large is None or len(text) <= _MOST_CHARACTERS:
+        return text if len(text) <= _MOST_READ else TOO_LONG
+    selected = Selected.of(solution.settings.exclusions)
+    large.remember(selected)
+    few = selected.of_kinds([kind for kind in selected.kinds if kind not in selected.keys])
+    shorter = solution._replace(settings=solution.settings.with_(exclusions=few.exclusions))
+    keys = (f"{kind}={MANY}{key}" for kind, key in selected.keys.items())
+    text = " ".join([*keys, settings_text(shorter)])
+    return text if len(text) <= _MOST_CHARACTERS else TOO_LONG

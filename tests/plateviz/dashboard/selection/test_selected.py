@@ -66,7 +66,7 @@ def test_address_has_a_key_of_the_kinds_of_which_many_are_selected():
 
 
 def test_large_selections_are_remembered_up_to_a_number():
-    many = [of(range(n, n + 30), [(n, plate) for plate in range(30)]) for n in range(60)]
+    many = [of(range(n, n + 30), [(n, plate) for plate in range(30)]) for n in range(450)]
     known = LargeSelections()
     for selected in many:
         known.remember(selected)

@@ -21,6 +21,7 @@ from plateviz.plots.style import SERIES_COLOURS
 from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.detector_shifts import detector_shifts, shift_statistics
+from plateviz.tables.rounded import rounded
 
 _TITLE = "Shift of each detector within the orbit"
 _XLABEL = "time since the first exposure (min)"
@@ -105,7 +106,8 @@ def _subtitle(single: pd.DataFrame, means: pd.DataFrame, axis: str) -> str:
     found, of_means = shift_statistics(single), shift_statistics(means)
     if axis == "x":
         return (
-            f"Points: one exposure, with ± 1σ and ± 2σ in grey, σ = {found.sigma_mpix:.2g} mpix = "
+            "Points: one exposure, with ± 1σ and ± 2σ in grey, σ = "
+            f"{rounded(found.sigma_mpix)} mpix = "
             f"{angle_text(found.sigma_mas)} by chance; lines: means of {means['together'].iloc[0]}"
         )
     return (

@@ -11,6 +11,7 @@ from plateviz.plots.focal_plane import XLABEL, YLABEL, detector_outlines, field_
 from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.calibration import distortion
+from plateviz.tables.rounded import rounded
 from solver.data.instrument import Detector
 
 _TITLE = "Fitted distortion, distorted minus ideal position"
@@ -54,7 +55,7 @@ def plot_distortion(
             *key(length_um / 1000.0, length, scale=scale, field=field),
         ],
         title=_TITLE,
-        subtitle=f"Zero at the optical centre; rms {rms_um:.3g} µm.\n"
+        subtitle=f"Zero at the optical centre; rms {rounded(rms_um, 3)} µm.\n"
         f"Arrows enlarged {scale:,.12g} times; key: {length}",
         x=Axis(XLABEL, field.x),
         y=Axis(YLABEL, field.ylim),

@@ -20,6 +20,7 @@ from plateviz.plots.focal_plane import XLABEL, YLABEL, detector_outlines, field_
 from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.distortion_comparison import ALONE, TOGETHER, distortion_comparison
+from plateviz.tables.rounded import rounded
 from solver.data.instrument import Detector
 
 _TITLE = "Difference of the distortion, B minus A"
@@ -85,12 +86,12 @@ def _removed(rows: pd.DataFrame) -> str:
     shift, roll, scale = (
         float(np.abs(rows[name].iloc[0])) for name in ("shift_um", "roll_arcsec", "scale_ppm")
     )
-    return f"removed: shift {_length(shift)}, roll {roll:.2g} arcsec, scale {scale:,.2f} ppm"
+    return f"removed: shift {_length(shift)}, roll {rounded(roll)} arcsec, scale {scale:,.2f} ppm"
 
 
 def _length(um: float) -> str:
     """Return a length to two digits or more: "12 µm", "0.05 nm"."""
-    return f"{um:.3g} µm" if um >= 0.001 or um == 0.0 else f"{1000.0 * um:.2g} nm"
+    return f"{rounded(um, 3)} µm" if um >= 0.001 or um == 0.0 else f"{rounded(1000.0 * um)} nm"
 
 
 def _plot(chosen: Chosen) -> Figure:

@@ -18,6 +18,7 @@ from plateviz.plots.explored_rows import (
 from plateviz.plots.style import CLASS_COLOURS, COLOUR_OF_CLASS, ROW_LIMIT
 from plateviz.tables.explore import ExplorableTable
 from plateviz.tables.labels import exposure_labels, id_strings, unit_text
+from plateviz.tables.rounded import rounded
 from plateviz.tables.sources import REFERENCE
 from solver.data.columns import Column
 
@@ -265,7 +266,11 @@ def _in_numbers(counts: Counts, unit: str) -> list[str]:
     median = counts.medians().median
     if not len(median):
         return []
-    return [f"medians from {median.min():.3g} to {median.max():.3g}{unit}".replace("-", "−")]
+    return [
+        f"medians from {rounded(median.min(), 3)} to {rounded(median.max(), 3)}{unit}".replace(
+            "-", "−"
+        )
+    ]
 
 
 def _counted(table: ExplorableTable, extent: Extent, chosen: Columns) -> list[str]:

@@ -12,6 +12,7 @@ from plateviz.plots.focal_plane import XLABEL, YLABEL, detector_outlines, field_
 from plateviz.plots.style import PANEL_WIDTH
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.field_residuals import field_residuals, field_statistics
+from plateviz.tables.rounded import rounded
 from solver.data.instrument import Detector
 
 _TITLE = "Residuals of each field against the others"
@@ -72,7 +73,7 @@ def _panel(
         [
             detector_outlines(detectors, "muted"),
             *arrows(rows, scale=scale, field=area, colour="mark", hover=_HOVER),
-            *key(length, f"{length:.3g} mpix", scale=scale, field=area),
+            *key(length, f"{rounded(length, 3)} mpix", scale=scale, field=area),
         ],
         title=f"Field {field_id} less others" if is_first else f"Field {field_id}",
         subtitle="\n".join(lines),

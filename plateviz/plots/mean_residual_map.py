@@ -20,6 +20,7 @@ from plateviz.plots.style import PANEL_WIDTH
 from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.mean_residuals import MapStatistics, map_statistics, mean_residuals
+from plateviz.tables.rounded import rounded
 from solver.data.instrument import Instrument
 
 _TITLE = "Mean residual over the focal plane"
@@ -91,8 +92,8 @@ def _subtitle(table: pd.DataFrame, axis: str, statistics: MapStatistics) -> str:
     if axis == "x":
         return (
             f"{statistics.n:,} measurements in {statistics.bins:,} bins; by chance ± "
-            f"{statistics.sigma_mpix:.2g} mpix = {angle_text(statistics.sigma_mas)} in a typical "
-            f"bin; colours to ± {_COLOUR_SIGMAS:g}σ"
+            f"{rounded(statistics.sigma_mpix)} mpix = {angle_text(statistics.sigma_mas)} in a "
+            f"typical bin; colours to ± {_COLOUR_SIGMAS:g}σ"
         )
     return (
         f"x and y: scatter {statistics.spread:.2f} times that by chance; largest bin "

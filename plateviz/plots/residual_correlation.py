@@ -11,6 +11,7 @@ from plateviz.plots.ticks import log_ticks
 from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.residual_correlation import correlation_statistics, residual_correlation
+from plateviz.tables.rounded import rounded
 
 _TITLE = "Correlation of the residuals, E and B parts"
 _XLABEL, _YLABEL = "separation on the focal plane (mm)", "correlation (mpix²)"
@@ -87,7 +88,8 @@ def _subtitle(table: pd.DataFrame) -> str:
     return (
         f"Largest E {found.largest_e:.1f}σ, B {found.largest_b:.1f}σ; chance exceeds "
         f"{found.limit:.1f}σ in one of 100 orbits\n"
-        f"Smallest σ {found.least_sigma_mpix2:.2g} mpix² = ({angle_text(found.least_sigma_mas)})²"
+        f"Smallest σ {rounded(found.least_sigma_mpix2)} mpix² = "
+        f"({angle_text(found.least_sigma_mas)})²"
     )
 
 

@@ -6,6 +6,7 @@ import pandas as pd
 from plateviz.tables.cause_case import Case
 from plateviz.tables.labels import id_strings
 from plateviz.tables.reference_influence import reference_influence
+from plateviz.tables.rounded import rounded
 from solver.data.result import FitResult
 from solver.results.diagnosis.exposures import WAVES
 from solver.results.diagnosis.table import BAD_RATE
@@ -38,8 +39,8 @@ def harm(case: Case) -> tuple[str, bool]:
         error = _on_sky(case, size)
         typical = _typical_sigma(case.result)
         spoils = (
-            f"It spoils the positions, by up to {error:.2g} mas rms where their uncertainty is "
-            f"{typical:.2g} mas, and the calibration."
+            f"It spoils the positions, by up to {rounded(error)} mas rms where their "
+            f"uncertainty is {rounded(typical)} mas, and the calibration."
         )
         return spoils, error > _LARGE_SHARE * typical
     if subject in of_parts:
@@ -53,7 +54,7 @@ def harm(case: Case) -> tuple[str, bool]:
     if subject == "references":
         spoils = (
             "It spoils the error that all positions share, which is up to "
-            f"{found.size:.2g} times as large as stated."
+            f"{rounded(found.size)} times as large as stated."
         )
         return spoils, _references_off(case.result)
     if subject == "kurtosis":
@@ -93,8 +94,8 @@ def _harm_of_swings(case: Case) -> tuple[str, bool]:
     """Return the same for exposures whose pointing jittered."""
     error, typical = _shift_by_swings(case), _typical_sigma(case.result)
     spoils = (
-        f"It spoils the positions of the sources in these exposures, by {error:.2g} mas rms "
-        f"where a typical uncertainty is {typical:.2g} mas."
+        f"It spoils the positions of the sources in these exposures, by {rounded(error)} mas rms "
+        f"where a typical uncertainty is {rounded(typical)} mas."
     )
     return spoils, error > _LARGE_SHARE * typical
 
@@ -107,14 +108,15 @@ def _harm_of_parts(case: Case, total: int) -> tuple[str, bool]:
     if subject == "reference":
         shared = _shared_error(case.result)
         return (
-            f"It spoils all positions alike, by about {_frame_shift(case):.2g} mas where the error "
-            f"that they share is {shared:.2g} mas: the frame follows the reference stars.",
+            f"It spoils all positions alike, by about {rounded(_frame_shift(case))} mas where "
+            "the error "
+            f"that they share is {rounded(shared)} mas: the frame follows the reference stars.",
             _references_off(case.result),
         )
     return (
         f"It spoils the positions of up to {count:,} sources, by at most "
-        f"{_largest_shift_of_one(case):.2g} mas, where a typical uncertainty is "
-        f"{_typical_sigma(case.result):.2g} mas.",
+        f"{rounded(_largest_shift_of_one(case))} mas, where a typical uncertainty is "
+        f"{rounded(_typical_sigma(case.result))} mas.",
         is_large,
     )
 
@@ -134,9 +136,10 @@ def _harm_of_others(case: Case) -> tuple[str, bool]:
     typical = float(np.nanmedian(sigma))
     frame, shared = _pull_on_frame(rows, offset, prior), _shared_error(case.result)
     words = (
-        f"these positions by {shift:.2g} mas rms, where their uncertainty is {typical:.2g} mas, "
-        f"and the frame by about {frame:.2g} mas, where the error that all positions share is "
-        f"{shared:.2g} mas."
+        f"these positions by {rounded(shift)} mas rms, where their uncertainty is "
+        f"{rounded(typical)} mas, "
+        f"and the frame by about {rounded(frame)} mas, where the error that all positions share is "
+        f"{rounded(shared)} mas."
     )
     is_large = shift > _LARGE_SHARE * typical or frame > _LARGE_SHARE * shared
     if not items:

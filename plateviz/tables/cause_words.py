@@ -15,6 +15,7 @@ from plateviz.tables.data_cause_words import (
     said_of_swapped,
 )
 from plateviz.tables.prior_words import said_of_prior
+from plateviz.tables.rounded import rounded
 
 _NM_PER_UM = 1000.0
 _ORDINALS = {2: "second", 3: "third"}
@@ -27,7 +28,7 @@ def said_of(case: Case) -> Said:
 
 
 def _size(case: Case) -> str:
-    return f"{_NM_PER_UM * case.found.test.size_um:.3g} nm rms on the focal plane"
+    return f"{rounded(_NM_PER_UM * case.found.test.size_um, 3)} nm rms on the focal plane"
 
 
 def _fall(case: Case) -> str:

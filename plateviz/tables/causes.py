@@ -13,6 +13,7 @@ from plateviz.tables.estimated_noise import reference_factor
 from plateviz.tables.labels import exposure_labels, id_strings
 from plateviz.tables.prior_words import narrowed_priors, usual_priors
 from plateviz.tables.remedy import remedied
+from plateviz.tables.rounded import rounded
 from solver.data.result import FitResult
 from solver.results.diagnosis.causes import SCATTER, FoundCauses, wrong_identifications
 from solver.results.diagnosis.table import Diagnosis
@@ -94,7 +95,7 @@ def _stuck(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> Caus
     is_wild = explains and not result.settings.robust
     words = (
         f"{far:,} of {total:,} residuals are more than six times as large as is usual in their "
-        f"exposures; χ² per degree of freedom without them is {noise.statistic:.3g}."
+        f"exposures; χ² per degree of freedom without them is {rounded(noise.statistic, 3)}."
     )
     if is_wild:
         title = "measurements that are far off keep the fit from converging"

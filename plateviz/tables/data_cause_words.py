@@ -7,6 +7,7 @@ import pandas as pd
 
 from plateviz.tables.cause_case import Case, Said
 from plateviz.tables.labels import id_strings
+from plateviz.tables.rounded import rounded
 
 _MOST_NAMED = 8
 # So many options a person would still give.
@@ -34,13 +35,13 @@ def said_of_noise_of(name: str, words: str, action: str, *options: str) -> Calla
     def said(case: Case) -> Said:
         test = case.found.test
         evidence = (
-            f"χ² scatters by more than chance: {test.statistic:.3g}, expected "
-            f"{test.expected:.3g} ± {test.scatter:.2g}."
+            f"χ² scatters by more than chance: {rounded(test.statistic, 3)}, expected "
+            f"{rounded(test.expected, 3)} ± {rounded(test.scatter)}."
         )
         if test.subject == "magnitudes":
             evidence = (
                 f"χ² over its expected value changes by {test.statistic:+.3f} per magnitude; "
-                f"chance makes ± {test.scatter:.2g}."
+                f"chance makes ± {rounded(test.scatter)}."
             )
         return Said(name, words, evidence, action, options)
 
@@ -53,7 +54,7 @@ def said_of_kurtosis(case: Case) -> Said:
     has_more = test.statistic > 0.0
     words = (
         f"The excess kurtosis of the residuals within six sigma is {test.statistic:+.3f}, that of "
-        f"normal ones 0 ± {test.scatter:.2g}, in all exposures and sources alike."
+        f"normal ones 0 ± {rounded(test.scatter)}, in all exposures and sources alike."
     )
     if not has_more:
         action = "check whether large errors were removed from the measurements, or others rounded"
@@ -79,7 +80,7 @@ def said_of_outliers(case: Case) -> Said:
         "outliers",
         "some measurements are outliers",
         f"{int(case.found.size):,} measurements are beyond six sigma; chance makes "
-        f"{case.found.test.expected:.1g}.",
+        f"{rounded(case.found.test.expected, 1)}.",
         "let the fit find and leave them out",
         ("--robust",),
     )
@@ -93,7 +94,7 @@ def said_of_swapped(case: Case) -> Said:
         "swapped",
         "measurements have each other's identification",
         f"In {pairs:,} pair{'s' if pairs > 1 else ''}, each is where the other should be; chance "
-        f"makes {case.found.test.expected:.1g}. The sources: "
+        f"makes {rounded(case.found.test.expected, 1)}. The sources: "
         f"{', '.join(ids[:_MOST_NAMED])}{', ...' if len(ids) > _MOST_NAMED else ''}.",
         "let the fit find, list and leave them out",
         ("--robust",),
@@ -117,8 +118,8 @@ def said_of_references(case: Case) -> Said:
     words = f"Its errors are about {case.found.size:.2f} times those stated."
     if is_nearer:
         words = (
-            f"Their rms deviation is {test.statistic:.2g} of its errors, where {test.expected:.2g} "
-            "is expected."
+            f"Their rms deviation is {rounded(test.statistic)} of its errors, where "
+            f"{rounded(test.expected)} is expected."
         )
     return Said(
         "reference-errors",
@@ -147,7 +148,7 @@ def said_of_others(case: Case) -> Said:
     return Said(
         "catalogue-errors",
         "the stars that are no reference stars are further from the catalogue than it states",
-        f"Its errors are about {case.found.size:.3g} times those stated.",
+        f"Its errors are about {rounded(case.found.size, 3)} times those stated.",
         "check the units and epochs of the catalogue, or state larger errors there",
     )
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from plateviz.tables.rounded import rounded
 from solver.data.result import FitResult
 from solver.units import PIX_PER_MPIX
 
@@ -55,7 +56,8 @@ def _parts(entry: Mapping[str, Any]) -> list[str]:
     if "floor_pix" in entry:
         floor, error = (float(entry[name]) for name in ("floor_pix", "floor_sigma_pix"))
         parts.append(
-            f"a floor of {floor / PIX_PER_MPIX:.3g} ± {error / PIX_PER_MPIX:.1g} mpix that adds to "
+            f"a floor of {rounded(floor / PIX_PER_MPIX, 3)} ± "
+            f"{rounded(error / PIX_PER_MPIX, 1)} mpix that adds to "
             "the uncertainties in quadrature"
         )
     if _REFERENCES in log_factor:
@@ -66,4 +68,4 @@ def _parts(entry: Mapping[str, Any]) -> list[str]:
 
 def _with_error(log_factor: float, sigma: float) -> str:
     factor = float(np.exp(log_factor))
-    return f"{factor:.3f} ± {factor * sigma:.2g}"
+    return f"{factor:.3f} ± {rounded(factor * sigma)}"

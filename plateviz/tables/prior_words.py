@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from plateviz.tables.cause_case import Case, Said
+from plateviz.tables.rounded import rounded
 from solver.data.parameters import BY_NAME, PARAMETERS
 from solver.data.prior_text import format_width, split_name
 from solver.data.settings import FitSettings
@@ -16,8 +17,8 @@ def said_of_prior(case: Case) -> Said:
     group, settings = PARAMETERS[case.found.test.what[0]], case.result.settings
     width, rms = settings.width(group.name), case.found.test.statistic
     words = (
-        f"The values lie {rms:.3g} times its width from its centre, rms, where about 1 is expected "
-        f"at most. The width is {width:.3g} {group.width_unit}".rstrip()
+        f"The values lie {rounded(rms, 3)} times its width from its centre, rms, where about "
+        f"1 is expected at most. The width is {rounded(width, 3)} {group.width_unit}".rstrip()
         + "."
     )
     title = f"the prior of {group.name} contradicts the measurements"

@@ -8,6 +8,7 @@ import pandas as pd
 
 from plateviz.tables.causes import Cause
 from plateviz.tables.labels import id_strings, unit_text
+from plateviz.tables.rounded import rounded
 from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests
 from solver.results.diagnosis.table import CARE_RATE, Test
 
@@ -111,16 +112,20 @@ def _zonal(case: Case) -> Cause:
     row = case.tables.zonal.iloc[0]
     rms = float(row["rms"])
     typical = _typical_sigma(case.motions)
-    spoils = f"It spoils all positions, by about {rms:.2g} mas, which more orbits do not reduce"
+    spoils = (
+        f"It spoils all positions, by about {rounded(rms)} mas, which more orbits do not reduce"
+    )
     if np.isfinite(typical):
         spoils += (
-            f"; the motions fitted to all orbits have a typical uncertainty of {typical:.2g} mas"
+            f"; the motions fitted to all orbits have a typical uncertainty of {rounded(typical)} "
+            "mas"
         )
     words = (
         "The reference stars of neighbouring places deviate together, and the frames of the "
         "orbits and their distortion follow as they would the catalogue, not the focal plane: "
         f"χ² {case.test.statistic:.1f}, expected {case.test.expected:.0f} ± "
-        f"{case.test.scatter:.1f}. The field has an rms of about {rms:.2g} mas along each axis."
+        f"{case.test.scatter:.1f}. The field has an rms of about {rounded(rms)} mas along "
+        "each axis."
     )
     return Cause(
         "zonal-errors",
@@ -159,7 +164,7 @@ def _against_time(case: Case) -> Cause:
     trend = case.diagnosis.trends[case.test.name]
     kind, group = case.test.subject, case.test.name.partition(" of ")[2]
     unit = unit_text(trend.unit)
-    change = f"{abs(trend.change):.3g} {unit}".rstrip()
+    change = f"{rounded(abs(trend.change), 3)} {unit}".rstrip()
     how = {
         "trend": f"It changes by {change} from the first orbit to the last",
         "jump": f"It changes by {change} at orbit {trend.orbit}",
@@ -268,11 +273,11 @@ def _motions(case: Case) -> Cause:
         action = "compare the times of the orbits with another source, and their origins"
     return Cause(
         "scattered-motions",
-        f"most sources scatter about their motions by {np.sqrt(ratio):.2g} times their noise",
+        f"most sources scatter about their motions by {rounded(np.sqrt(ratio))} times their noise",
         words,
         float(case.test.sigma),
-        f"It spoils all motions, by about {np.sqrt(ratio):.2g} times the uncertainties of a good "
-        "run.",
+        f"It spoils all motions, by about {rounded(np.sqrt(ratio))} times the uncertainties "
+        "of a good run.",
         action,
         (),
         ratio > _LARGE_SCATTER,

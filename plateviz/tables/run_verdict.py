@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.causes import Cause
+from plateviz.tables.rounded import rounded
 from plateviz.tables.run_causes import run_causes
 from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests, diagnose_run
 from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
@@ -155,12 +156,13 @@ def _smooth_errors(
     is_found = any(test.subject == "zonal" for test in found)
     if is_found and all(cause.name != "zonal-errors" for cause in causes):
         return [
-            f"The catalogue may have smooth errors as well, of about {zonal['rms'].iloc[0]:.2g} "
+            "The catalogue may have smooth errors as well, of about "
+            f"{rounded(zonal['rms'].iloc[0])} "
             "mas along each axis: what is named first can look like them. They can be told from "
             "it once it is mended."
         ]
     return [
         f"Smooth errors of the catalogue would be seen in half of such runs if their rms were "
-        f"{zonal['typical'].iloc[0]:.2g} mas along each axis; smaller ones spoil the positions "
-        "unseen."
+        f"{rounded(zonal['typical'].iloc[0])} mas along each axis; smaller ones spoil the "
+        "positions unseen."
     ]

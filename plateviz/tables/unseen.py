@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from plateviz.tables.rounded import rounded
 from solver.data.result import FitResult
 from solver.units import RAD_PER_MAS
 
@@ -25,7 +26,7 @@ def unseen_sentences(result: FitResult) -> list[str]:
     if np.isfinite(quadratic):
         sentences.append(
             "Those that are quadratic in the field are taken for distortion: they could be as "
-            f"large as all of the fitted quadratic distortion, {quadratic:.2g} mas rms. Only "
+            f"large as all of the fitted quadratic distortion, {rounded(quadratic)} mas rms. Only "
             "orbits at other position angles tell them apart."
         )
     factor = reference_factor(result)

@@ -196,7 +196,8 @@ def _evaluated(problem: Problem, mode: Mode) -> Mode:
 
 def _log_evidence(problem: Problem, mode: Mode) -> float:
     log_sigma = float(np.log(problem.measurements.sigma).sum())
-    return log_evidence(mode, problem.priors, log_sigma, 2 * problem.n_obs)
+    found = mode.trace[-1].objective
+    return log_evidence(mode, problem.priors, found, log_sigma, 2 * problem.n_obs)
 
 
 def _numbers(problem: Problem, mode: Mode, settings: FitSettings) -> dict[str, object]:

@@ -8,6 +8,7 @@ from solver.model.directions import offsets_mas
 from solver.results.diagnostics import (
     deviation_freedom,
     effective_parameters,
+    fall_to_the_mode,
     log_evidence,
     mean_covariance,
     normalised_deviation,
@@ -24,6 +25,10 @@ def summarise(solution: SolvedProblem, settings: FitSettings) -> dict[str, objec
     prior_hessian = problem.priors.hessian_diagonal(mode.theta)
     parameters = effective_parameters(problem.priors, prior_hessian, solution.covariance)
     dof = whitened.size - parameters
+    objective = chi2 + problem.priors.penalty(mode.theta, mode.sources)
+    if settings.engine != "gauss-newton":
+        objective -= fall_to_the_mode(problem, mode)
+    log_sigma = float(np.log(problem.measurements.sigma).sum())
     scatter = np.sqrt(np.mean((whitened * problem.measurements.sigma) ** 2, axis=0))
     return {
         "converged": mode.status.is_solution,
@@ -43,9 +48,7 @@ def summarise(solution: SolvedProblem, settings: FitSettings) -> dict[str, objec
         "chi2": chi2,
         "dof": dof,
         "chi2_per_dof": chi2 / dof,
-        "log_evidence": log_evidence(
-            mode, problem.priors, float(np.log(problem.measurements.sigma).sum()), whitened.size
-        ),
+        "log_evidence": log_evidence(mode, problem.priors, objective, log_sigma, whitened.size),
         "residual_rms_x": float(scatter[0]),
         "residual_rms_y": float(scatter[1]),
         **_reference_numbers(solution, is_reference),

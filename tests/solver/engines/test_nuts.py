@@ -44,6 +44,13 @@ def test_engines_agree(results):
 
 @pytest.mark.full
 @pytest.mark.slow
+def test_engines_find_the_same_evidence(results):
+    found = [result.summary["log_evidence"] for result in results.values()]
+    assert found == pytest.approx([found[0]] * 3, abs=0.1)
+
+
+@pytest.mark.full
+@pytest.mark.slow
 def test_wrong_results_do_not_agree(results):
     """Sigmas are twice as large and positions are one sigma off."""
     exact = results["gauss-newton"]

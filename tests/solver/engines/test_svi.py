@@ -11,6 +11,7 @@ from numpyro.infer import Trace_ELBO
 from solver.data.engine_settings import WARPFIELD, SviSettings
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
+from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import find_mode
 from solver.engines.numpyro_model import evidence_of, in_coordinates
 from solver.engines.svi import blocks, rate, start_state, variational
@@ -20,6 +21,8 @@ from solver.fit import OrbitFitter
 from solver.linear.covariances import covariances
 from solver.linear.whitening import whitened
 from solver.problem.problem import build_problem
+from solver.results.summary import summarise
+from solver.results.tables import solved_problem
 
 SETTINGS = FitSettings(engine="svi")
 
@@ -61,6 +64,15 @@ def test_svi_agrees_with_gauss_newton_from_a_cold_start(found, exact):
 def test_sigmas_are_the_conditional_ones(found, exact):
     expected = sigmas(exact.reduced.conditional_covariance())
     np.testing.assert_allclose(sigmas(found[0].conditional), expected, rtol=0.02)
+
+
+@pytest.mark.slow
+def test_log_evidence_is_that_of_gauss_newton(svi_problem, exact, found):
+    evidence = [
+        summarise(solved_problem(svi_problem, one, one.mode.reduced), SETTINGS)["log_evidence"]
+        for one in (Estimate(exact), found[0])
+    ]
+    assert evidence[1] == pytest.approx(evidence[0], abs=0.01)
 
 
 @pytest.mark.slow

@@ -105,6 +105,7 @@ def test_evidence_exceeds_the_bound_by_the_density_of_the_calibration(
     evidence = log_evidence(
         solution.mode,
         problem.priors,
+        solution.mode.trace[-1].objective,
         float(np.log(problem.measurements.sigma).sum()),
         2 * problem.n_obs,
     )

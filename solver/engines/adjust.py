@@ -13,6 +13,10 @@ from solver.engines.robust import find_outliers, outlier_table, with_robust_weig
 from solver.problem.adjustments import UNADJUSTED, Adjustments
 from solver.problem.problem_cache import ProblemCache
 
+# Searches of outliers, each with the noise of what the last one has left. Few measurements are near
+# the limit after the second one.
+_MAX_SEARCHES = 6
+
 
 def find_adjustments(
     cache: ProblemCache,
@@ -36,11 +40,39 @@ def find_adjustments(
         found = found._replace(moves=find_moves(searched, instrument, settings, progress))
         data, problem = cache.get(settings, found)
     if settings.robust:
-        outliers = outlier_table(find_outliers(problem, settings, progress), problem, data)
-        found = found._replace(outliers=outliers)
-        _, problem = cache.get(settings, found)
+        return _without_outliers(cache, settings, found, progress)
     if settings.has_noise_model:
         found = found._replace(noise=estimate_noise(problem, settings, progress))
+    return found
+
+
+def _without_outliers(
+    cache: ProblemCache,
+    settings: FitSettings,
+    moved: Adjustments,
+    progress: Callable[[Iteration], None],
+) -> Adjustments:
+    """Return the outliers and the noise of the other measurements, which follow from each other.
+
+    Parameters
+    ----------
+    moved : adjustments that do not depend on either
+    """
+    found = moved
+    for _ in range(_MAX_SEARCHES):
+        before = () if found.outliers is None else set(found.outliers.index)
+        data, scaled = cache.get(settings, moved._replace(noise=found.noise))
+        outliers = outlier_table(find_outliers(scaled, settings, progress), scaled, data)
+        found = moved._replace(outliers=outliers, noise=found.noise)
+        is_last = outliers is None or set(outliers.index) == before
+        if is_last or not settings.has_noise_model:
+            break
+        _, whole = cache.get(settings, moved)
+        _, problem = cache.get(settings, moved._replace(outliers=outliers))
+        noise = estimate_noise(problem, settings, progress, whole)
+        found = found._replace(noise=noise)
+        if noise is None:
+            break
     return found
 
 

@@ -41,8 +41,13 @@ def estimate_noise(
     problem: Problem,
     settings: FitSettings,
     progress: Callable[[Iteration], None] = lambda _: None,
+    whole: Problem | None = None,
 ) -> Noise | None:
     """Estimate the noise model that the settings ask for.
+
+    Parameters
+    ----------
+    whole : problem with the outliers, which get uncertainties, too; None if there are none
 
     Returns
     -------
@@ -53,7 +58,10 @@ def estimate_noise(
     InputError
         If the noise is to depend on magnitudes and there are none.
     """
-    model, by_reference = _variance_model(problem, settings), 0.0
+    model_of_all = _variance_model(whole or problem, settings)
+    labels = pd.Index((whole or problem).measurements.label)
+    model_of_all, model = model_of_all.of_rows(labels.get_indexer(problem.measurements.label))
+    by_reference = 0.0
     by_row, sigma = model.start(), model.start()
     mode, rounds, largest, is_solution = None, 0, np.inf, False
     while not (is_solution and largest < _TOLERANCE) and rounds < _MAX_ROUNDS:
@@ -92,7 +100,7 @@ def estimate_noise(
     if model.has_floor:
         entry["floor_pix"] = model.floor(by_row)
         entry["floor_sigma_pix"] = model.floor_sigma(by_row, sigma)
-    factor = pd.Series(model.factor(by_row), index=problem.measurements.label)
+    factor = pd.Series(model_of_all.factor(by_row), index=labels)
     return Noise(factor, model.floor(by_row), float(np.exp(0.5 * by_reference)), entry)
 
 

@@ -64,8 +64,10 @@ def find_outliers(
     last = _reweighted_fit(problem, settings, progress)
     if last is None:
         return None
-    # The squared distance of a good measurement is exponentially distributed with mean two.
-    limit = 2.0 * np.log(problem.n_obs / _FALSE_ALARMS)
+    # The squared distance of a good measurement is exponentially distributed with mean two. Where
+    # errors are larger than stated, many good ones are beyond what is expected of the best.
+    larger = max(1.0, float(np.median(last.squares)) / (2.0 * np.log(2.0)))
+    limit = 2.0 * np.log(problem.n_obs / _FALSE_ALARMS) * larger
     return _outliers(problem, last.mode, last.squares > limit)
 
 

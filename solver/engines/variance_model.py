@@ -7,7 +7,7 @@ plus the square of a floor that all measurements share.
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from solver.errors import InputError
 from solver.linear.leverage import Residuals
@@ -37,6 +37,14 @@ class VarianceModel(NamedTuple):
     design: Float[np.ndarray, "obs predictor"]
     stated: Float[np.ndarray, "obs 2"]
     has_floor: bool
+
+    def of_rows(self, rows: Int[np.ndarray, " row"]) -> tuple["VarianceModel", "VarianceModel"]:
+        """Return this model and that of some measurements, without predictors of none of these."""
+        of_some = self.design[rows]
+        kept = of_some.any(axis=0) | ~self.design.any(axis=0)
+        names = [name for name, is_kept in zip(self.names, kept, strict=True) if is_kept]
+        whole = self._replace(names=names, design=self.design[:, kept])
+        return whole, whole._replace(design=of_some[:, kept], stated=self.stated[rows])
 
     def start(self) -> Float[np.ndarray, " parameter"]:
         """Return the parameters of the stated variances."""

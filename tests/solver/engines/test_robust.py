@@ -64,6 +64,43 @@ def test_undisturbed_sources_are_not_biased(found, clean, axis):
     assert np.sqrt((moved**2).mean()) < 0.1
 
 
+@pytest.fixture(scope="module", params=["all", "exposure"])
+def understated(request, found):
+    """The disturbed orbit with half the uncertainties, of all exposures or of every third one."""
+    rows = found[1].measurements
+    is_half = (rows["plate_id"] % 3 == 0) | (request.param == "all")
+    factor = np.where(is_half, 0.5, 1.0)
+    data = replace(
+        found[1], measurements=rows.assign(sx=rows["sx"] * factor, sy=rows["sy"] * factor)
+    )
+    name = "noise_scale" if request.param == "all" else "noise_by_exposure"
+    return data, ROBUST.with_(**{name: True})
+
+
+@pytest.mark.slow
+def test_outliers_and_a_noise_model_are_found_together(understated, found, fit_whole):
+    data, settings = understated
+    result = fit_whole(data, settings)
+    # As with the right uncertainties.
+    right = set(found[0].outliers.index)
+    assert len(right ^ set(result.outliers.index)) <= 2
+    assert result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.01)
+    found_factor = np.exp(list(result.summary["noise"]["log_factor"].values()))
+    is_understated = found_factor > 1.5
+    expected = 1.0 if settings.noise_scale else 1.0 / 3.0
+    assert is_understated.mean() == pytest.approx(expected, abs=0.05)
+    assert found_factor[is_understated].mean() == pytest.approx(2.0, abs=0.03)
+
+
+@pytest.mark.slow
+def test_good_measurements_with_understated_errors_are_no_outliers(found, fit_whole):
+    rows = found[1].measurements
+    data = replace(found[1], measurements=rows.assign(sx=rows["sx"] / 3, sy=rows["sy"] / 3))
+    result = fit_whole(data, ROBUST)
+    assert len(set(found[0].outliers.index) ^ set(result.outliers.index)) <= 2
+    assert result.summary["chi2_per_dof"] == pytest.approx(9.0, rel=0.1)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("axis", ["ra", "dec"])
 def test_undisturbed_sources_are_biased_without_the_robust_fit(plain, found, clean, axis):

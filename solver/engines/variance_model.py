@@ -41,8 +41,8 @@ class VarianceModel(NamedTuple):
     def of_rows(self, rows: Int[np.ndarray, " row"]) -> tuple["VarianceModel", "VarianceModel"]:
         """Return this model and that of some measurements, without predictors of none of these."""
         of_some = self.design[rows]
-        kept = of_some.any(axis=0) | ~self.design.any(axis=0)
-        names = [name for name, is_kept in zip(self.names, kept, strict=True) if is_kept]
+        kept = np.any(of_some != 0.0, axis=0) | ~np.any(self.design != 0.0, axis=0)
+        names = [name for name, is_kept in zip(self.names, kept.tolist(), strict=True) if is_kept]
         whole = self._replace(names=names, design=self.design[:, kept])
         return whole, whole._replace(design=of_some[:, kept], stated=self.stated[rows])
 

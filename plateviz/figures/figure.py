@@ -5,7 +5,7 @@ be tested as they are, and one that is drawn can follow another (`plateviz.figur
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -90,6 +90,7 @@ class Glyphs:
     hover : what is shown beside a glyph under the cursor
     label : of the legend; "@name" for the texts of a column, empty for none
     reach : of the frame's limits between which an image is shown; None for all
+    units : column -> unit of its values, in place of the one at the end of its name
     """
 
     kind: Kind
@@ -100,6 +101,7 @@ class Glyphs:
     hover: Tooltips = ()
     label: str = ""
     reach: Limits | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Return the number of rows."""

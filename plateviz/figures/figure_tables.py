@@ -10,6 +10,7 @@ from plateviz.figures.figure import HANDLES, Figure, Frame, Glyphs
 
 _ALONG_X = ("x", "x0", "x1", "xs", "left", "right")
 _ALONG_Y = ("y", "y0", "y1", "y2", "ys", "bottom", "top")
+_UNIT = re.compile("_(mas|uas|mpix)$")
 # Names at their places, which other marks have as well.
 _WITHOUT_NUMBERS = ("texts",)
 
@@ -21,7 +22,8 @@ def figure_tables(figure: Figure) -> dict[str, Table]:
     -------
     Name -> table. Coordinates are described by the label of their axis, with its unit. Of several
     frames, a name begins with the number of its frame, from 1. An image has a row per cell that
-    has a value, at the cell's centre; outlines have a row per point, numbered by `path`.
+    has a value, at the cell's centre; outlines have a row per point, numbered by `path`. A unit at
+    the end of a column's name is that of its values.
     """
     found: dict[str, Table] = {}
     for number, frame in enumerate(figure, 1):
@@ -43,8 +45,16 @@ def _table(frame: Frame, glyphs: Glyphs) -> Table:
     table = Table(meta={"title": frame.title} if frame.title else {})
     for name, values in columns.items():
         plain = values.astype(str) if values.dtype == object else values
-        table[name] = Column(plain, description=described.get(name))
+        in_file = _in_unit(name, glyphs.units.get(name))
+        # A number in two units may be there twice in one that a person has chosen.
+        if in_file not in table.colnames:
+            table[in_file] = Column(plain, description=described.get(name))
     return table
+
+
+def _in_unit(name: str, unit: str | None) -> str:
+    """Return the name of a column with another unit at its end, if there was one."""
+    return name if unit is None else _UNIT.sub(f"_{unit.replace('µ', 'u')}", name)
 
 
 def _cells(glyphs: Glyphs) -> Mapping[str, np.ndarray]:

@@ -146,6 +146,10 @@ class AngleUnits:
             looks={name: self._look(look, factors) for name, look in glyphs.looks.items()},
             hover=[(label, self._hover(text)) for label, text in hover],
             label=self.text(glyphs.label),
+            units={
+                **glyphs.units,
+                **{name: self.unit for name, factor in factors.items() if factor != 1.0},
+            },
         )
 
     def _look(self, look: Look, factors: Mapping[str, float]) -> Look:

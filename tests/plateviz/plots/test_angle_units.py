@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from plateviz.figures.figure import Axis, Figure, Ramp, framed
+from plateviz.figures.figure_tables import figure_tables
 from plateviz.figures.glyphs import image, points
 from plateviz.plots.angle_units import AngleUnits, mas_per_pixel
 from solver.data.instrument import MINI_MOCK
@@ -57,6 +58,42 @@ def test_figure_in_another_unit_and_back_is_the_same(figures, name):
     ]
     for one, two in zip(numbers(figure), numbers(again), strict=True):
         np.testing.assert_allclose(one, two, rtol=1e-12)
+
+
+_OF_UNIT = re.compile("(.+)_(mas|uas|mpix)$")
+
+
+def with_units(figure):
+    """Yield table, name without unit -> the angles in mas of each column that has a unit."""
+    in_mas = {"mas": 1.0, "uas": 1e-3, "mpix": PIXEL / 1e3}
+    for table, columns in figure_tables(figure).items():
+        for name in columns.colnames:
+            if found := _OF_UNIT.fullmatch(name):
+                values = np.asarray(columns[name], float)
+                yield (table, found[1]), values * in_mas[found[2]]
+
+
+@with_every_plot
+@with_every_unit
+def test_saved_numbers_are_in_the_unit_of_their_names(figures, name, unit):
+    figure = Figure(tuple(figures(name)))
+    plain = {}
+    for key, values in with_units(figure):
+        plain.setdefault(key, []).append(values)
+    for key, values in with_units(AngleUnits(unit, PIXEL).figure(figure)):
+        assert any(np.allclose(values, one, rtol=1e-9, equal_nan=True) for one in plain[key]), key
+
+
+def test_saved_column_has_the_chosen_unit_in_its_name_once():
+    table = {"x": [1.0], "shift_mas": [2.0], "shift_mpix": [2.0e3 / PIXEL]}
+    hover = [("shift", "@{shift_mpix}{0.0} mpix = @{shift_mas}{0.00} mas")]
+    marks = points(table, "x", "shift_mas", name="marks", color="mark", hover=hover)
+    axes = {"x": Axis("x (mm)", (0.0, 1.0)), "y": Axis("shift (mas)", (0.0, 3.0))}
+    figure = framed([marks], title="Shifts", **axes, width=200, height=100)
+    saved = figure_tables(AngleUnits("µas", PIXEL).figure(figure))["marks"]
+    assert saved.colnames == ["x", "shift_uas"]
+    assert saved["shift_uas"][0] == pytest.approx(2000.0)
+    assert saved["shift_uas"].description == "shift (µas)"
 
 
 def test_coordinates_limits_hovers_and_words_are_scaled_together():

@@ -106,10 +106,11 @@ DIAGNOSTICS = (
         "distortion-comparison",
         "Comparison of two distortions",
         "The distortion of the current solution (B) minus that of the previous one (A), left, and "
-        "the same with the places, rotations and pitches of the detectors, right. A common shift, "
-        "roll and scale are removed, because pointing, roll and focal length absorb them. Good: "
-        "on the right, differences well below the uncertainty of the positions. What is on the "
-        "left alone has moved from the distortion to the detectors and does no harm.",
+        "the same with the places, rotations, pitches and own distortions of the detectors, right: "
+        "means over the exposures. A common shift, roll and scale are removed, because pointing, "
+        "roll and focal length absorb them. Good: on the right, differences well below the "
+        "uncertainty of the positions. What is on the left alone has moved from the distortion to "
+        "the detectors and does no harm.",
         OrbitWorkspace.ORDERS,
         87,
         _plot,
@@ -117,7 +118,7 @@ DIAGNOSTICS = (
         has_data=lambda chosen: chosen.other is not None,
         equation=(
             "Δ = δ(B) − δ(A), minus its best shift, roll and scale; right: with the "
-            "detectors' places, rotations and pitches"
+            "detectors' places, rotations, pitches and own distortions"
         ),
     ),
 )

@@ -77,13 +77,13 @@ DIAGNOSTICS = (
         "distortion-truth",
         "Distortion minus truth",
         "The fitted distortion minus that of the simulation, left, and the same with the places, "
-        "rotations and pitches of the detectors, right. A common shift, roll and scale are "
-        "removed, because pointing, roll and focal length absorb them; the focal length itself is "
-        "not compared. Good: on the right, arrows below the σ of a source (median, marginal), of "
-        "which they are a part; a smooth pattern of that size is a weak direction. What is on the "
-        "left alone has gone to the detectors and moves no star. Where the calibration changes "
-        "during the orbit, the truth is its mean over the exposures; it has the terms above the "
-        "fitted order.",
+        "rotations, pitches and own distortions of the detectors, right. A common shift, roll and "
+        "scale are removed, because pointing, roll and focal length absorb them; the focal length "
+        "itself is not compared. Good: on the right, arrows below the σ of a source (median, "
+        "marginal), of which they are a part; a smooth pattern of that size is a weak direction. "
+        "What is on the left alone has gone to the detectors and moves no star. Where the "
+        "calibration changes during the orbit, fit and truth are means over the exposures; the "
+        "truth has the terms above the fitted order.",
         OrbitWorkspace.CALIBRATION,
         80,
         _plot,
@@ -92,7 +92,7 @@ DIAGNOSTICS = (
         is_of_simulation=True,
         equation=(
             "Δ = δ(fit) − δ(truth), minus its best shift, roll and scale; right: with the "
-            "detectors' places, rotations and pitches"
+            "detectors' places, rotations, pitches and own distortions"
         ),
     ),
 )

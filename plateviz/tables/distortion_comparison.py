@@ -1,12 +1,15 @@
 """Table of the difference between two calibrations of the focal plane, as a vector field."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.calibration import displacement_um
+from plateviz.tables.mean_calibration import (
+    MeanCalibration,
+    fitted_calibration,
+    simulated_calibration,
+)
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.simulate.true_calibration import TrueCalibration
@@ -16,9 +19,6 @@ ALONE, TOGETHER = "distortion alone", "distortion and detectors"
 _UM_PER_MM = 1000.0
 _POINTS = 256
 _LEAST_PER_SIDE = 3
-# The distortion changes by less than a hundredth of the distance: each step of the inversion
-# gains two digits or more.
-_INVERSION_STEPS = 10
 _MILLIONTH = 1e-6
 
 
@@ -31,6 +31,9 @@ def distortion_comparison(
     pointing, the roll and the focal length of the exposures absorb a common shift, rotation
     and scale of the field; the ones that fit the grid best are removed. A shift includes its
     projection: away from the centre it is longer, as on a tangent plane.
+
+    Of what changes from exposure to exposure it is the mean. Each detector's own distortion is one
+    of the detectors.
 
     The distortion alone is not determined as well as the distortion and the detectors together:
     if all detectors move against the optical axis, the distortion about the new axis has other
@@ -49,7 +52,8 @@ def distortion_comparison(
     `mas_per_unit` (mas per mm), the difference as `dx_um`, `dy_um`, `dx_mas`, `dy_mas`, and
     what was removed: `shift_um`, `roll_arcsec`, `scale_ppm`
     """
-    return _difference(_fitted(result_a), _fitted(result_b), instrument)
+    a, b = (fitted_calibration(one, instrument) for one in (result_a, result_b))
+    return _difference(a, b, instrument)
 
 
 def distortion_truth(
@@ -70,56 +74,18 @@ def distortion_truth(
     As from `distortion_comparison`, and `source_mas`: the median marginal sigma of a coordinate of
     a source, of which the calibration is a part
     """
-    table = _difference(_true(truth), _fitted(result), instrument)
+    found = fitted_calibration(result, instrument)
+    table = _difference(simulated_calibration(truth, instrument), found, instrument)
     sigma = result.sources[["sigma_ra_marginal", "sigma_dec_marginal"]].to_numpy()
     return table.assign(source_mas=np.median(sigma))
 
 
-class _Calibration(NamedTuple):
-    """Calibration of the focal plane.
-
-    Attributes
-    ----------
-    coefficients : of the distortion along x and y, um, shape (n, 2)
-    centre, rotation, pitch : of each detector, um, rad and um
-    focal_length : um, mean of the exposures
-    """
-
-    coefficients: np.ndarray
-    centre: np.ndarray
-    rotation: np.ndarray
-    pitch: np.ndarray
-    focal_length: float
-
-
-def _fitted(result: FitResult) -> _Calibration:
-    detectors = result.values_on("det")
-    return _Calibration(
-        result.values_on("coef")[["distortion_x", "distortion_y"]].to_numpy(),
-        detectors[["detector_x", "detector_y"]].to_numpy(),
-        np.radians(detectors["detector_rotation"].to_numpy()),
-        detectors[["pitch_x", "pitch_y"]].to_numpy(),
-        float(result.values_on("exp")["focal_length"].mean()),
-    )
-
-
-def _true(truth: TrueCalibration) -> _Calibration:
-    detectors = truth.instrument.detectors
-    return _Calibration(
-        truth.coefficients,
-        np.array([(d.x_um, d.y_um) for d in detectors]),
-        np.radians([d.rotation_deg for d in detectors]),
-        np.array([(d.pitch_x_um, d.pitch_y_um) for d in detectors]),
-        truth.instrument.focal_length_um,
-    )
-
-
-def _difference(a: _Calibration, b: _Calibration, instrument: Instrument) -> pd.DataFrame:
+def _difference(a: MeanCalibration, b: MeanCalibration, instrument: Instrument) -> pd.DataFrame:
     numbers, pixels = _grid(instrument)
     focal, scale = a.focal_length, instrument.distortion_scale_um
-    places_a, places_b = (_ideal(one, scale, numbers, pixels) for one in (a, b))
+    places_a, places_b = (one.ideal(scale, numbers, pixels) for one in (a, b))
     moved = focal * (places_a / focal - places_b / b.focal_length)
-    by_optics = _displaced(b, places_a, scale) - _displaced(a, places_a, scale)
+    by_optics = b.displaced(places_a, scale) - a.displaced(places_a, scale)
     ids = np.array(instrument.detector_ids)[numbers]
     parts = [
         _part(name, ids, places_a, difference, focal)
@@ -182,22 +148,3 @@ def _grid(instrument: Instrument) -> tuple[np.ndarray, np.ndarray]:
     unit = np.stack(np.meshgrid(*[np.linspace(-0.5, 0.5, side)] * 2), axis=-1).reshape(-1, 2)
     pixels = np.concatenate([unit * (d.n_x, d.n_y) for d in detectors])
     return np.repeat(np.arange(len(detectors)), len(unit)), pixels
-
-
-def _ideal(
-    calibration: _Calibration, scale_um: float, numbers: np.ndarray, pixels: np.ndarray
-) -> np.ndarray:
-    """Return the undistorted positions of pixels in um: the inverse of Eq. (exp:model:nxny)."""
-    x, y = (pixels * calibration.pitch[numbers]).T
-    angle = calibration.rotation[numbers]
-    turned = [np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x]
-    focal_plane = calibration.centre[numbers] + np.stack(turned, axis=-1)
-    ideal = focal_plane
-    for _ in range(_INVERSION_STEPS):
-        ideal = focal_plane - _displaced(calibration, ideal, scale_um)
-    return ideal
-
-
-def _displaced(calibration: _Calibration, places: np.ndarray, scale_um: float) -> np.ndarray:
-    x, y = (places / scale_um).T
-    return np.stack([displacement_um(one, x, y) for one in calibration.coefficients.T], axis=-1)

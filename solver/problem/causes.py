@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
-from numpy.polynomial import legendre
 
 from solver.data.detector_spans import span_numbers
 from solver.data.instrument import Instrument
@@ -14,9 +13,8 @@ from solver.data.magnitudes import faintness
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.model.causes import ModelledCauses, TermFamily
-from solver.problem.elements import field_numbers
 from solver.problem.padding import pad
-from solver.units import MINUTES_PER_DAY
+from solver.problem.term_factors import changing_terms, own_frames
 
 
 def causes_of(
@@ -48,52 +46,17 @@ def _families(
 ) -> tuple[TermFamily, ...]:
     """Return the families in the order of `parameter_group.TERM_AXES`."""
     n_exp, n_det = len(exposures), len(instrument.detectors)
-    field = field_numbers(exposures)
-    time = exposures["obstime"].to_numpy()
-    angle = 2.0 * np.pi * MINUTES_PER_DAY * (time - _middle(time)) / settings.breathing_period
-    by_exposure = {
-        "drift": (settings.drift, _polynomials(time, settings.drift_in_time)),
-        "breathing": (settings.breathing, np.array([np.cos(angle), np.sin(angle)])),
-        "field_distortion": (
-            settings.field_distortion,
-            (field == np.arange(1, field.max() + 1)[:, None]).astype(float),
-        ),
-    }
     centre, scale = np.zeros((n_det, 2)), np.full(n_det, instrument.distortion_scale_um)
-    found = [
-        TermFamily(name, order, np.repeat(factor[:, :, None], n_det, axis=2), centre, scale)
-        for name, (order, factor) in by_exposure.items()
-        if order
-    ]
+    found = []
+    for name, _, order, factor in changing_terms(exposures, settings):
+        of_all = np.repeat(factor[:, :, None], n_det, axis=2)
+        found.append(TermFamily(name, order, of_all, centre, scale))
     if settings.detector_distortion:
         factor = np.repeat(np.eye(n_det)[:, None], n_exp, axis=1)
-        own = [(d.x_um, d.y_um) for d in instrument.detectors]
-        half = [0.5 * max(d.n_x * d.pitch_x_um, d.n_y * d.pitch_y_um) for d in instrument.detectors]
-        found.append(
-            TermFamily(
-                "own_distortion",
-                settings.detector_distortion,
-                factor,
-                np.array(own, dtype=float),
-                np.array(half, dtype=float),
-            )
-        )
+        own_centre, own_scale = own_frames(instrument)
+        order = settings.detector_distortion
+        found.append(TermFamily("own_distortion", order, factor, own_centre, own_scale))
     return tuple(found)
-
-
-def _polynomials(time: Float[np.ndarray, " exp"], degree: int) -> Float[np.ndarray, "degree exp"]:
-    """Return the Legendre polynomials of degree one and more in the time since the middle.
-
-    The time is scaled to -1 at the first exposure and 1 at the last.
-    """
-    half = max(0.5 * float(np.ptp(time)), 1e-9)
-    scaled = (time - _middle(time)) / half
-    return legendre.legvander(scaled, degree)[:, 1:].T.copy()
-
-
-def _middle(time: Float[np.ndarray, " exp"]) -> float:
-    """Return the time halfway between the first and the last exposure."""
-    return 0.5 * float(time.min() + time.max())
 
 
 def _faintness(sources: pd.DataFrame, settings: FitSettings) -> Float[np.ndarray, " src"]:

@@ -30,12 +30,7 @@ class Session(OnScreen):
     theme = param.Selector(default="light", objects=["light", "dark"])
 
     def __init__(self, store: SolutionStore, large: LargeSelections | None = None) -> None:
-        """Begin with the first orbit and the paper's settings.
-
-        Parameters
-        ----------
-        large : selections of the server's sessions that are too large for an address
-        """
+        """Begin with the first orbit, the paper's settings and the `large` selections so far."""
         super().__init__()
         self.store = store
         self.selection = Selection(large)

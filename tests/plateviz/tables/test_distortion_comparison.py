@@ -2,15 +2,19 @@
 
 from dataclasses import replace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from numpy.polynomial import legendre
 
 from plateviz import tables
 from plateviz.tables.distortion_comparison import ALONE, TOGETHER
+from plateviz.tables.mean_calibration import fitted_calibration
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
 from solver.fit import OrbitFitter
+from solver.model.forward import Index, image
+from solver.problem.problem import build_problem
 from solver.simulate.true_calibration import TrueCalibration
 from tests.solver.small_orbit import make_orbit
 
@@ -186,3 +190,73 @@ def test_truth_is_compared_as_another_solution(fit_result, make_fit_result, inst
     assert np.allclose(vectors(found), vectors(expected), atol=1e-4)
     sigma = other.sources[["sigma_ra_marginal", "sigma_dec_marginal"]].to_numpy()
     assert found["source_mas"].iloc[0] == np.median(sigma)
+
+
+CAUSES = {
+    "own": FitSettings(detector_distortion=3),
+    "in-time": FitSettings(drift=2, breathing=2, field_distortion=2, drift_walk=2),
+    "detectors": FitSettings(detector_motion=True, focal_anisotropy=True),
+}
+
+
+@pytest.fixture(scope="module")
+def with_causes():
+    """A small orbit with nothing that the paper's model lacks, fitted with causes."""
+    orbit = make_orbit()
+    fitter = OrbitFitter(orbit.data, orbit.instrument)
+    found = {name: fitter.fit(settings) for name, settings in CAUSES.items()}
+    return fitter.fit(FitSettings()), found, orbit.instrument
+
+
+@pytest.mark.slow
+def test_ideal_place_is_where_the_model_images_its_pixel_from(with_causes):
+    _, found, instrument = with_causes
+    large = {"own_distortion_x": 3.0, "own_distortion_y": -2.0, "detector_skew": 0.02}
+    result = moved(found["own"], **{k: lambda v, add=add: v + add for k, add in large.items()})
+    problem = build_problem(make_orbit().data, instrument, result.settings)
+    offsets = {
+        group.name: jnp.asarray(
+            result.values_on(group.axis)[group.name].to_numpy() * group.per_value_unit
+            - problem.geometry.origin[group.name]
+        )
+        for axis in ("det", "coef", "own")
+        for group in result.groups_on(axis)
+    }
+    rng = np.random.default_rng(1)
+    numbers = rng.integers(0, len(instrument.detectors), 200)
+    pixels = rng.uniform(-900.0, 900.0, (200, 2))
+    ideal = fitted_calibration(result, instrument).ideal(
+        instrument.distortion_scale_um, numbers, pixels
+    )
+    zeros = np.zeros_like(numbers)
+    index = Index(zeros, zeros, numbers)
+    places = jnp.asarray(ideal[:, 0]), jnp.asarray(ideal[:, 1])
+    predicted = image(places, offsets, problem.geometry, index).pixel
+    np.testing.assert_allclose(np.stack(predicted, axis=-1), pixels, atol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "changing", "constant"),
+    [
+        ("detectors", ("detector_motion_x", 10.0), ("detector_x", 10.0)),
+        ("detectors", ("detector_turn", 36.0), ("detector_rotation", 0.01)),
+        ("in-time", ("field_distortion_y", 1.0), ("distortion_y", 1.0)),
+    ],
+)
+def test_mean_of_what_changes_with_the_field_is_compared(with_causes, name, changing, constant):
+    _, found, instrument = with_causes
+    result = found[name]
+    is_later = result.exposures["field_id"] > result.exposures["field_id"].min()
+
+    def added(change, share=1.0):
+        group, value = change
+        n_low = len([one for one in TERMS if sum(one) <= 2])
+        # The terms of the fields end with the second degree.
+        size = value * share * np.ones(len(TERMS))
+        size[n_low:] = 0.0
+        is_term = group == "distortion_y"
+        return moved(result, **{group: lambda v: v + (size if is_term else value * share)})
+
+    one, other = added(changing), added(constant, float(is_later.mean()))
+    assert np.abs(vectors(tables.distortion_comparison(one, other, instrument))).max() < 1e-6

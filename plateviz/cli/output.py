@@ -206,7 +206,7 @@ def _truth_rows(truth: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]
             f"{name} against truth",
             f"{numbers['n']} sources: mean {_pair(numbers, 'mean_{}', 'mas')} "
             f"(of which {_pair(numbers, 'induced_{}', '')}from the reference sources), "
-            f"rms {_pair(numbers, 'rms_{}', 'mas')}, pull sd {_pair(numbers, 'pull_sd_{}', '')}",
+            f"rms {_pair(numbers, 'rms_{}', 'mas')}, rms pull {_pair(numbers, 'pull_rms_{}', '')}",
         )
         for name, numbers in truth.items()
     ]

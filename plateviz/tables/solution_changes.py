@@ -90,10 +90,12 @@ def _has_one_evidence(a: FitResult, b: FitResult) -> bool:
 def _from_truth(a: FitResult, b: FitResult) -> list[Row]:
     of_a, of_b = (one.summary.get("truth", {}) for one in (a, b))
     return [
-        merit(f"Pulls against truth in {symbol}, {name}", of_a[name][key], of_b[name][key], 3)
+        merit(f"{kind} against truth in {symbol}, {name}", of_a[name][key], of_b[name][key], 3)
         for name in of_a
         if name in of_b
-        for key, symbol in (("pull_sd_ra", "α"), ("pull_sd_dec", "δ"))
+        for kind, figure in (("Pulls", "pull_rms"), ("Scatter of the pulls", "pull_sd"))
+        for axis, symbol in (("ra", "α"), ("dec", "δ"))
+        if (key := f"{figure}_{axis}") in of_a[name] and key in of_b[name]
     ]
 
 

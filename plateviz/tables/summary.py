@@ -149,11 +149,12 @@ def _from_truth(result: FitResult) -> list[SummaryItem]:
     return [
         SummaryItem(
             f"Pulls against truth, {name}",
-            f"{figures['pull_sd_ra']:.2f}, {figures['pull_sd_dec']:.2f} "
+            f"{_pull(figures, 'ra'):.2f}, {_pull(figures, 'dec'):.2f} "
             f"({_rms(figures):.2f} mas rms)",
-            f"Standard deviation of deviation over marginal sigma in α, δ of {figures['n']} "
-            "sources with 10 or more measurements and a simulated truth; expected 1. It is not "
-            "judged, because the sources of one orbit share the calibration's error. "
+            f"Rms of deviation over marginal sigma in α, δ of {figures['n']} sources with 10 or "
+            "more measurements and a simulated truth; expected 1. It is not judged, because the "
+            "sources of one orbit share the calibration's error; about their mean it is "
+            f"{figures['pull_sd_ra']:.2f}, {figures['pull_sd_dec']:.2f}. "
             f"Mean deviation {figures['mean_ra']:.3f}, {figures['mean_dec']:.3f} mas, of which "
             f"{figures['induced_ra']:.3f}, {figures['induced_dec']:.3f} mas come from the "
             "reference sources' errors.",
@@ -161,6 +162,11 @@ def _from_truth(result: FitResult) -> list[SummaryItem]:
         )
         for name, figures in truth.items()
     ]
+
+
+def _pull(figures: Mapping[str, float], axis: str) -> float:
+    # Older results lack the first.
+    return figures.get(f"pull_rms_{axis}", figures[f"pull_sd_{axis}"])
 
 
 def _rms(figures: Mapping[str, float]) -> float:

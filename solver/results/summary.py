@@ -66,7 +66,8 @@ def truth_summary(sources: pd.DataFrame, places: pd.DataFrame) -> dict[str, dict
 
     Returns
     -------
-    class -> numbers; means and rms in mas, pulls with the marginal sigmas. `induced_*` is
+    class -> numbers; means and rms in mas, pulls with the marginal sigmas: `pull_rms_*` about zero,
+    `pull_sd_*` about their mean, which does not show an error that all share. `induced_*` is
     the mean shift due to errors of the reference sources.
     """
     joined = sources.loc[sources["n_obs"] >= MIN_OBS, _DEVIATING].merge(
@@ -109,6 +110,7 @@ def _deviation_numbers(rows: pd.DataFrame) -> dict[str, float | int]:
         numbers |= {
             f"mean_{axis}": float(deviation.mean()),
             f"rms_{axis}": float(np.sqrt((deviation**2).mean())),
+            f"pull_rms_{axis}": float(np.sqrt((pull**2).mean())),
             f"pull_sd_{axis}": float(pull.std(ddof=0)),
             f"induced_{axis}": float(rows[f"induced_{axis}"].mean()),
         }

@@ -6,7 +6,7 @@ import pytest
 
 from plateviz.tables import summary_strip
 
-KINDS = ("mean", "rms", "pull_sd", "induced")
+KINDS = ("mean", "rms", "pull_rms", "pull_sd", "induced")
 
 
 def _with(result, **changes):

@@ -99,6 +99,8 @@ def test_deviation_is_on_the_sky_and_pulls_use_marginal_sigmas():
     assert found["mean_ra"] == pytest.approx(2.0, abs=1e-6)
     assert found["rms_ra"] == pytest.approx(np.sqrt(8.0), abs=1e-6)
     assert found["pull_sd_ra"] == pytest.approx(1.0, abs=1e-6)
+    # An error that all share is part of it.
+    assert found["pull_rms_ra"] == pytest.approx(np.sqrt(2.0), abs=1e-6)
     assert found["induced_ra"] == pytest.approx(0.1)
     assert figures["artificial"]["n"] == 1
 

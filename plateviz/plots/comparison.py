@@ -12,13 +12,13 @@ from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.residuals import binned_vectors
+from solver.units import MAS_PER_ARCMIN
 
 _MAP = "Difference of positions, B minus A"
 _MAP_X, _MAP_Y = "Δα cos δ (arcmin, East to the left)", "Δδ (arcmin)"
 _HISTOGRAM = "Difference over uncertainty"
 _HISTOGRAM_X, _HISTOGRAM_Y = "(B minus A) / marginal σ of A", "sources per bin"
 _NONE = "No source in both fits"
-_MAS_PER_ARCMIN = 60_000.0
 _MARGIN = 1.14
 _LEAST_SHARE = 0.25
 _BINS = 24
@@ -63,7 +63,7 @@ def plot_comparison_map(
     field = Field((half, -half), (-half, half))
     shown, what = _thinned(_vectors(table), half)
     scale = arrow_scale or automatic_scale(shown, field)
-    mas = round_125(2.0 * rms_length(shown) * _MAS_PER_ARCMIN)
+    mas = round_125(2.0 * rms_length(shown) * MAS_PER_ARCMIN)
     length = angle_text(mas)
     single = [("source", "@{id}"), ("class", "@{source_class}")]
     hover = single if "id" in shown else [("sources in the bin", "@{n}")]
@@ -76,7 +76,7 @@ def plot_comparison_map(
                 colour="mark",
                 hover=[*hover, *_HOVER_VALUES],
             ),
-            *key(mas / _MAS_PER_ARCMIN, length, scale=scale, field=field),
+            *key(mas / MAS_PER_ARCMIN, length, scale=scale, field=field),
         ],
         title=_MAP,
         subtitle=f"{what}\nArrows enlarged {scale:,.12g} times; key: {length}",
@@ -119,8 +119,8 @@ def _vectors(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(
         x=table["x_arcmin"],
         y=table["y_arcmin"],
-        u=table["difference_ra_mas"] / _MAS_PER_ARCMIN,
-        v=table["difference_dec_mas"] / _MAS_PER_ARCMIN,
+        u=table["u_arcmin"],
+        v=table["v_arcmin"],
     )
 
 

@@ -10,6 +10,7 @@ from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.eigenmodes import eigenmode_shifts
 from plateviz.tables.residuals import binned_vectors
+from solver.units import MAS_PER_ARCMIN
 
 _TITLE = "What the weak directions do on the sky"
 _XLABEL, _YLABEL = "Δα cos δ (arcmin, East to the left)", "Δδ (arcmin)"
@@ -23,7 +24,6 @@ _ARROWS_OF_A_MAP, _BINS = 200, 12
 _LEAST_SHARE = 0.2
 _MARGIN = 1.2
 _KEY_SHARE = 0.08
-_MAS_PER_ARCMIN = 60_000.0
 
 
 def plot_eigenmode_shifts(table: pd.DataFrame, *, width: int = _WIDTH) -> Figure:
@@ -55,7 +55,7 @@ def _panel(rows: pd.DataFrame, title: str, scale: float, field: Field, width: in
         shown = binned_vectors(
             rows, x_range=field.y, y_range=field.y, bins=_BINS, least_share=_LEAST_SHARE
         )
-    length = round_125(_KEY_SHARE * field.width / scale * _MAS_PER_ARCMIN)
+    length = round_125(_KEY_SHARE * field.width / scale * MAS_PER_ARCMIN)
     length_text = angle_text(length)
     return framed(
         [
@@ -66,9 +66,9 @@ def _panel(rows: pd.DataFrame, title: str, scale: float, field: Field, width: in
                 colour="mark",
                 hover=[("source", "@{id}"), *_HOVER] if "id" in shown else [_MEAN, *_HOVER],
             ),
-            *key(length / _MAS_PER_ARCMIN, length_text, scale=scale, field=field),
+            *key(length / MAS_PER_ARCMIN, length_text, scale=scale, field=field),
         ],
-        title=f"{title}: {angle_text(rms_length(rows) * _MAS_PER_ARCMIN)} rms",
+        title=f"{title}: {angle_text(rms_length(rows) * MAS_PER_ARCMIN)} rms",
         subtitle=f"Arrows enlarged {scale:,.0f} times\n{rows['name'].iloc[0]}",
         x=Axis(_XLABEL, field.x),
         y=Axis(_YLABEL, field.ylim),

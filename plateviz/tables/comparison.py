@@ -4,9 +4,11 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import id_strings
+from plateviz.tables.sky import centre_of, places_arcmin
 from plateviz.tables.sources import ordered_by_class
 from solver.data.result import FitResult
-from solver.model.directions import mean_direction, offsets_arcmin, offsets_mas
+from solver.model.directions import offsets_mas, vectors_about
+from solver.units import MAS_PER_ARCMIN
 
 
 def comparison(result_a: FitResult, result_b: FitResult) -> pd.DataFrame:
@@ -19,18 +21,21 @@ def comparison(result_a: FitResult, result_b: FitResult) -> pd.DataFrame:
 
     Returns
     -------
-    `source_id`, `id`, `source_class`, `n_obs` (of A), `x_arcmin` (ra cos(dec)),
-    `y_arcmin`, `difference_ra_mas` (ra cos(dec)), `difference_dec_mas`, `pull_ra`,
-    `pull_dec` (difference over the marginal sigma of A; not unit normal, because both fits
-    use the same data), `sigma_ratio_ra`, `sigma_ratio_dec` (marginal, B over A)
+    `source_id`, `id`, `source_class`, `n_obs` (of A), `x_arcmin` (East),
+    `y_arcmin` in the plane tangent at the centre, the difference along its axes as `u_arcmin`,
+    `v_arcmin`, and at the source as `difference_ra_mas` (ra cos(dec)), `difference_dec_mas`,
+    `pull_ra`, `pull_dec` (difference over the marginal sigma of A; not unit normal, because both
+    fits use the same data), `sigma_ratio_ra`, `sigma_ratio_dec` (marginal, B over A)
     """
     columns = ["source_id", "ra", "dec", "sigma_ra_marginal", "sigma_dec_marginal"]
     table = ordered_by_class(result_a.sources).merge(
         result_b.sources[columns], on="source_id", suffixes=("", "_b"), validate="one_to_one"
     )
     d_ra, d_dec = offsets_mas(table["ra_b"], table["dec_b"], table["ra"], table["dec"])
-    centre = mean_direction(table["ra"].to_numpy(), table["dec"].to_numpy())
-    x, y = offsets_arcmin(table["ra"], table["dec"], *centre)
+    centre = centre_of(table)
+    x, y = places_arcmin(table, centre)
+    places = table["ra"].to_numpy(), table["dec"].to_numpy()
+    u, v = vectors_about(centre, *places, d_ra, d_dec).T
     return pd.DataFrame(
         {
             "source_id": table["source_id"],
@@ -39,6 +44,8 @@ def comparison(result_a: FitResult, result_b: FitResult) -> pd.DataFrame:
             "n_obs": table["n_obs"],
             "x_arcmin": x,
             "y_arcmin": y,
+            "u_arcmin": u / MAS_PER_ARCMIN,
+            "v_arcmin": v / MAS_PER_ARCMIN,
             "difference_ra_mas": d_ra,
             "difference_dec_mas": d_dec,
             "pull_ra": d_ra / table["sigma_ra_marginal"],

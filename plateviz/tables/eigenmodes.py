@@ -4,9 +4,11 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import element_labels, id_strings, unit_text
+from plateviz.tables.sky import centre_of, places_arcmin
 from solver.data.parameters import BY_NAME, PARAMETERS
 from solver.data.result import FitResult
-from solver.model.directions import mean_direction, offsets_arcmin
+from solver.model.directions import vectors_about
+from solver.units import MAS_PER_ARCMIN
 
 DATA, REFERENCES, SOURCES, CALIBRATION = (
     "measurements",
@@ -16,7 +18,6 @@ DATA, REFERENCES, SOURCES, CALIBRATION = (
 )
 DECIDERS = (DATA, REFERENCES, SOURCES, CALIBRATION)
 _COLUMNS = {DATA: "data_share", REFERENCES: "reference_share", SOURCES: "source_share"}
-_MAS_PER_ARCMIN = 60_000.0
 _LEAST_SHIFT_SHARE = 0.1
 _SPECTRUM = ["mode", "name", *_COLUMNS.values(), "calibration_share", "relative_information"]
 
@@ -103,8 +104,8 @@ def eigenmode_shifts(result: FitResult, *, most: int | None = None) -> pd.DataFr
 
     Returns
     -------
-    `mode`, `name`, `id`, tail `x`, `y` in arcmin from the centre of the field (ra
-    cos(dec), East positive), shift `u`, `v` in arcmin per sigma along the direction,
+    `mode`, `name`, `id`, tail `x`, `y` in arcmin (East positive) in the plane tangent
+    at the centre of the field, shift `u`, `v` in arcmin per sigma along the direction,
     `shift_ra_mas`, `shift_dec_mas`
     """
     columns = ["mode", "name", "id", "x", "y", "u", "v", "shift_ra_mas", "shift_dec_mas"]
@@ -116,15 +117,17 @@ def eigenmode_shifts(result: FitResult, *, most: int | None = None) -> pd.DataFr
     ).index
     rows = result.mode_shifts[result.mode_shifts["mode"].isin(largest)]
     rows = rows.merge(result.sources[["source_id", "ra", "dec"]], on="source_id", how="left")
-    centre = mean_direction(result.sources["ra"].to_numpy(), result.sources["dec"].to_numpy())
-    x, y = offsets_arcmin(rows["ra"], rows["dec"], *centre)
+    centre = centre_of(result.sources)
+    x, y = places_arcmin(rows, centre)
+    columns_of = (rows[one].to_numpy() for one in ("ra", "dec", "shift_ra", "shift_dec"))
+    u, v = vectors_about(centre, *columns_of).T
     return rows.assign(
         name=rows["mode"].map(eigenmode_spectrum(result).set_index("mode")["name"]),
         id=id_strings(rows["source_id"]),
         x=x,
         y=y,
-        u=rows["shift_ra"] / _MAS_PER_ARCMIN,
-        v=rows["shift_dec"] / _MAS_PER_ARCMIN,
+        u=u / MAS_PER_ARCMIN,
+        v=v / MAS_PER_ARCMIN,
         shift_ra_mas=rows["shift_ra"],
         shift_dec_mas=rows["shift_dec"],
     )[columns]

@@ -4,11 +4,12 @@ import numpy as np
 import pandas as pd
 
 from plateviz.tables.labels import id_strings
-from plateviz.tables.sky import sky_of_focal_plane
+from plateviz.tables.sky import centre_of, places_arcmin, sky_of_focal_plane
 from plateviz.tables.sources import ordered_by_class
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
-from solver.model.directions import mean_direction, offsets_arcmin, offsets_deg
+from solver.model.astrometry import sky_position
+from solver.model.directions import tangent_frame
 
 
 def footprint_sources(result: FitResult) -> pd.DataFrame:
@@ -17,11 +18,11 @@ def footprint_sources(result: FitResult) -> pd.DataFrame:
     Returns
     -------
     `source_id`, `id` (text), `source_class`, `n_obs`, `ra`, `dec` (deg), `x_arcmin`
-    (ra cos(dec), East positive) and `y_arcmin`; reference sources last, so that they are
-    drawn on top
+    (East positive) and `y_arcmin` in the plane tangent at the centre; reference sources last, so
+    that they are drawn on top
     """
     table = ordered_by_class(result.sources)
-    x, y = offsets_arcmin(table["ra"], table["dec"], *_centre(result))
+    x, y = places_arcmin(table, centre_of(result.sources))
     columns = ["source_id", "source_class", "n_obs", "ra", "dec"]
     return table[columns].assign(id=id_strings(table["source_id"]), x_arcmin=x, y_arcmin=y)
 
@@ -42,9 +43,8 @@ def footprint_fields(result: FitResult, instrument: Instrument) -> pd.DataFrame:
     Returns
     -------
     `field_id`, `plate_id`, `detector_id`, `corner` (0 to 4, closed), `ra`, `dec` (deg),
-    `x_arcmin` (ra cos(dec)), `y_arcmin`, as in `footprint_sources`
+    `x_arcmin`, `y_arcmin`, as in `footprint_sources`
     """
-    centre = _centre(result)
     optics = result.values_on("exp")
     exposures = result.exposures.reset_index(drop=True)
     first = exposures.sort_values(["field_id", "plate_id"]).drop_duplicates("field_id")
@@ -57,7 +57,7 @@ def footprint_fields(result: FitResult, instrument: Instrument) -> pd.DataFrame:
         return pd.DataFrame(columns=_FIELD_COLUMNS)
     table = pd.concat(frames, keys=first["field_id"], names=["field_id"]).reset_index(level=0)
     table["plate_id"] = table["field_id"].map(first.set_index("field_id")["plate_id"])
-    table["x_arcmin"], table["y_arcmin"] = offsets_arcmin(table["ra"], table["dec"], *centre)
+    table["x_arcmin"], table["y_arcmin"] = places_arcmin(table, centre_of(result.sources))
     return table[_FIELD_COLUMNS].reset_index(drop=True)
 
 
@@ -93,9 +93,9 @@ def _outline(
     ra, dec = sky_of_focal_plane(corners, pointing)
     if len(observed):
         apparent = sky_of_focal_plane(observed[["ideal_x", "ideal_y"]].to_numpy(), pointing)
-        east, north = offsets_deg(*apparent, observed["ra"].to_numpy(), observed["dec"].to_numpy())
-        dec = dec - north.mean()
-        ra = (ra - east.mean() / np.cos(np.radians(dec))) % 360.0
+        here = _directions(observed["ra"].to_numpy(), observed["dec"].to_numpy())
+        moved = (here - _directions(*apparent)).mean(axis=0)
+        ra, dec = sky_position(_directions(ra, dec) + moved)
     ids = instrument.detector_ids
     return pd.DataFrame(
         {
@@ -107,5 +107,5 @@ def _outline(
     )
 
 
-def _centre(result: FitResult) -> tuple[float, float]:
-    return mean_direction(result.sources["ra"].to_numpy(), result.sources["dec"].to_numpy())
+def _directions(ra: np.ndarray, dec: np.ndarray) -> np.ndarray:
+    return tangent_frame(ra, dec)[:, 0]

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from solver.units import ARCMIN_PER_DEG, MAS_PER_DEG
+from solver.units import MAS_PER_DEG
 
 Degrees = ArrayLike | float
 
@@ -94,6 +94,27 @@ def places_about(
     return np.degrees(np.stack([east, north], axis=1) / along[:, None])
 
 
+def vectors_about(
+    centre: tuple[float, float],
+    ra_deg: Float[np.ndarray, " n"],
+    dec_deg: Float[np.ndarray, " n"],
+    east: Float[np.ndarray, " n"],
+    north: Float[np.ndarray, " n"],
+) -> Float[np.ndarray, "n 2"]:
+    """Return small vectors at directions along East and North of `centre`, in their unit.
+
+    East turns across a field, near a pole by as much as the right ascension.
+
+    Parameters
+    ----------
+    east, north : along East and North of each direction
+    """
+    axes = tangent_frame(np.array([centre[0]]), np.array([centre[1]]))[0]
+    frames = tangent_frame(ra_deg, dec_deg)
+    vectors = east[:, None] * frames[:, 1] + north[:, None] * frames[:, 2]
+    return vectors @ axes[1:].T
+
+
 def offsets_deg(
     ra: Degrees, dec: Degrees, ra_0: Degrees, dec_0: Degrees
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -121,11 +142,3 @@ def offsets_mas(
     """Return the offsets of `offsets_deg` in mas."""
     d_ra, d_dec = offsets_deg(ra, dec, ra_0, dec_0)
     return d_ra * MAS_PER_DEG, d_dec * MAS_PER_DEG
-
-
-def offsets_arcmin(
-    ra: Degrees, dec: Degrees, ra_0: Degrees, dec_0: Degrees
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the offsets of `offsets_deg` in arcmin."""
-    d_ra, d_dec = offsets_deg(ra, dec, ra_0, dec_0)
-    return d_ra * ARCMIN_PER_DEG, d_dec * ARCMIN_PER_DEG

@@ -82,8 +82,12 @@ def test_comparison_arrows_are_drawn_to_the_stated_scale(drawings):
     _, table = drawings["comparison"]
     (frame,) = plots.plot_comparison_map(table, arrow_scale=60_000.0)
     shafts = shafts_of(frame)
-    assert np.allclose(shafts["x1"] - shafts["x0"], table["difference_ra_mas"])
-    assert np.allclose(shafts["y1"] - shafts["y0"], table["difference_dec_mas"])
+    assert np.allclose(shafts["x1"] - shafts["x0"], 60_000.0 * table["u_arcmin"])
+    assert np.allclose(shafts["y1"] - shafts["y0"], 60_000.0 * table["v_arcmin"])
+    of_sources = np.hypot(table["difference_ra_mas"], table["difference_dec_mas"])
+    assert np.allclose(
+        60_000.0 * np.hypot(table["u_arcmin"], table["v_arcmin"]), of_sources, rtol=1e-3
+    )
 
 
 def test_convergence_shows_the_tolerance(drawings):

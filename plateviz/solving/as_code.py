@@ -47,7 +47,11 @@ def as_command(origin: Origin, orbit: int | None, settings: FitSettings, name: s
 
 
 def report_command(
-    origin: Origin, orbit: int | None, other: str | None = None, more: Sequence[str] = ()
+    origin: Origin,
+    orbit: int | None,
+    other: str | None = None,
+    more: Sequence[str] = (),
+    name: str = NAME,
 ) -> str:
     """Return the command line that draws the figures of what `as_command` has made.
 
@@ -56,15 +60,16 @@ def report_command(
     orbit : as of `as_command`
     other : name of a second solution that it has made, to compare with; None for none
     more : further options and their values
+    name : as of `as_command`
     """
     if isinstance(origin, SurveyFolder):
-        made = [origin.directory, "--run", NAME, "--orbit", str(orbit)]
+        made = [origin.directory, "--run", name, "--orbit", str(orbit)]
         compared = [] if other is None else ["--other", other]
     else:
         camera = [] if origin.instrument is None else ["--instrument", origin.instrument]
-        made = [f"{NAME}.fits", *camera]
+        made = [f"{name}.fits", *camera]
         compared = [] if other is None else ["--other", f"{other}.fits"]
-    return shlex.join(["plateviz", "report", *made, *compared, *more, "-o", f"{NAME}.html"])
+    return shlex.join(["plateviz", "report", *made, *compared, *more, "-o", f"{name}.html"])
 
 
 def report_of_run(survey: str, run: str, *options: str) -> str:

@@ -1,5 +1,6 @@
 """The command line and the Python that make the solution and the figures on the screen again."""
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ from plateviz.dashboard.navigation.navigation import Navigation, View
 from plateviz.dashboard.session.orbit_figures import chosen_of, figures_of
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.solution import Solution
+from plateviz.dashboard.session.solution_address import run_settings
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.gallery import source_figures, survey_figures
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace, title_of
@@ -24,9 +26,9 @@ from plateviz.solving.as_code import (
     report_of_run,
 )
 from plateviz.solving.origin import SurveyFolder
+from solver.data.settings import FitSettings
 from solver.errors import InputError
 
-_OTHER = f"{NAME}-other"
 _OF_WHAT_IF = (
     "It is a what-if: the positions of a fit agree with it to a thousandth of their uncertainties."
 )
@@ -91,15 +93,18 @@ def _of_solution(navigation: Navigation) -> PageCode:
         calls.insert(0, (name, {"both": True, **_keywords(session, chosen)}))
         more = ["--both", name] if other.orbit == shown.orbit else []
     origin = session.store.origin
-    commands = [as_command(origin, shown.orbit, shown.settings)]
+    made = _free_name(navigation, NAME, shown.settings)
+    commands = [as_command(origin, shown.orbit, shown.settings, made)]
     compared = other is not None and other.orbit == shown.orbit
+    second = None
     if other is not None and compared:
-        commands.append(as_command(origin, other.orbit, other.settings, _OTHER))
-    commands.append(report_command(origin, shown.orbit, _OTHER if compared else None, more))
+        second = _free_name(navigation, f"{NAME}-other", other.settings)
+        commands.append(as_command(origin, other.orbit, other.settings, second))
+    commands.append(report_command(origin, shown.orbit, second, more, made))
     python = [as_python(origin, shown.orbit, shown.settings)]
     if other is not None:
-        second = as_python(origin, other.orbit, other.settings, "other").removeprefix(PREAMBLE)
-        python += [second, "solution = solution.compared_with(other)"]
+        code = as_python(origin, other.orbit, other.settings, "other").removeprefix(PREAMBLE)
+        python += [code, "solution = solution.compared_with(other)"]
     if workspace is OrbitWorkspace.EXPLORE:
         drawn = _explored_as_python(navigation.exploration, "solution", session)
     else:
@@ -109,7 +114,22 @@ def _of_solution(navigation: Navigation) -> PageCode:
     words += [_OF_WHAT_IF] if _is_step(shown, other) else []
     words += [_OF_ONE_ORBIT] if isinstance(origin, SurveyFolder) else []
     words += [_OF_OTHER_ORBIT] if other is not None and not compared else []
-    return PageCode(" ".join(words), "\n".join(commands), "\n".join(filter(None, python)))
+    return PageCode(" ".join(words), " &&\n".join(commands), "\n".join(filter(None, python)))
+
+
+def _free_name(navigation: Navigation, name: str, settings: FitSettings) -> str:
+    """Return a name for a run that no run with other settings has."""
+    runs = navigation.known_runs
+    runs.look()
+    names = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
+    return next(one for one in names if one not in runs or _has_settings(runs[one], settings))
+
+
+def _has_settings(run: SurveyRun, settings: FitSettings) -> bool:
+    try:
+        return run_settings(run) == settings
+    except InputError:
+        return False
 
 
 def _of_survey(navigation: Navigation, run: SurveyRun) -> PageCode:

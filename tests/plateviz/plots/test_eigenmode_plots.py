@@ -20,7 +20,6 @@ NAMES = [
     "eigenmode-shifts",
     "prior-shares",
 ]
-MAS_PER_ARCMIN = 60_000.0
 
 
 def of_kind(frame, kind):

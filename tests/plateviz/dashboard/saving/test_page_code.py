@@ -23,6 +23,7 @@ from plateviz.tables.explore import EXPLORABLE
 from solver.data.instrument import MINI_MOCK
 from solver.data.settings import FitSettings
 from solver.errors import InputError
+from tests.plateviz.dashboard.navigation.test_navigation import FakeRun
 
 
 @pytest.fixture
@@ -179,3 +180,16 @@ def test_nothing_on_the_screen_has_no_code(navigation):
     navigation.turn_to(View.SOURCE)
     with pytest.raises(InputError, match="no source is shown yet"):
         page_code(navigation)
+
+
+def test_name_of_a_run_with_other_settings_is_not_taken(solved, fit_result, survey):
+    code = page_code(solved)
+    assert "--run reproduced " in code.command
+    assert " &&\nplateviz report" in code.command
+    same = FakeRun("reproduced", survey, fit_result, solved.session.shown.settings)
+    other = FakeRun("reproduced", survey, fit_result, FitSettings(order=2))
+    solved.known_runs["reproduced"] = same
+    assert page_code(solved).command == code.command
+    solved.known_runs["reproduced"] = other
+    expected = code.command.replace("--run reproduced ", "--run reproduced-2 ")
+    assert page_code(solved).command == expected.replace("reproduced.html", "reproduced-2.html")

@@ -105,7 +105,7 @@ class ExploreView(pn.viewable.Viewer):
         )
         self.grid = FigureGrid([self._figure], wake, columns=1)
         self._limits = [
-            pmui.FloatInput(label=label, value=None, size="small", width=130, margin=(4, 6))
+            pmui.TextInput(label=label, size="small", width=130, margin=(4, 6))
             for label in ("at least", "at most")
         ]
         for entry in self._limits:
@@ -163,7 +163,7 @@ class ExploreView(pn.viewable.Viewer):
             with self._following():
                 problems = self._exploration.offer(request.columns)
             if problems:
-                self._say(f"Of the address, this was ignored: {'; '.join(problems)}.")
+                self._session.note(problems)
         if not self._select(request):
             return PENDING
         chosen, selected = self._exploration.columns(), self._session.selection.selected
@@ -269,15 +269,31 @@ class ExploreView(pn.viewable.Viewer):
             for entry, limit, end in zip(self._limits, limits, drawn.extent.only, strict=True):
                 entry.param.update(
                     visible=is_limited,
-                    value=limit if math.isfinite(limit) else None,
+                    value=f"{limit:.12g}" if math.isfinite(limit) else "",
+                    error_state=False,
+                    helper_text="",
                     placeholder="" if math.isnan(end) else f"{end:.6g}",
                 )
 
     def _take_limits(self, _: object) -> None:
         if self._is_following:
             return
-        lowest, highest = (entry.value for entry in self._limits)
-        self._exploration.param.update(
-            lowest=-math.inf if lowest is None else lowest,
-            highest=math.inf if highest is None else highest,
-        )
+        lowest, highest = (_number(entry) for entry in self._limits)
+        if lowest is not None and highest is not None:
+            self._exploration.param.update(
+                lowest=-math.inf if math.isnan(lowest) else lowest,
+                highest=math.inf if math.isnan(highest) else highest,
+            )
+
+
+def _number(entry: pmui.TextInput) -> float | None:
+    """Return the number in a control: NaN if it is empty, None, which it says, if it is none."""
+    text = entry.value.strip()
+    try:
+        number = float(text or "nan")
+        is_number = math.isfinite(number) or not text
+    except ValueError:
+        number, is_number = math.nan, False
+    words = "" if is_number else "Expected a number."
+    entry.param.update(error_state=not is_number, helper_text=words)
+    return number if is_number else None

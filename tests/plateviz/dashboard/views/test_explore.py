@@ -162,16 +162,16 @@ def test_address_opens_what_it_says(fit_result, survey, navigation):
     assert again.exploration.x is None
 
 
-def test_columns_of_an_older_version_are_named_until_others_are_chosen(view, executor, navigation):
+def test_columns_of_an_older_version_are_named(view, executor, navigation):
     address = navigation.address() | {"rows": "motions", "x": "n_plates", "colour": "sigma_px"}
     navigation.begin(address | {"view": "survey", "workspace": "explore"})
     draw(view, executor)
-    words = view._words.object
-    assert "x: expected a column of the motions, found &#x27;n_plates&#x27;" in words
-    assert "colour: expected a column of the motions" in words
-    assert view._words.visible
-    navigation.survey_exploration.y = "n_orbits"
-    assert not view._words.visible
+    notice = navigation.session.notice
+    assert "x: expected a column of the motions, found 'n_plates'" in notice
+    assert "colour: expected a column of the motions" in notice
+    # The next address has none of it.
+    navigation.begin(navigation.address())
+    assert navigation.session.notice == ""
 
 
 def test_area_of_cells_selects_the_sources_inside(view, executor, navigation):
@@ -234,15 +234,19 @@ def test_rows_are_limited_by_a_column(view, executor, navigation):
     navigation.survey_exploration.only = "leverage"
     draw(view, executor)
     assert low.visible
-    assert [(one.value, one.placeholder) for one in (low, high)] == [(None, "-1"), (None, "1")]
-    low.value = 0.0
+    assert [(one.value, one.placeholder) for one in (low, high)] == [("", "-1"), ("", "1")]
     exploration = navigation.survey_exploration
+    low.value = "wide"
+    assert (low.error_state, low.helper_text) == (True, "Expected a number.")
+    assert exploration.lowest == -math.inf
+    low.value = "0e3"
+    assert (low.error_state, low.helper_text) == (False, "")
     assert (exploration.lowest, exploration.highest) == (0.0, math.inf)
     draw(view, executor)
     assert "15,000 not between the limits of leverage" in view._drawn.figure[0].subtitle
     navigation.survey_exploration.only = "nx"
     draw(view, executor)
-    assert low.value is None
+    assert low.value == ""
     assert exploration.lowest == -math.inf
 
 

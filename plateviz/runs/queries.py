@@ -15,7 +15,15 @@ from pyarrow.compute import field as col
 
 from plateviz.runs.fitted_orbit import is_complete, kept_table, read_fitted_orbit, read_summary
 from plateviz.runs.orbit_cache import OrbitCache
-from plateviz.runs.run import ERRORS_FILE, HISTORY_FILE, MOTIONS_FILE, Run, Written, runs_of
+from plateviz.runs.run import (
+    ERRORS_FILE,
+    HISTORY_FILE,
+    MOTIONS_FILE,
+    RUN_FILE,
+    Run,
+    Written,
+    runs_of,
+)
 from solver.data.result import FitResult
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
 from solver.errors import InputError
@@ -50,6 +58,7 @@ class SurveyRun:
         """Open a run, complete or not; `cache` is of its fitted orbits."""
         self._run, self._cache = run, cache
         self._unchanged, self._had_history = UnchangedFiles(), False
+        self._first_header = self._header_bytes()
 
     @property
     def name(self) -> str:
@@ -79,6 +88,19 @@ class SurveyRun:
     def is_there(self) -> bool:
         """Return whether nobody has removed the run; costs one look at its directory."""
         return self.directory.is_dir()
+
+    def is_replaced(self) -> bool:
+        """Return whether another run has its name since it was opened; costs a look at a file."""
+        now = self._header_bytes()
+        self._first_header = self._first_header or now
+        return now not in (b"", self._first_header)
+
+    def _header_bytes(self) -> bytes:
+        """Return what the run began with; empty while it is not there."""
+        try:
+            return (self.directory / RUN_FILE).read_bytes()
+        except OSError:
+            return b""
 
     def written(self) -> Written:
         """Return what the run has now; takes a millisecond for each hundred orbits."""

@@ -1,10 +1,13 @@
 """NotableSourceLink: a line of text that opens the source with the most significant motion."""
 
+from contextlib import suppress
+
 import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.tables.notable_source import notable_source
+from solver.errors import InputError
 
 _STYLE = {
     "textTransform": "none",
@@ -36,7 +39,10 @@ class NotableSourceLink(pn.viewable.Viewer):
 
     def _read(self, *_: object) -> None:
         run = self._navigation.run
-        found = None if run is None else notable_source(run.motions())
+        found = None
+        # Where the motions cannot be read, the page of the run or the source says so.
+        with suppress(InputError):
+            found = None if run is None else notable_source(run.motions())
         self._button.visible = found is not None
         if found is not None:
             self._source_id = str(found.source_id)

@@ -38,6 +38,19 @@ def test_removed_run_is_said_until_it_is_there_again(fit_result, survey_folder):
     assert len(notice) == 0
 
 
+def test_run_that_was_made_again_with_other_settings_is_said(fit_result, survey_folder):
+    run = begin_run(survey_folder, "default", FitSettings())
+    navigation = Navigation(Session(SurveyStore(fit_result, survey_runs(survey_folder))))
+    for settings, is_said in ((FitSettings(), False), (FitSettings(order=3), True)):
+        shutil.rmtree(run.directory)
+        begin_run(survey_folder, "default", settings)
+        look_for_run(navigation)
+        assert ("Another run has the name default" in navigation.session.loss) == is_said
+    opened = Navigation(Session(SurveyStore(fit_result, survey_runs(survey_folder))))
+    look_for_run(opened)
+    assert opened.session.loss == ""
+
+
 def test_page_of_files_has_no_run_to_lose(fit_result):
     navigation = Navigation(Session(SurveyStore(fit_result, [])))
     look_for_run(navigation)

@@ -146,9 +146,8 @@ class Navigation(param.Parameterized):
         except InputError as error:
             problems.append(str(error))
             orbit = session.selection.orbit
-        views = {view.value: view for view in View}
         default = View.ORBIT if {*address} & {*session.selection.param} else self.view
-        view = views[chosen("view", address, views, default.value, problems)]
+        view = View(chosen("view", address, [v.value for v in View], default.value, problems))
         session.note(problems)
         self._named = {name: address[name] for name in _NAMED if name in address}
         if view is View.ORBIT or session.shown is not None:
@@ -259,6 +258,7 @@ class Navigation(param.Parameterized):
                 # It is a change of that solution, to which the controls lead back.
                 other = self._solution(None, orbit)
         except InputError as error:
+            session.selection.orbit = orbit
             session.refuse(str(error))
             return
         session.open(solution, other)

@@ -29,7 +29,7 @@ class RequestState(param.Parameterized):
     what-if that has only begun, of which nothing is said yet. `notice` says what of the last
     address, or saved view, cannot be shown, `remark` why the last drag has selected nothing,
     `advice` what to do for the last change of the settings to take effect, and `loss` that the run
-    on the screen is gone.
+    on the screen is gone, or another one.
     """
 
     stage = param.ClassSelector(class_=Stage, default=Stage.LOADING)

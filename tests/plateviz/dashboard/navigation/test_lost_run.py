@@ -111,3 +111,23 @@ def test_source_of_one_run_is_not_shown_under_the_name_of_another(fit_result, su
     assert page._list._table.value.empty
     navigation.run_name = "default"
     assert navigation.found is not None
+
+
+def test_orbit_whose_solution_is_damaged_is_the_one_that_a_fit_solves(fit_result, survey):
+    class Damaged(FakeRun):
+        def has_fitted(self, orbit):
+            return True
+
+        def result(self, orbit):
+            if orbit == 1:
+                raise InputError("orbit=0001/residuals.parquet: damaged")
+            return super().result(orbit)
+
+    run = Damaged("default", survey, fit_result)
+    navigation = Navigation(Session(SurveyStore(fit_result, [run])))
+    navigation.begin({"view": "orbit", "orbit": "1"})
+    session = navigation.session
+    assert "orbit=0001/residuals.parquet: damaged" in session.message
+    assert session.selection.orbit == 1
+    session.refit()
+    assert session.store.requested[-1][0] == 1

@@ -46,7 +46,7 @@ _REMEDY = "`plateviz survey` with --repair fits the orbit again"
 def write_fitted_orbit(
     directory: Path, result: FitResult, beside: Mapping[str, pd.DataFrame] | None = None
 ) -> None:
-    """Write one fitted orbit; an existing directory is not changed.
+    """Write one fitted orbit; one that is complete is not changed.
 
     Parameters
     ----------
@@ -73,6 +73,9 @@ def write_fitted_orbit(
             (staging / _COMPLETE).write_text(manifest, encoding="utf-8")
             flush(staging / _COMPLETE)
             flush(staging)
+            if directory.exists() and not is_complete(directory):
+                # A directory appears as a whole: this one has been damaged since.
+                remove_fitted_orbit(directory)
             if not directory.exists():
                 _move(staging, directory)
                 flush(directory.parent)

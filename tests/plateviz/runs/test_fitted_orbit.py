@@ -49,6 +49,16 @@ def test_existing_fitted_orbit_is_not_changed(fit_result, make_fit_result, tmp_p
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
+def test_orbit_that_has_lost_its_manifest_is_written_again(fit_result, tmp_path):
+    directory = tmp_path / "orbit=0007"
+    write_fitted_orbit(directory, fit_result)
+    before = read_fitted_orbit(directory)
+    (directory / "COMPLETE").unlink()
+    write_fitted_orbit(directory, fit_result)
+    assert read_fitted_orbit(directory).sources.equals(before.sources)
+    assert [path.name for path in tmp_path.iterdir()] == ["orbit=0007"]
+
+
 def test_interrupted_write_leaves_no_file(fit_result, tmp_path, monkeypatch):
     def stop(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")

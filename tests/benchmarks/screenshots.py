@@ -1,4 +1,4 @@
-"""Take a screenshot of every workspace of the dashboard, in both themes and three sizes.
+r"""Take a screenshot of every workspace of the dashboard, in both themes and three sizes.
 
     python tests/benchmarks/screenshots.py DIR OUTPUT [--source ID | --readme]
 
@@ -6,7 +6,8 @@ DIR is a survey with a run, such as `plateviz simulate DIR && plateviz survey DI
 one PNG each, such as `orbit-sky-dark-1366x768.png`, and is made if it is not there. With --readme
 it gets the picture of README.md only, `orbit-page.png`, whose survey has a defect:
 
-    plateviz simulate DIR --orbits 2 --stars 40000 --defect distortion-drift=0.3um --magnitudes
+    plateviz simulate DIR --orbits 2 --stars 40000 --seed 2 \
+        --defect distortion-drift=0.3um --magnitudes
 """
 
 import argparse

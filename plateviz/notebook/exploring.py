@@ -6,6 +6,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from plateviz.notebook.figures import FigureSpec, NotebookFigure, figure_collection
+from solver.errors import InputError
 
 if TYPE_CHECKING:
     from plateviz.tables.explore import ExplorableTable
@@ -48,24 +49,14 @@ class Explores(ABC):
         Raises
         ------
         InputError
-            If there are no such rows, columns or theme, or files of the run cannot be read.
+            If there are no such rows, columns or theme, the limits are no numbers in order, or
+            files of the run cannot be read.
         """
         from plateviz.plots.explored import explored
         from plateviz.plots.explored_rows import Columns
 
-        lowest, highest = between
-        chosen = Columns(
-            x,
-            y,
-            colour,
-            only,
-            -math.inf if lowest is None else lowest,
-            math.inf if highest is None else highest,
-            log_x,
-            log_y,
-            median,
-            zoom,
-        )
+        lowest, highest = _limits(between)
+        chosen = Columns(x, y, colour, only, lowest, highest, log_x, log_y, median, zoom)
         found = explored(rows, chosen, self._explorable_rows(), self._explorable)
         spec = FigureSpec("explore", *found)
         return figure_collection([spec], theme)["explore"]
@@ -77,3 +68,18 @@ class Explores(ABC):
     @abstractmethod
     def _explorable(self, rows: str) -> "ExplorableTable":
         """Return the table of some rows."""
+
+
+def _limits(between: Range) -> tuple[float, float]:
+    """Return the limits, which may be infinite."""
+    try:
+        low, high = between
+        limits = (
+            -math.inf if low is None else float(low),
+            math.inf if high is None else float(high),
+        )
+    except (TypeError, ValueError) as error:
+        raise InputError(f"between: expected two numbers or None, found {between!r}") from error
+    if not limits[0] <= limits[1]:
+        raise InputError(f"between: expected the lower limit first, found {between!r}")
+    return limits

@@ -74,12 +74,10 @@ def _limits(between: Range) -> tuple[float, float]:
     """Return the limits, which may be infinite."""
     try:
         low, high = between
-        limits = (
-            -math.inf if low is None else float(low),
-            math.inf if high is None else float(high),
-        )
+        least = -math.inf if low is None else float(low)
+        most = math.inf if high is None else float(high)
     except (TypeError, ValueError) as error:
         raise InputError(f"between: expected two numbers or None, found {between!r}") from error
-    if not limits[0] <= limits[1]:
+    if not least <= most:
         raise InputError(f"between: expected the lower limit first, found {between!r}")
-    return limits
+    return least, most

@@ -153,6 +153,8 @@ def test_any_column_is_drawn_against_any_other(solution):
         ("sources", "flux", {}, "a column of the sources out of .*, found 'flux'"),
         ("sources", "ra", {"only": "flux"}, "found 'flux'"),
         ("sources", "ra", {"theme": "blue"}, "theme: expected one of light, dark"),
+        ("sources", "ra", {"only": "n_obs", "between": (90, 20)}, "the lower limit first, found"),
+        ("sources", "ra", {"only": "n_obs", "between": ("a", None)}, "two numbers or None, found"),
     ],
 )
 def test_what_is_not_there_is_not_explored(solution, rows, x, options, message):

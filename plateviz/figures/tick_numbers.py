@@ -6,16 +6,20 @@ from plateviz.figures.figure import Limits
 
 # From here on digits stand in groups of three.
 _GROUPED = 1e4
-# As many decimals as a date needs in the smallest frame; none that are zero at the end.
-_FORMAT = "0,0.[000000000]"
+# With as many decimals as a date needs in the smallest frame, none that are zero at the end, and
+# with the minus of BokehJS's other numbers.
+_WRITE = """
+    return new Intl.NumberFormat("en-US", {maximumFractionDigits: 9}).format(tick)
+      .replace("-", "\u2212")
+"""
 
 
 def with_tick_numbers(drawn: models.Axis | models.ColorBar, limits: Limits) -> None:
     """Let a linear axis or colour bar write its numbers as those between two limits are written."""
     grouped = is_grouped(limits)
-    if isinstance(drawn.formatter, models.NumeralTickFormatter) is not grouped:
+    if isinstance(drawn.formatter, models.CustomJSTickFormatter) is not grouped:
         drawn.update(
-            formatter=models.NumeralTickFormatter(format=_FORMAT)
+            formatter=models.CustomJSTickFormatter(code=_WRITE)
             if grouped
             else models.BasicTickFormatter()
         )

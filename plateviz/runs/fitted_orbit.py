@@ -87,8 +87,12 @@ def remove_fitted_orbit(directory: Path) -> None:
         directory.rename(doomed)
 
 
-def read_fitted_orbit(directory: Path) -> FitResult:
+def read_fitted_orbit(directory: Path, remedy: str = _REMEDY) -> FitResult:
     """Read one fitted orbit.
+
+    Parameters
+    ----------
+    remedy : what to do about a damaged file, a sentence without its full stop
 
     Raises
     ------
@@ -102,8 +106,8 @@ def read_fitted_orbit(directory: Path) -> FitResult:
         )
     manifest = read_manifest(directory / _COMPLETE)
     for name, digest in manifest.items():
-        require_unchanged(directory / name, digest, _REMEDY)
-    head, timings = _read_json(directory / _HEAD), _read_timings(directory)
+        require_unchanged(directory / name, digest, remedy)
+    head, timings = _read_json(directory / _HEAD), _read_timings(directory, remedy)
     with reading(str(directory), "a fitted orbit"):
         if head["format"] > FORMAT:
             raise InputError(
@@ -216,12 +220,12 @@ def _read_table(directory: Path, table: Table) -> pd.DataFrame | None:
     return table.completed(read_frame(path)) if path.is_file() else None
 
 
-def _read_timings(directory: Path) -> dict[str, Any]:
+def _read_timings(directory: Path, remedy: str = _REMEDY) -> dict[str, Any]:
     path = directory / _TIMINGS
     with reading(str(path), "the times of a fit"):
         timings = dict(_read_json(path))
         # Older versions wrote none.
-        require_digest(path, _digest(timings), timings.pop("sha256", None), _REMEDY)
+        require_digest(path, _digest(timings), timings.pop("sha256", None), remedy)
         return timings
 
 

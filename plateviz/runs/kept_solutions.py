@@ -34,6 +34,7 @@ from solver.simulate.simulated import simulation_of
 FOLDER = "solutions"
 # Whoever can open a dashboard can keep solutions; each takes some 30 MB.
 MOST = 200
+_REMEDY = "fit the orbit with these settings again, and keep it under another name"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,59}")
 _DIRECTORY = re.compile(r"(?P<kind>orbit|what-if)=(?P<orbit>\d{4,18}|file)")
 
@@ -68,7 +69,7 @@ class KeptSolution(NamedTuple):
 
     def read(self) -> FitResult:
         """Read it; InputError if it is damaged."""
-        return read_fitted_orbit(self.directory)
+        return read_fitted_orbit(self.directory, _REMEDY)
 
 
 class KeptSolutions:

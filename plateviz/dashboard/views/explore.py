@@ -105,7 +105,7 @@ class ExploreView(pn.viewable.Viewer):
         )
         self.grid = FigureGrid([self._figure], wake, columns=1)
         self._limits = [
-            pmui.TextInput(label=label, size="small", width=130, margin=(4, 6))
+            pmui.TextInput(label=label, size="small", width=130, margin=(4, 6), visible=False)
             for label in ("at least", "at most")
         ]
         for entry in self._limits:

@@ -184,7 +184,11 @@ def _solve_from(
     Jacobians, so that the evidence is evaluated at its own point.
     """
     warm_start = solve_what_if(mode, solved, lower, settings) if mode.status.is_solution else None
-    return _evaluated(lower, find_mode(lower, settings, progress, start=warm_start))
+    found = find_mode(lower, settings, progress, start=warm_start)
+    if warm_start is not None and not found.status.is_solution:
+        # The solution of a higher order may be a bad start where that order is far too low.
+        found = find_mode(lower, settings, progress)
+    return _evaluated(lower, found)
 
 
 def _evaluated(problem: Problem, mode: Mode) -> Mode:

@@ -7,6 +7,7 @@ import pytest
 
 from solver.data.distortion_terms import terms
 from solver.data.exclusions import of_rows
+from solver.data.result import FitStatus
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.engines.gauss_newton import find_mode
 from solver.errors import CancelledError
@@ -46,6 +47,22 @@ def test_every_order_is_present_and_converged(orders):
     assert orders["order"].tolist() == list(range(HIGHEST + 1))
     assert orders["n_terms"].tolist() == [2 * len(terms(n)) for n in range(HIGHEST + 1)]
     assert orders["converged"].all()
+
+
+@pytest.mark.slow
+def test_an_order_that_a_warm_start_leads_astray_starts_anew(short_orbit, monkeypatch):
+    starts = []
+
+    def astray(problem, settings, progress, start=None):
+        found = find_mode(problem, settings, progress, start=start)
+        starts.append(start)
+        return found if start is None else found._replace(status=FitStatus.NOT_FINITE)
+
+    monkeypatch.setattr("solver.results.orders.find_mode", astray)
+    settings = FitSettings(order=3)
+    problem = build_problem(short_orbit.data, short_orbit.instrument, settings)
+    assert compare_orders(problem, settings)["converged"].all()
+    assert any(start is not None for start in starts)
 
 
 @pytest.mark.slow

@@ -36,6 +36,9 @@ class ComparedRun(FakeRun):
     def is_there(self):
         return not self.is_lost
 
+    def is_replaced(self):
+        return False
+
     def orbits(self):
         self.n_read += 1
         return super().orbits()

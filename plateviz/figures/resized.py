@@ -23,8 +23,6 @@ _ROW, _MARK = 26, 32
 # Words that would leave a frame less than this height, in screen pixels, or less than this share of
 # its height, are left out.
 _ENOUGH, _SHARE = 110, 0.65
-# How much higher a frame is that is clearly larger.
-_GAIN = 1.12
 # Lines of the label of an axis, at most.
 _X_LINES, _Y_LINES = 2, 3
 

@@ -133,6 +133,7 @@ class AngleUnits:
         for _, text in hover:
             for fields, unit in _FIELDS.findall(text):
                 factors |= dict.fromkeys(_names(fields), self.factor(unit))
+        scaled = [name for name, factor in factors.items() if factor != 1.0]
         columns = {
             name: _scaled(values, factors.get(name, 1.0)) for name, values in glyphs.columns.items()
         }
@@ -146,10 +147,7 @@ class AngleUnits:
             looks={name: self._look(look, factors) for name, look in glyphs.looks.items()},
             hover=[(label, self._hover(text)) for label, text in hover],
             label=self.text(glyphs.label),
-            units={
-                **glyphs.units,
-                **{name: self.unit for name, factor in factors.items() if factor != 1.0},
-            },
+            units={**glyphs.units, **dict.fromkeys(scaled, self.unit)},
         )
 
     def _look(self, look: Look, factors: Mapping[str, float]) -> Look:

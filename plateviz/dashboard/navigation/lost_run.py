@@ -8,8 +8,8 @@ from plateviz.runs.queries import SurveyRun
 def look_for_run(navigation: Navigation) -> None:
     """Offer runs that have begun, and say whether that on the screen is gone or another one.
 
-    The first run of a survey is shown. It costs a look at two directories; where two runs are
-    compared, the other one is looked at, too.
+    The first run of a survey is shown. It costs a look at two directories and a small file; where
+    two runs are compared, the other one is looked at, too.
     """
     runs = navigation.known_runs
     if runs.look() and runs.first is not None:

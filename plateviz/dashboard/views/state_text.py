@@ -31,7 +31,7 @@ def outdated_text(session: Session) -> str:
         so_far = f": {session.message}" if session.message else ""
         return f"Another solution is being computed{so_far}. This is still the last one."
     if session.stage is Stage.FAILED:
-        return f"The last request has no solution, and this one stays. {_sentence(session.message)}"
+        return f"The last request has no solution, and this one stays: {_sentence(session.message)}"
     return ""
 
 

@@ -88,7 +88,7 @@ def test_panes_of_an_orbit_go_through_their_states(fresh):
     session.job.take({"event": "failed", "message": "orbit <0>: no exposure"})
     session.poll()
     for pane in (outdated, words):
-        assert "The last request has no solution, and this one stays." in pane.object
+        assert "The last request has no solution, and this one stays:" in pane.object
         assert "<0>" not in pane.object
     assert not view._tools.is_stale
     assert tabs.visible

@@ -68,7 +68,8 @@ def _causes(verdict: dict) -> Iterator[dict]:
     """Yield the causes of an orbit's verdict, or one row without a cause."""
     state = str(verdict["state"])
     causes = verdict.get("causes") or [{**_NO_CAUSE, "options": (), "is_large": False}]
-    for cause in causes:
+    # One that another may be in place of does not make many orbits name it.
+    for cause in (one for one in causes if not one.get("instead_of")):
         plain = {name: cause[name] for name in ORBIT_CAUSES.names if name in cause}
         yield {**plain, "state": state, "options": "\n".join(cause["options"])}
 

@@ -36,7 +36,7 @@ def harm(case: Case) -> tuple[str, bool]:
     size = found.test.size_um if np.isfinite(found.test.size_um) else _rms(case)
     if np.isfinite(size):
         # On the sky, along one axis.
-        error = _on_sky(case, size)
+        error = case.diagnosis.camera.on_sky(size)
         typical = _typical_sigma(case.result)
         spoils = (
             f"It spoils the positions, by up to {rounded(error)} mas rms where their "
@@ -195,11 +195,6 @@ def _magnitude_group(case: Case) -> np.ndarray:
     return groups.fillna(-1).to_numpy(dtype=int)
 
 
-def _on_sky(case: Case, size_um: float) -> float:
-    """Return a displacement on the focal plane as that on the sky along one axis, mas."""
-    return size_um / case.diagnosis.camera.um_per_mas / float(np.sqrt(2.0))
-
-
 def _largest_shift_of_one(case: Case) -> float:
     """Return how far a measurement that is far off moves its source at most, mas along one axis.
 
@@ -208,7 +203,7 @@ def _largest_shift_of_one(case: Case) -> float:
     rows = case.diagnosis.rows
     residual = np.sqrt(rows.chi2[rows.is_far] / rows.weight[rows.is_far])
     left = np.maximum(rows.left[rows.is_far], 1e-3)
-    return _on_sky(case, float((residual * (1.0 - left) / left).max(initial=0.0)))
+    return case.diagnosis.camera.on_sky(float((residual * (1.0 - left) / left).max(initial=0.0)))
 
 
 def _shift_by_swings(case: Case) -> float:
@@ -224,7 +219,9 @@ def _shift_by_swings(case: Case) -> float:
     moved = np.bincount(rows.source, (rows.weight * size[rows.exposure]) ** 2)
     shift = np.sqrt(moved) / np.bincount(rows.source, rows.weight)
     of_these = shift[moved > 0.0]
-    return _on_sky(case, float(np.sqrt(np.mean(of_these**2)))) if len(of_these) else 0.0
+    return (
+        case.diagnosis.camera.on_sky(float(np.sqrt(np.mean(of_these**2)))) if len(of_these) else 0.0
+    )
 
 
 def _frame_shift(case: Case) -> float:

@@ -36,6 +36,8 @@ class Cause(NamedTuple):
     options : options of `plateviz fit` that do it; empty if there are none
     is_large : whether the solution should not be trusted because of it
     items : what it concerns, if that can be listed: sources, exposures, or pairs of measurements
+    instead_of : name of the cause in place of which it explains the tests nearly as well; empty
+        for a cause of its own
     """
 
     name: str
@@ -47,22 +49,33 @@ class Cause(NamedTuple):
     options: tuple[str, ...]
     is_large: bool
     items: tuple[str, ...] = ()
+    instead_of: str = ""
+
+    def heading(self) -> str:
+        """Return the title as the beginning of a sentence."""
+        if self.instead_of:
+            return f"Or, nearly as likely: {self.title}"
+        return self.title[0].upper() + self.title[1:]
 
     def sentence(self) -> str:
         """Return all of it as text."""
-        title = self.title[0].upper() + self.title[1:]
         options = f" ({' '.join(self.options)})" if self.options else ""
         return (
-            f"{title}, {self.significance:.0f} sigma. {self.words} {self.spoils} "
+            f"{self.heading()}, {self.significance:.0f} sigma. {self.words} {self.spoils} "
             f"What to do: {self.action}{options}."
         )
 
 
 def causes_in_words(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> list[Cause]:
-    """Return the causes of a solution's flaws in words, the most likely first."""
+    """Return the causes of a solution's flaws in words, the most likely first.
+
+    Those that explain the tests nearly as well as the first one follow it.
+    """
     if not result.summary["converged"]:
         return [_stuck(result, diagnosis, causes)]
-    return [_in_words(Case(one, causes, diagnosis, result)) for one in causes.found]
+    said = [_in_words(Case(one, causes, diagnosis, result)) for one in causes.found]
+    rivals = [_in_words(Case(one, causes, diagnosis, result)) for one in causes.rivals]
+    return [*said[:1], *(one._replace(instead_of=said[0].name) for one in rivals), *said[1:]]
 
 
 def wrong_catalogue(result: FitResult) -> list[Cause]:

@@ -61,7 +61,7 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     reasons = [*(cause.sentence() for cause in causes), *_tested(diagnosis, found, tables)]
     reasons += [*_fitted(orbits), *_motions(motions)]
     reasons += _smooth_errors(tables.zonal, found, causes)
-    faults = [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
+    faults = [f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes]
     notable = _failed(orbits)
     if len(far):
         notable.append(f"Numbers far from their expected values: {_named(far['orbit_id'])}.")

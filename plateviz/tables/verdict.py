@@ -111,26 +111,32 @@ def _judge(result: FitResult) -> Verdict:
     has_causes = found or not converged
     causes = causes_in_words(result, diagnosis, find_causes(diagnosis)) if has_causes else []
     state: State = "warn" if found else "good"
-    is_large = any(cause.is_large for cause in causes)
+    is_large = any(cause.is_large for cause in causes if not cause.instead_of)
     catalogue = wrong_catalogue(result)
     if not converged or (certain and is_large) or catalogue:
         state = "bad"
     causes = [*catalogue, *causes]
     left_out = references_left_out(result)
     state = worst([state, "warn" if left_out else "good"])
-    titles = [*(cause.title for cause in causes), *left_out[:1]]
+    titles = [*_first(causes), *left_out[:1]]
     headline = f"{_HEADLINES[state][:-1]}: {titles[0]}." if titles else _HEADLINES[state]
     items = summary_strip(result)
     reasons = [_converged(result), *(cause.sentence() for cause in causes), *left_out[1:]]
     reasons += [discoveries_in_words(diagnosis.tests, found), *map(_sentence, _judged(items))]
     reasons += [*noise_sentences(result), *_common_error(result), *unseen_sentences(result)]
     faults = [] if converged else [_converged(result)]
-    faults += [f"{cause.title}, {cause.significance:.0f} sigma." for cause in causes]
+    faults += [f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes]
     faults += left_out[1:]
     if found and not causes:
         faults.append(discoveries_in_words(diagnosis.tests, found))
     tests = tests_in_words(diagnosis)
     return Verdict(state, headline, reasons, notable_sentences(result), faults, causes, tests)
+
+
+def _first(causes: Sequence[Cause]) -> list[str]:
+    """Return the title of the first cause, and of one that is nearly as likely."""
+    nearly = [one.title for one in causes[1:2] if one.instead_of]
+    return [", or ".join([causes[0].title, *nearly])] if causes else []
 
 
 def _judged(items: list[SummaryItem]) -> list[SummaryItem]:

@@ -107,11 +107,10 @@ class _Row:
 
 
 def _words(cause: Cause) -> str:
-    title = f"{cause.title[0].upper()}{cause.title[1:]}"
     options = "".join(f" <code>{escape(one)}</code>" for one in cause.options[:_MOST_OPTIONS])
     action = f"{cause.action[0].upper()}{cause.action[1:]}"
     return (
-        f"<p class='cause'><b>{escape(title)}</b>, {cause.significance:.0f} sigma. "
+        f"<p class='cause'><b>{escape(cause.heading())}</b>, {cause.significance:.0f} sigma. "
         f"{escape(action)}.{options}{_and_more(cause)}<br><span>{escape(cause.spoils)}</span></p>"
     )
 

@@ -12,31 +12,19 @@ import numpy as np
 
 from solver.results.diagnosis import gains
 from solver.results.diagnosis.contradictions import (
+    STARS,
+    beyond_shift,
     is_beyond_noise,
     of_others,
     of_priors,
     of_references,
 )
-from solver.results.diagnosis.courses import COURSES, Courses, are_alternatives
-from solver.results.diagnosis.found import Found, limit_of
-from solver.results.diagnosis.patterns import Family
-from solver.results.diagnosis.projection import Projection
+from solver.results.diagnosis.found import CLOSE, Found, limit_of
+from solver.results.diagnosis.pattern_causes import LEAST_SHARE, PATTERNS, pattern_causes
 from solver.results.diagnosis.rate import sigmas
 from solver.results.diagnosis.scatter import Scatter, scatter_tests
-from solver.results.diagnosis.table import (
-    Diagnosis,
-    Test,
-    pattern_test,
-)
+from solver.results.diagnosis.table import Diagnosis
 
-_MOST_PATTERNS = 4
-# A pattern after the first one is named if it explains this share of what the first one does.
-_LEAST_SHARE = 0.1
-# Patterns that name no cause: one is taken first, and only if it explains so much more than any
-# other.
-_WITHOUT_CAUSE, _MUCH_MORE = ("cells", "map"), 4.0
-# Those whose tests follow one another.
-_PATTERNS = (*COURSES, "order", "shift", "turn", "phase", "magnitude", *_WITHOUT_CAUSE)
 _OF_EXPOSURES = ("stretch", "shear", "quadratic")
 # The positions of the sources carry these into all exposures.
 _MAKES_PATTERNS = (
@@ -50,6 +38,7 @@ _MAKES_PATTERNS = (
 _OF_ITS_OWN = 0.5
 # What these bring about explains at most so many times what the positions carry.
 _SHIFTS_STARS, _MARGIN = ("swing", "outliers"), 2.0
+_MOST_RIVALS = 2
 # Outliers are wrong identifications if these have this share of their chi2.
 _OF_OUTLIERS = 0.5
 # Patterns that explain more of chi2 are not linear: what they leave tells nothing about the noise.
@@ -63,17 +52,19 @@ class FoundCauses(NamedTuple):
     Attributes
     ----------
     found : the causes, the most likely first
+    rivals : causes that explain the tests nearly as well as the first one, in place of it
     left : chi2 per degree of freedom without what the patterns explain, as a test; None where
         they are so large that it is not known
     """
 
     found: tuple[Found, ...]
+    rivals: tuple[Found, ...]
     left: Scatter | None
 
 
 def find_causes(diagnosis: Diagnosis) -> FoundCauses:
     """Return the causes that explain the tests of a solution."""
-    patterns, explained = _patterns(diagnosis)
+    patterns, rivals, explained = pattern_causes(diagnosis)
     of_exposures, of_each = _of_exposures(diagnosis, explained)
     found = [*_swinging(diagnosis), *patterns, *of_exposures]
     found += [*_of_outliers(diagnosis), *of_priors(diagnosis), *of_others(diagnosis)]
@@ -88,25 +79,39 @@ def find_causes(diagnosis: Diagnosis) -> FoundCauses:
     found.sort(key=lambda one: (spoils and one.test.subject == "kurtosis", -one.gain))
     if left is None and found[:1] == patterns[:1]:
         found = patterns
-    return FoundCauses(tuple(_of_their_own(found, diagnosis)), left)
+    named, left_out = _of_their_own(found, diagnosis)
+    rivals = [*(rivals if named[:1] == patterns[:1] else ()), *_rivals(named, left_out)]
+    return FoundCauses(tuple(named), tuple(rivals[:_MOST_RIVALS]), left)
 
 
-def _of_their_own(found: list[Found], diagnosis: Diagnosis) -> list[Found]:
-    """Return the causes without those that the first one may have brought about.
+def _rivals(named: list[Found], left_out: list[Found]) -> list[Found]:
+    """Return the causes that are left out, but nearly as likely as the first one.
+
+    What describes the size of the residuals includes a noise that is larger as a whole.
+    """
+    return [
+        one
+        for one in left_out
+        if one.gain > named[0].gain - CLOSE and one.test.subject not in (*SCATTER, "kurtosis")
+    ]
+
+
+def _of_their_own(found: list[Found], diagnosis: Diagnosis) -> tuple[list[Found], list[Found]]:
+    """Return the causes without those that the first one may have brought about, and these.
 
     Patterns were tested one after the other. Of two kinds of causes the weaker may be a result of
     the stronger; the next fit finds it if it is not.
     """
     if not found:
-        return []
+        return [], []
     leads, *others = found
     subject, rows = leads.test.subject, diagnosis.rows
     # One wrong of n measurements shifts its star by 1/n; its other residuals have 1/n of the chi2.
     carried = _MARGIN * leads.gain * len(np.unique(rows.source)) / max(rows.n, 1)
 
     def is_named(one: Found) -> bool:
-        is_pattern = one.test.subject in _PATTERNS
-        if is_pattern and subject in _PATTERNS:
+        is_pattern = one.test.subject in PATTERNS
+        if is_pattern and subject in PATTERNS:
             return True
         if one.test.subject == "prior" and subject in SCATTER:
             return is_beyond_noise(one, diagnosis.scale, limit_of(diagnosis))
@@ -116,9 +121,18 @@ def _of_their_own(found: list[Found], diagnosis: Diagnosis) -> list[Found]:
         if is_pattern and subject in _SHIFTS_STARS:
             return one.gain > carried
         is_made = is_pattern and subject in (*_MAKES_PATTERNS, *_OF_EXPOSURES)
-        return one.gain > _LEAST_SHARE * leads.gain and not is_made
+        return one.gain > LEAST_SHARE * leads.gain and not is_made
 
-    return [leads, *filter(is_named, others)]
+    named, left_out = [leads], list[Found]()
+    sizes = [one.test.size_um for one in found if one.test.subject in PATTERNS]
+    shift = diagnosis.camera.on_sky(float(np.hypot.reduce(sizes))) if sizes else 0.0
+    for one in others:
+        is_shifted = subject in PATTERNS and one.test.subject in STARS
+        rest = beyond_shift(diagnosis, one, shift) if is_shifted else [one]
+        its_own = list(filter(is_named, rest))
+        named += its_own
+        left_out += [] if its_own else [one]
+    return named, left_out
 
 
 def _is_of_tails(subject: str, leads: str) -> bool:
@@ -128,47 +142,6 @@ def _is_of_tails(subject: str, leads: str) -> bool:
     makes groups scatter.
     """
     return subject == "kurtosis" or (leads == "kurtosis" and subject in SCATTER)
-
-
-def _patterns(diagnosis: Diagnosis) -> tuple[list[Found], float]:
-    """Return the patterns that the residuals have, and how much of chi2 they explain."""
-    projection: Projection = diagnosis.projection
-    families, scale = list(diagnosis.patterns.families), diagnosis.scale
-    courses, taken, found = Courses(diagnosis), list[Family](), list[Found]()
-    explained, limit = 0.0, limit_of(diagnosis)
-    while len(found) < _MOST_PATTERNS:
-        tests = [(family, pattern_test(projection, family, scale)) for family in families]
-        tests = [one for one in tests if one[1].log_chance < limit]
-        named = [one for one in tests if one[1].subject not in _WITHOUT_CAUSE]
-        candidates = named if found else tests
-        if not candidates:
-            break
-        gained = [(gains.of_pattern(projection, *one, scale), *one) for one in candidates]
-        first = max(gained, key=_rank)[1]
-        gained = [one for one in gained if are_alternatives(one[1], first)]
-        falls = [scale * test.statistic for _, _, test in gained]
-        # Before they are compared, which takes as long as all tests.
-        if found and max(falls) < _LEAST_SHARE * explained:
-            break
-        likeliest = courses.likeliest([family for _, family, _ in gained], taken)
-        number = next(i for i, one in enumerate(gained) if one[1] is likeliest)
-        (gain, family, test), fall = gained[number], falls[number]
-        if found and fall < _LEAST_SHARE * explained:
-            break
-        found.append(Found(test, gain, size=test.size_um))
-        explained += fall - test.expected
-        projection = projection.without(family)
-        taken.append(family)
-        families = [one for one in families if not are_alternatives(one, family)]
-    return found, explained
-
-
-def _rank(gained: tuple[float, Family, Test]) -> tuple[bool, float]:
-    """Return what patterns are ordered by: the gain, less for one that names no cause."""
-    gain, _, test = gained
-    if test.subject in _WITHOUT_CAUSE:
-        return gain > 0.0, gain / _MUCH_MORE
-    return True, gain
 
 
 def _swinging(diagnosis: Diagnosis) -> list[Found]:

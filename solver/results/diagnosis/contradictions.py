@@ -5,34 +5,62 @@ from scipy.special import chdtri
 
 from solver.results.diagnosis import gains
 from solver.results.diagnosis.found import Found, limit_of
-from solver.results.diagnosis.rate import log_chance
-from solver.results.diagnosis.references import MEDIAN_CHI2, CatalogueChi2
-from solver.results.diagnosis.table import Diagnosis, prior_test
+from solver.results.diagnosis.rate import log_chance, sigmas
+from solver.results.diagnosis.references import MEDIAN_CHI2, CatalogueChi2, catalogue_chi2
+from solver.results.diagnosis.table import Diagnosis, Test, furthest_test, prior_test
 
 _STAR_LIMIT = 0.01
 # If the errors of the other stars are so much larger than stated, no single ones are named.
 _ALL_ARE_OFF = 3.0
 # The tests of all stars of a kind, and of the one that is furthest off.
 _REFERENCES, _OTHERS = ("references", "reference"), ("others", "other")
+STARS = (*_REFERENCES, *_OTHERS)
 
 
 def of_references(diagnosis: Diagnosis) -> list[Found]:
     """Return whether some, or all, of the reference stars are wrong."""
-    return _of_stars(diagnosis, diagnosis.references, *_REFERENCES)
+    return _of_kind(diagnosis, diagnosis.references, _REFERENCES)
 
 
 def of_others(diagnosis: Diagnosis) -> list[Found]:
     """Return whether some, or all, of the other stars are wrong."""
-    return _of_stars(diagnosis, diagnosis.others, *_OTHERS)
+    return _of_kind(diagnosis, diagnosis.others, _OTHERS)
 
 
-def _of_stars(diagnosis: Diagnosis, stars: CatalogueChi2, of_all: str, of_one: str) -> list[Found]:
+def beyond_shift(diagnosis: Diagnosis, found: Found, shift: float) -> list[Found]:
+    """Return what is left of wrong stars if an error of the model has shifted all stars.
+
+    Parameters
+    ----------
+    found : the cause without the shift; its subject is one of `STARS`
+    shift : of the positions, rms along each axis, mas
+    """
+    kind = _REFERENCES if found.test.subject in _REFERENCES else _OTHERS
+    rows = diagnosis.result.sources
+    is_reference = rows["is_reference"].to_numpy(dtype=bool)
+    stars = catalogue_chi2(rows[is_reference == (kind is _REFERENCES)], shift)
+    chi2, dof = float(stars.chi2.sum()), 2.0 * len(stars.chi2)
+    chance = log_chance(chi2, dof)
+    numbers = chi2, dof, float(np.sqrt(2.0 * dof)), chance, sigmas(chance)
+    of_one = next(one.name for one in diagnosis.tests if one.subject == kind[1])
+    tests = [Test(found.test.name, kind[0], (), *numbers), furthest_test(of_one, kind[1], stars)]
+    return _of_stars(stars, tests, kind, limit_of(diagnosis))
+
+
+def _of_kind(diagnosis: Diagnosis, stars: CatalogueChi2, kind: tuple[str, str]) -> list[Found]:
+    tests = [one for one in diagnosis.tests if one.subject in kind]
+    return _of_stars(stars, tests, kind, limit_of(diagnosis))
+
+
+def _of_stars(
+    stars: CatalogueChi2, tests: list[Test], kind: tuple[str, str], limit: float
+) -> list[Found]:
     ids, chi2, factor, rescaled = stars
     if not len(chi2):
         return []
-    tests = [one for one in diagnosis.tests if one.subject in (of_all, of_one)]
+    of_all, of_one = kind
     worst = min(tests, key=lambda one: one.log_chance)
-    if worst.log_chance > limit_of(diagnosis):
+    if worst.log_chance > limit:
         return []
     # Wrong stars pull the frame, and so all others; only those that are far beyond are wrong.
     far = rescaled > chdtri(2.0, -np.expm1(np.log1p(-_STAR_LIMIT) / len(chi2)))

@@ -26,8 +26,8 @@ class Courses:
     def __init__(self, diagnosis: Diagnosis) -> None:
         self._diagnosis = diagnosis
 
-    def likeliest(self, rivals: Sequence[Family], explained: Sequence[Family]) -> Family:
-        """Return the course that makes the residuals most likely.
+    def gains(self, rivals: Sequence[Family], explained: Sequence[Family]) -> list[float]:
+        """Return the gain of each course; that of a single one, which has no rival, is zero.
 
         Parameters
         ----------
@@ -35,7 +35,7 @@ class Courses:
         explained : patterns that are fitted, too
         """
         if len(rivals) == 1:
-            return rivals[0]
+            return [0.0]
         projection, scale = self._projection, self._diagnosis.scale
         for family in explained:
             projection = projection.without(family)
@@ -44,7 +44,7 @@ class Courses:
             test = pattern_test(projection, family, scale)
             return gains.of_pattern(projection, family, test, scale)
 
-        return max(rivals, key=gain)
+        return [gain(family) for family in rivals]
 
     @cached_property
     def _projection(self) -> Projection:

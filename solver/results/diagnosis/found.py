@@ -6,6 +6,9 @@ import numpy as np
 
 from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test
 
+# Causes whose gains differ by less are nearly as likely: at most ninety times, three sigmas.
+CLOSE = 9.0
+
 
 class Found(NamedTuple):
     """A cause that the tests point to.

@@ -39,12 +39,13 @@ class CatalogueChi2(NamedTuple):
     rescaled: np.ndarray
 
 
-def catalogue_chi2(rows: pd.DataFrame) -> CatalogueChi2:
+def catalogue_chi2(rows: pd.DataFrame, shift: float = 0.0) -> CatalogueChi2:
     """Return the chi2 of the catalogue positions of stars.
 
     Parameters
     ----------
     rows : of `schema.SOURCES`
+    shift : of the fitted positions by an error of the model, rms along each axis, mas
     """
     used = rows[["prior_sigma_ra", "prior_sigma_dec", "sigma_ra_marginal", "sigma_dec_marginal"]]
     rows = rows[np.isfinite(used.to_numpy(dtype=float)).all(axis=1)]
@@ -57,35 +58,38 @@ def catalogue_chi2(rows: pd.DataFrame) -> CatalogueChi2:
     scaled = (inverse_root[known] @ offset[known, :, None])[:, :, 0]
     shares, axes = np.linalg.eigh(share[known])
     along = np.square(np.einsum("nik,ni->nk", axes, scaled))
-    factor = _error_factor(along, shares)
+    shifts = shift**2 * np.sum(np.square(axes.transpose(0, 2, 1) @ inverse_root[known]), axis=2)
+    factor = _error_factor(along, shares, shifts)
     return CatalogueChi2(
         rows["source_id"].to_numpy()[known],
-        _chi2(along, shares, 1.0),
+        _chi2(along, shares, shifts, 1.0),
         factor,
-        _chi2(along, shares, factor),
+        _chi2(along, shares, shifts, factor),
     )
 
 
-def _chi2(along: np.ndarray, shares: np.ndarray, factor: float) -> np.ndarray:
+def _chi2(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray, factor: float) -> np.ndarray:
     """Return the chi2 of each star with errors of the catalogue that are larger by a factor.
 
-    With an error f times as large, the catalogue position minus the fit without it has the
-    covariance f^2 P + M, where P + M = P (P - C)^-1 P. In units of the catalogue's errors it is
-    1 / s + f^2 - 1 along an eigenvector of the share s of P that the measurements remove.
+    With an error f times as large, and a shift, the catalogue position minus the fit without it
+    has the covariance (f^2 + e^2) P + M, where P + M = P (P - C)^-1 P. In units of the
+    catalogue's errors it is 1 / s + f^2 + e^2 - 1 along an eigenvector of the share s of P that
+    the measurements remove.
 
     Parameters
     ----------
     along : squares of the deviations from the catalogue along the eigenvectors, shape (n, 2)
     shares : s, shape (n, 2)
+    shifts : e^2 along the eigenvectors, shape (n, 2)
     """
-    return np.sum(along / (shares + (factor**2 - 1.0) * shares**2), axis=1)
+    return np.sum(along / (shares + (factor**2 - 1.0 + shifts) * shares**2), axis=1)
 
 
-def _error_factor(along: np.ndarray, shares: np.ndarray) -> float:
+def _error_factor(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray) -> float:
     """Return the factor on the catalogue's errors for which the median chi2 is as expected."""
 
     def excess(log_factor: float) -> float:
-        chi2 = _chi2(along, shares, float(np.exp(log_factor)))
+        chi2 = _chi2(along, shares, shifts, float(np.exp(log_factor)))
         return float(np.median(chi2)) - MEDIAN_CHI2
 
     if not len(along) or excess(0.0) <= 0.0:

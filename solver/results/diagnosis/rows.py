@@ -92,6 +92,10 @@ class Camera(NamedTuple):
     span: np.ndarray
     um_per_mas: float
 
+    def on_sky(self, size_um: float) -> float:
+        """Return an rms displacement on the focal plane as one along one axis of the sky, mas."""
+        return size_um / self.um_per_mas / float(np.sqrt(2.0))
+
 
 def camera_rows(result: FitResult) -> tuple[Camera, Rows]:
     """Return the residuals of a result, and its camera."""

@@ -273,7 +273,7 @@ def _of_references(result: FitResult, found: CatalogueChi2) -> list[Test]:
         numbers = value, expected, scatter, chance, sigmas(chance)
         tests.append(Test("reference stars, all", "references", (number,), *numbers))
     if len(found.chi2):
-        tests.append(_of_furthest("reference star that is furthest off", "reference", found))
+        tests.append(furthest_test("reference star that is furthest off", "reference", found))
     return tests
 
 
@@ -287,11 +287,12 @@ def _of_others(found: CatalogueChi2) -> list[Test]:
     numbers = many / n, 0.5, float(np.sqrt(0.25 / n)), chance, sigmas(chance)
     return [
         Test("other stars beyond the median of their errors", "others", (), *numbers),
-        _of_furthest("other star that is furthest off", "other", found),
+        furthest_test("other star that is furthest off", "other", found),
     ]
 
 
-def _of_furthest(name: str, subject: str, found: CatalogueChi2) -> Test:
+def furthest_test(name: str, subject: str, found: CatalogueChi2) -> Test:
+    """Return the test of the star that is furthest from its catalogue position."""
     largest, n = float(found.chi2.max()), len(found.chi2)
     chance = of_many(-0.5 * largest, n)
     numbers = largest, 2.0 * float(np.log(n / np.log(2.0))), 2.6, chance, sigmas(chance)

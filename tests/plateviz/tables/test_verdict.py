@@ -11,12 +11,15 @@ from plateviz.plots.solution_tests import plot_solution_tests
 from plateviz.tables import verdict
 from plateviz.tables.solution_tests import solution_tests
 from plateviz.tables.verdict import (
+    as_plain,
     is_judged,
     orbit_verdict,
     source_verdict,
     with_verdict,
     worst,
 )
+from solver.results.diagnosis.causes import find_causes
+from solver.results.diagnosis.found import Found
 from solver.results.diagnosis.table import diagnose
 
 
@@ -66,7 +69,24 @@ def test_solution_with_a_flaw_names_its_cause_first(monkeypatch, fit_result):
     assert judged.causes
     assert judged.headline.endswith(f": {judged.causes[0].title}.")
     assert "What to do: " in judged.reasons[1]
-    assert judged.faults[0].startswith(judged.causes[0].title)
+    assert judged.faults[0].startswith(judged.causes[0].heading())
+
+
+def test_rival_of_the_first_cause_is_said_in_the_headline_and_follows_it(monkeypatch, fit_result):
+    judged = with_chances(monkeypatch, fit_result, stretch=-40.0)
+
+    def with_a_rival(diagnosis):
+        found = find_causes(diagnosis)
+        (shear,) = (one for one in diagnosis.tests if one.subject == "shear")
+        return found._replace(rivals=(Found(shear, 0.0),))
+
+    monkeypatch.setattr(verdict, "find_causes", with_a_rival)
+    judged = orbit_verdict(judged)
+    first, rival = judged.causes[:2]
+    assert rival.instead_of == first.name == "anisotropy"
+    assert judged.headline.endswith(f": {first.title}, or {rival.title}.")
+    assert judged.reasons[2].startswith(f"Or, nearly as likely: {rival.title}, ")
+    assert as_plain(judged)["causes"][1]["instead_of"] == "anisotropy"
 
 
 def stuck_with(result, rows, factor):

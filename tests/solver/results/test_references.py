@@ -10,19 +10,21 @@ from solver.results.diagnosis.references import catalogue_chi2
 STARS = 4000
 
 
-def solution(factor, measured, seed=1):
+def solution(factor, measured, shift=0.0, seed=1):
     """Return reference stars whose catalogue errors are larger than stated by a factor.
 
     Parameters
     ----------
     measured : uncertainty of the measurements over that of the catalogue
+    shift : of the fitted positions by something else, rms along each axis, mas
     """
     rng = np.random.default_rng(seed)
     correlation = rng.uniform(-0.8, 0.8, STARS)
     prior = 0.25**2 * np.array([[[1.0, rho], [rho, 1.0]] for rho in correlation])
     noise = np.broadcast_to((0.25 * measured) ** 2 * np.diag([1.0, 0.5]), prior.shape)
     posterior = np.linalg.inv(np.linalg.inv(prior) + np.linalg.inv(noise))
-    deviation = np.linalg.cholesky(factor**2 * prior + noise) @ rng.standard_normal((STARS, 2, 1))
+    scatter = factor**2 * prior + noise + shift**2 * np.eye(2)
+    deviation = np.linalg.cholesky(scatter) @ rng.standard_normal((STARS, 2, 1))
     offset = (prior @ np.linalg.solve(prior + noise, deviation))[:, :, 0]
     columns = {"source_id": np.arange(STARS), "is_reference": True}
     for i, axis in enumerate(("ra", "dec")):
@@ -43,6 +45,14 @@ def test_factor_on_the_errors_is_found_however_good_the_measurements_are(factor,
 
 def test_good_catalogue_needs_no_factor():
     found = catalogue_chi2(solution(1.0, 1.0))
+    assert found.factor == pytest.approx(1.0, abs=0.1)
+    assert np.mean(found.chi2) == pytest.approx(2.0, rel=0.05)
+
+
+def test_shift_of_the_stars_is_no_error_of_the_catalogue():
+    rows = solution(1.0, 1.0, shift=2.0)
+    assert catalogue_chi2(rows).factor > 5.0
+    found = catalogue_chi2(rows, 2.0)
     assert found.factor == pytest.approx(1.0, abs=0.1)
     assert np.mean(found.chi2) == pytest.approx(2.0, rel=0.05)
 

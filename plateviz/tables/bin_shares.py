@@ -5,6 +5,7 @@ from functools import cached_property
 import numpy as np
 
 from plateviz.tables.focal_residuals import FocalResiduals
+from solver.data.distortion_terms import terms
 from solver.data.result import FitResult
 
 # Measurements that stand for all where the share of the calibration is computed.
@@ -122,12 +123,10 @@ class BinShares:
                 on = found.detector[rows] == number
                 modes.append((mode[0] * on, mode[1] * on))
         shares, order = result.values_on("coef", "prior_share"), result.settings.order
-        terms = np.polynomial.legendre.legvander2d(x, y, [order, order])
-        degrees = [(i, d - i) for d in range(2, order + 1) for i in range(d + 1)]
-        for (i, j), (held_x, held_y) in zip(
-            degrees, shares[["distortion_x", "distortion_y"]].to_numpy(), strict=False
-        ):
-            term = terms[:, i * (order + 1) + j]
+        products = np.polynomial.legendre.legvander2d(x, y, [order, order])
+        held = shares[["distortion_x", "distortion_y"]].to_numpy()
+        for (i, j), (held_x, held_y) in zip(terms(order), held, strict=True):
+            term = products[:, i * (order + 1) + j]
             modes += [(term, none)] * bool(held_x < _HELD) + [(none, term)] * bool(held_y < _HELD)
         design = np.array(modes).transpose(1, 2, 0)
         weight, c, s = (

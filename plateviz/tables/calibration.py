@@ -5,6 +5,7 @@ import pandas as pd
 from numpy.polynomial import legendre
 
 from plateviz.tables.labels import element_labels, unit_text
+from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.parameters import Axis
 from solver.data.result import FitResult
@@ -131,7 +132,6 @@ def _coefficient_matrix(coefficients: np.ndarray) -> np.ndarray:
             f"found {len(coefficients)}"
         )
     matrix = np.zeros((order + 1, order + 1))
-    degrees = [(d - power, power) for d in range(2, order + 1) for power in range(d + 1)]
-    for (power_x, power_y), value in zip(degrees, coefficients, strict=True):
-        matrix[power_x, power_y] = value
+    for degrees, value in zip(terms(order), coefficients, strict=True):
+        matrix[degrees] = value
     return matrix

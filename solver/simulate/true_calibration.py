@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Bool, Float
 
+from solver.data.distortion_terms import terms
 from solver.data.instrument import Detector, Instrument
 from solver.simulate.defects.defect import Case, Defect, Stage
 from solver.simulate.defects.detectors import motion
@@ -61,13 +62,13 @@ def true_calibration(
         pd.MultiIndex.from_frame(exposures[pairs])
     )
     found = list(_cases(settings, orbit_id))
-    terms = {(k, j): np.array([a, b]) for k, j, a, b in settings.distortion_um}
+    by_degrees = {(k, j): np.array([a, b]) for k, j, a, b in settings.distortion_um}
     for _, case in found:
         if case.name in ADDED_TERMS:
             added = ADDED_TERMS[case.name](case, schedule)
             mean = added.coefficients * _mean(added.change, is_used)
             for degrees, pair in zip(added.degrees, mean, strict=True):
-                terms[degrees] = terms.get(degrees, np.zeros(2)) + pair
+                by_degrees[degrees] = by_degrees.get(degrees, np.zeros(2)) + pair
     detectors = list(place_detectors(instrument, settings).detectors)
     for _, case in found:
         if case.name in (_SHIFT, _TURN):
@@ -78,7 +79,7 @@ def true_calibration(
     known = (*ADDED_TERMS, _SHIFT, _TURN)
     return TrueCalibration(
         replace(instrument, detectors=tuple(detectors)),
-        _all(terms),
+        _all(by_degrees),
         tuple(defect.label for defect, _ in found if defect.name in _VARYING),
         tuple(defect.label for defect, _ in found if defect.name not in known),
     )
@@ -89,11 +90,10 @@ def _cases(settings: SurveySettings, orbit_id: int) -> Iterator[tuple[Defect, Ca
         yield from cases(settings, stage, orbit_id)
 
 
-def _all(terms: dict[tuple[int, int], np.ndarray]) -> Float[np.ndarray, "term 2"]:
+def _all(by_degrees: dict[tuple[int, int], np.ndarray]) -> Float[np.ndarray, "term 2"]:
     """Return the coefficients of all terms up to the highest degree."""
-    order = max(map(sum, terms), default=0)
-    every = [(degree - j, j) for degree in range(2, order + 1) for j in range(degree + 1)]
-    return np.array([terms.get(one, np.zeros(2)) for one in every]).reshape(-1, 2)
+    every = terms(max(map(sum, by_degrees), default=0))
+    return np.array([by_degrees.get(one, np.zeros(2)) for one in every]).reshape(-1, 2)
 
 
 def _mean(change: np.ndarray, is_used: Bool[np.ndarray, " exp"]) -> float:

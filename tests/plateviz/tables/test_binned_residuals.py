@@ -8,6 +8,7 @@ import pytest
 from plateviz import tables
 from plateviz.tables.bin_shares import BinShares
 from plateviz.tables.focal_residuals import focal_residuals
+from solver.data.distortion_terms import terms
 from tests.plateviz.tables.fields import (
     SIGMA_MPIX,
     left_by_exposures,
@@ -140,6 +141,26 @@ def test_share_that_is_left_is_that_of_least_squares(with_magnitudes, instrument
             left = left_by_sources(fitted, left_by_exposures(fitted, left))
         assert share[axis] == pytest.approx((left * field).sum() / inside.sum(), abs=0.06)
     assert share.max() < 0.97
+
+
+@pytest.mark.parametrize(("degrees", "axis"), [((5, 0), 0), ((0, 5), 1), ((2, 1), 0), ((1, 2), 1)])
+def test_free_term_of_the_distortion_takes_from_the_bins_that_it_changes_in(
+    known, instrument, degrees, axis
+):
+    """A polynomial of higher degree in x than in y differs more between bins along x."""
+    rows = known.calibration
+    is_free = (rows["group"] == "distortion_x") & (rows["element"] == terms(5).index(degrees))
+    assert is_free.sum() == 1
+    freed = replace(known, calibration=rows.assign(prior_share=np.where(is_free, 0.0, 1.0)))
+    found = focal_residuals(freed, instrument)
+    turn = np.radians(freed.values_on("det")["detector_rotation"].to_numpy())[found.detector]
+    taken = []
+    for places in found.at.T:
+        edges = np.quantile(places, np.linspace(0.0, 1.0, 17)[1:-1])
+        cells = np.searchsorted(edges, places)
+        both = [BinShares(one, found, turn)(cells, 16).sum() for one in (known, freed)]
+        taken.append(both[0] - both[1])
+    assert taken[axis] > 1.5 * max(taken[1 - axis], 0.0)
 
 
 def test_orbital_phase_is_there_beyond_one_period(known, instrument):

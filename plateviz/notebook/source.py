@@ -1,5 +1,6 @@
 """OpenSource: one source through the orbits of a run."""
 
+from contextlib import suppress
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -16,13 +17,12 @@ from plateviz.notebook.table import OpenTable
 from plateviz.runs.queries import SurveyRun
 from plateviz.tables import motion_table, source_class, source_strip, time_series
 from plateviz.tables.verdict import Verdict, source_verdict
+from solver.data.ids import is_id
 from solver.data.survey_schema import HISTORY
 from solver.errors import InputError
 
 if TYPE_CHECKING:
     from plateviz.reports.report import Facts, Report
-
-_LARGEST_ID = 2**63 - 1
 
 
 class OpenSource(HasFigures):
@@ -137,10 +137,8 @@ def id_of(given: object) -> int:
     InputError
         If it is not a 64-bit integer.
     """
-    try:
+    with suppress(ValueError):
         number = int(str(given))
-    except ValueError:
-        number = _LARGEST_ID + 1
-    if abs(number) > _LARGEST_ID:
-        raise InputError(f"expected the id of a source, a whole number, found {given!r}")
-    return number
+        if is_id(number):
+            return number
+    raise InputError(f"expected the id of a source, a whole number, found {given!r}")

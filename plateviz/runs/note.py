@@ -1,6 +1,7 @@
 """Notes: short texts that people write about a run or a kept solution, in a file beside it."""
 
 import hashlib
+import unicodedata
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +12,8 @@ from solver.io.lock import locked
 
 NOTE_FILE = "note.txt"
 MOST_BYTES = 8_000
+# Of characters that let what follows run, or be shown, in another direction.
+_DIRECTIONS = ("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI")
 
 
 class Note(NamedTuple):
@@ -74,7 +77,7 @@ def write_note(path: Path, text: str, version: str) -> Note:
     InputError
         If the text is too long.
     """
-    text = "".join(c for c in text.replace("\r\n", "\n") if c.isprintable() or c in "\n\t").strip()
+    text = "".join(filter(_is_text, text.replace("\r\n", "\n"))).strip()
     content = text.encode("utf-8", "replace")
     if len(content) > MOST_BYTES:
         raise InputError(
@@ -89,6 +92,14 @@ def write_note(path: Path, text: str, version: str) -> Note:
         with write_atomically(path) as temporary:
             temporary.write_bytes(content)
     return _note(content.decode("utf-8"))
+
+
+def _is_text(character: str) -> bool:
+    """Return whether a character is no control character, and changes no direction of the text."""
+    if character in "\n\t":
+        return True
+    is_control = unicodedata.category(character) in ("Cc", "Cs", "Co", "Cn")
+    return not is_control and unicodedata.bidirectional(character) not in _DIRECTIONS
 
 
 def _note(text: str) -> Note:

@@ -3,8 +3,7 @@
 The web process sends a what-if where its orbit is ready, so it must know how many are.
 """
 
-import os
-
+from solver.runtime.available_memory import available_bytes
 from solver.runtime.threads import count_cores
 
 _MOST_QUICK, _BYTES_PER_SOLVER = 2, 3 * 2**30
@@ -20,14 +19,10 @@ def usual_solvers() -> int:
 
     These are two for what-ifs, and one for long fits, where it has the cores and the memory.
     """
-    return max(1, min(min(_MOST_QUICK, count_cores()) + 1, _memory() // _BYTES_PER_SOLVER))
+    return max(1, min(min(_MOST_QUICK, count_cores()) + 1, available_bytes() // _BYTES_PER_SOLVER))
 
 
 def ready_orbits() -> int:
     """Return the number of orbits that a solver process keeps ready for what-ifs."""
-    room = int(_SHARE * _memory() / _BYTES_PER_ORBIT)
+    room = int(_SHARE * available_bytes() / _BYTES_PER_ORBIT)
     return max(_LEAST_ORBITS, min(_MOST_ORBITS, room))
-
-
-def _memory() -> int:
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

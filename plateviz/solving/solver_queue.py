@@ -54,9 +54,12 @@ class SolverQueue:
         self._start()
 
     def submit(self, job: Job) -> Job:
-        """Put a job at the end of the queue and return it."""
+        """Put a job at the end of the queue and return it; after `close`, cancelled."""
         job.tell_by(lambda: self._forecast(job))
         with self._lock:
+            if self._is_closed:
+                job.cancel()
+                return job
             self._jobs.append(job)
             if len(self._jobs) == 1:
                 self._send(job.request)
@@ -85,9 +88,13 @@ class SolverQueue:
         return Forecast(place, sum(known) if len(known) == place else None).words()
 
     def prepare(self, request: Mapping[str, object]) -> None:
-        """Send a request for preparations, which give way to every job; nothing is reported."""
+        """Send a request for preparations, which give way to every job; nothing is reported.
+
+        After `close` there are none.
+        """
         with self._lock:
-            self._send({"do": "prepare", **request})
+            if not self._is_closed:
+                self._send({"do": "prepare", **request})
 
     def pause(self) -> None:
         """Let what the process prepares wait for a moment."""
@@ -166,7 +173,7 @@ class SolverQueue:
         )
         if self._niceness:
             _give_way(process.pid, self._niceness)
-        self._process, self._is_closed = process, False
+        self._process = process
         threading.Thread(target=self._listen, args=(process, errors), daemon=True).start()
         return process
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
+from solver.data.ids import ID, is_id
 from solver.data.orbit import OrbitData
 from solver.errors import InputError
 
-_LARGEST_ID = 2**63 - 1
-_ID = r"(-?[0-9]{1,19})"
-_EXCLUSION = re.compile(rf"(source|detector)={_ID}|(exposure)={_ID}/{_ID}")
+_EXCLUSION = re.compile(rf"(source|detector)=({ID})|(exposure)=({ID})/({ID})")
 # Columns that identify an exposure.
 _EXPOSURE = ["field_id", "plate_id"]
 # Number of excluded items of a kind that a short description names one by one.
@@ -176,7 +175,7 @@ def parse_exclusions(texts: Iterable[str]) -> Exclusions:
                 "what to leave out: expected source=ID, exposure=FIELD/PLATE or detector=ID, such "
                 f"as source=12 or exposure=0/3, found {text!r}"
             )
-        if any(abs(int(number)) > _LARGEST_ID for number in match.group(2, 4, 5) if number):
+        if not all(is_id(int(number)) for number in match.group(2, 4, 5) if number):
             raise InputError(f"what to leave out: expected an id of 64 bits, found {text!r}")
         if match[3]:
             exposures.add((int(match[4]), int(match[5])))

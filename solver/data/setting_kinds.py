@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, asdict, dataclass, field, fields
 from enum import Enum
+from numbers import Real
 from typing import Any
 
 from solver.errors import InputError
@@ -133,9 +134,10 @@ class Degree(Whole):
 class Positive(Setting):
     """A positive number."""
 
-    def check(self, name: str, value: float) -> None:
-        """Raise `InputError` for zero, negative numbers, NaN and infinity."""
-        if not 0.0 < value < math.inf:
+    def check(self, name: str, value: object) -> None:
+        """Raise `InputError` for zero, negative numbers, NaN, infinity, and what is no number."""
+        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        if not is_number or not 0.0 < value < math.inf:  # type: ignore[operator]
             raise InputError(f"expected a positive {name}, found {value!r}")
 
 

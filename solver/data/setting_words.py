@@ -13,7 +13,7 @@ from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import Texts
 from solver.errors import InputError
 
-_WHOLE = re.compile(r"-?[0-9]{1,9}")
+_WHOLE = re.compile(r"-?[0-9]{1,19}")
 _OFF = "no-"
 
 

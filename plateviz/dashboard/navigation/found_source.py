@@ -6,9 +6,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from plateviz.runs.queries import SurveyRun
-
-_ID = re.compile(r"-?[0-9]{1,19}")
-_LARGEST_ID = 2**63 - 1
+from solver.data.ids import ID, is_id
 
 
 class FoundSource(NamedTuple):
@@ -21,7 +19,7 @@ class FoundSource(NamedTuple):
 
 def find_source(run: SurveyRun, text: str) -> tuple[FoundSource | None, str]:
     """Return a source of a run, or a message on why there is none."""
-    if not _ID.fullmatch(text) or abs(int(text)) > _LARGEST_ID:
+    if not re.fullmatch(ID, text) or not is_id(int(text)):
         return None, f"Expected the id of a source, a whole number, found {text[:40]!r}."
     source_id = int(text)
     history = run.history(source_id)

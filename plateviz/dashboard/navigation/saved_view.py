@@ -16,6 +16,7 @@ from plateviz.dashboard.address_parts import quoted
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.selection.selected import KINDS, Selected
 from plateviz.dashboard.session.solution_address import settings_text
+from solver.data.ids import is_id
 from solver.errors import InputError
 
 _FORMAT, _VERSION = "plateviz view", 1
@@ -23,7 +24,6 @@ MOST_BYTES = 800_000
 """A message of the browser has room for it."""
 _MOST_SELECTED = 30_000
 _MOST_PARTS = 60
-_LARGEST_ID = 2**63 - 1
 
 
 def view_text(navigation: Navigation) -> str:
@@ -125,5 +125,5 @@ def _ids(found: object) -> frozenset[int] | None:
     """Return ids; None if they are none, are too many, or are not all different."""
     if not isinstance(found, list) or len(found) > _MOST_SELECTED:
         return None
-    ids = frozenset(one for one in found if type(one) is int and abs(one) <= _LARGEST_ID)
+    ids = frozenset(one for one in found if type(one) is int and is_id(one))
     return ids if len(ids) == len(found) else None

@@ -15,6 +15,7 @@ import pandas as pd
 from plateviz.dashboard.address_parts import quoted
 from plateviz.tables.labels import exposure_label
 from solver.data.exclusions import Exclusions
+from solver.data.ids import ID, is_id
 from solver.errors import InputError
 
 Exposure = tuple[int, int]
@@ -32,9 +33,8 @@ Find = Callable[[str, str], frozenset[Any] | None]
 # Runs of exposures and detectors that are named one by one.
 _FEW_NAMED = 3
 _LONGEST_NAME = 60
-_LARGEST_ID = 2**63 - 1
-_NUMBERS = re.compile(r"-?[0-9]{1,19}(,-?[0-9]{1,19})*")
-_PAIRS = re.compile(r"-?[0-9]{1,9}/-?[0-9]{1,9}(,-?[0-9]{1,9}/-?[0-9]{1,9})*")
+_NUMBERS = re.compile(rf"{ID}(,{ID})*")
+_PAIRS = re.compile(rf"{ID}/{ID}(,{ID}/{ID})*")
 
 
 @dataclass(frozen=True)
@@ -221,14 +221,15 @@ def _numbers(text: str) -> frozenset[int] | None:
     if not _NUMBERS.fullmatch(text):
         return None
     ids = frozenset(map(int, text.split(",")))
-    return ids if all(abs(one) <= _LARGEST_ID for one in ids) else None
+    return ids if all(map(is_id, ids)) else None
 
 
 def _pairs(text: str) -> frozenset[Exposure] | None:
     if not _PAIRS.fullmatch(text):
         return None
     pairs = (pair.split("/") for pair in text.split(","))
-    return frozenset((int(field), int(plate)) for field, plate in pairs)
+    ids = frozenset((int(field), int(plate)) for field, plate in pairs)
+    return ids if all(is_id(field) and is_id(plate) for field, plate in ids) else None
 
 
 _READERS: Mapping[str, Callable[[str], frozenset[Any] | None]] = MappingProxyType(

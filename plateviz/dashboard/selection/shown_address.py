@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from plateviz.dashboard.address_parts import quoted
+from solver.data.ids import ID, is_id
 
 SHOWN = ("field", "plates", "detector")
-_PLATES = re.compile(r"(-?[0-9]{1,9})-(-?[0-9]{1,9})")
+_PLATES = re.compile(rf"({ID})-({ID})")
 
 
 def shown_parts(shown: Mapping[str, Any]) -> dict[str, str]:
@@ -26,7 +27,8 @@ def read_shown(address: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
     shown: dict[str, Any] = {k: address[k] for k in ("field", "detector") if k in address}
     if "plates" not in address:
         return shown, []
-    plates = _PLATES.fullmatch(address["plates"])
-    if not plates:
+    found = _PLATES.fullmatch(address["plates"])
+    plates = sorted(map(int, found.groups())) if found else []
+    if not plates or not all(map(is_id, plates)):
         return shown, [f"plates: expected FIRST-LAST, found {quoted(address['plates'])}"]
-    return shown | {"plates": tuple(sorted(int(number) for number in plates.groups()))}, []
+    return shown | {"plates": tuple(plates)}, []

@@ -112,6 +112,7 @@ class Session(OnScreen):
                 self._request(first)
             else:
                 self._put_on_screen(first)
+        self._is_opening &= self.job is not None
         self._take_up()
 
     def _take_up(self) -> None:

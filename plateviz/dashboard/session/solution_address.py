@@ -17,6 +17,7 @@ from plateviz.dashboard.selection.selected import KINDS, MANY, Selected, parsed
 from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.queries import SurveyRun
+from solver.data.ids import ID
 from solver.data.setting_words import parse_setting_words, setting_words
 from solver.data.settings import FitSettings
 from solver.errors import InputError
@@ -32,7 +33,7 @@ _MOST_READ = 400_000
 _TOO_MANY = "the settings were too many for the address"
 _KEPT = "kept="
 _OF_MANY = re.compile(rf"({'|'.join(KINDS)})={MANY}\w+")
-_OF_RUN = re.compile(r"run=(?P<run>[^ ]+)(?: orbit=(?P<orbit>-?[0-9]{1,9}))?")
+_OF_RUN = re.compile(rf"run=(?P<run>[^ ]+)(?: orbit=(?P<orbit>{ID}))?")
 
 
 def solution_query(

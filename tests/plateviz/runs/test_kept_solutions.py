@@ -90,6 +90,14 @@ def test_note_is_written_and_read(tmp_path):
     assert note.text == "<b>bold</b>\nµ"
 
 
+@pytest.mark.parametrize("text", ["σ = 3\u00a0mas", "良い\u3000解", "👩\u200d🚀"])
+def test_note_keeps_spaces_and_joiners_of_all_scripts(tmp_path, text):
+    assert (
+        write_note(tmp_path / "note.txt", text, read_note(tmp_path / "note.txt").version).text
+        == text
+    )
+
+
 def test_second_of_two_people_is_told_and_loses_nothing(tmp_path):
     path = tmp_path / "note.txt"
     before = read_note(path)

@@ -10,12 +10,12 @@ from plateviz.solving.capacity import ready_orbits, usual_solvers
     ("gib", "solvers", "orbits"), [(2, 1, 4), (8, 2, 4), (24, 3, 10), (1024, 3, 16)]
 )
 def test_more_memory_has_room_for_more(gib, solvers, orbits, monkeypatch):
-    monkeypatch.setattr(capacity, "_memory", lambda: gib * 2**30)
+    monkeypatch.setattr(capacity, "available_bytes", lambda: gib * 2**30)
     monkeypatch.setattr(capacity, "count_cores", lambda: 8)
     assert (usual_solvers(), ready_orbits()) == (solvers, orbits)
 
 
 def test_one_core_has_one_solver_for_what_ifs_and_one_for_long_fits(monkeypatch):
-    monkeypatch.setattr(capacity, "_memory", lambda: 24 * 2**30)
+    monkeypatch.setattr(capacity, "available_bytes", lambda: 24 * 2**30)
     monkeypatch.setattr(capacity, "count_cores", lambda: 1)
     assert usual_solvers() == 2

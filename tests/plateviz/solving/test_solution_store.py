@@ -341,6 +341,15 @@ def test_closed_solver_removes_what_ended_workers_left_only(tmp_path, monkeypatc
         assert of_another_survey.path.is_dir()
 
 
+def test_closed_solver_starts_no_process_for_those_who_still_ask(tmp_path, monkeypatch):
+    solver = SolverQueue()
+    solver.close()
+    monkeypatch.setattr(SolverQueue, "_start", lambda _: pytest.fail("started a process"))
+    solver.prepare({"orbit": 0})
+    assert solver.submit(Job({"do": "fit"})).status is JobStatus.CANCELLED
+    assert solver.jobs == []
+
+
 def test_files_that_are_replaced_are_read_again(tmp_path, sample_orbit_dir):
     files = OrbitFiles(*(str(tmp_path / f"sample_{name}.fits") for name in ("obs", "ref")))
     for name in ("sample_obs.fits", "sample_ref.fits"):

@@ -22,6 +22,7 @@ SETTINGS = [
     FitSettings(engine="svi", **engine_settings(seed=2, steps=30)),
     FitSettings(engine="svi", **engine_settings(steps=2000, compat="warpfield")),
     FitSettings(engine="nuts", **engine_settings(seed=4)),
+    FitSettings(engine="svi", **engine_settings(seed=2**32 - 1)),
 ]
 
 

@@ -47,6 +47,13 @@ def test_flat_prior_is_allowed_on_the_calibration_and_not_on_the_sources():
         FitSettings(prior_widths={"sources": np.inf})
 
 
+def test_what_is_no_number_is_refused_where_one_is_needed():
+    for period in ("97 min", True, None):
+        with pytest.raises(InputError, match="positive breathing_period, found"):
+            FitSettings(breathing_period=period)
+    assert FitSettings(breathing_period=np.float32(90.0)).breathing_period == 90.0
+
+
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")], ids=str)
 def test_tolerance_that_is_not_positive_and_finite_is_refused(tolerance):
     with pytest.raises(InputError, match="tolerance"):

@@ -10,7 +10,7 @@ from plateviz.dashboard.selection.selection import ALL, Selection
 from plateviz.dashboard.session.fit_choices import ANSWERED_AT_ONCE, CONTROLS, FitChoices
 from plateviz.dashboard.session.prior_widths import default_widths
 from plateviz.dashboard.session.session import Session
-from plateviz.dashboard.session.solution import Solution
+from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.dashboard.session.stage import Stage
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.solving.job import Job
@@ -446,3 +446,13 @@ def test_every_setting_with_a_control_is_a_parameter():
     others = {"name", "what_if_at_once", "typed"}
     assert controls == set(CONTROLS) == set(FitChoices.param) - others
     assert set(ANSWERED_AT_ONCE) == controls - {"engine", "compare_orders"}
+
+
+def test_what_if_after_a_solution_was_opened_is_not_what_is_opened(live):
+    live.open(Request(1, FitSettings(order=4)))
+    assert live.is_opening
+    finish(live)
+    assert not live.is_opening
+    live.choices.order = 3
+    assert live.job is not None
+    assert not live.is_opening

@@ -279,6 +279,8 @@ OPTIONAL_GROUPS: tuple[Group, ...] = (
 PARAMETERS = (*_ALWAYS, *OPTIONAL_GROUPS)
 # Without the sources and the optional groups.
 CALIBRATION_GROUPS = tuple(g for g in _ALWAYS if g.axis != "src")
+# Their origins are the axes of a frame on the sky, not a value.
+FRAME_GROUPS = ("pointing_ra", "pointing_dec")
 BY_NAME = {g.name: g for g in PARAMETERS}
 
 

@@ -15,7 +15,7 @@ from solver.data.detector_spans import span_numbers
 from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
-from solver.data.parameters import BY_NAME, SOURCES
+from solver.data.parameters import BY_NAME, FRAME_GROUPS, SOURCES
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import InputError
 from solver.model.astrometry import propagate, sky_position
@@ -265,7 +265,7 @@ def _geometry(
         origin={
             name: pad(values, BY_NAME[name].axis, sizes)
             for name, values in centres.items()
-            if not name.startswith("pointing")
+            if name not in FRAME_GROUPS
         },
         velocity=pad(observer.velocity * settings.aberration, "exp", sizes),
         sun_distance=pad(observer.sun_distance, "exp", sizes),

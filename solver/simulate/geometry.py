@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
-from solver.data.parameters import CALIBRATION_GROUPS, SOURCES
+from solver.data.parameters import CALIBRATION_GROUPS, FRAME_GROUPS, SOURCES
 from solver.data.settings import FitSettings
 from solver.model.directions import tangent_frame
 from solver.model.ephemeris import observer_at
@@ -58,7 +58,9 @@ def true_geometry(
     arrays = {
         "source_frame": source_frame,
         "pointing_frame": tangent_frame(attitude["ra"].to_numpy(), attitude["dec"].to_numpy()),
-        "origin": {g.name: origin[g.name] for g in CALIBRATION_GROUPS if "pointing" not in g.name},
+        "origin": {
+            g.name: origin[g.name] for g in CALIBRATION_GROUPS if g.name not in FRAME_GROUPS
+        },
         "velocity": observer.velocity,
         "sun_distance": observer.sun_distance,
         "distortion_scale": instrument.distortion_scale_um,

@@ -33,6 +33,7 @@ FOLDERS = {
         "cache",
         "figures",
         "tables",
+        "verdict",
         "plots",
         "runs",
         "solving",
@@ -63,6 +64,7 @@ USER_INTERFACE = ("panel", "param", "holoviews", "bokeh", "datashader")
 NEVER = {
     "solver": ("plateviz", *USER_INTERFACE),
     "plateviz.tables": USER_INTERFACE,
+    "plateviz.verdict": USER_INTERFACE,
     "plateviz.runs": USER_INTERFACE,
     "plateviz.solving": USER_INTERFACE,
     "plateviz.figures": ("panel", "param"),

@@ -9,7 +9,7 @@ from plateviz.cache import keep_compilations
 from plateviz.cli.output import print_agreement, print_fit, print_json, print_orders
 from plateviz.solving.origin import OrbitFiles
 from plateviz.solving.progress import Reporter, reporting
-from plateviz.tables.verdict import with_verdict
+from plateviz.verdict.verdict import with_verdict
 from solver.data.settings import COUNTED, ENGINES, FitSettings
 from solver.errors import DistrustError, FitError, InputError
 from solver.io.outputs import FITS_SUFFIXES, check_output

@@ -8,7 +8,7 @@ import typer
 from plateviz.cli.output import print_json
 from plateviz.solving.survey_progress import fit_and_report, require_all, require_trust
 from plateviz.tables.counts import orbits_text
-from plateviz.tables.verdict import as_plain
+from plateviz.verdict.verdict import as_plain
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 

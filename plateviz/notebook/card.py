@@ -6,7 +6,7 @@ from importlib.resources import files
 
 from plateviz.reports.summary_strip import STYLE, strip
 from plateviz.tables import SummaryItem
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.verdict import Verdict
 
 CARD_STYLE = STYLE + (files("plateviz.notebook") / "card.css").read_text(encoding="utf-8")
 """The colours of both themes, and the classes of cards and captions."""

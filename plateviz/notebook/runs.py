@@ -14,17 +14,16 @@ from plateviz.notebook.figures import FigureSpec
 from plateviz.runs.load_tables import compared_run, require_same_catalogue, survey_tables
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run_tables import read_run_tables
-from plateviz.tables import run_changes
-from plateviz.tables.run_changes import ComparedRun
-from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.survey_tables import SurveyTables
+from plateviz.verdict.run_changes import ComparedRun, run_changes
+from plateviz.verdict.run_verdict import run_verdict
 
 if TYPE_CHECKING:
     from plateviz.plots.survey_figure import SurveyFigure
 
 
 def changes_of(a: SurveyRun, b: SurveyRun) -> pd.DataFrame:
-    """Return `tables.run_changes` of two runs.
+    """Return `verdict.run_changes` of two runs.
 
     Raises
     ------

@@ -22,7 +22,7 @@ from plateviz.notebook.report import path_of, write_report
 from plateviz.notebook.table import OpenTable, result_tables
 from plateviz.tables.explore import EXPLORABLE, ExplorableTable
 from plateviz.tables.summary import summary_strip
-from plateviz.tables.verdict import Verdict, orbit_verdict
+from plateviz.verdict.verdict import Verdict, orbit_verdict
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings

@@ -16,7 +16,7 @@ from plateviz.notebook.report import write_report
 from plateviz.notebook.table import OpenTable
 from plateviz.runs.queries import SurveyRun
 from plateviz.tables import motion_table, source_class, source_strip, time_series
-from plateviz.tables.verdict import Verdict, source_verdict
+from plateviz.verdict.verdict import Verdict, source_verdict
 from solver.data.ids import is_id
 from solver.data.survey_schema import HISTORY
 from solver.errors import InputError

@@ -31,7 +31,7 @@ from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import SummaryItem, run_strip, source_list
 from plateviz.tables.counts import orbits_text
 from plateviz.tables.explore import ExplorableTable
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.verdict import Verdict
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import MOTIONS, RUN_ORBITS

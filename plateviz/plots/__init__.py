@@ -1,8 +1,9 @@
-"""Plots: pure functions from the tables of `plateviz.tables` to figures as plain values.
+"""Plots: pure functions from tables to figures as plain values.
 
-Imports `plateviz.tables` and `plateviz.figures`. Every `plot_<noun>(table, *, options)` of a module
-in this folder is exported here. It returns a `plateviz.figures.figure.Figure`; for an empty table,
-one with a message. Dashboard, notebooks and reports share them.
+Imports `plateviz.verdict`, `plateviz.tables` and `plateviz.figures`. Every
+`plot_<noun>(table, *, options)` of a module in this folder is exported here. It returns a
+`plateviz.figures.figure.Figure`; for an empty table, one with a message. Dashboard, notebooks and
+reports share them.
 """
 
 import importlib

@@ -7,7 +7,7 @@ from plateviz.figures.glyphs import band, points, vertical
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.chance import largest_by_chance
-from plateviz.tables.solution_tests import solution_tests
+from plateviz.verdict.solution_tests import solution_tests
 
 _TITLE = "Tests of the solution"
 _XLABEL, _YLABEL = "significance (σ)", "test (the most significant)"
@@ -26,7 +26,7 @@ def plot_solution_tests(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Fig
 
     Parameters
     ----------
-    table : `tables.solution_tests`
+    table : `verdict.solution_tests`
     width : of the frame, screen pixels
     """
     if table.empty:

@@ -14,12 +14,12 @@ from plateviz.tables import (
     calibration_tables,
     exposure_chi2,
     outlier_list,
-    solution_changes,
     summary_strip,
 )
 from plateviz.tables.headings import CHANGES, in_words
 from plateviz.tables.labels import dates
-from plateviz.tables.verdict import Verdict, orbit_verdict
+from plateviz.verdict.solution_changes import solution_changes
+from plateviz.verdict.verdict import Verdict, orbit_verdict
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.result import FitResult

@@ -9,7 +9,7 @@ import pandas as pd
 
 from plateviz.figures.figure import Figure
 from plateviz.tables import SummaryItem
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.verdict import Verdict
 
 Facts = dict[str, dict[str, str]]
 """Provenance of a report: title -> name -> value."""

@@ -15,18 +15,17 @@ from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import (
     motion_table,
     orbit_list,
-    run_changes,
     run_strip,
     source_class,
     source_orbits,
     source_strip,
 )
 from plateviz.tables.headings import CHANGES, MOTION, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in_words
-from plateviz.tables.run_changes import ComparedRun
 from plateviz.tables.run_health import MISSING
-from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
-from plateviz.tables.verdict import source_verdict
+from plateviz.verdict.run_changes import ComparedRun, run_changes
+from plateviz.verdict.run_verdict import run_verdict
+from plateviz.verdict.verdict import source_verdict
 from solver.data.result import FitResult
 from solver.errors import InputError
 from solver.io.survey import section

@@ -13,7 +13,7 @@ from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 from plateviz.cache import keep_compilations
 from plateviz.runs.run import Run
 from plateviz.runs.worker_scratch import worker_scratch
-from plateviz.tables.verdict import orbit_verdict, with_verdict
+from plateviz.verdict.verdict import orbit_verdict, with_verdict
 from solver.data.result import FitResult
 from solver.errors import DiskError, FitError, InputError
 from solver.io.disk import disk_error

@@ -7,9 +7,9 @@ import pandas as pd
 
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run_tables import RunTables, read_run_tables
-from plateviz.tables.run_changes import ComparedRun
 from plateviz.tables.survey_tables import SurveyTables
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.run_changes import ComparedRun
+from plateviz.verdict.verdict import Verdict
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.errors import InputError
 from solver.io.settings import parse_settings

@@ -6,8 +6,8 @@ import pandas as pd
 
 from plateviz.runs.queries import SurveyRun
 from plateviz.tables.run_diagnosis import RunTests
-from plateviz.tables.run_verdict import run_verdict
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.run_verdict import run_verdict
+from plateviz.verdict.verdict import Verdict
 from solver.data.columns import Table
 from solver.data.run_schema import RUN_TABLES
 

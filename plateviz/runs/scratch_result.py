@@ -98,7 +98,7 @@ def write_verdict(directory: Path, verdict: Mapping[str, Any]) -> None:
 
     Parameters
     ----------
-    verdict : as `plateviz.tables.verdict.with_verdict` adds it to a summary
+    verdict : as `plateviz.verdict.verdict.with_verdict` adds it to a summary
     """
     with writing(directory, "to write the verdict on a fit"):
         part = directory / f"{VERDICT}.part"

@@ -5,7 +5,7 @@ from contextlib import suppress
 from weakref import finalize
 
 from plateviz.runs.scratch_result import is_judged_later
-from plateviz.tables.verdict import is_judged, orbit_verdict
+from plateviz.verdict.verdict import is_judged, orbit_verdict
 from solver.data.result import FitResult
 
 

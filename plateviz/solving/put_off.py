@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from plateviz.runs.scratch_result import write_scratch_result, write_verdict
-from plateviz.tables.verdict import as_plain, orbit_verdict
+from plateviz.verdict.verdict import as_plain, orbit_verdict
 from solver.data.result import FitResult
 from solver.errors import InputError
 

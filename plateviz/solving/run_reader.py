@@ -7,10 +7,10 @@ from concurrent.futures import Executor, Future
 from plateviz.runs.load_tables import compared_run, survey_tables
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run_tables import RunTables, read_run_tables
-from plateviz.tables.run_changes import ComparedRun
-from plateviz.tables.run_verdict import run_verdict
 from plateviz.tables.survey_tables import SurveyTables
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.run_changes import ComparedRun
+from plateviz.verdict.run_verdict import run_verdict
+from plateviz.verdict.verdict import Verdict
 
 # Runs that are kept; pages keep what they show.
 _MOST = 2

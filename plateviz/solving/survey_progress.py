@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from plateviz.cache import keep_compilations
 from plateviz.solving.progress import reporting
 from plateviz.tables.counts import duration_text, orbits_text
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.verdict import Verdict
 from solver.data.settings import FitSettings
 from solver.errors import DistrustError, FitError
 

@@ -56,14 +56,11 @@ from plateviz.tables.residuals import (
     residual_scatter,
     scatter_statistics,
 )
-from plateviz.tables.run_changes import ComparedRun, run_changes
 from plateviz.tables.run_health import orbit_list, orbit_states, run_strip
 from plateviz.tables.selected_exposures import selected_detectors, selected_exposures
 from plateviz.tables.selected_sources import selected_sources
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
-from plateviz.tables.solution_changes import solution_changes
-from plateviz.tables.solution_tests import solution_tests
 from plateviz.tables.source_profile import (
     motion_table,
     source_class,
@@ -91,7 +88,6 @@ __all__ = [
     "ARTIFICIAL",
     "BinStatistics",
     "CLASSES",
-    "ComparedRun",
     "CorrelationStatistics",
     "FieldStatistics",
     "MapStatistics",
@@ -152,7 +148,6 @@ __all__ = [
     "residual_correlation",
     "residual_map",
     "residual_scatter",
-    "run_changes",
     "run_strip",
     "scatter_cells",
     "scatter_statistics",
@@ -164,8 +159,6 @@ __all__ = [
     "sky_density",
     "sky_distribution",
     "sky_track",
-    "solution_changes",
-    "solution_tests",
     "source_class",
     "source_curves",
     "source_list",

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 # Imported before NumPy, as in the program, because it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
-from plateviz.tables.verdict import with_verdict
+from plateviz.verdict.verdict import with_verdict
 from solver.data.exclusions import Exclusions
 from solver.fit import fit_orbit
 from solver.engines.gauss_newton import Mode, find_mode

@@ -26,7 +26,7 @@ import solver  # noqa: F401, I001
 import numpy as np
 
 from plateviz.runs.scratch_result import write_scratch_result, write_verdict
-from plateviz.tables.verdict import with_verdict
+from plateviz.verdict.verdict import with_verdict
 from solver.data.exclusions import Exclusions
 from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings

@@ -34,8 +34,8 @@ from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run_tables import read_run_tests
 from plateviz.tables.run_diagnosis import RunTests
-from plateviz.tables.run_verdict import run_verdict
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.run_verdict import run_verdict
+from plateviz.verdict.verdict import Verdict
 from solver.data.run_schema import RUN_TABLES
 from solver.data.settings import FitSettings
 from solver.simulate.settings import SurveySettings

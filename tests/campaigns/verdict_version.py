@@ -9,10 +9,10 @@ ROOT = Path(__file__).resolve().parents[2]
 # with a cause adjusts before its solution.
 _PARTS = (
     "solver/results/diagnosis/*.py",
-    "plateviz/tables/causes.py",
-    "plateviz/tables/cause_harm.py",
-    "plateviz/tables/*cause_words.py",
-    "plateviz/tables/verdict.py",
+    "plateviz/verdict/causes.py",
+    "plateviz/verdict/cause_harm.py",
+    "plateviz/verdict/*cause_words.py",
+    "plateviz/verdict/verdict.py",
     "solver/engines/moves.py",
     "solver/engines/noise.py",
     "solver/engines/variance_model.py",

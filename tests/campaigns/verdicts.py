@@ -25,7 +25,7 @@ import solver  # noqa: F401, I001
 
 import numpy as np
 
-from plateviz.tables.verdict import orbit_verdict
+from plateviz.verdict.verdict import orbit_verdict
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import FitError, InputError

@@ -10,7 +10,7 @@ from plateviz.notebook.solution import OpenSolution
 from plateviz.reports.orbit import orbit_report
 from plateviz.reports.page import page_of
 from plateviz.tables.summary import SummaryItem
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.verdict import Verdict
 
 HOSTILE = "a\"'></script></title><img src=x onerror='window.ran = 1'><b class=hostile>"
 

@@ -12,7 +12,7 @@ from plateviz.reports.page import page_of
 from plateviz.reports.pdf import print_pdf
 from plateviz.reports.report import Report, ReportFigure
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.verdict import Verdict
 from solver.data.instrument import MINI_MOCK
 from tests.plateviz.conftest import synthetic_fit
 from tests.plateviz.survey_tables import synthetic_survey

@@ -5,8 +5,8 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from plateviz.dashboard.session.session import Session
-from plateviz.tables.causes import Cause
-from plateviz.tables.remedy import remedied
+from plateviz.verdict.causes import Cause
+from plateviz.verdict.remedy import remedied
 from solver.data.settings import ENGINES, FitSettings
 from solver.errors import InputError
 

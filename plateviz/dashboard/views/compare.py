@@ -15,8 +15,8 @@ from plateviz.dashboard.views.save_button import SaveButton
 from plateviz.dashboard.views.save_choices import table_choices
 from plateviz.plots.both_solutions import comparable_figures
 from plateviz.plots.diagnostic import Diagnostic
-from plateviz.tables import solution_changes
 from plateviz.tables.headings import CHANGES, in_words
+from plateviz.verdict.solution_changes import solution_changes
 from solver.errors import InputError
 
 _BEFORE = "the solution before it"

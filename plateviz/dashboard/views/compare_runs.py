@@ -21,10 +21,10 @@ from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.runs.load_tables import require_same_catalogue
 from plateviz.solving.run_reader import ReadRun
-from plateviz.tables import run_changes
 from plateviz.tables.headings import CHANGES, in_words
 from plateviz.tables.run_health import COMPLETE
 from plateviz.tables.survey_tables import SurveyTables
+from plateviz.verdict.run_changes import run_changes
 from solver.errors import InputError
 
 _BEING_READ = "The other run is being read."

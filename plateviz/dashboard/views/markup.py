@@ -9,7 +9,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.reports.summary_strip import STYLE
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.verdict import Verdict
 
 _STYLES = [STYLE, (Path(__file__).parent / "style.css").read_text(encoding="utf-8")]
 

@@ -8,8 +8,8 @@ import panel_material_ui as pmui
 from plateviz.dashboard.session.remedies import Remedy, remedies, try_settings
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.markup import markup_pane, themed
-from plateviz.tables.causes import Cause
-from plateviz.tables.verdict import orbit_verdict
+from plateviz.verdict.causes import Cause
+from plateviz.verdict.verdict import orbit_verdict
 
 # The most likely causes, and the first of many options; the reasons of the verdict have all.
 _MOST, _MOST_OPTIONS = 4, 3

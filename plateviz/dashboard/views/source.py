@@ -47,7 +47,7 @@ from plateviz.tables import (
 )
 from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE, SOURCES_OF_RUN, in_words
 from plateviz.tables.survey_tables import SourceTables
-from plateviz.tables.verdict import source_verdict
+from plateviz.verdict.verdict import source_verdict
 from solver.data.survey_schema import HISTORY, MOTIONS
 from solver.errors import InputError
 

@@ -12,7 +12,7 @@ from plateviz.dashboard.views.state_text import missing_text, outdated_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.reports.summary_strip import strip
 from plateviz.tables import summary_strip
-from plateviz.tables.verdict import orbit_verdict
+from plateviz.verdict.verdict import orbit_verdict
 from solver.data.result import FitResult
 
 # As high as the headline of a verdict, so that nothing moves when this comes.

@@ -11,6 +11,7 @@ from plateviz import plots, tables
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.tables.calibration_trends import calibration_trends
 from plateviz.tables.run_diagnosis import no_tests
+from plateviz.verdict.solution_tests import solution_tests
 from solver.simulate.settings import SurveySettings
 from solver.simulate.true_calibration import true_calibration
 from tests.plateviz.linear_stars import N_STARS, LinearStars
@@ -58,7 +59,7 @@ def orbit_drawings(fit_result, linear_fit, compared, make_fit_result, truth, ins
         ),
         "eigenmode_groups": (plots.plot_eigenmode_groups, tables.eigenmode_groups(fit_result)),
         "eigenmode_shifts": (plots.plot_eigenmode_shifts, tables.eigenmode_shifts(fit_result)),
-        "solution_tests": (plots.plot_solution_tests, tables.solution_tests(fit_result)),
+        "solution_tests": (plots.plot_solution_tests, solution_tests(fit_result)),
         "prior_shares": (plots.plot_prior_shares, tables.prior_shares(fit_result)),
         "mean_residual_map": (
             lambda t, **o: plots.plot_mean_residual_map(t, instrument, **o),

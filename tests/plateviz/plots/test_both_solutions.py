@@ -10,7 +10,7 @@ from plateviz.figures.figure import Ramp
 from plateviz.plots.both_solutions import BOTH, comparable_figures, figure_of_both
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.gallery import diagnostics
-from plateviz.tables.solution_changes import solution_changes
+from plateviz.verdict.solution_changes import solution_changes
 from solver.data.settings import FitSettings
 
 

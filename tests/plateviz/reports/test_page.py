@@ -11,7 +11,7 @@ from plateviz.plots.gallery import diagnostics
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.page import page_of
 from plateviz.reports.report import Report
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.verdict import Verdict
 from solver.data.orbit import OrbitData
 from solver.errors import InputError
 

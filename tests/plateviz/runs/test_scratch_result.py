@@ -18,7 +18,7 @@ from plateviz.runs.scratch_result import (
     write_scratch_result,
     write_verdict,
 )
-from plateviz.tables.verdict import with_verdict
+from plateviz.verdict.verdict import with_verdict
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
 from solver.data.schema import RESULT_TABLES
 from solver.errors import DiskError, InputError

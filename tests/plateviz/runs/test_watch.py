@@ -14,7 +14,7 @@ from plateviz.runs.fitted_exposures import FittedExposures
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.run import Run
 from plateviz.runs.watch import Ends, Watch
-from plateviz.tables.verdict import with_verdict
+from plateviz.verdict.verdict import with_verdict
 from solver.data.schema import ENVIRONMENT
 from solver.data.settings import FitSettings
 from solver.errors import FitError, InputError

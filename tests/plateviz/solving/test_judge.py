@@ -14,7 +14,7 @@ from plateviz.runs.scratch_result import (
     write_verdict,
 )
 from plateviz.solving.judge import Judge
-from plateviz.tables.verdict import is_judged, orbit_verdict, with_verdict
+from plateviz.verdict.verdict import is_judged, orbit_verdict, with_verdict
 
 
 class Waiting(Executor):

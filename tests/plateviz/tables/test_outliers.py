@@ -6,7 +6,7 @@ import numpy as np
 
 from plateviz.reports.orbit import orbit_report
 from plateviz.tables.outliers import EXCHANGED, outlier_list, swapped_with
-from plateviz.tables.verdict import orbit_verdict
+from plateviz.verdict.verdict import orbit_verdict
 from solver.data.instrument import MINI_MOCK
 
 SIGMA = 0.01

@@ -7,8 +7,8 @@ import pytest
 from plateviz.dashboard.session.remedies import remedies, try_settings
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.remedies import RemediesView
-from plateviz.tables.causes import Cause
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.causes import Cause
+from plateviz.verdict.verdict import Verdict
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
 from tests.plateviz.dashboard.session.test_session import FakeStore, finish

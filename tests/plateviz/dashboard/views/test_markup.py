@@ -3,7 +3,7 @@
 import pytest
 
 from plateviz.dashboard.views.markup import judged, paragraph
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.verdict import Verdict
 
 VERDICT = Verdict("warn", "The headline.", ["A reason."], ["What stands out."])
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.cause_case import Case
 from plateviz.tables.labels import id_strings
 from plateviz.tables.reference_influence import reference_influence
 from plateviz.tables.rounded import rounded
+from plateviz.verdict.cause_case import Case
 from solver.data.result import FitResult
 from solver.results.diagnosis.exposures import WAVES
 from solver.results.diagnosis.table import BAD_RATE

@@ -14,7 +14,7 @@ def remedied(settings: FitSettings, options: Iterable[str]) -> FitSettings | Non
     Parameters
     ----------
     settings : of the solution that has the flaw
-    options : of `plateviz fit`, as in `plateviz.tables.causes.Cause`
+    options : of `plateviz fit`, as in `plateviz.verdict.causes.Cause`
 
     Raises
     ------

@@ -8,9 +8,9 @@ import pytest
 from scipy.special import chdtri
 
 from plateviz.plots.solution_tests import plot_solution_tests
-from plateviz.tables import verdict
-from plateviz.tables.solution_tests import solution_tests
-from plateviz.tables.verdict import (
+from plateviz.verdict import verdict
+from plateviz.verdict.solution_tests import solution_tests
+from plateviz.verdict.verdict import (
     as_plain,
     is_judged,
     orbit_verdict,

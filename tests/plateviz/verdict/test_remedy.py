@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from plateviz.tables import causes as module
-from plateviz.tables.cause_words import Said
-from plateviz.tables.remedy import remedied
-from plateviz.tables.verdict import orbit_verdict
+from plateviz.verdict import causes as module
+from plateviz.verdict.cause_words import Said
+from plateviz.verdict.remedy import remedied
+from plateviz.verdict.verdict import orbit_verdict
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from tests.plateviz.tables.test_verdict import with_chances
+from tests.plateviz.verdict.test_verdict import with_chances
 
 PAPER = FitSettings()
 

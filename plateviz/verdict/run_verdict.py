@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.causes import Cause
 from plateviz.tables.rounded import rounded
-from plateviz.tables.run_causes import run_causes
 from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests, diagnose_run
 from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
-from plateviz.tables.tests_in_words import TestInWords, discoveries_in_words
-from plateviz.tables.verdict import Verdict, worst
+from plateviz.verdict.causes import Cause
+from plateviz.verdict.run_causes import run_causes
+from plateviz.verdict.tests_in_words import TestInWords, discoveries_in_words
+from plateviz.verdict.verdict import Verdict, worst
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Test
 
 _MOST_ORBITS = 20

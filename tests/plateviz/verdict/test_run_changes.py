@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from plateviz.tables import motion_differences, run_changes, shared_motions
-from plateviz.tables.run_changes import ComparedRun
+from plateviz.tables import motion_differences, shared_motions
 from plateviz.tables.run_diagnosis import no_tests
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.run_changes import ComparedRun, run_changes
+from plateviz.verdict.verdict import Verdict
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import MOTION_PARAMETERS
 

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.changes import COLUMNS, Row, merit, setting_changes
 from plateviz.tables.motion_differences import (
     PARAMETER_NAMES,
     Shared,
@@ -16,7 +15,8 @@ from plateviz.tables.motion_differences import (
 from plateviz.tables.run_diagnosis import RunTests
 from plateviz.tables.run_health import COMPLETE, FAILED, MISSING
 from plateviz.tables.sources import REFERENCE
-from plateviz.tables.verdict import Verdict
+from plateviz.verdict.changes import COLUMNS, Row, merit, setting_changes
+from plateviz.verdict.verdict import Verdict
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import MOTION_PARAMETERS, MOTION_UNITS
 

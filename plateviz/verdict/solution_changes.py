@@ -6,9 +6,9 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.changes import COLUMNS, Row, merit, setting_changes
 from plateviz.tables.comparison import comparison
-from plateviz.tables.verdict import orbit_verdict
+from plateviz.verdict.changes import COLUMNS, Row, merit, setting_changes
+from plateviz.verdict.verdict import orbit_verdict
 from solver.data.result import FitResult
 from solver.data.schema import MEASURED
 

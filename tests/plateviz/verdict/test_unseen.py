@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plateviz.tables.unseen import quadratic_mas, reference_factor, unseen_sentences
-from plateviz.tables.verdict import orbit_verdict
+from plateviz.verdict.unseen import quadratic_mas, reference_factor, unseen_sentences
+from plateviz.verdict.verdict import orbit_verdict
 
 
 def with_summary(result, **values):

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from plateviz.tables.cause_words import said_of
+from plateviz.verdict.cause_words import said_of
 from solver.data.settings import FitSettings
 from solver.results.diagnosis.table import Test
 

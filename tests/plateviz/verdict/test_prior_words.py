@@ -2,9 +2,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from plateviz.tables.cause_words import said_of
-from plateviz.tables.prior_words import narrowed_priors
-from plateviz.tables.remedy import remedied
+from plateviz.verdict.cause_words import said_of
+from plateviz.verdict.prior_words import narrowed_priors
+from plateviz.verdict.remedy import remedied
 from solver.data.parameters import BY_NAME, PARAMETERS
 from solver.data.settings import FitSettings
 from solver.results.diagnosis.table import Test

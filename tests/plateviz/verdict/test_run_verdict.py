@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from plateviz.tables.run_diagnosis import RunTests, diagnose_run, no_tests
-from plateviz.tables.run_verdict import run_verdict
-from plateviz.tables.verdict import as_plain
+from plateviz.verdict.run_verdict import run_verdict
+from plateviz.verdict.verdict import as_plain
 from tests.plateviz.run_tables import N_ORBITS, calibrations, causes, orbit_tests, zonal
 
 

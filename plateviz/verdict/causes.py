@@ -5,15 +5,15 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.cause_case import Case
-from plateviz.tables.cause_harm import harm
-from plateviz.tables.cause_words import said_of
-from plateviz.tables.data_cause_words import WRONG_FACTOR, said_of_wrong_catalogue
-from plateviz.tables.estimated_noise import reference_factor
 from plateviz.tables.labels import exposure_labels, id_strings
-from plateviz.tables.prior_words import narrowed_priors, usual_priors
-from plateviz.tables.remedy import remedied
 from plateviz.tables.rounded import rounded
+from plateviz.verdict.cause_case import Case
+from plateviz.verdict.cause_harm import harm
+from plateviz.verdict.cause_words import said_of
+from plateviz.verdict.data_cause_words import WRONG_FACTOR, said_of_wrong_catalogue
+from plateviz.verdict.estimated_noise import reference_factor
+from plateviz.verdict.prior_words import narrowed_priors, usual_priors
+from plateviz.verdict.remedy import remedied
 from solver.data.result import FitResult
 from solver.results.diagnosis.causes import SCATTER, FoundCauses, wrong_identifications
 from solver.results.diagnosis.table import Diagnosis

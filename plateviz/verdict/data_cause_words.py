@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.cause_case import Case, Said
 from plateviz.tables.labels import id_strings
 from plateviz.tables.rounded import rounded
+from plateviz.verdict.cause_case import Case, Said
 
 _MOST_NAMED = 8
 # So many options a person would still give.

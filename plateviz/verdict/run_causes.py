@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.causes import Cause
 from plateviz.tables.labels import id_strings, unit_text
 from plateviz.tables.rounded import rounded
 from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests
+from plateviz.verdict.causes import Cause
 from solver.results.diagnosis.table import CARE_RATE, Test
 
 # A cause after the first one is named if it has this share of its sigmas: it may be a result of it.

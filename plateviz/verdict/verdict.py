@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import pandas as pd
 from scipy.special import chdtrc
 
-from plateviz.tables.causes import Cause, causes_in_words, wrong_catalogue
-from plateviz.tables.estimated_noise import noise_sentences
-from plateviz.tables.notable_in_orbit import notable_sentences
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
-from plateviz.tables.tests_in_words import TestInWords, discoveries_in_words, tests_in_words
-from plateviz.tables.unseen import references_left_out, unseen_sentences
+from plateviz.verdict.causes import Cause, causes_in_words, wrong_catalogue
+from plateviz.verdict.estimated_noise import noise_sentences
+from plateviz.verdict.notable_in_orbit import notable_sentences
+from plateviz.verdict.tests_in_words import TestInWords, discoveries_in_words, tests_in_words
+from plateviz.verdict.unseen import references_left_out, unseen_sentences
 from solver.data.result import FitResult, FitStatus
 from solver.data.settings import COUNTED
 from solver.results.diagnosis.causes import find_causes

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 
-from plateviz.tables.cause_case import Case, Said
-from plateviz.tables.data_cause_words import (
+from plateviz.tables.rounded import rounded
+from plateviz.verdict.cause_case import Case, Said
+from plateviz.verdict.data_cause_words import (
     said_of_kurtosis,
     said_of_noise,
     said_of_noise_of,
@@ -14,8 +15,7 @@ from plateviz.tables.data_cause_words import (
     said_of_references,
     said_of_swapped,
 )
-from plateviz.tables.prior_words import said_of_prior
-from plateviz.tables.rounded import rounded
+from plateviz.verdict.prior_words import said_of_prior
 
 _NM_PER_UM = 1000.0
 _ORDINALS = {2: "second", 3: "third"}

@@ -2,7 +2,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from plateviz.tables.tests_in_words import tests_in_words as in_words
+from plateviz.verdict.tests_in_words import tests_in_words as in_words
 from solver.results.diagnosis.table import Test
 
 

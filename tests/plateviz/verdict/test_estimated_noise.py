@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from plateviz.tables.estimated_noise import noise_sentences
+from plateviz.verdict.estimated_noise import noise_sentences
 from solver.data.settings import FitSettings
 
 

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from plateviz.tables.verdict import orbit_verdict
+from plateviz.verdict.verdict import orbit_verdict
 from solver.data.result import FitResult
 
 

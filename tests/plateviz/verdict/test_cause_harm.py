@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from plateviz.tables import cause_harm
-from plateviz.tables.cause_case import Case
-from plateviz.tables.cause_harm import harm
+from plateviz.verdict import cause_harm
+from plateviz.verdict.cause_case import Case
+from plateviz.verdict.cause_harm import harm
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.found import Found
 from solver.results.diagnosis.table import Diagnosis, diagnose

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable
 
-from plateviz.tables.cause_case import Case, Said
 from plateviz.tables.rounded import rounded
+from plateviz.verdict.cause_case import Case, Said
 from solver.data.parameters import BY_NAME, PARAMETERS
 from solver.data.prior_text import format_width, split_name
 from solver.data.settings import FitSettings

@@ -16,18 +16,18 @@ from plateviz.dashboard.serving.page_request import WINDOW
 from plateviz.dashboard.serving.rooms import Rooms, Window, window_from
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.ticker import Ticker
-from plateviz.dashboard.views.accessible_names import AccessibleNames
-from plateviz.dashboard.views.address_bar import AddressBar
-from plateviz.dashboard.views.browser_session import BrowserSession
-from plateviz.dashboard.views.figure import Part
-from plateviz.dashboard.views.figure_painting import FigurePainting
-from plateviz.dashboard.views.keyboard import Keyboard
-from plateviz.dashboard.views.page_style import PAGE_STYLE
-from plateviz.dashboard.views.pages import Pages
-from plateviz.dashboard.views.report_button import report_button
-from plateviz.dashboard.views.selection_bar import SelectionBar
-from plateviz.dashboard.views.system_theme import SystemTheme
-from plateviz.dashboard.views.view_file import ViewFile
+from plateviz.dashboard.views.browser.accessible_names import AccessibleNames
+from plateviz.dashboard.views.browser.address_bar import AddressBar
+from plateviz.dashboard.views.browser.browser_session import BrowserSession
+from plateviz.dashboard.views.browser.figure_painting import FigurePainting
+from plateviz.dashboard.views.browser.system_theme import SystemTheme
+from plateviz.dashboard.views.cards.figure import Part
+from plateviz.dashboard.views.controls.keyboard import Keyboard
+from plateviz.dashboard.views.controls.selection_bar import SelectionBar
+from plateviz.dashboard.views.elements.page_style import PAGE_STYLE
+from plateviz.dashboard.views.pages.pages import Pages
+from plateviz.dashboard.views.saving.report_button import report_button
+from plateviz.dashboard.views.saving.view_file import ViewFile
 from plateviz.solving.solution_store import SolutionStore
 
 _SIDEBAR_WIDTH = 264

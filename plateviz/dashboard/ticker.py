@@ -15,7 +15,7 @@ from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.selection.selected import KINDS
 from plateviz.dashboard.serving.model_search import one_search
 from plateviz.dashboard.session.expected_what_ifs import ExpectedWhatIfs
-from plateviz.dashboard.views.pages import Pages
+from plateviz.dashboard.views.pages.pages import Pages
 from plateviz.solving.job import Job
 
 # Milliseconds between two looks at what a running job says.

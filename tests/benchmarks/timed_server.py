@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from plateviz.cli.main import main
 from plateviz.dashboard.session.session import Session
-from plateviz.dashboard.views.figure import FigureView
-from plateviz.dashboard.views.figure_grid import FigureGrid
+from plateviz.dashboard.views.cards.figure import FigureView
+from plateviz.dashboard.views.cards.figure_grid import FigureGrid
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.solving.job import Job
 from plateviz.solving.solution_store import SolutionStore

@@ -37,7 +37,7 @@ GROUP_FILES = {"solver/data/parameters.py", "solver/model/forward.py"}
 CONTROLS = """
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.fit_choices import ANSWERED_AT_ONCE, FitChoices
-from plateviz.dashboard.views.refit import RefitView
+from plateviz.dashboard.views.controls.refit import RefitView
 from plateviz.notebook.keywords import settings_with
 from solver.data.settings import FitSettings
 

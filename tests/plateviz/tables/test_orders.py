@@ -10,7 +10,7 @@ from plateviz import plots, tables
 from plateviz.cli.output import print_orders
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.session.session import Session
-from plateviz.dashboard.views.refit import RefitView
+from plateviz.dashboard.views.controls.refit import RefitView
 from plateviz.tables.orders import preferred_order
 from tests.plateviz.dashboard.navigation.test_navigation import SurveyStore
 

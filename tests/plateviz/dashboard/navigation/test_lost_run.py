@@ -8,10 +8,10 @@ from plateviz.dashboard.navigation.lost_run import look_for_run
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.ticker import Ticker
-from plateviz.dashboard.views.notice import NoticeView
-from plateviz.dashboard.views.run_selector import run_selector
-from plateviz.dashboard.views.source import SourcePage
-from plateviz.dashboard.views.survey import SurveyPage
+from plateviz.dashboard.views.controls.run_selector import run_selector
+from plateviz.dashboard.views.elements.notice import NoticeView
+from plateviz.dashboard.views.pages.source import SourcePage
+from plateviz.dashboard.views.pages.survey import SurveyPage
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import survey_runs
 from solver.data.settings import FitSettings

@@ -10,7 +10,7 @@ from plateviz.dashboard.navigation.keys import press
 from plateviz.dashboard.navigation.navigation import Navigation, View
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.stage import Stage
-from plateviz.dashboard.views.selection import SelectionView
+from plateviz.dashboard.views.controls.selection import SelectionView
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.runs.queries import Written
 from plateviz.solving.origin import OrbitFiles, SurveyFolder

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.saved_view import MOST_BYTES, open_view, view_text
 from plateviz.dashboard.session.session import Session
-from plateviz.dashboard.views.view_file import ViewFile
+from plateviz.dashboard.views.saving.view_file import ViewFile
 from plateviz.plots.workspace import OrbitWorkspace
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings

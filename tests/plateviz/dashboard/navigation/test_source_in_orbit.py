@@ -6,7 +6,7 @@ import pytest
 from plateviz.dashboard.navigation.navigation import View
 from plateviz.dashboard.navigation.source_in_orbit import open_source_in_orbit
 from plateviz.dashboard.selection.selected import Selected
-from plateviz.dashboard.views.source import SourcePage
+from plateviz.dashboard.views.pages.source import SourcePage
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace
 from tests.plateviz.dashboard.navigation.test_navigation import end_job
 

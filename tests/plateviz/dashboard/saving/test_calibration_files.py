@@ -8,10 +8,10 @@ from astropy.table import Table
 
 from plateviz.dashboard.saving.calibration_files import calibration_files
 from plateviz.dashboard.saving.downloads import FORMATS, as_file
-from plateviz.dashboard.views.calibration import CalibrationView
-from plateviz.dashboard.views.compare import CompareView
-from plateviz.dashboard.views.save_button import SaveButton
-from plateviz.dashboard.views.solution_window import SolutionWindow
+from plateviz.dashboard.views.dialogs.solution_window import SolutionWindow
+from plateviz.dashboard.views.panes.calibration import CalibrationView
+from plateviz.dashboard.views.panes.compare import CompareView
+from plateviz.dashboard.views.saving.save_button import SaveButton
 from solver.data.parameters import PARAMETERS
 from tests.plateviz.dashboard.navigation.test_navigation import end_job
 

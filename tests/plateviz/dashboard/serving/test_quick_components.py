@@ -12,7 +12,7 @@ from panel.custom import ReactiveESM
 from param import parameterized
 
 from plateviz.dashboard.serving import quick_components
-from plateviz.dashboard.views.visibility import Visibility
+from plateviz.dashboard.views.browser.visibility import Visibility
 
 pytestmark = pytest.mark.newest
 

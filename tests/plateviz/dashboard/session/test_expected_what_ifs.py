@@ -7,7 +7,7 @@ import pytest
 from plateviz.dashboard.session.expected_what_ifs import ExpectedWhatIfs
 from plateviz.dashboard.session.selection_actions import SelectionActions
 from plateviz.dashboard.session.session import Session
-from plateviz.dashboard.views.fit_controls import width_input
+from plateviz.dashboard.views.controls.fit_controls import width_input
 from solver.data.parameters import BY_NAME
 from solver.data.settings import FitSettings
 from tests.plateviz.dashboard.session.test_session import FakeStore, finish, of_run

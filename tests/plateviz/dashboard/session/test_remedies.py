@@ -6,7 +6,7 @@ import pytest
 
 from plateviz.dashboard.session.remedies import remedies, try_settings
 from plateviz.dashboard.session.session import Session
-from plateviz.dashboard.views.remedies import RemediesView
+from plateviz.dashboard.views.panes.remedies import RemediesView
 from plateviz.verdict.causes import Cause
 from plateviz.verdict.verdict import Verdict
 from solver.data.exclusions import Exclusions

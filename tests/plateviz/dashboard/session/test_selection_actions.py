@@ -8,7 +8,7 @@ from plateviz.dashboard.session.prior_widths import default_widths
 from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.stage import Stage
-from plateviz.dashboard.views.notice import NoticeView
+from plateviz.dashboard.views.elements.notice import NoticeView
 from plateviz.runs.kept_selections import KeptSelections
 from solver.data.settings import FitSettings
 from solver.errors import InputError

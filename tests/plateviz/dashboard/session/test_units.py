@@ -4,8 +4,8 @@ import pandas as pd
 import pytest
 
 from plateviz.dashboard.session.units import NAMES, Units
-from plateviz.dashboard.views.selection_list import SelectionList
-from plateviz.dashboard.views.source import SourcePage
+from plateviz.dashboard.views.dialogs.selection_list import SelectionList
+from plateviz.dashboard.views.pages.source import SourcePage
 from plateviz.plots.workspace import SourceWorkspace
 from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE
 from solver.data.instrument import MINI_MOCK

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from plateviz.dashboard.views.figure import FigureView
+from plateviz.dashboard.views.cards.figure import FigureView
 from plateviz.plots.gallery import diagnostics, survey_figures
 
 

@@ -8,14 +8,14 @@ from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.view import View
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.stage import Stage
-from plateviz.dashboard.views.address_bar import AddressBar
-from plateviz.dashboard.views.calibration import CalibrationView
-from plateviz.dashboard.views.figure import FigureView
-from plateviz.dashboard.views.orbit import OrbitPage
-from plateviz.dashboard.views.refit import RefitView
-from plateviz.dashboard.views.source import SourcePage
-from plateviz.dashboard.views.summary import HeadView, StripView
-from plateviz.dashboard.views.survey import SurveyPage
+from plateviz.dashboard.views.browser.address_bar import AddressBar
+from plateviz.dashboard.views.cards.figure import FigureView
+from plateviz.dashboard.views.controls.refit import RefitView
+from plateviz.dashboard.views.pages.orbit import OrbitPage
+from plateviz.dashboard.views.pages.source import SourcePage
+from plateviz.dashboard.views.pages.survey import SurveyPage
+from plateviz.dashboard.views.panes.calibration import CalibrationView
+from plateviz.dashboard.views.panes.summary import HeadView, StripView
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.runs.scratch_result import (

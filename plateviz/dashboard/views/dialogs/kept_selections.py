@@ -1,0 +1,73 @@
+"""KeptSelections: a window in which selections are kept under names and taken up again."""
+
+from html import escape
+
+import panel as pn
+import panel_material_ui as pmui
+
+from plateviz.dashboard.navigation.navigation import Navigation
+from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
+from plateviz.dashboard.views.dialogs.window import window
+from solver.errors import InputError
+
+
+class KeptSelections(pn.viewable.Viewer):
+    """A name for the selection, and the list of those that are kept, by others too."""
+
+    def __init__(self, navigation: Navigation, **params: object) -> None:
+        """Follow the selection of the session of `navigation`."""
+        super().__init__(**params)
+        self._session, self._selection = navigation.session, navigation.session.selection
+        self._actions = SelectionActions(navigation.session)
+        wide = {"sizing_mode": "stretch_width", "size": "small", "margin": (10, 10)}
+        self._name = pmui.TextInput(label="Name", placeholder="such as: lower left corner", **wide)
+        self._keep = pmui.Button(label="Keep", margin=(10, 10))
+        # The names are a person's text: a menu shows them as text.
+        self._kept = pmui.Select(label="Kept selections", options=[], **wide)
+        self._take_up = pmui.Button(label="Select again", variant="outlined", margin=(10, 4))
+        self._forget = pmui.Button(label="Forget", variant="text", margin=(10, 4))
+        self._words = pmui.Alert(object="", severity="info", sizing_mode="stretch_width")
+        self._again = pmui.Row(self._kept, self._take_up, self._forget, margin=0)
+        self._new = pmui.Row(self._name, self._keep, margin=0)
+        self._window = window("Keep the selection", self._words, self._new, self._again, width="sm")
+        self._keep.on_click(lambda _: self._keep_it())
+        self._take_up.on_click(lambda _: self._actions.take_up(self._kept.value))
+        self._forget.on_click(lambda _: self._actions.forget(self._kept.value))
+        self._selection.param.watch(self._show, ["sources", "exposures", "detectors", "kept"])
+
+    def __panel__(self) -> pn.viewable.Viewable:
+        """Return the window."""
+        return self._window
+
+    def open(self) -> None:
+        """Open the window."""
+        look_for_kept(self._session)
+        self._name.value = self._selection.name_of_selected or ""
+        self._show()
+        self._window.open = True
+
+    def _keep_it(self) -> None:
+        try:
+            why = self._actions.keep(self._name.value_input or self._name.value)
+            if why:
+                self._say(f"It is kept in this session only: {escape(why)}.", "warning")
+        except InputError as error:
+            self._say(f"It was not kept: {error}.", "error")
+
+    def _show(self, *_: object) -> None:
+        selected, kept = self._selection.selected, self._selection.kept
+        name = self._selection.name_of_selected
+        options = {f"{one} ({items.words()})": one for one, items in kept.items()}
+        chosen = name or (self._kept.value if self._kept.value in kept else next(iter(kept), None))
+        self._kept.param.update(options=options, value=chosen)
+        self._again.visible, self._new.visible = bool(kept), bool(selected)
+        if not selected:
+            self._say("Nothing is selected.")
+        elif name is None:
+            self._say(f"Selected: {selected.words()}.")
+        else:
+            self._say(f"Kept under the name that is chosen below: {selected.words()}.", "success")
+
+    def _say(self, text: str, severity: str = "info") -> None:
+        # It is taken for Markdown: no text of a person's may be in it.
+        self._words.param.update(object=text, severity=severity)

@@ -1,0 +1,45 @@
+"""A workspace: its cards have the row that fills the window, and their grid has no hole."""
+
+import panel as pn
+import pytest
+
+from plateviz.dashboard.views.cards.figure import FigureView
+from plateviz.dashboard.views.cards.figure_grid import FigureGrid
+from plateviz.dashboard.views.cards.workspace import workspace
+from plateviz.plots.gallery import diagnostics
+
+
+@pytest.fixture
+def view():
+    return FigureView(diagnostics()[0], lambda: None)
+
+
+def test_parts_of_a_workspace_stand_above_and_below_its_cards(view):
+    grid, first, last = FigureGrid([view], lambda *_: None), pn.Spacer(), pn.Spacer()
+    box = workspace(grid, first, below=[last])
+    head, middle, foot = box
+    assert list(head) == [first]
+    assert foot is last
+    assert middle is grid.__panel__() or grid.__panel__() in list(middle)
+    assert box.sx["gridTemplateRows"] == "auto minmax(0, 1fr) auto"
+
+
+def test_hidden_parts_leave_the_cards_the_row_that_fills_the_window(view):
+    """The browser gives the parts that are not hidden the rows in order."""
+    first, hidden = pn.Spacer(), pn.Spacer(visible=False)
+    box = workspace(FigureGrid([view], lambda *_: None), hidden, first)
+    assert [part.visible for part in box] == [True, True]
+    assert box.sx["gridTemplateRows"] == "auto minmax(0, 1fr)"
+
+
+def test_first_wide_card_takes_a_row_of_a_grid_that_would_have_a_hole():
+    named = {one.name: one for one in diagnostics()}
+    wide, second, third = (
+        FigureView(named[name], lambda: None)
+        for name in ("mean-residual-map", "solution-tests", "residual-map")
+    )
+    FigureGrid([second, wide], lambda *_: None)
+    assert "grid-column" not in wide.__panel__().styles
+    FigureGrid([second, wide, third], lambda *_: None)
+    assert wide.__panel__().styles["grid-column"] == "1 / -1"
+    assert "grid-column" not in second.__panel__().styles

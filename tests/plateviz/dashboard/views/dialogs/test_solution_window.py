@@ -1,0 +1,109 @@
+"""SolutionWindow: what somebody writes stays until it is saved."""
+
+import pytest
+
+from plateviz.dashboard.views.dialogs.solution_window import SolutionWindow
+from plateviz.runs.kept_solutions import KeptSolutions
+from plateviz.runs.note import read_note, write_note
+
+
+@pytest.fixture
+def page(navigation, run, tmp_path, fit_result):
+    """A page with the orbit of a run, whose store has one kept solution."""
+    navigation.session.store.kept = KeptSolutions(tmp_path / "solutions")
+    navigation.session.store.kept.keep("old", 0, False, fit_result)
+    run.directory = tmp_path
+    navigation.open_orbit(0)
+    return navigation
+
+
+@pytest.fixture
+def window(page):
+    made = SolutionWindow(page)
+    made.open()
+    choose(made, "old")
+    return made
+
+
+def choose(window, name):
+    (entry,) = (one for one in window._choice.options.values() if one.name == name)
+    window._choice.value = entry
+
+
+def write(window, text):
+    window._text.param.update(value=text, value_input=text)
+
+
+def test_note_that_is_not_saved_stays_while_the_list_is_filled_again(page, window):
+    write(window, "half a sentence")
+    page.session.journal.param.trigger("made")
+    page.session.param.trigger("shown")
+    assert (window._text.value, window._text.label) == ("half a sentence", "Note (not saved)")
+    window._save_note()
+    path = window._chosen.note_path
+    assert (read_note(path).text, window._text.label) == ("half a sentence", "Note")
+    # What is saved is read again.
+    write_note(path, "theirs", read_note(path).version)
+    page.session.journal.param.trigger("made")
+    assert window._text.value == "theirs"
+
+
+def test_typed_characters_are_kept_before_the_browser_has_left_the_field(page, window):
+    window._text.value_input = "half"
+    page.session.journal.param.trigger("made")
+    assert window._text.value_input == "half"
+    choose(window, "default")
+    assert (window._text.value_input, window._text.label) == ("", "Note")
+    choose(window, "old")
+    assert window._text.value_input == "half"
+
+
+def test_each_entry_keeps_the_note_that_was_written_for_it(window):
+    write(window, "of the kept one")
+    choose(window, "default")
+    assert (window._text.value, window._text.label) == ("", "Note")
+    write(window, "of the run")
+    choose(window, "old")
+    assert (window._text.value, window._text.label) == ("of the kept one", "Note (not saved)")
+    window._save_note()
+    choose(window, "default")
+    assert (window._text.value, window._text.label) == ("of the run", "Note (not saved)")
+    choose(window, "old")
+    assert (window._text.value, window._text.label) == ("of the kept one", "Note")
+
+
+def test_note_of_somebody_else_stays_beside_what_is_not_saved(page, window):
+    write(window, "mine")
+    path = window._chosen.note_path
+    write_note(path, "theirs", read_note(path).version)
+    choose(window, "default")
+    choose(window, "old")
+    window._save_note()
+    assert (window._theirs.visible, window._theirs.value) == (True, "theirs")
+    page.session.journal.param.trigger("made")
+    assert (window._text.value, window._theirs.visible) == ("mine", True)
+    choose(window, "default")
+    assert not window._theirs.visible
+    choose(window, "old")
+    assert (window._text.value, window._theirs.value) == ("mine", "theirs")
+    assert window._theirs.visible
+    window._save_note()
+    assert read_note(path).text == "mine"
+    assert not window._theirs.visible
+
+
+def test_note_that_cannot_be_read_shows_no_other_note(window):
+    write(window, "mine")
+    (entry,) = (one for one in window._choice.options.values() if one.name == "default")
+    entry.note_path.write_bytes(b"\xff\xfe")
+    choose(window, "default")
+    assert window._message.visible
+    assert not window._text.visible
+    choose(window, "old")
+    assert window._text.value == "mine"
+
+
+def test_name_that_is_written_stays_while_the_list_is_filled_again(page, window):
+    window._name.value = "half"
+    page.session.journal.param.trigger("made")
+    assert window._name.value == "half"

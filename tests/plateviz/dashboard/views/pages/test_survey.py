@@ -1,0 +1,20 @@
+"""The Survey page: how its figures are laid out."""
+
+from plateviz.dashboard.navigation.navigation import Navigation, View
+from plateviz.dashboard.session.session import Session
+from plateviz.dashboard.views.pages.survey import SurveyPage
+from plateviz.plots.workspace import SurveyWorkspace
+from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+
+
+def test_figures_of_many_frames_have_a_row_each(fit_result, survey):
+    store = SurveyStore(fit_result, [FakeRun("default", survey, fit_result)])
+    navigation = Navigation(Session(store))
+    page = SurveyPage(navigation, lambda *_: None)
+    navigation.turn_to(View.SURVEY)
+    navigation.turn_to_workspace(SurveyWorkspace.ACCURACY)
+    views = page.figures._views
+    rows = [one.card_name for one in views if "grid-column" in one.__panel__().styles]
+    assert rows == ["motion-pulls", "calibration-trends"]
+    # The others fill rows of two.
+    assert (len(views) - len(rows)) % 2 == 0

@@ -57,9 +57,12 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
     width = max(len(name) for name, _ in rows)
     for name, text in rows:
         typer.echo(f"{name:<{width}}  {text}")
-    if summary["verdict"]["state"] != "good":
-        for sentence in summary["verdict"]["reasons"]:
-            typer.echo(f"- {sentence}")
+    verdict = summary["verdict"]
+    for sentence in [
+        *(verdict["reasons"] if verdict["state"] != "good" else ()),
+        *verdict["notable"],
+    ]:
+        typer.echo(f"- {sentence}")
 
 
 def _common_error_row(summary: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -9,6 +9,7 @@ from plateviz.tables.rounded import rounded
 from plateviz.verdict.cause_case import Case
 from solver.data.result import FitResult
 from solver.results.diagnosis.exposures import WAVES
+from solver.results.diagnosis.scatter import FEWEST
 from solver.results.diagnosis.table import BAD_RATE
 
 # Sources with fewer measurements do not say how good a solution is.
@@ -67,7 +68,7 @@ def harm(case: Case) -> tuple[str, bool]:
     if subject == "prior":
         return _harm_of_prior(case)
     if subject == "noise":
-        error, extent = 0.5 * abs(found.test.statistic - 1.0), ""
+        error, extent = abs(float(np.sqrt(found.test.statistic)) - 1.0), ""
     else:
         error, extent = _noise_error(case)
     return (
@@ -180,11 +181,14 @@ def _noise_error(case: Case) -> tuple[float, str]:
     used = ~rows.is_far & (groups >= 0) & ~np.isin(rows.exposure, case.diagnosis.swinging)
     chi2 = np.bincount(groups[used], rows.chi2[used])
     dof = np.bincount(groups[used], 2.0 * rows.left[used])
-    ratio, by_chance = chi2[dof > 0.0] / dof[dof > 0.0], 2.0 / dof[dof > 0.0]
-    error = 0.5 * float(np.sqrt(max(np.mean((ratio - 1.0) ** 2 - by_chance), 0.0)))
+    known = dof > FEWEST
+    if not known.any():
+        return 0.0, ""
+    ratio, by_chance = np.sqrt(chi2[known] / dof[known]), 0.5 / dof[known]
+    error = float(np.sqrt(max(np.mean((ratio - 1.0) ** 2 - by_chance), 0.0)))
     if subject == "sources":  # of which the most extreme are so by chance
         return error, " rms"
-    low, high = (100.0 * (np.sqrt(one) - 1.0) for one in (float(ratio.min()), float(ratio.max())))
+    low, high = (100.0 * (float(one) - 1.0) for one in (ratio.min(), ratio.max()))
     return error, f" rms, from {low:+.0f} to {high:+.0f} % between {subject}"
 
 

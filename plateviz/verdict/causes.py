@@ -10,7 +10,7 @@ from plateviz.tables.rounded import rounded
 from plateviz.verdict.cause_case import Case
 from plateviz.verdict.cause_harm import harm
 from plateviz.verdict.cause_words import said_of
-from plateviz.verdict.data_cause_words import WRONG_FACTOR, said_of_wrong_catalogue
+from plateviz.verdict.data_cause_words import DOUBTFUL_FACTOR, WRONG_FACTOR, said_of_wrong_catalogue
 from plateviz.verdict.estimated_noise import reference_factor
 from plateviz.verdict.prior_words import narrowed_priors, usual_priors
 from plateviz.verdict.remedy import remedied
@@ -79,19 +79,22 @@ def causes_in_words(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses
 
 
 def wrong_catalogue(result: FitResult) -> list[Cause]:
-    """Return as a cause that the fit had to multiply the catalogue's errors by very much.
+    """Return as a cause that the fit had to multiply the catalogue's errors by much.
 
     With these errors, nothing is left for the tests to find.
     """
     found = reference_factor(result)
-    if found is None or found[0] < WRONG_FACTOR:
+    if found is None or found[0] < DOUBTFUL_FACTOR:
         return []
     factor, significance = found
     said = said_of_wrong_catalogue(
         f"The fit has multiplied the catalogue's errors by {factor:.1f} to agree with them."
     )
     spoils = "It spoils what all positions have in common, perhaps by more than they state."
-    return [Cause(said.name, said.title, said.words, significance, spoils, said.action, (), True)]
+    is_large = factor >= WRONG_FACTOR
+    return [
+        Cause(said.name, said.title, said.words, significance, spoils, said.action, (), is_large)
+    ]
 
 
 def _stuck(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> Cause:

@@ -8,12 +8,18 @@ import pandas as pd
 from plateviz.tables.labels import id_strings
 from plateviz.tables.rounded import rounded
 from plateviz.verdict.cause_case import Case, Said
+from plateviz.verdict.prior_words import narrowed_priors, usual_priors
 
 _MOST_NAMED = 8
 # So many options a person would still give.
 _MOST_LEFT_OUT = 20
-# No catalogue states errors that are so many times too small: something else is wrong with it.
-WRONG_FACTOR = 30.0
+# Few catalogues state errors that are so many times too small, and none so many: something else is
+# wrong with them.
+DOUBTFUL_FACTOR, WRONG_FACTOR = 5.0, 30.0
+_OTHER_ERRORS = (
+    "Positions of another epoch, wrong proper motions, wrong times of the exposures, smooth errors "
+    "or wrong units do this"
+)
 
 
 def said_of_noise(case: Case) -> Said:
@@ -114,8 +120,13 @@ def said_of_references(case: Case) -> Said:
         # The errors are in units of the prior's sigmas, which the fit may have widened already.
         action = "widen the prior of the reference stars"
         option = f"prior sources={max(factor, 1.1 * settings.width('sources')):.2f}"
+    if "sources" in narrowed_priors(settings):
+        # The fit was told so.
+        action, option = "take the catalogue's errors as it states them", "prior sources=1"
     is_nearer = test.statistic < test.expected
-    words = f"Its errors are about {case.found.size:.2f} times those stated."
+    words = f"Its errors are about {rounded(factor)} times those stated."
+    if factor >= DOUBTFUL_FACTOR:
+        words += f" {_OTHER_ERRORS}; check these first."
     if is_nearer:
         words = (
             f"Their rms deviation is {rounded(test.statistic)} of its errors, where "
@@ -136,8 +147,7 @@ def said_of_wrong_catalogue(evidence: str) -> Said:
     return Said(
         "wrong-catalogue",
         "the reference stars are nowhere near the catalogue",
-        f"{evidence} Positions of another epoch, wrong proper motions, wrong times of the "
-        "exposures or wrong units do this.",
+        f"{evidence} {_OTHER_ERRORS}.",
         "check the epochs, proper motions and units of the catalogue, and the times of the "
         "exposures",
     )
@@ -145,11 +155,20 @@ def said_of_wrong_catalogue(evidence: str) -> Said:
 
 def said_of_others(case: Case) -> Said:
     """Return what is said of other stars whose catalogue errors are larger than stated."""
+    settings = case.result.settings
+    action, options = (
+        "check the units and epochs of the catalogue, or state larger errors there",
+        (),
+    )
+    if "sources" in narrowed_priors(settings):
+        action, options = "take the catalogue's errors as it states them", usual_priors(["sources"])
+    factor = case.found.size * settings.width("sources")
     return Said(
         "catalogue-errors",
         "the stars that are no reference stars are further from the catalogue than it states",
-        f"Its errors are about {rounded(case.found.size, 3)} times those stated.",
-        "check the units and epochs of the catalogue, or state larger errors there",
+        f"Its errors are about {rounded(factor, 3)} times those stated.",
+        action,
+        options,
     )
 
 

@@ -68,4 +68,5 @@ def _parts(entry: Mapping[str, Any]) -> list[str]:
 
 def _with_error(log_factor: float, sigma: float) -> str:
     factor = float(np.exp(log_factor))
-    return f"{factor:.3f} ± {rounded(factor * sigma)}"
+    error = rounded(factor * sigma)
+    return f"{factor:.{len(error.partition('.')[2])}f} ± {error}"

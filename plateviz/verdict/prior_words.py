@@ -17,8 +17,8 @@ def said_of_prior(case: Case) -> Said:
     group, settings = PARAMETERS[case.found.test.what[0]], case.result.settings
     width, rms = settings.width(group.name), case.found.test.statistic
     words = (
-        f"The values lie {rounded(rms, 3)} times its width from its centre, rms, where about "
-        f"1 is expected at most. The width is {rounded(width, 3)} {group.width_unit}".rstrip()
+        f"The values lie {rounded(rms, 3)} times as far from its centre, rms, as chance makes "
+        f"them. The width is {rounded(width, 3)} {group.width_unit}".rstrip()
         + "."
     )
     title = f"the prior of {group.name} contradicts the measurements"

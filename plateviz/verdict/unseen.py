@@ -14,13 +14,18 @@ _MANY = 0.1
 _MOST_PLACES = 50_000
 
 
-def unseen_sentences(result: FitResult) -> list[str]:
-    """Return sentences on the errors of the reference catalogue that a solution cannot show."""
+def unseen_sentences(result: FitResult, are_noticed: bool = False) -> list[str]:
+    """Return sentences on the errors of the reference catalogue that a solution cannot show.
+
+    Parameters
+    ----------
+    are_noticed : whether the reference stars are known to be further off than stated
+    """
     sentences = [
         "No test of one orbit shows smooth errors of the reference catalogue. Those that shift, "
         "turn or stretch the field are taken for pointing, and move all positions by as much as "
-        "they are large. Nor does one show a time that is wrong in all exposures alike: it moves "
-        "all positions by the motion of the reference stars in that time."
+        "they are large. Nor is a time tested that is wrong in all exposures alike: it moves each "
+        "star against the reference stars by its own motion in that time."
     ]
     quadratic = quadratic_mas(result)
     if np.isfinite(quadratic):
@@ -30,9 +35,10 @@ def unseen_sentences(result: FitResult) -> list[str]:
             "orbits at other position angles tell them apart."
         )
     factor = reference_factor(result)
-    if np.isfinite(factor):
+    if np.isfinite(factor) and not are_noticed:
+        taken = "the fit takes them" if result.settings.reference_scale else "stated"
         sentences.append(
-            f"The errors of all reference stars could be {factor:.1f} times as large as stated "
+            f"The errors of all reference stars could be {factor:.1f} times as large as {taken} "
             "before they are noticed: the catalogue decides their positions, not the measurements."
         )
     return sentences

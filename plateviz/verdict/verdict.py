@@ -23,6 +23,8 @@ from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, diagnose
 _NAME = "verdict"
 # Tail probabilities of a single chi2: three and four sigmas of a normal, one-sided.
 _UNLIKELY, _FAR_OFF = 1.35e-3, 3.2e-5
+# Causes that the errors of all reference stars are.
+_OF_REFERENCES = ("reference-errors", "wrong-catalogue")
 _HEADLINES: dict[State, str] = {
     "good": "This solution can be trusted.",
     "warn": "This solution can be used with care.",
@@ -113,24 +115,26 @@ def _judge(result: FitResult) -> Verdict:
     state: State = "warn" if found else "good"
     is_large = any(cause.is_large for cause in causes if not cause.instead_of)
     catalogue = wrong_catalogue(result)
-    if not converged or (certain and is_large) or catalogue:
+    if not converged or (certain and is_large) or any(cause.is_large for cause in catalogue):
         state = "bad"
     causes = [*catalogue, *causes]
     left_out = references_left_out(result)
-    state = worst([state, "warn" if left_out else "good"])
+    state = worst([state, "warn" if left_out or catalogue else "good"])
     titles = [*_first(causes), *left_out[:1]]
     headline = f"{_HEADLINES[state][:-1]}: {titles[0]}." if titles else _HEADLINES[state]
     items = summary_strip(result)
     reasons = [_converged(result), *(cause.sentence() for cause in causes), *left_out[1:]]
     reasons += [discoveries_in_words(diagnosis.tests, found), *map(_sentence, _judged(items))]
-    reasons += [*noise_sentences(result), *_common_error(result), *unseen_sentences(result)]
+    are_noticed = any(cause.name in _OF_REFERENCES for cause in causes)
+    reasons += [*_common_error(result), *unseen_sentences(result, are_noticed)]
     faults = [] if converged else [_converged(result)]
     faults += [f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes]
     faults += left_out[1:]
     if found and not causes:
         faults.append(discoveries_in_words(diagnosis.tests, found))
     tests = tests_in_words(diagnosis)
-    return Verdict(state, headline, reasons, notable_sentences(result), faults, causes, tests)
+    notable = [*noise_sentences(result), *notable_sentences(result)]
+    return Verdict(state, headline, reasons, notable, faults, causes, tests)
 
 
 def _first(causes: Sequence[Cause]) -> list[str]:

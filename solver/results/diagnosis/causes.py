@@ -39,6 +39,7 @@ _OF_ITS_OWN = 0.5
 # What these bring about explains at most so many times what the positions carry.
 _SHIFTS_STARS, _MARGIN = ("swing", "outliers"), 2.0
 _MOST_RIVALS = 2
+_FAR_OFF = ("outliers", "swapped")
 # Outliers are wrong identifications if these have this share of their chi2.
 _OF_OUTLIERS = 0.5
 # Patterns that explain more of chi2 are not linear: what they leave tells nothing about the noise.
@@ -79,6 +80,10 @@ def find_causes(diagnosis: Diagnosis) -> FoundCauses:
     found.sort(key=lambda one: (spoils and one.test.subject == "kurtosis", -one.gain))
     if left is None and found[:1] == patterns[:1]:
         found = patterns
+    swapped = wrong_identifications(diagnosis)
+    if swapped and found and found[0].test.subject in (*SCATTER, *STARS):
+        # They make both of these, and neither makes them.
+        found = [*swapped, *(one for one in found if one.test.subject not in _FAR_OFF)]
     named, left_out = _of_their_own(found, diagnosis)
     rivals = [*(rivals if named[:1] == patterns[:1] else ()), *_rivals(named, left_out)]
     return FoundCauses(tuple(named), tuple(rivals[:_MOST_RIVALS]), left)
@@ -115,6 +120,8 @@ def _of_their_own(found: list[Found], diagnosis: Diagnosis) -> tuple[list[Found]
             return True
         if one.test.subject == "prior" and subject in SCATTER:
             return is_beyond_noise(one, diagnosis.scale, limit_of(diagnosis))
+        if one.test.subject == "sources" and subject in _FAR_OFF:
+            return False
         is_weak = one.test.sigma <= _OF_ITS_OWN * leads.test.sigma
         if is_weak or _is_of_tails(one.test.subject, subject):
             return False
@@ -139,9 +146,9 @@ def _is_of_tails(subject: str, leads: str) -> bool:
     """Return whether a cause is not to be named beside the first one because of tails.
 
     Whatever spoils some residuals more than others gives all of them tails, and noise with tails
-    makes groups scatter.
+    makes groups scatter; but it does not change their size as a whole.
     """
-    return subject == "kurtosis" or (leads == "kurtosis" and subject in SCATTER)
+    return subject == "kurtosis" or (leads == "kurtosis" and subject in SCATTER[1:])
 
 
 def _swinging(diagnosis: Diagnosis) -> list[Found]:
@@ -209,11 +216,19 @@ def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
         elif one.name == "magnitudes":
             found.append(Found(test, gains.of_slope(noise, one)))
         elif one.name == "kurtosis":
-            found.append(Found(test, gains.of_kurtosis(noise, one)))
+            found.append(Found(test, gains.of_kurtosis(one)))
         elif one.name in ("exposures", "detectors", "sources"):
             found.append(Found(test, gains.of_groups(noise, one)))
     tails = [one for one in found if one.test.subject == "kurtosis"]
     of_size = [one for one in found if one.test.subject != "kurtosis"]
+    if tails:
+        # Noise with tails makes groups scatter: they count with what they gain beyond its size.
+        whole = gains.of_scale(noise.value, noise.freedom)
+        of_size = [
+            one
+            for one in of_size
+            if one.test.subject == "noise" or one.gain - whole > tails[0].gain
+        ]
     if not of_size:
         return tails
     best = max(of_size, key=lambda one: one.gain)

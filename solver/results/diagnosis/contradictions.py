@@ -44,34 +44,35 @@ def beyond_shift(diagnosis: Diagnosis, found: Found, shift: float) -> list[Found
     numbers = chi2, dof, float(np.sqrt(2.0 * dof)), chance, sigmas(chance)
     of_one = next(one.name for one in diagnosis.tests if one.subject == kind[1])
     tests = [Test(found.test.name, kind[0], (), *numbers), furthest_test(of_one, kind[1], stars)]
-    return _of_stars(stars, tests, kind, limit_of(diagnosis))
+    return _of_stars(diagnosis, stars, tests, kind)
 
 
 def _of_kind(diagnosis: Diagnosis, stars: CatalogueChi2, kind: tuple[str, str]) -> list[Found]:
     tests = [one for one in diagnosis.tests if one.subject in kind]
-    return _of_stars(stars, tests, kind, limit_of(diagnosis))
+    return _of_stars(diagnosis, stars, tests, kind)
 
 
 def _of_stars(
-    stars: CatalogueChi2, tests: list[Test], kind: tuple[str, str], limit: float
+    diagnosis: Diagnosis, stars: CatalogueChi2, tests: list[Test], kind: tuple[str, str]
 ) -> list[Found]:
     ids, chi2, factor, rescaled = stars
     if not len(chi2):
         return []
     of_all, of_one = kind
     worst = min(tests, key=lambda one: one.log_chance)
-    if worst.log_chance > limit:
+    if worst.log_chance > limit_of(diagnosis):
         return []
     # Wrong stars pull the frame, and so all others; only those that are far beyond are wrong.
     far = rescaled > chdtri(2.0, -np.expm1(np.log1p(-_STAR_LIMIT) / len(chi2)))
     # Catalogue errors of other stars may be mere bounds: a few that are further are no news then.
     if not far.any() or (of_all == "others" and factor > _ALL_ARE_OFF):
-        typical = max(float(np.median(chi2)) / MEDIAN_CHI2, 1.0)
+        typical = max(float(np.median(chi2)) / MEDIAN_CHI2 / diagnosis.scale, 1.0)
         gain = gains.of_scale(typical, 2.0 * len(chi2))
         return [Found(worst._replace(subject=of_all), gain, size=factor)]
     order = np.argsort(-chi2[far])
     named = tuple(int(one) for one in ids[far][order])
-    gain = float(np.sum(chi2[far] - 2.0 * gains.PER_PARAMETER))
+    # As that of all other causes, by the scatter of the residuals.
+    gain = float(np.sum(chi2[far] / diagnosis.scale - 2.0 * gains.PER_PARAMETER))
     return [Found(worst._replace(subject=of_one), gain, named, float(far.sum()))]
 
 

@@ -84,14 +84,14 @@ def of_slope(noise: Scatter, slope: Scatter) -> float:
     return of_scale(noise.value, noise.freedom) + squares - PER_PARAMETER
 
 
-def of_kurtosis(noise: Scatter, kurtosis: Scatter) -> float:
-    """Return the gain of a noise with other tails, which includes that of the noise as a whole.
+def of_kurtosis(kurtosis: Scatter) -> float:
+    """Return the gain of a noise with other tails, but of the stated size.
 
     It grows with the square of a small kurtosis, and slowly with a large one, which sources of
     different noise make.
     """
     n, squares = kurtosis.freedom, (kurtosis.value / kurtosis.scatter) ** 2
-    return of_scale(noise.value, noise.freedom) + n * float(np.log1p(squares / n)) - PER_PARAMETER
+    return n * float(np.log1p(squares / n)) - PER_PARAMETER
 
 
 def of_outliers(diagnosis: Diagnosis) -> float:

@@ -10,7 +10,7 @@ from solver.results.diagnosis.rows import Rows
 # Chance of a good residual beyond `rows.FAR` on either axis.
 _FAR_BY_CHANCE = 4.0e-9
 # Degrees of freedom below which a chi2 says nothing.
-_FEWEST = 2.0
+FEWEST = 2.0
 # Of a measurement; those of which the fit leaves less are rounding errors.
 _LEAST_DOF = 0.04
 
@@ -78,7 +78,7 @@ def _normalised(chi2: np.ndarray, dof: np.ndarray) -> np.ndarray:
 def _dispersion(name: str, group: np.ndarray, chi2: np.ndarray, dof: np.ndarray) -> Scatter:
     """Return whether the chi2 of groups scatter about their expected values as by chance."""
     of_chi2, of_dof = np.bincount(group, chi2), np.bincount(group, dof)
-    known = of_dof > _FEWEST
+    known = of_dof > FEWEST
     z = _normalised(of_chi2[known], of_dof[known])
     freedom = max(float(known.sum()) - 1.0, 0.0)
     squares = float(np.sum(z**2))

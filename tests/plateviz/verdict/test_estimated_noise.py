@@ -40,10 +40,10 @@ def test_several_parts_make_one_sentence():
     entry |= {"floor_pix": 0.002, "floor_sigma_pix": 0.0001}
     settings = {"noise_by_magnitude": True, "noise_floor": True, "reference_scale": True}
     (found,) = noise_sentences(solution(entry, **settings))
-    assert "at the mean magnitude as 1.000 ± 0.01 times" in found
+    assert "at the mean magnitude as 1.00 ± 0.01 times" in found
     assert "a floor of 2 ± 0.1 mpix" in found
     assert found.endswith(
-        "and the errors of the reference stars as 2.000 ± 0.02 times those stated."
+        "and the errors of the reference stars as 2.00 ± 0.02 times those stated."
     )
 
 

@@ -22,7 +22,7 @@ def test_narrow_prior_is_to_be_as_wide_as_usual():
     narrow = {"distortion_x": 0.03}
     said = said_with(prior_widths=narrow)
     assert said.title == "the prior of distortion_x contradicts the measurements"
-    assert "8 times its width" in said.words
+    assert "8 times as far from its centre" in said.words
     assert "0.03 um." in said.words
     wider = remedied(FitSettings(prior_widths=narrow), said.options)
     assert wider.width("distortion_x") == BY_NAME["distortion_x"].width

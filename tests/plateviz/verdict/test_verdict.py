@@ -96,7 +96,9 @@ def stuck_with(result, rows, factor):
     return replace(with_summary(result, converged=False, reason="stuck"), residuals=residuals)
 
 
-@pytest.mark.parametrize(("factor", "state"), [(1.5, "good"), (27.0, "good"), (53.8, "bad")])
+@pytest.mark.parametrize(
+    ("factor", "state"), [(1.5, "good"), (4.0, "good"), (27.0, "warn"), (53.8, "bad")]
+)
 def test_catalogue_whose_errors_had_to_be_multiplied_by_much_is_not_trusted(
     monkeypatch, fit_result, factor, state
 ):

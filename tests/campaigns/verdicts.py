@@ -86,7 +86,7 @@ def trial(number: int) -> Record:
     found = pulls(result.sources, result.true_places)
     record = {
         "state": verdict.state,
-        "causes": [cause.name for cause in verdict.causes],
+        "causes": [cause.name for cause in verdict.causes if not cause.instead_of],
         "sigma": round(float(verdict.causes[0].significance), 1) if verdict.causes else 0.0,
         "converged": bool(result.summary["converged"]),
         "pull": round(float(np.sqrt(np.mean(found**2))), 4),

@@ -74,12 +74,20 @@ def _panel(
             *key(length, length_text, scale=scale, field=field),
         ],
         title=title,
-        subtitle=f"rms {_length(1000.0 * rms)} = {angle_text(rms * mas_per_mm)}; {_removed(rows)}\n"
+        subtitle=f"rms {_length(1000.0 * rms)} = {angle_text(rms * mas_per_mm)}"
+        f"{_unmeasured(rows, detectors)}; {_removed(rows)}\n"
         f"Arrows enlarged {scale:,.12g} times; key: {length_text}",
         x=Axis(XLABEL, field.x),
         y=Axis(YLABEL, field.ylim),
         width=width,
     )
+
+
+def _unmeasured(rows: pd.DataFrame, detectors: Sequence[Detector]) -> str:
+    known = set(rows["detector_id"])
+    others = [str(one.detector_id) for one in detectors if one.detector_id not in known]
+    named = f"detector{'s' if others[1:] else ''} {', '.join(others)}"
+    return f" without {named}, of which there are no measurements" if others else ""
 
 
 def _removed(rows: pd.DataFrame) -> str:

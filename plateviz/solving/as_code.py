@@ -22,28 +22,36 @@ FigureCall = tuple[str, Mapping[str, object]]
 """Name of a figure, and the keywords with which it is drawn."""
 
 
-def as_command(origin: Origin, orbit: int | None, settings: FitSettings, name: str = NAME) -> str:
+def as_command(
+    origin: Origin,
+    orbit: int | None,
+    settings: FitSettings,
+    name: str = NAME,
+    accept: bool = False,
+) -> str:
     """Return the command line that makes a solution.
 
     Parameters
     ----------
     orbit : orbit_id; None if the origin is files with one orbit only
     name : of the run, or of the result file without its suffix
+    accept : whether it ends well for a solution that should not be trusted, too
 
     Raises
     ------
     ValueError
         If a survey is given without an orbit.
     """
+    accepted = ["--accept"] if accept else []
     if isinstance(origin, SurveyFolder):
         if orbit is None:
             raise ValueError("orbit: expected an orbit_id of the survey, found None")
         words = ["plateviz", "survey", origin.directory, "--run", name, "--orbits", str(orbit)]
-        return _in_lines(words, _options(settings, "survey"))
+        return _in_lines(words + accepted, _options(settings, "survey"))
     words = ["plateviz", "fit", origin.observations, origin.reference, "-o", f"{name}.fits"]
     for name, value in _files(origin):
         words += [f"--{name}", str(value)]
-    return _in_lines(words, _options(settings, "fit"))
+    return _in_lines(words + accepted, _options(settings, "fit"))
 
 
 def report_command(

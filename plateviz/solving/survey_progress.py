@@ -66,13 +66,13 @@ def require_trust(report: "Report", verdict: Verdict) -> None:
         raise DistrustError(
             f"the solutions of {orbits_text(len(orbits))} should not be trusted as they are: "
             f"{listed}; they are written. `plateviz report {quote(str(report.run.survey))} "
-            f"--run {report.run.name} --orbit {orbits[0]}` says why, and --accept ends with exit "
-            "code 0"
+            f"--run {report.run.name} --orbit {orbits[0]} -o report.html` says why, and --accept "
+            "ends with exit code 0"
         )
     if verdict.state == "bad":
         raise DistrustError(
             f"{verdict.headline} It is written. `plateviz report {quote(str(report.run.survey))} "
-            f"--run {report.run.name}` says why, and --accept ends with exit code 0"
+            f"--run {report.run.name} -o report.html` says why, and --accept ends with exit code 0"
         )
 
 

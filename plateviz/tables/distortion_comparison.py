@@ -39,6 +39,8 @@ def distortion_comparison(
     if all detectors move against the optical axis, the distortion about the new axis has other
     coefficients, but every star stays where it was.
 
+    A detector without measurements in a fit, which is where its prior has it, has no points.
+
     Parameters
     ----------
     result_a : the fit taken as reference
@@ -53,7 +55,8 @@ def distortion_comparison(
     what was removed: `shift_um`, `roll_arcsec`, `scale_ppm`
     """
     a, b = (fitted_calibration(one, instrument) for one in (result_a, result_b))
-    return _difference(a, b, instrument)
+    is_measured = _measured(result_a, instrument) & _measured(result_b, instrument)
+    return _difference(a, b, instrument, is_measured)
 
 
 def distortion_truth(
@@ -75,13 +78,22 @@ def distortion_truth(
     a source, of which the calibration is a part
     """
     found = fitted_calibration(result, instrument)
-    table = _difference(simulated_calibration(truth, instrument), found, instrument)
+    simulated = simulated_calibration(truth, instrument)
+    table = _difference(simulated, found, instrument, _measured(result, instrument))
     sigma = result.sources[["sigma_ra_marginal", "sigma_dec_marginal"]].to_numpy()
     return table.assign(source_mas=np.median(sigma))
 
 
-def _difference(a: MeanCalibration, b: MeanCalibration, instrument: Instrument) -> pd.DataFrame:
+def _measured(result: FitResult, instrument: Instrument) -> np.ndarray:
+    """Return which detectors a fit has measurements of."""
+    return np.isin(instrument.detector_ids, result.residuals["detector_id"].unique())
+
+
+def _difference(
+    a: MeanCalibration, b: MeanCalibration, instrument: Instrument, is_measured: np.ndarray
+) -> pd.DataFrame:
     numbers, pixels = _grid(instrument)
+    numbers, pixels = numbers[is_measured[numbers]], pixels[is_measured[numbers]]
     focal, scale = a.focal_length, instrument.distortion_scale_um
     places_a, places_b = (one.ideal(scale, numbers, pixels) for one in (a, b))
     moved = focal * (places_a / focal - places_b / b.focal_length)

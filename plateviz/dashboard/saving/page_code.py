@@ -26,6 +26,7 @@ from plateviz.solving.as_code import (
     report_of_run,
 )
 from plateviz.solving.origin import SurveyFolder
+from plateviz.verdict.verdict import orbit_verdict
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 
@@ -94,12 +95,13 @@ def _of_solution(navigation: Navigation) -> PageCode:
         more = ["--both", name] if other.orbit == shown.orbit else []
     origin = session.store.origin
     made = _free_name(navigation, NAME, shown.settings)
-    commands = [as_command(origin, shown.orbit, shown.settings, made)]
+    commands = [as_command(origin, shown.orbit, shown.settings, made, _is_distrusted(shown))]
     compared = other is not None and other.orbit == shown.orbit
     second = None
     if other is not None and compared:
         second = _free_name(navigation, f"{NAME}-other", other.settings)
-        commands.append(as_command(origin, other.orbit, other.settings, second))
+        accept = _is_distrusted(other)
+        commands.append(as_command(origin, other.orbit, other.settings, second, accept))
     commands.append(report_command(origin, shown.orbit, second, more, made))
     python = [as_python(origin, shown.orbit, shown.settings)]
     if other is not None:
@@ -115,6 +117,11 @@ def _of_solution(navigation: Navigation) -> PageCode:
     words += [_OF_ONE_ORBIT] if isinstance(origin, SurveyFolder) else []
     words += [_OF_OTHER_ORBIT] if other is not None and not compared else []
     return PageCode(" ".join(words), " &&\n".join(commands), "\n".join(filter(None, python)))
+
+
+def _is_distrusted(solution: Solution) -> bool:
+    """Return whether the command that makes a solution would end as if it had failed."""
+    return orbit_verdict(solution.result).state == "bad"
 
 
 def _free_name(navigation: Navigation, name: str, settings: FitSettings) -> str:

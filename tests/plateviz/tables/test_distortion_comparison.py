@@ -199,6 +199,18 @@ CAUSES = {
 }
 
 
+def test_detector_without_measurements_does_not_count(fit_result, instrument):
+    """It is where its prior has it, some 10 µm from where it belongs."""
+    left_out = int(instrument.detector_ids[2])
+    rows = fit_result.residuals
+    without = replace(fit_result, residuals=rows[rows["detector_id"] != left_out])
+    found = moved(without, detector_x=lambda v: v + 100.0 * (np.arange(len(v)) == 2))
+    table = tables.distortion_comparison(fit_result, found, instrument)
+    assert left_out not in set(table["detector_id"])
+    assert np.abs(table[["dx_um", "dy_um"]].to_numpy()).max() < 1e-9
+    assert set(table["detector_id"]) == set(instrument.detector_ids) - {left_out}
+
+
 @pytest.fixture(scope="module")
 def with_causes():
     """A small orbit with nothing that the paper's model lacks, fitted with causes."""

@@ -9,6 +9,7 @@ import pytest
 
 import plateviz
 from plateviz.dashboard.navigation.navigation import View
+from plateviz.dashboard.saving import page_code as module
 from plateviz.dashboard.saving.page_code import page_code
 from plateviz.dashboard.session.orbit_figures import chosen_of, figures_of
 from plateviz.notebook.keywords import settings_with
@@ -106,7 +107,8 @@ def test_compared_solution_is_made_too(solved, make_fit_result):
     require_same(figures[both.name]._plot(), figure_of_both(both, chosen))
     assert "It is a what-if" in code.about
     assert "Without --orbits" in code.about
-    made, other, report = code.command.replace("\\\n", "").splitlines()
+    command = code.command.replace("\\\n", "").replace(" --accept", "")
+    made, other, report = command.splitlines()
     assert "--run reproduced --orbits 0   --order 3" in made
     assert other.startswith("plateviz survey sky --run reproduced-other --orbits 0")
     assert shlex.split(report)[2:8] == ["sky", "--run", "reproduced", "--orbit", "0", "--other"]
@@ -193,3 +195,12 @@ def test_name_of_a_run_with_other_settings_is_not_taken(solved, fit_result, surv
     solved.known_runs["reproduced"] = other
     expected = code.command.replace("--run reproduced ", "--run reproduced-2 ")
     assert page_code(solved).command == expected.replace("reproduced.html", "reproduced-2.html")
+
+
+def test_command_of_a_solution_that_is_not_trusted_does_not_stop_before_the_report(
+    solved, monkeypatch
+):
+    for state, is_accepted in (("warn", False), ("bad", True)):
+        judged = SimpleNamespace(state=state)
+        monkeypatch.setattr(module, "orbit_verdict", lambda _, judged=judged: judged)
+        assert ("--accept" in page_code(solved).command) == is_accepted

@@ -70,6 +70,9 @@ class SaveButton(pn.custom.JSComponent):
       try {
         for (let turn = 0; turn < 200 && !drawn.is_idle; turn++) await pause()
         await pause()
+        // As SVG, Bokeh measures a legend beside the frame before the marks in it have their size.
+        for (const plot of views.query(one => "below" in one.model)) plot.invalidate_layout()
+        await pause()
         keep(name, await view.export(name.split(".").pop()).to_blob())
       } finally {
         views.clear()

@@ -54,10 +54,11 @@ class JobTimes:
 
     def left(self, job: Job) -> float | None:
         """Return the seconds that a job still has to run; None if nothing tells."""
-        total = _steps(job.request)
-        done = _last_step(job)
-        if total and done:
-            return job.seconds_running * max(total - done, 0) / done
+        total, first, done = _steps(job.request), job.first_step, _last_step(job)
+        # Before the first step, models are compiled: only the steps after it tell the rate.
+        if total and first and done and done > first[0]:
+            per_step = (job.seconds_running - first[1]) / (done - first[0])
+            return per_step * max(total - done, 0)
         with self._lock:
             before = list(self._seconds[_kind(job.request)])
         return max(statistics.median(before) - job.seconds_running, 0.0) if before else None

@@ -48,6 +48,7 @@ class Job:
         self._forecast: Callable[[], str] = lambda: ""
         self._started = time.monotonic()
         self._begun: float | None = None
+        self._first_step: tuple[int, float] | None = None
         self._ended: float | None = None
 
     @property
@@ -64,6 +65,11 @@ class Job:
     def progress(self) -> list[Mapping[str, object]]:
         """Progress events so far."""
         return list(self._progress)
+
+    @property
+    def first_step(self) -> tuple[int, float] | None:
+        """Number of the first step that was told, and the seconds until then; None before it."""
+        return self._first_step
 
     @property
     def progress_text(self) -> str:
@@ -174,6 +180,9 @@ class Job:
                     self._begun = time.monotonic()
                 if event is not None:
                     self._progress.append(event)
+                    step = event.get("iteration")
+                    if isinstance(step, int) and self._first_step is None:
+                        self._first_step = step, self.seconds_running
                 if status.is_over:
                     self._ended = time.monotonic()
                     listeners, self._listeners = self._listeners, []

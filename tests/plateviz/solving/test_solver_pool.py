@@ -133,13 +133,16 @@ def test_one_process_does_everything_in_order(queues):
 
 
 def test_waiting_job_tells_its_place_and_when_it_begins(pool, queues, monkeypatch):
-    monkeypatch.setattr(Job, "seconds_running", 20.0)
     first, second, third = [pool.submit(fit(orbit, "svi")) for orbit in range(3)]
     assert "2 fits before it" in third.progress_text
     assert "begins" not in third.progress_text
     svi = FitSettings().svi
-    step = (svi.steps + svi.patience) // 5
-    first.take({"event": "progress", "stage": f"step {step}", "iteration": step})
+    total = svi.steps + svi.patience
+    # It compiles for a minute, which says nothing of its steps.
+    for step, seconds in ((total // 10, 60.0), (total // 5, 70.0)):
+        monkeypatch.setattr(Job, "seconds_running", seconds)
+        first.take({"event": "progress", "stage": f"step {step}", "iteration": step})
+        assert ("begins" in second.progress_text) == (seconds > 60.0)
     assert second.progress_text == ("waiting for the solver, 1 fit before it, begins in about 80 s")
     assert ", about 80 s left)" in first.progress_text
     queues[1].finish()

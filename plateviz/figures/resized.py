@@ -22,7 +22,7 @@ _TITLE, _TOOLBAR, _SPACE, _LINE, _BELOW, _LABEL, _FREE = 19, 38, 18, 15, 48, 18,
 _ROW, _MARK = 26, 32
 # Words that would leave a frame less than this height, in screen pixels, or less than this share of
 # its height, are left out.
-_ENOUGH, _SHARE = 110, 0.65
+_ENOUGH, _SHARE = 100, 0.65
 # Lines of the label of an axis, at most.
 _X_LINES, _Y_LINES = 2, 3
 
@@ -84,11 +84,13 @@ def _with_one_legend(figure: Figure, columns: int) -> Figure:
     A legend of its own below each would say the same.
     """
     labels = {frozenset(_labels(frame)) for frame in figure}
-    if len(labels) > 1 or not all(frame.legend_columns for frame in figure):
+    if len(labels) > 1 or not any(frame.legend_columns for frame in figure):
         return figure
     last = (len(figure) - 1) // columns * columns
+    legend_columns = max(frame.legend_columns for frame in figure)
     frames = [
-        frame if n == last else replace(frame, legend_columns=0) for n, frame in enumerate(figure)
+        replace(frame, legend_columns=legend_columns if n == last else 0)
+        for n, frame in enumerate(figure)
     ]
     return replace(figure, frames=tuple(frames))
 

@@ -129,7 +129,8 @@ class SurveyRun:
         complete, failures = set(self._run.complete_orbits()), self._run.failures()
         rows = []
         for orbit in survey_orbits(self.survey):
-            row: dict[str, object] = {"orbit_id": orbit, "status": "missing", "message": ""}
+            row: dict[str, object] = {"orbit_id": orbit, "status": "missing"}
+            row |= {"message": "", "state": ""}
             if orbit in complete:
                 row |= {"status": "complete", **self._figures(orbit)}
             elif orbit in failures:
@@ -252,7 +253,10 @@ class SurveyRun:
         with reading(str(directory), "the summary of a fitted orbit"):
             figures = {name: summary.get(name) for name in RUN_ORBITS.names if name in summary}
             seconds = sum(float(value) for value in summary["seconds"].values())
-            return {**figures, "epoch": summary["epoch_mjd"], "seconds": seconds}
+            # Of an old version it may be there without a verdict.
+            state = summary.get("verdict", {}).get("state", "")
+            figures |= {"state": state, "epoch": summary["epoch_mjd"], "seconds": seconds}
+            return figures
 
     def _table(
         self, name: str, columns: list[str] | None = None, rows: Expression | None = None

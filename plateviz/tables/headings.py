@@ -23,6 +23,7 @@ ORBITS_OF_RUN: Mapping[str, Heading] = {
     "orbit_id": Heading("orbit", "0"),
     "date": Heading("mean epoch (TCB)"),
     "status": Heading("status"),
+    "verdict": Heading("verdict"),
     "chi2_per_dof": Heading("χ²/dof", "0.000"),
     "normalised_deviation_ra": Heading("deviation/σ", "0.000", _ALPHA),
     "expected_normalised_deviation_ra": Heading("expected", "0.000", _ALPHA),

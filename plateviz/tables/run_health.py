@@ -14,6 +14,7 @@ COMPLETE, FAILED, MISSING = "complete", "failed", "missing"
 _OF_STATUS: Mapping[str, State] = MappingProxyType(
     {COMPLETE: "good", FAILED: "bad", MISSING: "warn"}
 )
+_VERDICTS = {"good": "trusted", "warn": "with care", "bad": "not trusted"}
 
 
 def orbit_list(orbits: pd.DataFrame) -> pd.DataFrame:
@@ -25,9 +26,11 @@ def orbit_list(orbits: pd.DataFrame) -> pd.DataFrame:
 
     Returns
     -------
-    `orbit_id`, `date` (of the mean epoch, as text), and the numbers that describe the fit
+    `orbit_id`, `date` (of the mean epoch, as text), `verdict` in words, and the numbers that
+    describe the fit
     """
-    return orbits.assign(date=dates(orbits["epoch"]))[list(ORBITS_OF_RUN)]
+    verdict = orbits["state"].map(_VERDICTS).fillna("")
+    return orbits.assign(date=dates(orbits["epoch"]), verdict=verdict)[list(ORBITS_OF_RUN)]
 
 
 def orbit_states(orbits: pd.DataFrame) -> pd.DataFrame:
@@ -39,6 +42,7 @@ def orbit_states(orbits: pd.DataFrame) -> pd.DataFrame:
     """
     columns = {
         "status": orbits["status"].map(_OF_STATUS),
+        "verdict": orbits["state"].where(orbits["state"] != "", "neutral"),
         "chi2_per_dof": _verdicts(orbits["chi2_per_dof"], 1.0, 2.0 / _positive(orbits["dof"])),
         "iterations": np.where(orbits["converged"] == 0, "bad", "neutral"),
     }

@@ -44,7 +44,7 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     if len(diagnosis.states) == 1:
         # Nothing is compared with other orbits: the run is as good as its only orbit.
         by_tests = worst([by_tests, diagnosis.states.iloc[0]])
-    of_orbits = orbit_states(orbits).drop(columns="status")
+    of_orbits = orbit_states(orbits).drop(columns=["status", "verdict"])
     is_off = (of_orbits == "bad").any(axis=1) & (orbits["status"] == COMPLETE)
     far = orbits[is_off]
     # Some numbers of many orbits are far off by chance; the tests know how many, but not of orbits
@@ -65,6 +65,8 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     notable = _failed(orbits)
     if len(far):
         notable.append(f"Numbers far from their expected values: {_named(far['orbit_id'])}.")
+    if len(careful := diagnosis.states[diagnosis.states == "warn"]):
+        notable.append(f"Solutions to be used with care: {_named(pd.Series(careful.index))}.")
     if len(distrusted := diagnosis.states[diagnosis.states == "bad"]):
         notable.append(f"Solutions not to be trusted: {_named(pd.Series(distrusted.index))}.")
     tests = _in_words(diagnosis, found)

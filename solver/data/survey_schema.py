@@ -152,6 +152,7 @@ RUN_ORBITS = Table(
         _ORBIT,
         Column("status", "str", "", "complete, failed or missing"),
         Column("message", "str", "", "why the fit failed; empty otherwise"),
+        Column("state", "str", "", "of the verdict: good, warn or bad; empty without one"),
         *(
             Column(name, "float64", unit, meaning, may_be_nan=True)
             for name, unit, meaning in (

@@ -130,6 +130,7 @@ def _orbits(random: np.random.Generator, n_orbits: int, n_sources: int) -> pd.Da
             "orbit_id": number,
             "status": "complete",
             "message": "",
+            "state": "good",
             "epoch": np.take(_SEASONS, season) + days,
             "converged": 1.0,
             "iterations": 3.0,
@@ -151,11 +152,13 @@ def _orbits(random: np.random.Generator, n_orbits: int, n_sources: int) -> pd.Da
             "seconds": random.uniform(3.0, 4.0, n_orbits),
         }
     )[survey_schema.RUN_ORBITS.names]
-    figures = table.columns.difference(["orbit_id", "status", "message"])
+    figures = table.columns.difference(["orbit_id", "status", "message", "state"])
     table.loc[table["orbit_id"].isin(FAILED), figures] = np.nan
-    table.loc[table["orbit_id"].isin(FAILED), ["status", "message"]] = ["failed", "not finite"]
+    table.loc[table["orbit_id"].isin(FAILED), ["status", "message", "state"]] = [
+        *("failed", "not finite", "")
+    ]
     table.loc[n_orbits - 1, figures] = np.nan
-    table.loc[n_orbits - 1, "status"] = "missing"
+    table.loc[n_orbits - 1, ["status", "state"]] = ["missing", ""]
     return table
 
 

@@ -282,5 +282,6 @@ def _counted(table: ExplorableTable, extent: Extent, chosen: Columns) -> list[st
         words.append(f"{extent.n_left_out:,} not between the limits of {chosen.only}")
     without = total - extent.n_left_out - shown
     if without:
-        words.append(f"{without:,} without a value on these axes")
+        is_log = chosen.is_log_x or chosen.is_log_y
+        words.append(f"{without:,} without a {'positive ' if is_log else ''}value on these axes")
     return words

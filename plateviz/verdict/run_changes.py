@@ -106,12 +106,12 @@ def _sources(a: ComparedRun, b: ComparedRun) -> list[Row]:
     chosen = _without_references(shared)
     if chosen.b.empty:
         return rows
-    rows.append(("Sources compared", "", "", f"{len(chosen.b):,}"))
+    rows.append(("Compared below: non-reference sources", "", "", f"{len(chosen.b):,}"))
     for name, words in PARAMETER_NAMES.items():
         sigmas = (one[f"sigma_{name}"].median() for one in (chosen.a, chosen.b))
         rows.append(_merit(f"Median σ of {words} ({_UNITS[name]})", sigmas))
     chi2 = (_chi2_per_dof(one) for one in (chosen.a, chosen.b))
-    rows.append(_merit("χ² per degree of freedom of the motions", chi2))
+    rows.append(_merit("χ² per degree of freedom of their motions", chi2))
     differences = motion_differences(chosen)
     for name, words in PARAMETER_NAMES.items():
         pulls = [_rms(one[f"pull_{name}"]) for one in (chosen.a, chosen.b)]

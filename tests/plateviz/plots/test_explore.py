@@ -151,7 +151,7 @@ def test_rows_without_a_value_are_counted():
     table = table_of(x=np.array([1.0, np.nan, -1.0, 2.0]), y=np.ones(4))
     (frame,) = explored_figure(table, Columns("x", "y", is_log_x=True))
     assert frame["rows"].values("x").tolist() == [1.0, 2.0]
-    assert frame.subtitle == "2 of 4 stars; 2 without a value on these axes"
+    assert frame.subtitle == "2 of 4 stars; 2 without a positive value on these axes"
 
 
 def test_nothing_to_draw_is_said():

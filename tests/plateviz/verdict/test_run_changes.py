@@ -84,7 +84,7 @@ def test_figures_of_merit_are_of_the_sources_in_both(survey, shifted):
     rows = rows_of(compared(survey, survey.motions), compared(survey, shifted))
     both = shared_motions(survey.motions, shifted)
     chosen = both.b["source_class"] != "reference"
-    assert rows.loc["Sources compared", "change"] == str(int(chosen.sum()))
+    assert rows.loc["Compared below: non-reference sources", "change"] == str(int(chosen.sum()))
     of_a, of_b, change = rows.loc["Median σ of parallax (mas)"]
     expected = float(both.a.loc[chosen, "sigma_parallax"].median())
     assert float(of_a) == pytest.approx(expected, abs=5e-5)
@@ -118,5 +118,5 @@ def test_run_that_is_not_gathered_has_its_orbits_only(survey):
     growing = compared(survey, survey.motions.head(0))
     rows = rows_of(compared(survey, survey.motions), growing)
     assert rows.loc["Sources with a fitted motion", "b"] == "0"
-    assert "Sources compared" not in rows.index
+    assert "Compared below: non-reference sources" not in rows.index
     assert rows.loc["Orbits fitted", "change"] == "0"

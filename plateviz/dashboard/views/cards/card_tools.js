@@ -106,7 +106,8 @@ export function render({ model, el }) {
   colour()
   model.on("theme", colour)
   // Where a figure is drawn anew at once, a word would only flicker.
-  const stale = made("p", "The last solution; another is being computed", "stale")
+  const stale = made("p", "Being computed", "stale")
+  stale.title = "The last solution; another is being computed"
   stale.setAttribute("role", "status")
   const follow = () => { stale.hidden = !model.is_stale }
   follow()

@@ -130,7 +130,7 @@ class SurveyRun:
         rows = []
         for orbit in survey_orbits(self.survey):
             row: dict[str, object] = {"orbit_id": orbit, "status": "missing"}
-            row |= {"message": "", "state": ""}
+            row |= dict.fromkeys(("message", "state"), "")
             if orbit in complete:
                 row |= {"status": "complete", **self._figures(orbit)}
             elif orbit in failures:
@@ -253,10 +253,9 @@ class SurveyRun:
         with reading(str(directory), "the summary of a fitted orbit"):
             figures = {name: summary.get(name) for name in RUN_ORBITS.names if name in summary}
             seconds = sum(float(value) for value in summary["seconds"].values())
-            # Of an old version it may be there without a verdict.
-            state = summary.get("verdict", {}).get("state", "")
-            figures |= {"state": state, "epoch": summary["epoch_mjd"], "seconds": seconds}
-            return figures
+            # Older versions wrote no verdict.
+            figures["state"] = summary.get("verdict", {}).get("state", "")
+            return {**figures, "epoch": summary["epoch_mjd"], "seconds": seconds}
 
     def _table(
         self, name: str, columns: list[str] | None = None, rows: Expression | None = None

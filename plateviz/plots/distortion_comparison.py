@@ -50,7 +50,7 @@ def plot_distortion_comparison(
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        text = "No second solution"
+        text = "No detector has measurements in both solutions"
         return message(_TITLE, text, width=width, xlabel=XLABEL, ylabel=YLABEL)
     field = field_about(table, _MARGIN)
     panels = [

@@ -254,7 +254,7 @@ class SurveyRun:
             figures = {name: summary.get(name) for name in RUN_ORBITS.names if name in summary}
             seconds = sum(float(value) for value in summary["seconds"].values())
             # Older versions wrote no verdict.
-            figures["state"] = summary.get("verdict", {}).get("state", "")
+            figures["state"] = (summary.get("verdict") or {}).get("state", "")
             return {**figures, "epoch": summary["epoch_mjd"], "seconds": seconds}
 
     def _table(

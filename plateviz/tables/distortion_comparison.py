@@ -147,7 +147,7 @@ def _without_common(
         ]
     ).reshape(4, -1)
     # Columns of one size, so that none is lost by rounding.
-    size = np.linalg.norm(terms, axis=1)
+    size = np.maximum(np.linalg.norm(terms, axis=1), np.finfo(float).tiny)
     found, *_ = np.linalg.lstsq((terms.T / size), difference.T.ravel(), rcond=None)
     common = (terms.T @ (found / size)).reshape(2, -1).T
     return difference - common, found / size

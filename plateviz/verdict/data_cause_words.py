@@ -143,10 +143,10 @@ def said_of_references(case: Case) -> Said:
 
 
 def said_of_wrong_catalogue(evidence: str) -> Said:
-    """Return what is said of a catalogue that the reference stars are nowhere near."""
+    """Return what is said of a catalogue that the reference stars are much too far from."""
     return Said(
         "wrong-catalogue",
-        "the reference stars are nowhere near the catalogue",
+        "the reference stars are much further from the catalogue than it states",
         f"{evidence} {_OTHER_ERRORS}.",
         "check the epochs, proper motions and units of the catalogue, and the times of the "
         "exposures",

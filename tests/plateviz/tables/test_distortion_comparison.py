@@ -8,6 +8,7 @@ import pytest
 from numpy.polynomial import legendre
 
 from plateviz import tables
+from plateviz.plots.distortion_comparison import plot_distortion_comparison
 from plateviz.tables.distortion_comparison import ALONE, TOGETHER
 from plateviz.tables.mean_calibration import fitted_calibration
 from solver.data.exclusions import Exclusions
@@ -209,6 +210,18 @@ def test_detector_without_measurements_does_not_count(fit_result, instrument):
     assert left_out not in set(table["detector_id"])
     assert np.abs(table[["dx_um", "dy_um"]].to_numpy()).max() < 1e-9
     assert set(table["detector_id"]) == set(instrument.detector_ids) - {left_out}
+
+
+def test_fits_of_different_detectors_have_nothing_to_compare(fit_result, instrument):
+    first, *others = instrument.detector_ids
+    a, b = (
+        replace(fit_result, residuals=fit_result.residuals.query("detector_id in @ids"))
+        for ids in ([first], others)
+    )
+    table = tables.distortion_comparison(a, b, instrument)
+    assert table.empty
+    figure = plot_distortion_comparison(table, detectors=instrument.detectors)
+    assert "No detector" in figure.message
 
 
 @pytest.fixture(scope="module")

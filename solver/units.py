@@ -21,22 +21,31 @@ if TYPE_CHECKING:
     from astropy.units import UnitBase
 
 RAD_PER_DEG = math.pi / 180.0
+RAD_PER_ARCMIN = RAD_PER_DEG / 60.0
 RAD_PER_ARCSEC = RAD_PER_DEG / 3600.0
 RAD_PER_MAS = RAD_PER_ARCSEC / 1000.0
 MAS_PER_DEG = 3.6e6
 ARCMIN_PER_DEG = 60.0
 MAS_PER_ARCMIN = 60_000.0
+MAS_PER_ARCSEC = 1000.0
 ARCSEC_PER_DEG = 3600.0
 SECONDS_PER_DAY = 86_400.0
+SECONDS_PER_MINUTE = 60.0
 MINUTES_PER_DAY = 1440.0
 UAS_PER_MAS = 1000.0
+UM_PER_MM = 1000.0
+NM_PER_UM = 1000.0
+MPIX_PER_PIX = 1000.0
+# Not the inverse in floating point: a thousandth is rounded.
 PIX_PER_MPIX = 1e-3
+# One part per million.
+PPM = 1e-6
 DAYS_PER_JULIAN_YEAR = 365.25
 MJD_J2000 = 51544.5
 KM_PER_S_IN_C = 1.0 / 299_792.458
 
 # Names that astropy does not know, with their value.
-_MORE_UNITS = {"ppm": 1e-6}
+_MORE_UNITS = {"ppm": PPM}
 
 
 @cache

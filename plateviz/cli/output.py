@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from solver.data.settings import COUNTED
+from solver.units import MPIX_PER_PIX
 
 if TYPE_CHECKING:
     from solver.results.agreement import Comparison
@@ -186,7 +187,7 @@ def _chi2(summary: Mapping[str, Any]) -> str:
 
 
 def _milli_pixels(summary: Mapping[str, Any]) -> str:
-    x, y = (1e3 * summary[f"residual_rms_{axis}"] for axis in "xy")
+    x, y = (MPIX_PER_PIX * summary[f"residual_rms_{axis}"] for axis in "xy")
     return f"{x:.2f}, {y:.2f} mpix in x, y"
 
 

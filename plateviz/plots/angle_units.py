@@ -16,10 +16,9 @@ from plateviz.figures.figure import Axis, Figure, Frame, Glyphs, Look, Ramp, Too
 from plateviz.plots.ticks import log_ticks
 from plateviz.plots.units import number_text
 from solver.data.instrument import Instrument
-from solver.units import RAD_PER_MAS, UAS_PER_MAS
+from solver.units import MPIX_PER_PIX, RAD_PER_MAS, UAS_PER_MAS
 
 Unit = Literal["mas", "µas", "mpix"]
-_MPIX_PER_PIX = 1000.0
 _MOST_DECIMALS = 8
 
 _UNITS = r"(mas|µas|mpix)"
@@ -86,7 +85,7 @@ class AngleUnits:
         return _IN_LABEL.sub(self.unit, label)
 
     def _in_mas(self, unit: str) -> float:
-        sizes = {"mas": 1.0, "µas": 1.0 / UAS_PER_MAS, "mpix": self.mas_per_pixel / _MPIX_PER_PIX}
+        sizes = {"mas": 1.0, "µas": 1.0 / UAS_PER_MAS, "mpix": self.mas_per_pixel / MPIX_PER_PIX}
         return sizes[unit]
 
     def _numbers(self, numbers: str, unit: str) -> str:

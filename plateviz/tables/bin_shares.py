@@ -7,12 +7,12 @@ import numpy as np
 from plateviz.tables.focal_residuals import FocalResiduals
 from solver.data.distortion_terms import terms
 from solver.data.result import FitResult
+from solver.units import UM_PER_MM
 
 # Measurements that stand for all where the share of the calibration is computed.
 _ENOUGH = 4_000
 # Calibration parameters that the prior holds by more than this share absorb next to nothing.
 _HELD = 0.5
-_UM_PER_MM = 1000.0
 _RCOND = 1e-9
 
 
@@ -109,7 +109,7 @@ class BinShares:
         found, result = self._found, self._result
         rows = np.arange(0, len(found), max(1, len(found) // _ENOUGH))
         at = found.at[rows]
-        scale = float(result.summary.get("distortion_scale_um", 0.0)) / _UM_PER_MM
+        scale = float(result.summary.get("distortion_scale_um", 0.0)) / UM_PER_MM
         x, y = (at / (scale or max(float(np.abs(at).max(initial=0.0)), 1.0))).T
         one, none = np.ones(len(x)), np.zeros(len(x))
         modes = [(one, none), (none, one), (-y, x), (x, y)]

@@ -12,8 +12,8 @@ from plateviz.tables.exposures import minutes_since_first
 from plateviz.tables.focal_residuals import focal_residuals
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
+from solver.units import MPIX_PER_PIX
 
-_MPIX_PER_PIX = 1000.0
 _BINS = 16
 # Bins with fewer measurements have no row.
 _FEWEST = 20
@@ -86,8 +86,8 @@ def binned_residuals(result: FitResult, instrument: Instrument) -> pd.DataFrame:
     turn = np.radians(result.values_on("det")["detector_rotation"].to_numpy())[found.detector]
     shares = BinShares(result, found, turn)
     rows = result.residuals
-    residuals = [_MPIX_PER_PIX * rows[f"residual_{axis}"].to_numpy() for axis in "xy"]
-    weights = [np.square(1.0 / (_MPIX_PER_PIX * rows[f"s{axis}"].to_numpy())) for axis in "xy"]
+    residuals = [MPIX_PER_PIX * rows[f"residual_{axis}"].to_numpy() for axis in "xy"]
+    weights = [np.square(1.0 / (MPIX_PER_PIX * rows[f"s{axis}"].to_numpy())) for axis in "xy"]
     sums = [weight * residual for weight, residual in zip(weights, residuals, strict=True)]
     chi2 = sums[0] * residuals[0] + sums[1] * residuals[1]
     summed = _Summed(weights, sums, chi2, 2.0 * (1.0 - found.leverage))

@@ -9,9 +9,8 @@ from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.parameters import Axis
 from solver.data.result import FitResult
-from solver.units import RAD_PER_MAS
+from solver.units import RAD_PER_MAS, UM_PER_MM
 
-_UM_PER_MM = 1000.0
 _TITLES: tuple[tuple[str, Axis], ...] = (
     ("Exposures", "exp"),
     ("Detectors", "det"),
@@ -52,11 +51,11 @@ def distortion(result: FitResult, instrument: Instrument, *, grid: int = 17) -> 
     mas_per_um = 1.0 / focal_um / RAD_PER_MAS
     return pd.DataFrame(
         {
-            "x": x / _UM_PER_MM,
-            "y": y / _UM_PER_MM,
-            "u": dx / _UM_PER_MM,
-            "v": dy / _UM_PER_MM,
-            "mas_per_unit": mas_per_um * _UM_PER_MM,
+            "x": x / UM_PER_MM,
+            "y": y / UM_PER_MM,
+            "u": dx / UM_PER_MM,
+            "v": dy / UM_PER_MM,
+            "mas_per_unit": mas_per_um * UM_PER_MM,
             "dx_um": dx,
             "dy_um": dy,
             "dx_mas": dx * mas_per_um,

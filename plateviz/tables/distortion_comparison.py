@@ -13,13 +13,11 @@ from plateviz.tables.mean_calibration import (
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.simulate.true_calibration import TrueCalibration
-from solver.units import RAD_PER_ARCSEC, RAD_PER_MAS
+from solver.units import PPM, RAD_PER_ARCSEC, RAD_PER_MAS, UM_PER_MM
 
 ALONE, TOGETHER = "distortion alone", "distortion and detectors"
-_UM_PER_MM = 1000.0
 _POINTS = 256
 _LEAST_PER_SIDE = 3
-_MILLIONTH = 1e-6
 
 
 def distortion_comparison(
@@ -115,18 +113,18 @@ def _part(
         {
             "part": name,
             "detector_id": ids,
-            "x": places[:, 0] / _UM_PER_MM,
-            "y": places[:, 1] / _UM_PER_MM,
-            "u": rest[:, 0] / _UM_PER_MM,
-            "v": rest[:, 1] / _UM_PER_MM,
-            "mas_per_unit": mas_per_um * _UM_PER_MM,
+            "x": places[:, 0] / UM_PER_MM,
+            "y": places[:, 1] / UM_PER_MM,
+            "u": rest[:, 0] / UM_PER_MM,
+            "v": rest[:, 1] / UM_PER_MM,
+            "mas_per_unit": mas_per_um * UM_PER_MM,
             "dx_um": rest[:, 0],
             "dy_um": rest[:, 1],
             "dx_mas": rest[:, 0] * mas_per_um,
             "dy_mas": rest[:, 1] * mas_per_um,
             "shift_um": math.hypot(shift_x, shift_y),
             "roll_arcsec": roll / RAD_PER_ARCSEC,
-            "scale_ppm": scale / _MILLIONTH,
+            "scale_ppm": scale / PPM,
         }
     )
 

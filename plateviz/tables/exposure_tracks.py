@@ -6,8 +6,8 @@ import pandas as pd
 from plateviz.tables.exposures import minutes_since_first
 from plateviz.tables.labels import exposure_labels, unit_text
 from solver.data.result import FitResult
+from solver.units import MAS_PER_ARCSEC
 
-_MAS_PER_ARCSEC = 1000.0
 _IN_UNIT = ["offset", "sigma_conditional", "sigma_marginal", "prior_sigma"]
 
 
@@ -64,5 +64,5 @@ def _in_readable_unit(rows: pd.DataFrame) -> pd.DataFrame:
     units = {name: unit_text(rows[name].iloc[0]) for name in ("unit", "value_unit")}
     if units["unit"] != "arcsec":
         return rows.assign(**units)
-    scaled = {name: _MAS_PER_ARCSEC * rows[name] for name in _IN_UNIT}
+    scaled = {name: MAS_PER_ARCSEC * rows[name] for name in _IN_UNIT}
     return rows.assign(**scaled, **{**units, "unit": "mas"})

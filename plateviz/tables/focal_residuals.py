@@ -7,11 +7,7 @@ import pandas as pd
 
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
-from solver.units import RAD_PER_DEG, RAD_PER_MAS
-
-_UM_PER_MM = 1000.0
-_MPIX_PER_PIX = 1000.0
-_RAD_PER_ARCMIN = RAD_PER_DEG / 60.0
+from solver.units import MPIX_PER_PIX, RAD_PER_ARCMIN, RAD_PER_MAS, UM_PER_MM
 
 
 class FocalResiduals(NamedTuple):
@@ -99,11 +95,11 @@ def focal_residuals(result: FitResult, instrument: Instrument) -> FocalResiduals
     fitted = result.values_on("det")
     turn = np.radians(fitted["detector_rotation"].to_numpy())[detector]
     pitch_um = float(np.mean([(d.pitch_x_um, d.pitch_y_um) for d in instrument.detectors]))
-    mpix = fitted[["pitch_x", "pitch_y"]].to_numpy()[detector] * (_MPIX_PER_PIX / pitch_um)
+    mpix = fitted[["pitch_x", "pitch_y"]].to_numpy()[detector] * (MPIX_PER_PIX / pitch_um)
     vector = rows[["residual_x", "residual_y"]].to_numpy() * mpix
     variance = np.square(rows[["sx", "sy"]].to_numpy() * mpix)
     focal_um = float(result.values_on("exp")["focal_length"].mean())
-    mas_per_mpix = pitch_um / _MPIX_PER_PIX / focal_um / RAD_PER_MAS
+    mas_per_mpix = pitch_um / MPIX_PER_PIX / focal_um / RAD_PER_MAS
     sigmas = result.sources[["sigma_ra_conditional", "sigma_dec_conditional"]].to_numpy()
     ids = result.sources["source_id"].to_numpy()
     # Few are searched for: the ids of all measurements would take ten times as long.
@@ -113,12 +109,12 @@ def focal_residuals(result: FitResult, instrument: Instrument) -> FocalResiduals
         exposure=result.exposure_index,
         detector=detector,
         source=np.searchsorted(ids, known)[source],
-        at=rows[["focal_x", "focal_y"]].to_numpy() / _UM_PER_MM,
+        at=rows[["focal_x", "focal_y"]].to_numpy() / UM_PER_MM,
         # The inverse of the rotation of Eq. (exp:model:nxny).
         vector=c * vector + s * vector[:, ::-1] * (1.0, -1.0),
         weight=1.0 / (c**2 * variance + s**2 * variance[:, ::-1]),
         leverage=np.clip(0.5 * rows["leverage"].to_numpy(), 0.0, 1.0),
         source_variance=np.mean(np.square(sigmas), axis=1) / mas_per_mpix**2,
         mas_per_mpix=mas_per_mpix,
-        arcmin_per_mm=_UM_PER_MM / focal_um / _RAD_PER_ARCMIN,
+        arcmin_per_mm=UM_PER_MM / focal_um / RAD_PER_ARCMIN,
     )

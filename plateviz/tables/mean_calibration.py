@@ -11,12 +11,11 @@ from solver.data.parameters import Axis
 from solver.data.result import FitResult
 from solver.problem.term_factors import changing_terms, own_frames
 from solver.simulate.true_calibration import TrueCalibration
-from solver.units import RAD_PER_ARCSEC
+from solver.units import PPM, RAD_PER_ARCSEC
 
 # The distortion changes by less than a hundredth of the distance: each step of the inversion
 # gains two digits or more.
 _INVERSION_STEPS = 10
-_PPM = 1e-6
 
 
 class MeanCalibration(NamedTuple):
@@ -95,7 +94,7 @@ def fitted_calibration(result: FitResult, instrument: Instrument) -> MeanCalibra
         skew,
         own,
         *own_frames(instrument),
-        _PPM * anisotropy,
+        PPM * anisotropy,
         float(exposures["focal_length"].mean()),
     )
 

@@ -9,8 +9,8 @@ from plateviz.tables.chance import largest_by_chance
 from plateviz.tables.focal_residuals import FocalResiduals, focal_residuals
 from solver.data.instrument import Detector, Instrument
 from solver.data.result import FitResult
+from solver.units import UM_PER_MM
 
-_UM_PER_MM = 1000.0
 # Enough measurements in a bin for a mean that is much smaller than a single residual.
 _PER_BIN = 50
 _FEWEST_BINS, _MOST_BINS = 4, 12
@@ -130,7 +130,7 @@ def square_bins(
 
 def _grid(detector: Detector, bins: int) -> pd.DataFrame:
     """Return the bins over one detector, row by row, with sides along the focal plane's axes."""
-    corners = detector.corners_um() / _UM_PER_MM
+    corners = detector.corners_um() / UM_PER_MM
     low, high = corners.min(axis=0), corners.max(axis=0)
     columns, rows = np.maximum(np.round((high - low) / (high - low).max() * bins), 1).astype(int)
     x, y = np.linspace(low[0], high[0], columns + 1), np.linspace(low[1], high[1], rows + 1)

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from solver.units import SECONDS_PER_MINUTE, UAS_PER_MAS
+
 # "Observed for more than 80 orbits", section "Time-series astrometric analysis".
 OFTEN = 80
 # Minimum number of sources; few artificial sources reach the largest number of orbits.
 _ENOUGH_SOURCES = 50
 _A100_MINUTES = (50.0, 140.0)
-_SECONDS_PER_MINUTE = 60.0
 
 COLUMNS = ["quantity", "reading", "unit", "paper_low", "paper_high", "ours", "ratio"]
 
@@ -132,7 +133,7 @@ def _of_classes(classes: pd.DataFrame) -> list[_Row]:
             "uas",
             100.0,
             100.0,
-            1e3 * float(reference["sigma_often"]),
+            UAS_PER_MAS * float(reference["sigma_often"]),
         ),
     ]
 
@@ -143,7 +144,7 @@ def _of_motions(motions: pd.DataFrame) -> list[_Row]:
     artificial = often[often["is_artificial"] & ~often["is_reference"]]
     other = often[~often["is_artificial"] & ~often["is_reference"]]
     which = f"median of those in over {OFTEN} orbits"
-    scatter = 1e3 * _median(reference[["scatter_ra", "scatter_dec"]])
+    scatter = UAS_PER_MAS * _median(reference[["scatter_ra", "scatter_dec"]])
     fewest = motions.loc[motions["is_artificial"], "n_orbits"].min()
     return [
         _separation("reference", (100.0, 500.0), "two-dimensional", reference["rms_truth_2d"]),
@@ -168,7 +169,7 @@ def _separation(
     name: str, paper: tuple[float, float], reading: str, separations: pd.Series
 ) -> _Row:
     which = f"{reading}, median of those in over {OFTEN} orbits"
-    return f"rms separation, {name}", which, "uas", *paper, 1e3 * _median(separations)
+    return f"rms separation, {name}", which, "uas", *paper, UAS_PER_MAS * _median(separations)
 
 
 def _one_coordinate(motions: pd.DataFrame) -> pd.Series:
@@ -182,9 +183,9 @@ def _of_errors(errors: pd.DataFrame) -> list[_Row]:
         return []
     last = enough.iloc[-1]
     count = int(last["n_orbits"])
-    law = 1e3 * 4.0 / np.sqrt(36.0 * count)
-    ours = 1e3 * float(last["error_mas"])
-    expected = 1e3 * float(last["expected_mas"])
+    law = UAS_PER_MAS * 4.0 / np.sqrt(36.0 * count)
+    ours = UAS_PER_MAS * float(last["error_mas"])
+    expected = UAS_PER_MAS * float(last["expected_mas"])
     return [
         (
             "error of artificial sources",
@@ -199,7 +200,7 @@ def _of_errors(errors: pd.DataFrame) -> list[_Row]:
 
 
 def _time(orbits: pd.DataFrame) -> _Row:
-    minutes = float(orbits["seconds"].median()) / _SECONDS_PER_MINUTE
+    minutes = float(orbits["seconds"].median()) / SECONDS_PER_MINUTE
     reading = "one core here, one A100 GPU there"
     return "time per orbit", reading, "min", *_A100_MINUTES, minutes
 

@@ -19,8 +19,8 @@ from plateviz.tables.chance import largest_by_chance
 from plateviz.tables.focal_residuals import FocalResiduals, focal_residuals
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
+from solver.units import UM_PER_MM
 
-_UM_PER_MM = 1000.0
 # Cells along the focal plane; twice as many, with zeros around, are a fast length for an FFT.
 _CELLS = 80
 # For fewer cells, the direction from one to the other is not that of their measurements.
@@ -76,7 +76,7 @@ def residual_correlation(
     (mpix^2), `pull_e`, `pull_b` (over sigma), and `mas_per_mpix` (the same in all rows)
     """
     found = focal_residuals(result, instrument)
-    half = max(np.abs(d.corners_um()).max() for d in instrument.detectors) / _UM_PER_MM
+    half = max(np.abs(d.corners_um()).max() for d in instrument.detectors) / UM_PER_MM
     sums = _sums(found, half, len(result.exposures))
     edges = np.geomspace((_FEWEST_CELLS - 0.5) * 2.0 * half / _CELLS, 2.0 * half, bins + 1)
     table = _in_bins(sums, half, edges)

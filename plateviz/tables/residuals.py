@@ -10,10 +10,7 @@ from plateviz.tables.exposures import ExposureKey, is_shown
 from plateviz.tables.labels import exposure_labels, id_strings
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
-from solver.units import RAD_PER_MAS
-
-_MPIX_PER_PIX = 1000.0
-_UM_PER_MM = 1000.0
+from solver.units import MPIX_PER_PIX, RAD_PER_MAS, UM_PER_MM
 
 
 def residual_map(
@@ -52,10 +49,10 @@ def residual_map(
     if detector_id is None:
         # The inverse of the rotation of Eq. (exp:model:nxny).
         angle = np.radians(fitted["detector_rotation"].to_numpy())
-        u = (np.cos(angle) * d_x_um + np.sin(angle) * d_y_um) / _UM_PER_MM
-        v = (np.cos(angle) * d_y_um - np.sin(angle) * d_x_um) / _UM_PER_MM
-        x, y = rows["focal_x"] / _UM_PER_MM, rows["focal_y"] / _UM_PER_MM
-        mas_per_unit = mas_per_um * _UM_PER_MM
+        u = (np.cos(angle) * d_x_um + np.sin(angle) * d_y_um) / UM_PER_MM
+        v = (np.cos(angle) * d_y_um - np.sin(angle) * d_x_um) / UM_PER_MM
+        x, y = rows["focal_x"] / UM_PER_MM, rows["focal_y"] / UM_PER_MM
+        mas_per_unit = mas_per_um * UM_PER_MM
     else:
         x, y, u, v = (rows[name] for name in ("nx", "ny", "residual_x", "residual_y"))
         mas_per_unit = mas_per_um * fitted["pitch_x"].to_numpy()
@@ -70,8 +67,8 @@ def residual_map(
             "u": u,
             "v": v,
             "mas_per_unit": mas_per_unit,
-            "residual_x_mpix": rows["residual_x"] * _MPIX_PER_PIX,
-            "residual_y_mpix": rows["residual_y"] * _MPIX_PER_PIX,
+            "residual_x_mpix": rows["residual_x"] * MPIX_PER_PIX,
+            "residual_y_mpix": rows["residual_y"] * MPIX_PER_PIX,
             "residual_x_mas": d_x_um * mas_per_um,
             "residual_y_mas": d_y_um * mas_per_um,
         }
@@ -106,10 +103,10 @@ def residual_scatter(
             "id": id_strings(rows["source_id"]),
             "exposure": exposure_labels(rows),
             "detector_id": rows["detector_id"],
-            "residual_x_mpix": rows["residual_x"] * _MPIX_PER_PIX,
-            "residual_y_mpix": rows["residual_y"] * _MPIX_PER_PIX,
-            "expected_x_mpix": rows["sx"] * kept * _MPIX_PER_PIX,
-            "expected_y_mpix": rows["sy"] * kept * _MPIX_PER_PIX,
+            "residual_x_mpix": rows["residual_x"] * MPIX_PER_PIX,
+            "residual_y_mpix": rows["residual_y"] * MPIX_PER_PIX,
+            "expected_x_mpix": rows["sx"] * kept * MPIX_PER_PIX,
+            "expected_y_mpix": rows["sy"] * kept * MPIX_PER_PIX,
         }
     ).reset_index(drop=True)
 

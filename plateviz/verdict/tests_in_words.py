@@ -7,8 +7,8 @@ import numpy as np
 
 from solver.results.diagnosis.rate import discoveries
 from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test
+from solver.units import NM_PER_UM
 
-_NM_PER_UM = 1000.0
 _MOST_NAMED = 3
 _DEGREES = ("drift", "bend", "step")
 _DETECTORS = ("shift", "turn", "cells")
@@ -50,7 +50,7 @@ def tests_in_words(diagnosis: Diagnosis) -> list[TestInWords]:
             float(test.expected),
             float(test.scatter),
             float(test.sigma),
-            _NM_PER_UM * float(test.size_um) if np.isfinite(test.size_um) else None,
+            NM_PER_UM * float(test.size_um) if np.isfinite(test.size_um) else None,
             bool(is_found),
         )
         for test, is_found in zip(diagnosis.tests, discoveries(chances, CARE_RATE), strict=True)

@@ -12,14 +12,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from solver.model.distortion import basis
-from solver.units import PIX_PER_MPIX, RAD_PER_ARCSEC
+from solver.units import PIX_PER_MPIX, PPM, RAD_PER_ARCSEC
 
 AnyArray = Any
 # Optional group -> values, in the group's unit; only of those that the fit includes.
 Values = Mapping[str, Float[AnyArray, " _"]]
 Pair = tuple[Float[AnyArray, "*obs"], Float[AnyArray, "*obs"]]
-
-_PPM = 1e-6
 
 
 class TermFamily(eqx.Module):
@@ -85,7 +83,7 @@ def anisotropic(ideal: Pair, values: Values, exposure: Int[AnyArray, "*#obs"]) -
     """Return ideal positions under a focal length for each axis, whose mean is unchanged."""
     if "focal_anisotropy" not in values:
         return ideal
-    half = 0.5 * _PPM * values["focal_anisotropy"][exposure]
+    half = 0.5 * PPM * values["focal_anisotropy"][exposure]
     return ideal[0] * (1.0 - half), ideal[1] * (1.0 + half)
 
 

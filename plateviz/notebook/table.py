@@ -71,10 +71,7 @@ def _fitted(result: FitResult, axis: Axis) -> OpenTable:
     """Return the fitted calibration on one axis, a row per element."""
     groups = result.groups_on(axis)
     columns = [Column("element", "str", "", "exposure, detector or distortion term")]
-    names = [group.name for group in groups]
-    rows = result.calibration[result.calibration["group"].isin(names)]
-    labels = rows.groupby("element")["label"].agg(lambda texts: " ".join(dict.fromkeys(texts)))
-    parts: dict[str, pd.Series] = {"element": labels}
+    parts: dict[str, pd.Series] = {"element": result.labels_on(axis)}
     for group in groups:
         meanings = (
             group.label,

@@ -114,10 +114,8 @@ def _display_table(result: FitResult, axis: Axis) -> pd.DataFrame:
         columns[f"{group.label} [{value_unit}]"] = wide["value"][group.name]
         columns[f"σ {group.label}, marginal [{unit}]"] = wide["sigma_marginal"][group.name]
         columns[f"{group.label}, prior share"] = wide["prior_share"][group.name]
-    rows = result.calibration[result.calibration["group"].isin([g.name for g in groups])]
-    labels = rows.groupby("element")["label"].agg(lambda names: " ".join(dict.fromkeys(names)))
     table = pd.DataFrame(columns)
-    table.insert(0, "element", element_labels(labels.reindex(table.index)))
+    table.insert(0, "element", element_labels(result.labels_on(axis).reindex(table.index)))
     return table.reset_index(drop=True)
 
 

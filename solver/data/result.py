@@ -115,6 +115,12 @@ class FitResult:
         known = set(self.calibration["group"].unique())
         return tuple(g for g in PARAMETERS if g.axis == axis and g.name in known)
 
+    def labels_on(self, axis: Axis) -> pd.Series:
+        """Return the words of each element of an axis; those of groups that differ, together."""
+        is_here = self.calibration["group"].isin([group.name for group in self.groups_on(axis)])
+        labels = self.calibration[is_here].groupby("element")["label"]
+        return labels.agg(lambda names: " ".join(dict.fromkeys(names)))
+
     def values_on(self, axis: Axis, column: str = "value") -> pd.DataFrame:
         """Return one column of `calibration` as a wide table.
 

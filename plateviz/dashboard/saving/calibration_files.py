@@ -47,8 +47,7 @@ def _of_axis(result: FitResult, axis: Axis) -> Table:
     if not groups:
         return Table()
     found = described(result.exposures, EXPOSURES) if axis == "exp" else Table()
-    rows = result.calibration[result.calibration["group"].isin([one.name for one in groups])]
-    labels = rows.groupby("element")["label"].agg(lambda names: " ".join(dict.fromkeys(names)))
+    labels = result.labels_on(axis)
     found["element"] = labels.index.to_numpy()
     found["label"] = labels.to_numpy().astype(str)
     for column in CALIBRATION:

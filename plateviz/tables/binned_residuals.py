@@ -12,6 +12,7 @@ from plateviz.tables.exposures import minutes_since_first
 from plateviz.tables.focal_residuals import focal_residuals
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
+from solver.problem.term_factors import orbital_phase
 from solver.units import MPIX_PER_PIX
 
 _BINS = 16
@@ -179,8 +180,8 @@ def _quantities(result: FitResult, instrument: Instrument, source: np.ndarray) -
     period = result.settings.breathing_period
     # The phase of less than a period is the time by another name.
     if np.ptp(minutes) > period:
-        # Zero in the middle of the exposures, as for the breathing of the distortion.
-        turns = (minutes - 0.5 * minutes.max()) / period
+        times = result.exposures["obstime"].to_numpy(dtype=float)
+        turns = orbital_phase(times, period) / (2.0 * np.pi)
         phase = turns - np.floor(turns)
         cells = _equal_widths(phase, 0.0, 1.0)
         yield _Binned("orbital phase", "periods", phase[exposure], cells[exposure])

@@ -7,6 +7,7 @@ import pandas as pd
 
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
+from solver.results.diagnosis.rows import onto_focal_plane
 from solver.units import MPIX_PER_PIX, RAD_PER_ARCMIN, RAD_PER_MAS, UM_PER_MM
 
 
@@ -93,7 +94,7 @@ def focal_residuals(result: FitResult, instrument: Instrument) -> FocalResiduals
     rows = result.residuals
     detector = instrument.index_of(rows["detector_id"].to_numpy())
     fitted = result.values_on("det")
-    turn = np.radians(fitted["detector_rotation"].to_numpy())[detector]
+    turn = np.radians(fitted["detector_rotation"].to_numpy())
     pitch_um = float(np.mean([(d.pitch_x_um, d.pitch_y_um) for d in instrument.detectors]))
     mpix = fitted[["pitch_x", "pitch_y"]].to_numpy()[detector] * (MPIX_PER_PIX / pitch_um)
     vector = rows[["residual_x", "residual_y"]].to_numpy() * mpix
@@ -104,14 +105,13 @@ def focal_residuals(result: FitResult, instrument: Instrument) -> FocalResiduals
     ids = result.sources["source_id"].to_numpy()
     # Few are searched for: the ids of all measurements would take ten times as long.
     source, known = pd.factorize(rows["source_id"].to_numpy())
-    c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
+    c, s = np.cos(turn)[detector, None], np.sin(turn)[detector, None]
     return FocalResiduals(
         exposure=result.exposure_index,
         detector=detector,
         source=np.searchsorted(ids, known)[source],
         at=rows[["focal_x", "focal_y"]].to_numpy() / UM_PER_MM,
-        # The inverse of the rotation of Eq. (exp:model:nxny).
-        vector=c * vector + s * vector[:, ::-1] * (1.0, -1.0),
+        vector=onto_focal_plane(vector, turn, detector),
         weight=1.0 / (c**2 * variance + s**2 * variance[:, ::-1]),
         leverage=np.clip(0.5 * rows["leverage"].to_numpy(), 0.0, 1.0),
         source_variance=np.mean(np.square(sigmas), axis=1) / mas_per_mpix**2,

@@ -1,15 +1,16 @@
 """MeanCalibration: where the stars of an orbit fall on the focal plane, mean of its exposures."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from plateviz.tables.calibration import displacement_um
-from solver.data.detector_spans import Move, span_numbers, with_moves
+from solver.data.detector_spans import motion_elements
 from solver.data.instrument import Instrument
 from solver.data.parameters import Axis
 from solver.data.result import FitResult
 from solver.problem.term_factors import changing_terms, own_frames
+from solver.results.diagnosis.rows import detector_spans, onto_focal_plane
 from solver.simulate.true_calibration import TrueCalibration
 from solver.units import PPM, RAD_PER_ARCSEC
 
@@ -51,10 +52,9 @@ class MeanCalibration(NamedTuple):
         numbers, pixels : number of the detector, and place on it from its centre
         """
         x, y = pixels.T
-        x, y = (np.stack([x - self.skew[numbers] * y, y], axis=-1) * self.pitch[numbers]).T
-        angle = self.rotation[numbers]
-        turned = [np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x]
-        focal_plane = self.centre[numbers] + np.stack(turned, axis=-1)
+        vector = np.stack([x - self.skew[numbers] * y, y], axis=-1) * self.pitch[numbers]
+        turned = onto_focal_plane(vector, self.rotation, numbers)
+        focal_plane = self.centre[numbers] + turned
         ideal = focal_plane
         for _ in range(_INVERSION_STEPS):
             moved = self.displaced(ideal, scale_um) + self._displaced_alone(ideal, numbers)
@@ -118,8 +118,8 @@ def simulated_calibration(truth: TrueCalibration, instrument: Instrument) -> Mea
 def _mean_coefficients(result: FitResult) -> np.ndarray:
     """Return the coefficients of the distortion, those of its changes among them."""
     found = [_pairs(result, "coef", "distortion")]
-    for name, axis, _, factor in changing_terms(result.exposures, result.settings):
-        of_functions = _pairs(result, axis, name).reshape(len(factor), -1, 2)
+    for terms, factor in changing_terms(result.exposures, result.settings):
+        of_functions = _pairs(result, terms.axis, terms.name).reshape(len(factor), -1, 2)
         found.append(np.einsum("f,fkd->kd", factor.mean(axis=1), of_functions))
     if result.settings.drift_walk:
         walk = _pairs(result, "walk", "drift_walk").reshape(len(result.exposures), -1, 2)
@@ -134,13 +134,11 @@ def _mean_motion(result: FitResult, n_det: int) -> np.ndarray:
     """Return the mean motion of each detector, um and um, and its mean turn, arcsec."""
     if not result.settings.detector_motion:
         return np.zeros((n_det, 3))
-    moves: Any = result.summary.get("detector_moves", ())
-    span = span_numbers(with_moves(result.exposures, [Move(**one) for one in moves]))
-    n_moved = max(int(span.max()), 1)
+    span = detector_spans(result)
     names = ["detector_motion_x", "detector_motion_y", "detector_turn"]
-    values = result.values_on("motion")[names].to_numpy().reshape(n_det, n_moved, 3)
-    at_exposure = values[:, np.maximum(span - 1, 0)] * (span > 0)[:, None]
-    return at_exposure.mean(axis=1)
+    element = motion_elements(span, np.arange(len(span)), np.arange(n_det)[:, None])
+    moved = result.values_on("motion")[names].to_numpy()[element] * (span > 0)[:, None]
+    return moved.mean(axis=1)
 
 
 def _pairs(result: FitResult, axis: Axis, name: str) -> np.ndarray:

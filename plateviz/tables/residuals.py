@@ -10,6 +10,7 @@ from plateviz.tables.exposures import ExposureKey, is_shown
 from plateviz.tables.labels import exposure_labels, id_strings
 from solver.data.instrument import Instrument
 from solver.data.result import FitResult
+from solver.results.diagnosis.rows import onto_focal_plane
 from solver.units import MPIX_PER_PIX, RAD_PER_MAS, UM_PER_MM
 
 
@@ -40,17 +41,17 @@ def residual_map(
     keep = is_shown(result, exposures, detector_id)
     # Several times as fast as a mask, for the few rows of an exposure.
     rows = result.residuals.iloc[np.flatnonzero(keep)]
-    fitted = result.values_on("det").loc[instrument.index_of(rows["detector_id"].to_numpy())]
+    calibration = result.values_on("det")
+    detector = instrument.index_of(rows["detector_id"].to_numpy())
+    fitted = calibration.loc[detector]
     focal_lengths = result.values_on("exp")["focal_length"].to_numpy()
     focal_um = focal_lengths[result.exposure_index[keep]]
     d_x_um = (rows["residual_x"] * fitted["pitch_x"].to_numpy()).to_numpy()
     d_y_um = (rows["residual_y"] * fitted["pitch_y"].to_numpy()).to_numpy()
     mas_per_um = 1.0 / focal_um / RAD_PER_MAS
     if detector_id is None:
-        # The inverse of the rotation of Eq. (exp:model:nxny).
-        angle = np.radians(fitted["detector_rotation"].to_numpy())
-        u = (np.cos(angle) * d_x_um + np.sin(angle) * d_y_um) / UM_PER_MM
-        v = (np.cos(angle) * d_y_um - np.sin(angle) * d_x_um) / UM_PER_MM
+        turn = np.radians(calibration["detector_rotation"].to_numpy())
+        u, v = onto_focal_plane(np.stack([d_x_um, d_y_um], axis=-1), turn, detector).T / UM_PER_MM
         x, y = rows["focal_x"] / UM_PER_MM, rows["focal_y"] / UM_PER_MM
         mas_per_unit = mas_per_um * UM_PER_MM
     else:

@@ -44,3 +44,22 @@ def span_numbers(exposures: pd.DataFrame) -> Int[np.ndarray, " exp"]:
     """Return the number of the span of each exposure, from 0, in order of the fields."""
     names = ["field_id", MOVES] if MOVES in exposures else ["field_id"]
     return exposures.groupby(names).ngroup().to_numpy()
+
+
+def motion_elements(
+    spans: Int[np.ndarray, " exp"],
+    exposure: Int[np.ndarray, "*#n"],
+    detector: Int[np.ndarray, "*#n"],
+) -> Int[np.ndarray, "*n"]:
+    """Return the element of the axis `motion` of exposures and detectors.
+
+    The elements of a detector are adjacent, one per span after the first. Nothing moves in the
+    first span; its exposures are given the element of the second.
+
+    Parameters
+    ----------
+    spans : number of the span of each exposure
+    exposure, detector : indices, broadcast against each other
+    """
+    n_moved = max(int(spans.max(initial=0)), 1)
+    return n_moved * detector + np.maximum(spans[exposure] - 1, 0)

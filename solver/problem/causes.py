@@ -7,12 +7,13 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from solver.data.detector_spans import span_numbers
+from solver.data.detector_spans import motion_elements, span_numbers
 from solver.data.instrument import Instrument
 from solver.data.magnitudes import faintness
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.model.causes import ModelledCauses, TermFamily
+from solver.problem.optional_terms import optional_terms
 from solver.problem.padding import pad
 from solver.problem.term_factors import changing_terms, own_frames
 
@@ -30,11 +31,10 @@ def causes_of(
     if not settings.optional_groups:
         return None
     span, n_det = span_numbers(exposures), len(instrument.detectors)
-    n_moved = max(int(span.max()), 1)
     moves = np.repeat((span > 0).astype(float)[:, None], n_det, axis=1)
     return ModelledCauses(
         families=_families(exposures, instrument, settings),
-        element=n_moved * np.arange(n_det) + np.maximum(span - 1, 0)[:, None],
+        element=motion_elements(span, np.arange(len(span))[:, None], np.arange(n_det)),
         moves=moves,
         faintness=_faintness(sources, settings),
         pixels=np.array([(d.n_x, d.n_y) for d in instrument.detectors], dtype=float),
@@ -48,14 +48,14 @@ def _families(
     n_exp, n_det = len(exposures), len(instrument.detectors)
     centre, scale = np.zeros((n_det, 2)), np.full(n_det, instrument.distortion_scale_um)
     found = []
-    for name, _, order, factor in changing_terms(exposures, settings):
-        of_all = np.repeat(factor[:, :, None], n_det, axis=2)
-        found.append(TermFamily(name, order, of_all, centre, scale))
-    if settings.detector_distortion:
-        factor = np.repeat(np.eye(n_det)[:, None], n_exp, axis=1)
-        own_centre, own_scale = own_frames(instrument)
-        order = settings.detector_distortion
-        found.append(TermFamily("own_distortion", order, factor, own_centre, own_scale))
+    changing = dict(changing_terms(exposures, settings))
+    for terms in optional_terms(settings):
+        if terms in changing:
+            of_all = np.repeat(changing[terms][:, :, None], n_det, axis=2)
+            found.append(TermFamily(terms.name, terms.order, of_all, centre, scale))
+        else:
+            own = np.repeat(np.eye(n_det)[:, None], n_exp, axis=1)
+            found.append(TermFamily(terms.name, terms.order, own, *own_frames(instrument)))
     return tuple(found)
 
 

@@ -11,6 +11,7 @@ from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.parameter_group import Axis
 from solver.data.settings import FitSettings
+from solver.problem.optional_terms import optional_terms
 
 
 class Element(NamedTuple):
@@ -42,13 +43,17 @@ def elements(exposures: pd.DataFrame, instrument: Instrument, settings: FitSetti
     ]
     phases = [Element("cos", "cos"), Element("sin", "sin")]
     moved = _spans(exposures)[1:] if settings.detector_motion else []
+    functions: Elements = {
+        "drift": times,
+        "breathing": phases,
+        "field": _called("field", later),
+        "own": _called("detector", detectors),
+    }
     return {
         "exp": exposures_called,
         "coef": _terms(settings.order),
-        "drift": _products(settings.drift, times),
-        "breathing": _products(settings.breathing, phases),
-        "field": _products(settings.field_distortion, _called("field", later)),
-        "own": _products(settings.detector_distortion, _called("detector", detectors)),
+        **dict.fromkeys(functions, []),
+        **{one.axis: _products(one.order, functions[one.axis]) for one in optional_terms(settings)},
         # Only terms that the distortion has can walk.
         "walk": _products(min(settings.drift_walk, settings.order), exposures_called),
         "det": _called("detector", detectors),

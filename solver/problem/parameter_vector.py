@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int, Shaped
 
+from solver.data.detector_spans import motion_elements
 from solver.data.parameter_group import TERM_AXES, Axis, Group
 from solver.data.parameters import BY_NAME, CALIBRATION_GROUPS, PARAMETERS, groups_on
 
@@ -133,15 +134,13 @@ class VectorLayout:
     ) -> Int[np.ndarray, "*n"]:
         """Return the element of an axis of local groups that measurements depend on.
 
-        Nothing moves in the first span; its measurements are given any element.
+        Those of the first span, in which nothing moves, are given that of the second.
         """
         if axis == "exp":
             return exposure
         if axis == "det":
             return detector
-        n_moved = max(max(self.spans, default=0), 1)
-        span = np.asarray(self.spans)[exposure]
-        return n_moved * detector + np.maximum(span - 1, 0)
+        return motion_elements(np.asarray(self.spans, dtype=np.int64), exposure, detector)
 
     def touched(
         self, exposure: Int[np.ndarray, "*n"], detector: Int[np.ndarray, "*n"]

@@ -11,6 +11,7 @@ from solver.data.instrument import Instrument
 from solver.data.parameter_group import Axis
 from solver.data.settings import FitSettings
 from solver.problem.elements import field_numbers
+from solver.problem.optional_terms import OptionalTerms, optional_terms
 from solver.units import MINUTES_PER_DAY
 
 
@@ -19,15 +20,11 @@ class ChangingTerms(NamedTuple):
 
     Attributes
     ----------
-    name : of the groups, without "_x" and "_y"
-    axis : of their elements; the terms of a function are adjacent
-    order : highest degree of the terms
+    terms : the groups, and the degree of the terms; those of a function are adjacent
     factor : one row per function
     """
 
-    name: str
-    axis: Axis
-    order: int
+    terms: OptionalTerms
     factor: Float[np.ndarray, "function exp"]
 
 
@@ -39,18 +36,29 @@ def changing_terms(exposures: pd.DataFrame, settings: FitSettings) -> list[Chang
     exposures : `field_id` and `obstime` (MJD) of each
     """
     field, time = field_numbers(exposures), exposures["obstime"].to_numpy()
-    angle = 2.0 * np.pi * MINUTES_PER_DAY * (time - _middle(time)) / settings.breathing_period
+    phase = orbital_phase(time, settings.breathing_period)
     later = np.arange(1, field.max() + 1)[:, None]
-    found = [
-        ChangingTerms("drift", "drift", settings.drift, _polynomials(time, settings.drift_in_time)),
-        ChangingTerms(
-            "breathing", "breathing", settings.breathing, np.array([np.cos(angle), np.sin(angle)])
-        ),
-        ChangingTerms(
-            "field_distortion", "field", settings.field_distortion, (field == later).astype(float)
-        ),
+    factors: dict[Axis, np.ndarray] = {
+        "drift": _polynomials(time, settings.drift_in_time),
+        "breathing": np.array([np.cos(phase), np.sin(phase)]),
+        "field": (field == later).astype(float),
+    }
+    return [
+        ChangingTerms(terms, factors[terms.axis])
+        for terms in optional_terms(settings)
+        if terms.axis in factors
     ]
-    return [one for one in found if one.order]
+
+
+def orbital_phase(time: Float[np.ndarray, " exp"], period: float) -> Float[np.ndarray, " exp"]:
+    """Return the phase of the breathing, rad: zero halfway from the first exposure to the last.
+
+    Parameters
+    ----------
+    time : of the exposures, MJD
+    period : of the breathing, min
+    """
+    return 2.0 * np.pi * MINUTES_PER_DAY * (time - _middle(time)) / period
 
 
 def own_frames(

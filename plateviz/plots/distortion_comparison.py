@@ -75,7 +75,7 @@ def _panel(
         ],
         title=title,
         subtitle=f"rms {_length(1000.0 * rms)} = {angle_text(rms * mas_per_mm)}"
-        f"{_unmeasured(rows, detectors)}; {_removed(rows)}\n"
+        f"{_unmeasured(rows, detectors)}; {_removed(rows)}{_left_out(rows)}\n"
         f"Arrows enlarged {scale:,.12g} times; key: {length_text}",
         x=Axis(XLABEL, field.x),
         y=Axis(YLABEL, field.ylim),
@@ -95,6 +95,11 @@ def _removed(rows: pd.DataFrame) -> str:
         float(np.abs(rows[name].iloc[0])) for name in ("shift_um", "roll_arcsec", "scale_ppm")
     )
     return f"removed: shift {_length(shift)}, roll {rounded(roll)} arcsec, scale {scale:,.2f} ppm"
+
+
+def _left_out(rows: pd.DataFrame) -> str:
+    left_out = rows["left_out"].iloc[0]
+    return f"; not compared: {left_out}" if left_out else ""
 
 
 def _length(um: float) -> str:

@@ -37,6 +37,9 @@ def distortion_comparison(
     if all detectors move against the optical axis, the distortion about the new axis has other
     coefficients, but every star stays where it was.
 
+    What a fit includes that shifts stars by their magnitude or by their place within a pixel is
+    not compared, and named in the column `left_out`.
+
     A detector without measurements in a fit, which is where its prior has it, has no points.
 
     Parameters
@@ -50,7 +53,8 @@ def distortion_comparison(
     A row per part ("distortion alone", "distortion and detectors") and point: `part`,
     `detector_id`, the tail `x`, `y` (ideal position in A) and the difference `u`, `v` in mm,
     `mas_per_unit` (mas per mm), the difference as `dx_um`, `dy_um`, `dx_mas`, `dy_mas`, and
-    what was removed: `shift_um`, `roll_arcsec`, `scale_ppm`
+    what was removed: `shift_um`, `roll_arcsec`, `scale_ppm`; `left_out`: what was not compared,
+    as text, empty where the fits have no more than this
     """
     a, b = (fitted_calibration(one, instrument) for one in (result_a, result_b))
     is_measured = _measured(result_a, instrument) & _measured(result_b, instrument)
@@ -101,7 +105,12 @@ def _difference(
         _part(name, ids, places_a, difference, focal)
         for name, difference in ((ALONE, by_optics), (TOGETHER, moved))
     ]
-    return pd.concat(parts, ignore_index=True)
+    return pd.concat(parts, ignore_index=True).assign(left_out=_left_out(a, b))
+
+
+def _left_out(a: MeanCalibration, b: MeanCalibration) -> str:
+    """Return what either calibration leaves out, in lower case and separated by commas."""
+    return ", ".join(dict.fromkeys(one.lower() for one in (*a.left_out, *b.left_out)))
 
 
 def _part(

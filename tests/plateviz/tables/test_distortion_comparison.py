@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.polynomial import legendre
 
@@ -12,6 +13,7 @@ from plateviz.plots.distortion_comparison import plot_distortion_comparison
 from plateviz.tables.distortion_comparison import ALONE, TOGETHER
 from plateviz.tables.mean_calibration import fitted_calibration
 from solver.data.exclusions import Exclusions
+from solver.data.parameters import OPTIONAL_GROUPS
 from solver.data.settings import FitSettings
 from solver.fit import OrbitFitter
 from solver.model.forward import Index, image
@@ -224,6 +226,22 @@ def test_fits_of_different_detectors_have_nothing_to_compare(fit_result, instrum
     assert "No detector" in figure.message
 
 
+def test_groups_that_are_not_compared_are_named(fit_result, instrument):
+    rows = fit_result.calibration
+    pitches = rows[rows["group"] == "pitch_x"]
+    names = ("magnitude_shift_x", "magnitude_shift_y", "charge_transfer_x", "phase_sine_x")
+    shifts = [pitches.assign(group=name) for name in names]
+    other = replace(fit_result, calibration=pd.concat([rows, *shifts], ignore_index=True))
+    table = tables.distortion_comparison(fit_result, other, instrument)
+    named = "shift by magnitude, charge transfer, shift by pixel phase"
+    assert set(table["left_out"]) == {named}
+    figure = plot_distortion_comparison(table, detectors=instrument.detectors)
+    assert all(f"not compared: {named}" in panel.subtitle for panel in figure)
+    table = tables.distortion_comparison(fit_result, fit_result, instrument)
+    assert set(table["left_out"]) == {""}
+    assert "not compared" not in plot_distortion_comparison(table)[0].subtitle
+
+
 @pytest.fixture(scope="module")
 def with_causes():
     """A small orbit with nothing that the paper's model lacks, fitted with causes."""
@@ -258,6 +276,16 @@ def test_ideal_place_is_where_the_model_images_its_pixel_from(with_causes):
     places = jnp.asarray(ideal[:, 0]), jnp.asarray(ideal[:, 1])
     predicted = image(places, offsets, problem.geometry, index).pixel
     np.testing.assert_allclose(np.stack(predicted, axis=-1), pixels, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_causes_that_do_not_depend_on_the_star_are_compared(with_causes):
+    _, found, instrument = with_causes
+    for result in found.values():
+        assert fitted_calibration(result, instrument).left_out == ()
+    star = {"magnitude_shift", "charge_transfer", "pixel_phase"}
+    compared = {one.setting for result in found.values() for one in result.settings.optional_groups}
+    assert compared == {one.setting for one in OPTIONAL_GROUPS} - star
 
 
 @pytest.mark.slow

@@ -84,7 +84,7 @@ class OpenSolution(HasFigures, Explores):
 
     @property
     def tables(self) -> LazyCollection[pd.DataFrame]:
-        """All tables by name, as pandas tables: `tables.sources`, `tables["modes"]`."""
+        """All tables by name, as pandas tables: `tables.sources`, `tables["eigenmodes"]`."""
         found = self._tables()
         return LazyCollection("table", {name: partial(_frame, one) for name, one in found.items()})
 

@@ -192,7 +192,7 @@ def is_complete(directory: Path) -> bool:
 
 
 def _write_tables(directory: Path, result: FitResult, beside: Mapping[str, pd.DataFrame]) -> None:
-    tables = {table.name: getattr(result, table.name) for table in RESULT_TABLES}
+    tables = {table.file or table.name: getattr(result, table.name) for table in RESULT_TABLES}
     tables["trace"] = result.trace.drop(columns="seconds")
     for name, frame in {**tables, **beside}.items():
         if frame is not None:
@@ -216,7 +216,7 @@ def _write_head(directory: Path, result: FitResult) -> None:
 
 
 def _read_table(directory: Path, table: Table) -> pd.DataFrame | None:
-    path = directory / f"{table.name}.parquet"
+    path = directory / f"{table.file or table.name}.parquet"
     return table.completed(read_frame(path)) if path.is_file() else None
 
 

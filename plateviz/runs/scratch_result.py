@@ -261,7 +261,7 @@ class _Later:
 class ScratchResult(FitResult):
     """A result of a scratch directory: a `FitResult` whose eigenmodes may be written later."""
 
-    modes = _Later()  # type: ignore[assignment]
+    eigenmodes = _Later()  # type: ignore[assignment]
     mode_parameters = _Later()  # type: ignore[assignment]
     mode_shifts = _Later()  # type: ignore[assignment]
 

@@ -27,12 +27,12 @@ def eigenmode_spectrum(result: FitResult) -> pd.DataFrame:
 
     Returns
     -------
-    The columns of `solver.data.schema`'s table `modes` and `is_weak`: whether the eigenmode is
+    The columns of `solver.data.schema`'s table `eigenmodes` and `is_weak`: whether the eigenmode is
     one of the weak directions that are described in full
     """
-    if result.modes is None:
+    if result.eigenmodes is None:
         return pd.DataFrame(columns=[*_SPECTRUM, "is_weak"])
-    modes = result.modes[_SPECTRUM].assign(name=element_labels(result.modes["name"]))
+    modes = result.eigenmodes[_SPECTRUM].assign(name=element_labels(result.eigenmodes["name"]))
     return modes.assign(is_weak=modes["name"] != "")
 
 
@@ -46,7 +46,7 @@ def eigenmode_deciders(result: FitResult) -> pd.DataFrame:
     no row
     """
     columns = ["mode", "name", "decider", "what", "share", "left", "right"]
-    if result.modes is None or result.mode_parameters is None:
+    if result.eigenmodes is None or result.mode_parameters is None:
         return pd.DataFrame(columns=columns)
     modes = eigenmode_spectrum(result)
     weak = modes[modes["is_weak"]]
@@ -76,7 +76,7 @@ def eigenmode_groups(result: FitResult) -> pd.DataFrame:
     `shift_mas`, the rms shift of the sources, the same in all rows of a direction
     """
     columns = ["mode", "name", "group", "share", "move", "unit", "shift_mas"]
-    if result.modes is None or result.mode_parameters is None:
+    if result.eigenmodes is None or result.mode_parameters is None:
         return pd.DataFrame(columns=columns)
     rows = result.mode_parameters.assign(square=result.mode_parameters["move"] ** 2)
     table = (
@@ -109,7 +109,7 @@ def eigenmode_shifts(result: FitResult, *, most: int | None = None) -> pd.DataFr
     `shift_ra_mas`, `shift_dec_mas`
     """
     columns = ["mode", "name", "id", "x", "y", "u", "v", "shift_ra_mas", "shift_dec_mas"]
-    if result.modes is None or result.mode_shifts is None:
+    if result.eigenmodes is None or result.mode_shifts is None:
         return pd.DataFrame(columns=columns)
     rms = _shift_rms(result)
     largest = (

@@ -39,12 +39,21 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """Definition of one table: name (also of its HDU), columns and key columns."""
+    """Definition of one table.
+
+    Attributes
+    ----------
+    name : in Python, and of its HDU in a file that is read
+    columns, key : all columns, and those that no two rows share
+    aliases : other names of its HDU accepted when reading
+    file : name of its file in a run, without the suffix, where it is not `name`
+    """
 
     name: str
     columns: tuple[Column, ...]
     key: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
+    file: str = ""
     _by_name: dict[str, Column] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

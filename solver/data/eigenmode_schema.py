@@ -8,8 +8,8 @@ from solver.data.columns import Column, Table
 
 _MODE = Column("mode", "int64", "", "combination of calibration parameters, 1 is the weakest")
 
-MODES = Table(
-    "modes",
+EIGENMODES = Table(
+    "eigenmodes",
     (
         _MODE,
         Column("name", "str", "", "the mode in words; empty where it is not told in full"),
@@ -25,6 +25,7 @@ MODES = Table(
         ),
     ),
     key=("mode",),
+    file="modes",
 )
 
 MODE_PARAMETERS = Table(
@@ -53,4 +54,4 @@ MODE_SHIFTS = Table(
     key=("mode", "source_id"),
 )
 
-EIGENMODE_TABLES = (MODES, MODE_PARAMETERS, MODE_SHIFTS)
+EIGENMODE_TABLES = (EIGENMODES, MODE_PARAMETERS, MODE_SHIFTS)

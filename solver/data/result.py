@@ -63,7 +63,7 @@ class FitResult:
     outliers : `schema.OUTLIERS`, or None if the fit was not robust
     orders : `schema.ORDERS`, or None if orders were not compared
     losses : `schema.LOSSES`, or None if the engine has no loss
-    modes, mode_parameters, mode_shifts : the eigenmodes, and the parameters and sources that
+    eigenmodes, mode_parameters, mode_shifts : the eigenmodes, and the parameters and sources that
         the weak ones move, as in `solver.data.eigenmode_schema`; None in a result of an older
         version without them
     derived : what was computed from the result and is kept with it, by name; written nowhere
@@ -81,7 +81,7 @@ class FitResult:
     true_places: pd.DataFrame | None = None
     losses: pd.DataFrame | None = None
     outliers: pd.DataFrame | None = None
-    modes: pd.DataFrame | None = None
+    eigenmodes: pd.DataFrame | None = None
     mode_parameters: pd.DataFrame | None = None
     mode_shifts: pd.DataFrame | None = None
     orders: pd.DataFrame | None = None

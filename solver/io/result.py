@@ -31,7 +31,7 @@ _OPTIONAL = {
     "true_places": layout.TRUE_PLACES,
     "losses": layout.LOSSES,
     "outliers": layout.OUTLIERS,
-    "modes": layout.MODES,
+    "eigenmodes": layout.MODES,
     "mode_parameters": layout.MODE_PARAMETERS,
     "mode_shifts": layout.MODE_SHIFTS,
     "orders": layout.ORDERS,

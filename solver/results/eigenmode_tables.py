@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from solver.data.eigenmode_schema import MODE_PARAMETERS, MODE_SHIFTS, MODES
+from solver.data.eigenmode_schema import EIGENMODES, MODE_PARAMETERS, MODE_SHIFTS
 from solver.data.instrument import Instrument
 from solver.data.parameters import PARAMETERS, Axis, Group
 from solver.linear.source_elimination import ReducedSystem
@@ -16,7 +16,7 @@ from solver.results.tables import SolvedProblem
 def eigenmode_tables(
     solution: SolvedProblem, calibration: pd.DataFrame, instrument: Instrument
 ) -> dict[str, pd.DataFrame]:
-    """Return `MODES`, `MODE_PARAMETERS` and `MODE_SHIFTS` of `eigenmode_schema` by name.
+    """Return `EIGENMODES`, `MODE_PARAMETERS` and `MODE_SHIFTS` of `eigenmode_schema` by name.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def eigenmode_tables(
     places = _places(solution, instrument)
     names = [_name(rows, places) for _, rows in parameters.groupby("mode")]
     return {
-        MODES.name: _eigenmode_table(found, names),
+        EIGENMODES.name: _eigenmode_table(found, names),
         MODE_PARAMETERS.name: parameters,
         MODE_SHIFTS.name: _shift_table(solution, weak),
     }
@@ -57,7 +57,7 @@ def _eigenmode_table(found: Eigenmodes, names: list[str]) -> pd.DataFrame:
         "calibration_share": found.calibration,
         "relative_information": found.relative,
     }
-    return pd.DataFrame({name: columns[name] for name in MODES.names})
+    return pd.DataFrame({name: columns[name] for name in EIGENMODES.names})
 
 
 def _parameter_table(

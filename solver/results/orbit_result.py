@@ -42,7 +42,7 @@ class PartialResult(NamedTuple):
     instrument: Instrument
 
     def eigenmodes(self) -> dict[str, pd.DataFrame]:
-        """Return `MODES`, `MODE_PARAMETERS`, `MODE_SHIFTS` of `eigenmode_schema` by name."""
+        """Return `EIGENMODES`, `MODE_PARAMETERS`, `MODE_SHIFTS` of `eigenmode_schema` by name."""
         return eigenmode_tables(self.solution, self.result.calibration, self.instrument)
 
     def whole(self) -> FitResult:

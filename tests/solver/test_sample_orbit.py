@@ -125,7 +125,7 @@ def test_flags_are_read(sample_result):
 
 
 def test_weak_directions_are_those_of_the_geometry(sample_result):
-    modes = sample_result.modes
+    modes = sample_result.eigenmodes
     is_weak = modes["data_share"] < 1e-3
     # Shift, roll and scale of the detectors against the pointings; shift, roll, scale and
     # stretch of the sky; and the two quadratic maps that pointings, focal lengths, position

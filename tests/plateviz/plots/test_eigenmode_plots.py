@@ -30,14 +30,14 @@ def test_weak_directions_are_marked_in_the_spectrum(fit_result):
     frame = plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result))[0]
     rest, weak = of_kind(frame, "points")
     assert weak.columns["mode"].tolist() == [1, 2, 3]
-    assert len(rest) + len(weak) == len(fit_result.modes)
+    assert len(rest) + len(weak) == len(fit_result.eigenmodes)
 
 
 def test_both_panels_of_the_spectrum_have_all_eigenmodes(fit_result):
     figure = plots.plot_eigenmode_spectrum(tables.eigenmode_spectrum(fit_result))
     assert len(figure) == 2
     for frame in figure:
-        assert sum(map(len, of_kind(frame, "points"))) == len(fit_result.modes)
+        assert sum(map(len, of_kind(frame, "points"))) == len(fit_result.eigenmodes)
 
 
 def test_every_weak_direction_is_named_above_its_bar_with_what_decides_it(fit_result):
@@ -138,6 +138,6 @@ def test_rows_of_texts_have_room_in_a_small_window(fit_result, instrument, name)
 
 @pytest.mark.parametrize("name", NAMES[:-1])
 def test_result_without_eigenmodes_is_drawn_as_a_message(fit_result, instrument, name):
-    old = replace(fit_result, modes=None, mode_parameters=None, mode_shifts=None)
+    old = replace(fit_result, eigenmodes=None, mode_parameters=None, mode_shifts=None)
     (diagnostic,) = [d for d in diagnostics() if d.name == name]
     assert diagnostic.plot(Chosen(old, instrument)).message.startswith("No ")

@@ -28,6 +28,11 @@ def test_fitted_orbit_is_unchanged_when_read_back(fit_result, tmp_path):
     assert back.sources["source_id"].dtype == "int64"
 
 
+def test_eigenmodes_have_the_file_of_older_versions(fit_result, tmp_path):
+    write_fitted_orbit(tmp_path / "run", fit_result)
+    assert len(pd.read_parquet(tmp_path / "run" / "modes.parquet")) == len(fit_result.eigenmodes)
+
+
 def test_fitted_orbit_of_an_older_version_has_uncorrelated_priors(fit_result, tmp_path):
     older = replace(fit_result, sources=fit_result.sources.drop(columns="prior_corr"))
     write_fitted_orbit(tmp_path / "run", older)

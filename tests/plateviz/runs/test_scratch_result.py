@@ -140,7 +140,7 @@ def test_page_that_has_given_up_does_not_wait_again(partial, monkeypatch):
     result = read_scratch_result(partial[0], complete=lambda part: asked.append(part) or True)
     assert not are_eigenmodes_to_come(result)
     with pytest.raises(InputError, match="had no time"):
-        result.modes.head()
+        result.eigenmodes.head()
     assert asked == ["eigenmodes"]
     monkeypatch.setattr(scratch_result, "_PATIENCE_OF_PAGE", 60.0)
     assert are_eigenmodes_to_come(result)

@@ -226,9 +226,11 @@ def test_what_if_is_a_step_from_the_last_fit(store):
     fitter = OrbitFitter(store.origin.read(0), store.instrument)
     fitter.fit(FitSettings())
     expected = fitter.what_if(settings)
-    for name in ("modes", "mode_parameters", "mode_shifts"):
+    for name in ("eigenmodes", "mode_parameters", "mode_shifts"):
         assert len(getattr(result, name)) == len(getattr(expected, name))
-    pd.testing.assert_frame_equal(result.modes[["mode", "name"]], expected.modes[["mode", "name"]])
+    pd.testing.assert_frame_equal(
+        result.eigenmodes[["mode", "name"]], expected.eigenmodes[["mode", "name"]]
+    )
 
 
 def test_likely_what_if_is_there_when_it_is_asked_for(store):
@@ -246,7 +248,7 @@ def test_likely_what_if_is_there_when_it_is_asked_for(store):
     assert result.summary["reason"] == FitStatus.WHAT_IF.value
     assert result.summary["verdict"] == plain(with_verdict(result).summary["verdict"])
     # Nobody may have asked for it: its eigenmodes are made now.
-    assert len(result.modes) > 0
+    assert len(result.eigenmodes) > 0
 
 
 def test_eigenmodes_that_were_given_up_are_computed_when_asked_for(store):
@@ -254,7 +256,7 @@ def test_eigenmodes_that_were_given_up_are_computed_when_asked_for(store):
     settings = FitSettings(prior_widths={"sources": 2.5})
     assert store.request(0, settings, what_if=True).wait(LONG) is JobStatus.DONE
     directory = store._directory(0, settings, what_if=True)
-    names = ("modes", "mode_parameters", "mode_shifts")
+    names = ("eigenmodes", "mode_parameters", "mode_shifts")
     before = {name: getattr(store.result(0, settings, what_if=True), name) for name in names}
     for name in names:
         (directory / f"{name}.arrow").unlink()
@@ -282,7 +284,7 @@ def test_what_a_process_had_put_off_when_it_died_is_computed_by_the_next_one(sto
         time.sleep(0.02)
     result = store.result(0, likely, what_if=True)
     assert result.summary["verdict"] == plain(with_verdict(result).summary["verdict"])
-    assert len(result.modes) > 0
+    assert len(result.eigenmodes) > 0
 
 
 def test_what_if_without_sources_starts_from_all_measurements(store):

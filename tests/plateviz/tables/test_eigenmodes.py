@@ -11,7 +11,7 @@ from plateviz.tables.eigenmodes import DECIDERS
 
 def test_spectrum_has_every_eigenmode_and_marks_the_weak_ones(fit_result):
     table = tables.eigenmode_spectrum(fit_result)
-    assert len(table) == len(fit_result.modes)
+    assert len(table) == len(fit_result.eigenmodes)
     assert table.loc[table["is_weak"], "mode"].tolist() == [1, 2, 3]
 
 
@@ -74,7 +74,7 @@ def test_only_the_eigenmodes_with_the_largest_shifts_are_mapped(fit_result):
     ids=lambda table: table.__name__,
 )
 def test_result_without_eigenmodes_has_no_rows_and_all_columns(fit_result, table):
-    old = replace(fit_result, modes=None, mode_parameters=None, mode_shifts=None)
+    old = replace(fit_result, eigenmodes=None, mode_parameters=None, mode_shifts=None)
     assert table(old).empty
     assert list(table(old).columns) == list(table(fit_result).columns)
 

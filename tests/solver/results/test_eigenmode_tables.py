@@ -17,19 +17,19 @@ def test_columns_are_those_of_the_schema(result, table):
 
 
 def test_there_is_one_eigenmode_per_calibration_parameter(result):
-    assert len(result.modes) == len(result.calibration)
-    assert result.modes["mode"].tolist() == list(range(1, len(result.calibration) + 1))
+    assert len(result.eigenmodes) == len(result.calibration)
+    assert result.eigenmodes["mode"].tolist() == list(range(1, len(result.calibration) + 1))
 
 
 def test_weak_eigenmodes_are_named(result):
-    weak = result.modes["data_share"] < WEAK
-    named = result.modes["name"] != ""
+    weak = result.eigenmodes["data_share"] < WEAK
+    named = result.eigenmodes["name"] != ""
     assert named.sum() == min(weak.sum(), MAX_NAMED) > 3
     assert weak[named].all()
 
 
 def test_shares_of_an_eigenmode_sum_to_one(result):
-    shares = result.modes.filter(like="_share")
+    shares = result.eigenmodes.filter(like="_share")
     assert shares.shape[1] == 4
     np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=1e-8)
 
@@ -37,7 +37,7 @@ def test_shares_of_an_eigenmode_sum_to_one(result):
 def test_prior_shares_of_the_parameters_sum_to_the_calibration_share(result):
     by_eigenmode = result.mode_parameters.groupby("mode")[["share", "prior_share"]].sum()
     np.testing.assert_allclose(by_eigenmode["share"], 1.0)
-    expected = result.modes["calibration_share"].head(len(by_eigenmode))
+    expected = result.eigenmodes["calibration_share"].head(len(by_eigenmode))
     np.testing.assert_allclose(by_eigenmode["prior_share"], expected, atol=1e-8)
 
 
@@ -74,7 +74,7 @@ def test_shifts_do_not_exceed_the_variance_due_to_the_calibration(result):
 
 
 def test_common_shifts_of_detectors_and_pointings_form_one_eigenmode(result):
-    named = result.modes["name"].head(MAX_NAMED)
+    named = result.eigenmodes["name"].head(MAX_NAMED)
     for axis in "xy":
         both = named.str.contains(f"common detector {axis}") | named.str.contains(
             f"pointing.* and detector {axis}"

@@ -164,7 +164,9 @@ def test_only_what_shows_eigenmodes_waits_for_them(fresh, tmp_path):
     finish(session)
     page = OrbitPage(fresh, wake)
     whole = session.shown.result
-    tables = {name: getattr(whole, name) for name in ("modes", "mode_parameters", "mode_shifts")}
+    tables = {
+        name: getattr(whole, name) for name in ("eigenmodes", "mode_parameters", "mode_shifts")
+    }
     partial = replace(whole, **dict.fromkeys(tables))
     write_scratch_result(tmp_path / "result", partial, is_partial=True)
     what_if = read_scratch_result(tmp_path / "result", lambda part: asked.append(part) or True)

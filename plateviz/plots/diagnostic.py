@@ -53,7 +53,7 @@ class Diagnostic:
     title : displayed title
     caption : what it shows and what a good solution looks like, in a few sentences
     workspace : part of the Orbit page that shows the figure
-    order : sort key on the page
+    position : sort key on the page
     plot : function of a `Chosen` that returns the figure
     follows_shown : whether the figure depends on the shown exposures and detector
     is_wide : whether it takes the whole width of its workspace, or of a report
@@ -71,7 +71,7 @@ class Diagnostic:
     title: str
     caption: str
     workspace: OrbitWorkspace
-    order: int
+    position: int
     plot: Callable[[Chosen], Figure]
     follows_shown: bool = False
     is_wide: bool = False

@@ -14,19 +14,19 @@ from plateviz.plots.survey_figure import SourceFigure, SurveyFigure
 @cache
 def diagnostics() -> tuple[Diagnostic, ...]:
     """Return the diagnostics in page order."""
-    return tuple(sorted(_entries("DIAGNOSTICS"), key=attrgetter("order")))
+    return tuple(sorted(_entries("DIAGNOSTICS"), key=attrgetter("position")))
 
 
 @cache
 def survey_figures() -> tuple[SurveyFigure, ...]:
     """Return the figures of a survey in page order."""
-    return tuple(sorted(_entries("SURVEY_FIGURES"), key=attrgetter("order")))
+    return tuple(sorted(_entries("SURVEY_FIGURES"), key=attrgetter("position")))
 
 
 @cache
 def source_figures() -> tuple[SourceFigure, ...]:
     """Return the figures of one source in page order."""
-    return tuple(sorted(_entries("SOURCE_FIGURES"), key=attrgetter("order")))
+    return tuple(sorted(_entries("SOURCE_FIGURES"), key=attrgetter("position")))
 
 
 def _entries(name: str) -> Iterator:

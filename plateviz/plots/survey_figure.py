@@ -28,7 +28,7 @@ class SurveyFigure:
     title : displayed title
     caption : what it shows and what a good solution looks like, in a few sentences
     workspace : part of the Survey page that shows the figure
-    order : sort key on the page
+    position : sort key on the page
     plot : function of the tables that returns the figure
     is_wide : whether it takes the whole width of its workspace, or of a report
     equation : what is drawn, as text
@@ -43,7 +43,7 @@ class SurveyFigure:
     title: str
     caption: str
     workspace: SurveyWorkspace
-    order: int
+    position: int
     plot: Callable[[SurveyTables], Figure]
     is_wide: bool = False
     equation: str = ""
@@ -67,7 +67,7 @@ class SourceFigure:
     title: str
     caption: str
     workspace: SourceWorkspace
-    order: int
+    position: int
     plot: Callable[[SourceTables], Figure]
     is_wide: bool = False
     equation: str = ""

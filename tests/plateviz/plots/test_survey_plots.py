@@ -242,10 +242,11 @@ def test_gallery_draws_every_figure_of_a_survey(survey, errors_by_count, theme):
 
 
 def test_gallery_separates_the_pages_and_sorts_their_figures():
-    orders = [[f.order for f in page()] for page in (diagnostics, survey_figures, source_figures)]
-    assert [len(page) > 1 for page in orders] == [True, True, True]
-    assert all(page == sorted(page) for page in orders)
-    names = [f.name for page in (diagnostics, survey_figures, source_figures) for f in page()]
+    pages = (diagnostics, survey_figures, source_figures)
+    positions = [[f.position for f in page()] for page in pages]
+    assert [len(page) > 1 for page in positions] == [True, True, True]
+    assert all(page == sorted(page) for page in positions)
+    names = [f.name for page in pages for f in page()]
     assert len(names) == len(set(names))
 
 

@@ -51,7 +51,7 @@ class Progress(NamedTuple):
     last: Outcome | None
 
 
-class Report(NamedTuple):
+class SurveyOutcome(NamedTuple):
     """Result of a call.
 
     Attributes
@@ -79,7 +79,7 @@ def fit_survey(
     scheduler: str | None = None,
     progress: Callable[[Progress], None] = lambda _: None,
     repair: bool = False,
-) -> Report:
+) -> SurveyOutcome:
     """Fit the orbits of a survey that a run does not contain yet, and write the tables over all.
 
     Parameters
@@ -131,7 +131,7 @@ def fit_missing(
     scheduler: str | None,
     progress: Callable[[Progress], None],
     closes: bool = True,
-) -> Report:
+) -> SurveyOutcome:
     """Fit those of some orbits that a locked run does not contain, and write the tables over all.
 
     Parameters
@@ -163,7 +163,7 @@ def fit_missing(
     fitted = [orbit for orbit in missing if orbit not in failed]
     kept = [orbit for orbit in wanted if orbit in there]
     distrusted = _distrusted(run, sorted([*fitted, *kept]))
-    return Report(run, fitted, kept, failed, distrusted, time.perf_counter() - start)
+    return SurveyOutcome(run, fitted, kept, failed, distrusted, time.perf_counter() - start)
 
 
 def _distrusted(run: Run, orbits: list[int]) -> dict[int, list[str]]:

@@ -13,7 +13,7 @@ from solver.data.settings import FitSettings
 from solver.errors import DistrustError, FitError
 
 if TYPE_CHECKING:
-    from plateviz.runs.fit_survey import Progress, Report
+    from plateviz.runs.fit_survey import Progress, SurveyOutcome
 
 _MAX_LISTED = 20
 
@@ -26,7 +26,7 @@ def fit_and_report(
     workers: int | None = None,
     scheduler: str | None = None,
     repair: bool = False,
-) -> "Report":
+) -> "SurveyOutcome":
     """Fit the missing orbits, with a line of progress; arguments as for `fit_survey`."""
     keep_compilations()
     from plateviz.runs.fit_survey import fit_survey
@@ -51,13 +51,13 @@ def _progress_text(progress: "Progress", elapsed: float) -> str:
     return f"{text}, {duration_text(left)} left"
 
 
-def require_all(report: "Report") -> None:
+def require_all(report: "SurveyOutcome") -> None:
     """Raise `FitError` with the reasons if orbits failed."""
     if report.failed:
         raise FitError(_failure_message(report.failed))
 
 
-def require_trust(report: "Report", verdict: Verdict) -> None:
+def require_trust(report: "SurveyOutcome", verdict: Verdict) -> None:
     """Raise `DistrustError` if the run, or the solutions of some orbits, should not be trusted."""
     orbits = list(map(str, report.distrusted))
     if orbits:

@@ -26,7 +26,7 @@ _LARGE_SCATTER = 1.5
 _OF_ORBITS = ("together", "care", "bad", "orbit")
 
 
-class Case(NamedTuple):
+class RunCase(NamedTuple):
     """A test that finds something, and the run in which it does."""
 
     test: Test
@@ -54,7 +54,7 @@ def run_causes(diagnosis: RunDiagnosis, tables: RunTests, motions: pd.DataFrame)
         words = _WORDS.get(test.subject)
         # What orbits name themselves is also found in all of them together.
         if words is not None and not (test.subject in _OF_ORBITS and is_explained):
-            causes.append(words(Case(test, diagnosis, tables, motions)))
+            causes.append(words(RunCase(test, diagnosis, tables, motions)))
     causes.sort(key=lambda cause: -cause.significance)
     return _of_their_own(causes)
 
@@ -108,7 +108,7 @@ def _repeated(rows: pd.DataFrame, total: int, diagnosis: RunDiagnosis) -> Cause:
     )
 
 
-def _zonal(case: Case) -> Cause:
+def _zonal(case: RunCase) -> Cause:
     row = case.tables.zonal.iloc[0]
     rms = float(row["rms"])
     typical = _typical_sigma(case.motions)
@@ -146,7 +146,7 @@ def _typical_sigma(motions: pd.DataFrame) -> float:
     return _median(rows[["sigma_ra", "sigma_dec"]])
 
 
-def _widened(case: Case, rms: float) -> float:
+def _widened(case: RunCase, rms: float) -> float:
     """Return the factor on the errors of the reference stars that has room for the field."""
     rows = case.motions[case.motions["is_reference"].astype(bool)]
     stated = _median(rows[["sigma_catalogue_ra", "sigma_catalogue_dec"]])
@@ -160,7 +160,7 @@ def _median(table: pd.DataFrame) -> float:
     return float(np.median(known)) if len(known) else float("nan")
 
 
-def _against_time(case: Case) -> Cause:
+def _against_time(case: RunCase) -> Cause:
     trend = case.diagnosis.trends[case.test.name]
     kind, group = case.test.subject, case.test.name.partition(" of ")[2]
     unit = unit_text(trend.unit)
@@ -189,7 +189,7 @@ def _against_time(case: Case) -> Cause:
     )
 
 
-def _together(case: Case) -> Cause:
+def _together(case: RunCase) -> Cause:
     name = case.test.name.partition(": ")[2]
     return Cause(
         "weak-in-each-orbit",
@@ -204,7 +204,7 @@ def _together(case: Case) -> Cause:
     )
 
 
-def _share(case: Case) -> Cause:
+def _share(case: RunCase) -> Cause:
     test = case.test
     what = "should not be trusted" if test.subject == "bad" else "have flaws"
     return Cause(
@@ -220,7 +220,7 @@ def _share(case: Case) -> Cause:
     )
 
 
-def _orbit(case: Case) -> Cause:
+def _orbit(case: RunCase) -> Cause:
     (orbit,) = case.test.what
     rows = case.tables.orbit_tests
     worst = rows[rows["orbit_id"] == orbit].nlargest(1, "sigma")["name"].iloc[0]
@@ -237,7 +237,7 @@ def _orbit(case: Case) -> Cause:
     )
 
 
-def _scatter(case: Case) -> Cause:
+def _scatter(case: RunCase) -> Cause:
     is_reference = "reference" in case.test.name
     name = id_strings(pd.Series(case.test.what, dtype=np.int64)).iloc[0]
     kind = "reference star" if is_reference else "source"
@@ -255,7 +255,7 @@ def _scatter(case: Case) -> Cause:
     )
 
 
-def _motions(case: Case) -> Cause:
+def _motions(case: RunCase) -> Cause:
     ratio, states = case.test.statistic, case.diagnosis.states
     bad = states.index[states == "bad"]
     named = ", ".join(map(str, bad[:_MOST_NAMED])) + (" and more" if len(bad) > _MOST_NAMED else "")
@@ -284,7 +284,7 @@ def _motions(case: Case) -> Cause:
     )
 
 
-_WORDS: dict[str, Callable[[Case], Cause]] = {
+_WORDS: dict[str, Callable[[RunCase], Cause]] = {
     "zonal": _zonal,
     "trend": _against_time,
     "jump": _against_time,

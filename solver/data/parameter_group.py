@@ -28,7 +28,7 @@ TERM_AXES: tuple[Axis, ...] = ("coef", "drift", "breathing", "field", "own")
 # Axes of all coefficients of distortion terms, and of what has elements for each exposure.
 DISTORTION_AXES: tuple[Axis, ...] = (*TERM_AXES, "walk")
 EXPOSURE_AXES: tuple[Axis, ...] = ("exp", "walk")
-Family = Literal["normal", "gamma", "uniform"]
+PriorFamily = Literal["normal", "gamma", "uniform"]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Group:
     axis: Axis
     unit: str
     value_unit: str
-    family: Family
+    family: PriorFamily
     width: float
     relative: bool = False
     origin: Literal["catalogue", "environment", "instrument", "zero"] = "zero"

@@ -7,7 +7,7 @@ entry here and one term in `solver.model.forward`.
 
 from solver.data.parameter_group import DISTORTION_AXES, Group, Published
 from solver.data.parameter_group import Axis as Axis
-from solver.data.parameter_group import Family as Family
+from solver.data.parameter_group import PriorFamily as PriorFamily
 
 # The paper gives the prior of the focal length as a variance of 100 on a scale in um/deg. The
 # simulated scatter (1e-3) agrees with a standard deviation of 100 um/deg instead (1.2e-3).

@@ -18,7 +18,7 @@ from plateviz.dashboard.views.cards.figure_text import FigureText
 from plateviz.dashboard.views.cards.point_actions import PointActions
 from plateviz.dashboard.views.elements.markup import markup_pane, paragraph
 from plateviz.dashboard.views.saving.save_button import SaveButton
-from plateviz.dashboard.views.saving.save_choices import OnScreen, Saved, figure_choices
+from plateviz.dashboard.views.saving.save_choices import FigureOnScreen, Saved, figure_choices
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.figure import Figure, Limits
 from plateviz.figures.figure_summary import TextTable, figure_summary, text_tables
@@ -201,11 +201,11 @@ class FigureView(pn.viewable.Viewer):
         self._fade()
         return False
 
-    def _on_screen(self) -> OnScreen | None:
+    def _on_screen(self) -> FigureOnScreen | None:
         """Return the figure as it is on the screen, with the limits that a person has chosen."""
         if self._figure is None or self._drawn is None:
             return None
-        return OnScreen(self._drawn.with_limits(self._resized(self._figure)), self._theme)
+        return FigureOnScreen(self._drawn.with_limits(self._resized(self._figure)), self._theme)
 
     def _resized(self, figure: Figure) -> Figure:
         """Return the figure in the size of the card."""

@@ -1,4 +1,4 @@
-"""KeptSelections: a window in which selections are kept under names and taken up again."""
+"""KeptSelectionsWindow: a window in which selections are kept under names and taken up again."""
 
 from html import escape
 
@@ -11,7 +11,7 @@ from plateviz.dashboard.views.dialogs.window import window
 from solver.errors import InputError
 
 
-class KeptSelections(pn.viewable.Viewer):
+class KeptSelectionsWindow(pn.viewable.Viewer):
     """A name for the selection, and the list of those that are kept, by others too."""
 
     def __init__(self, navigation: Navigation, **params: object) -> None:

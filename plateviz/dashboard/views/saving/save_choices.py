@@ -18,7 +18,7 @@ from solver.errors import InputError
 _PICTURES: Mapping[str, OutputBackendType] = {"png": "canvas", "svg": "svg"}
 
 
-class OnScreen(NamedTuple):
+class FigureOnScreen(NamedTuple):
     """A figure in its size and with its limits on the screen, and its theme."""
 
     figure: Figure
@@ -38,7 +38,9 @@ class Saved(NamedTuple):
     tables: Callable[[], Mapping[str, Table]] | None = None
 
 
-def figure_choices(name: str, on_screen: Callable[[], OnScreen | None], saved: Saved) -> Choices:
+def figure_choices(
+    name: str, on_screen: Callable[[], FigureOnScreen | None], saved: Saved
+) -> Choices:
     """Return what a figure can be saved as.
 
     Parameters
@@ -50,7 +52,7 @@ def figure_choices(name: str, on_screen: Callable[[], OnScreen | None], saved: S
     def stem() -> str:
         return "-".join(filter(None, (saved.subject(), name)))
 
-    def shown() -> OnScreen:
+    def shown() -> FigureOnScreen:
         found = on_screen()
         if found is None:
             raise InputError("there is nothing to save yet")
@@ -85,7 +87,7 @@ def _file(
     return as_file(tables(), stem(), suffix)
 
 
-def _item(shown: OnScreen, output_backend: OutputBackendType) -> dict[str, object]:
+def _item(shown: FigureOnScreen, output_backend: OutputBackendType) -> dict[str, object]:
     """Return the figure, drawn anew, as JSON: models of the page cannot be in another document."""
     drawn = BokehFigure(shown.figure, shown.theme)
     for frame in drawn.frames:

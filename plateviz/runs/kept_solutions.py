@@ -46,12 +46,12 @@ class KeptSolution(NamedTuple):
     ----------
     directory : with the fitted orbit
     orbit : orbit_id; None for files of one orbit
-    is_step : whether it was computed by a what-if
+    is_what_if : whether it was computed by a what-if
     """
 
     directory: Path
     orbit: int | None
-    is_step: bool
+    is_what_if: bool
 
     @property
     def name(self) -> str:
@@ -108,7 +108,9 @@ class KeptSolutions:
         require_instrument(result, self._instrument, f"kept solution {kept.name!r}", remedy)
         return result
 
-    def keep(self, name: str, orbit: int | None, is_step: bool, result: FitResult) -> KeptSolution:
+    def keep(
+        self, name: str, orbit: int | None, is_what_if: bool, result: FitResult
+    ) -> KeptSolution:
         """Keep a fitted orbit under a name.
 
         Raises
@@ -129,14 +131,14 @@ class KeptSolutions:
         if target.exists():
             raise InputError(f"expected a name that is free, found a kept solution {name!r}")
         number = "file" if orbit is None else f"{orbit:04d}"
-        directory = f"{'what-if' if is_step else 'orbit'}={number}"
+        directory = f"{'what-if' if is_what_if else 'orbit'}={number}"
         with writing(target, "to keep the solution"):
             self.folder.mkdir(parents=True, exist_ok=True)
             with scratch_beside(target) as staging:
                 write_fitted_orbit(staging / directory, result)
                 staging.rename(target)
             flush(self.folder)
-        return KeptSolution(target / directory, orbit, is_step)
+        return KeptSolution(target / directory, orbit, is_what_if)
 
 
 def survey_instrument_of(kept: KeptSolution) -> Instrument:

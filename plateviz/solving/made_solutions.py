@@ -26,13 +26,13 @@ class MadeSolution(NamedTuple):
     ----------
     orbit : orbit_id; None for files of one orbit
     settings : of the fit
-    is_step : whether it was computed by a what-if
+    is_what_if : whether it was computed by a what-if
     name : that a person gave it; empty for none
     """
 
     orbit: int | None
     settings: FitSettings
-    is_step: bool
+    is_what_if: bool
     name: str = ""
 
     def is_of(self, other: "MadeSolution") -> bool:
@@ -77,7 +77,7 @@ class MadeSolutions:
         """
         for one in [one for one in self.awaited(key) if one.job.status.is_over]:
             self.forget(key, one.job)
-            if one.job.status is JobStatus.DONE and not one.made.is_step:
+            if one.job.status is JobStatus.DONE and not one.made.is_what_if:
                 self.remember(key, one.made)
         return list(self._of[key].made) if key in self._of else []
 

@@ -207,7 +207,7 @@ class SolutionStore:
             raise InputError(
                 "expected a solution, found that it made room for others: show it first"
             )
-        return self.kept.keep(name, made.orbit, made.is_step, result)
+        return self.kept.keep(name, made.orbit, made.is_what_if, result)
 
     def close(self) -> None:
         """End the solver process and remove the scratch folder."""

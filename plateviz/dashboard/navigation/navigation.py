@@ -240,7 +240,7 @@ class Navigation(param.Parameterized):
         elif last is None or last.settings == found.settings:
             session.show_result(found)
         elif last.is_replaceable:
-            session.open(Request(orbit, last.settings, is_step=True), found)
+            session.open(Request(orbit, last.settings, is_what_if=True), found)
         else:
             session.show_orbit(orbit)
 
@@ -254,7 +254,7 @@ class Navigation(param.Parameterized):
         try:
             solution = self._find("solution", orbit) or self._solution(None, orbit)
             other = self._find("against", orbit)
-            if other is None and isinstance(solution, Request) and solution.is_step:
+            if other is None and isinstance(solution, Request) and solution.is_what_if:
                 # It is a change of that solution, to which the controls lead back.
                 other = self._solution(None, orbit)
         except InputError as error:

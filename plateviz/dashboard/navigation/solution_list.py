@@ -68,11 +68,11 @@ class SolutionList:
         store, orbit = self._session.store, self._session.selection.orbit
         what_if = self._what_if()
         made = [
-            Entry(one, one.orbit, one.name, one.settings.describe(), _how(one.is_step))
+            Entry(one, one.orbit, one.name, one.settings.describe(), _how(one.is_what_if))
             for one in reversed(self._session.journal.made)
         ]
         if what_if is not None:
-            words = f"{_how(what_if.is_step)}, on the screen"
+            words = f"{_how(what_if.is_what_if)}, on the screen"
             made.insert(0, Entry(what_if, what_if.orbit, "", what_if.settings.describe(), words))
         kept = [self._of_kept(one) for one in store.kept.all()]
         runs = [self._of_run(one, orbit) for one in self._navigation.runs]
@@ -103,10 +103,10 @@ class SolutionList:
             if found is None:
                 raise InputError(f"run {what.run.name}: orbit {what.orbit} is gone")
             return found
-        result = self._session.store.result(what.orbit, what.settings, what.is_step)
+        result = self._session.store.result(what.orbit, what.settings, what.is_what_if)
         if result is None:
-            return Request(what.orbit, what.settings, what.is_step)
-        return Solution(what.orbit, what.settings, result, is_step=what.is_step)
+            return Request(what.orbit, what.settings, what.is_what_if)
+        return Solution(what.orbit, what.settings, result, is_what_if=what.is_what_if)
 
     def rename(self, entry: Entry, name: str) -> None:
         """Give a solution of the session a name; a what-if on the screen stays in the list."""
@@ -127,7 +127,7 @@ class SolutionList:
         shown = self._session.shown
         if shown is None or not shown.is_replaceable:
             return None
-        made = MadeSolution(shown.orbit, shown.settings, shown.is_step)
+        made = MadeSolution(shown.orbit, shown.settings, shown.is_what_if)
         return None if any(one.is_of(made) for one in self._session.journal.made) else made
 
     def _of_kept(self, kept: KeptSolution) -> Entry:
@@ -135,7 +135,7 @@ class SolutionList:
             settings = kept.settings().describe()
         except InputError:
             settings = _DAMAGED
-        return Entry(kept, kept.orbit, kept.name, settings, f"{_how(kept.is_step)}, kept")
+        return Entry(kept, kept.orbit, kept.name, settings, f"{_how(kept.is_what_if)}, kept")
 
     def _of_run(self, run: SurveyRun, orbit: int | None) -> Entry | None:
         if orbit is None or not run.has_fitted(orbit):
@@ -162,15 +162,15 @@ def label_of(solution: Solution, entries: Mapping[str, Entry]) -> str | None:
             is_same = not (solution.run or solution.kept) and what[:3] == (
                 solution.orbit,
                 solution.settings,
-                solution.is_step,
+                solution.is_what_if,
             )
         if is_same:
             return label
     return None
 
 
-def _how(is_step: bool) -> str:
-    return "what-if" if is_step else "fit"
+def _how(is_what_if: bool) -> str:
+    return "what-if" if is_what_if else "fit"
 
 
 def by_label(entries: list[Entry]) -> dict[str, Entry]:

@@ -113,7 +113,7 @@ def _of_solution(navigation: Navigation) -> PageCode:
         drawn = figures_as_python("solution", calls)
     python.append(drawn)
     words = [_about(navigation, f"the solution ({shown.settings.describe()})", drawn)]
-    words += [_OF_WHAT_IF] if _is_step(shown, other) else []
+    words += [_OF_WHAT_IF] if _is_what_if(shown, other) else []
     words += [_OF_ONE_ORBIT] if isinstance(origin, SurveyFolder) else []
     words += [_OF_OTHER_ORBIT] if other is not None and not compared else []
     return PageCode(" ".join(words), " &&\n".join(commands), "\n".join(filter(None, python)))
@@ -193,8 +193,8 @@ def _about(navigation: Navigation, what: str, drawn: str) -> str:
     return f"These make {what} on the screen again{figures}. The report has all figures."
 
 
-def _is_step(shown: Solution, other: Solution | None) -> bool:
-    return shown.is_step or (other is not None and other.is_step)
+def _is_what_if(shown: Solution, other: Solution | None) -> bool:
+    return shown.is_what_if or (other is not None and other.is_what_if)
 
 
 def _keywords(session: Session, chosen: Chosen | None) -> dict[str, object]:

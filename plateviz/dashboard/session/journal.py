@@ -73,7 +73,7 @@ class Journal(param.Parameterized):
     def add(self, solution: Solution) -> None:
         """Remember a solution, unless it is on disk, or the next what-if replaces it."""
         if not (solution.run or solution.kept or solution.is_replaceable):
-            self.rename(MadeSolution(solution.orbit, solution.settings, solution.is_step), "")
+            self.rename(MadeSolution(solution.orbit, solution.settings, solution.is_what_if), "")
 
     def rename(self, made: MadeSolution, name: str) -> None:
         """Give a solution of the session a name."""

@@ -1,4 +1,4 @@
-"""OnScreen: the solution on the screen of a session, and the one that it is compared with."""
+"""SolutionsOnScreen: the solution that a session shows, and the one it is compared with."""
 
 from collections.abc import Mapping
 
@@ -11,7 +11,7 @@ from plateviz.dashboard.session.stage import RequestState, Stage
 from plateviz.plots.both_solutions import comparable_figures
 
 
-class OnScreen(RequestState):
+class SolutionsOnScreen(RequestState):
     """The solutions on the screen of one browser session.
 
     `shown` is the solution on the screen, `other` the one that it is compared with; either may

@@ -11,7 +11,7 @@ from plateviz.dashboard.session.fit_choices import ANSWERED_AT_ONCE, FitChoices
 from plateviz.dashboard.session.held_job import HeldJob
 from plateviz.dashboard.session.journal import Journal
 from plateviz.dashboard.session.judging import Judging
-from plateviz.dashboard.session.on_screen import OnScreen
+from plateviz.dashboard.session.on_screen import SolutionsOnScreen
 from plateviz.dashboard.session.solution import Request, Solution, what_if_settings
 from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.session.units import Units
@@ -21,7 +21,7 @@ from solver.data.settings import ENGINES, FitSettings
 from solver.errors import InputError
 
 
-class Session(OnScreen):
+class Session(SolutionsOnScreen):
     """State of one browser session.
 
     `journal` lists the solutions of the session, of all orbits.
@@ -60,7 +60,7 @@ class Session(OnScreen):
     @property
     def is_fitting(self) -> bool:
         """Whether there is a job that is no what-if."""
-        return self.job is not None and not self._requested.is_step
+        return self.job is not None and not self._requested.is_what_if
 
     @property
     def is_opening(self) -> bool:
@@ -177,13 +177,13 @@ class Session(OnScreen):
             return
         known = next((s for s in self.solutions if s.settings == settings), None)
         if self.job is not None:
-            self._next_what_if = settings if self._requested.is_step else None
+            self._next_what_if = settings if self._requested.is_what_if else None
         elif self.shown is not None and settings == self.shown.settings:
             return
         elif known is not None:
             self._return_to(known)
         else:
-            self._request(Request(self.selection.orbit, settings, is_step=True))
+            self._request(Request(self.selection.orbit, settings, is_what_if=True))
 
     def list_what_if(self) -> None:
         """Add the what-if on the screen to the list, so that the next one does not replace it."""
@@ -275,8 +275,8 @@ class Session(OnScreen):
         if result is None:
             self.refuse("The result of the fit was removed.")
         else:
-            orbit, settings, is_step = request
-            self._put_on_screen(Solution(orbit, settings, result, is_step, is_step))
+            orbit, settings, is_what_if = request
+            self._put_on_screen(Solution(orbit, settings, result, is_what_if, is_what_if))
 
     def _put_on_screen(self, solution: Solution) -> None:
         problems = self.selection.limit_to(solution.result, self._detectors)

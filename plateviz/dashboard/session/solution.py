@@ -15,12 +15,12 @@ class Request(NamedTuple):
     ----------
     orbit : orbit_id, or None for files of one orbit
     settings : of the fit
-    is_step : whether a step from the last fit is enough
+    is_what_if : whether a step from the last fit is enough
     """
 
     orbit: int | None
     settings: FitSettings
-    is_step: bool = False
+    is_what_if: bool = False
 
 
 class Solution(NamedTuple):
@@ -31,7 +31,7 @@ class Solution(NamedTuple):
     orbit, settings : as of `Request`
     result : of the fit
     is_replaceable : whether the next what-if replaces it
-    is_step : whether it was computed by a step from a fit, listed or not
+    is_what_if : whether it was computed by a step from a fit, listed or not
     run : name of the run that it was read from; empty for none
     kept : name of the kept solution that it was read from; empty for none
     """
@@ -40,7 +40,7 @@ class Solution(NamedTuple):
     settings: FitSettings
     result: FitResult
     is_replaceable: bool = False
-    is_step: bool = False
+    is_what_if: bool = False
     run: str = ""
     kept: str = ""
 

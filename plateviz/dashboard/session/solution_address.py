@@ -56,7 +56,7 @@ def solution_query(
         return _text(solution, shown.orbit, None if is_whole else large)
 
     query = {"solution": text(shown)}
-    is_default = run is None and not (shown.is_step or shown.kept)
+    is_default = run is None and not (shown.is_what_if or shown.kept)
     is_default = is_default and shown.settings == FitSettings()
     if is_default or (run is not None and shown.run == run):
         query = {}
@@ -115,13 +115,15 @@ def find_solution(
 
 def settings_text(solution: Solution) -> str:
     """Return the settings of a solution, and whether it is a what-if, in words."""
-    return " ".join([*setting_words(solution.settings), *([WHAT_IF] if solution.is_step else [])])
+    return " ".join(
+        [*setting_words(solution.settings), *([WHAT_IF] if solution.is_what_if else [])]
+    )
 
 
 def read_kept(kept: KeptSolutions, one: KeptSolution) -> Solution:
     """Return a kept solution; InputError if it is damaged, or of another instrument."""
     result = kept.read(one)
-    return Solution(one.orbit, result.settings, result, is_step=one.is_step, kept=one.name)
+    return Solution(one.orbit, result.settings, result, is_what_if=one.is_what_if, kept=one.name)
 
 
 def solution_of_run(run: SurveyRun | None, orbit: int | None) -> Solution | None:

@@ -21,7 +21,7 @@ def test_kept_solution_is_read_back(kept, fit_result):
     assert kept.all() == []
     made = kept.keep("lower-order", 3, True, fit_result)
     assert kept.all() == [made] == [kept.find("lower-order")]
-    assert (made.name, made.orbit, made.is_step) == ("lower-order", 3, True)
+    assert (made.name, made.orbit, made.is_what_if) == ("lower-order", 3, True)
     assert made.settings() == fit_result.settings
     assert made.read().sources.equals(fit_result.sources)
     assert kept.keep("of-files", None, False, fit_result).directory.name == "orbit=file"

@@ -98,7 +98,7 @@ def test_what_if_on_the_screen_is_listed_and_stays_once_it_has_a_name(page):
 
 
 def test_what_if_on_the_screen_that_an_earlier_page_has_listed_is_there_once(page):
-    page.session.journal.rename(MadeSolution(0, FitSettings(order=3), is_step=True), "low")
+    page.session.journal.rename(MadeSolution(0, FitSettings(order=3), is_what_if=True), "low")
     page.session.choices.order = 3
     end_job(page)
     assert page.session.shown.is_replaceable
@@ -130,14 +130,14 @@ def test_solution_of_the_session_is_shown_again_in_its_orbit(page):
     found = SolutionList(page).load(entry(page, "orbit 0: order 4 (what-if)"))
     page.session.open_listed(found)
     assert (page.session.shown.orbit, page.session.shown.settings.order) == (0, 4)
-    assert page.session.shown.is_step
+    assert page.session.shown.is_what_if
     assert not page.session.shown.is_replaceable
 
 
 def test_solution_that_the_store_has_lost_is_computed_again(page, monkeypatch):
     monkeypatch.setattr(page.session.store, "result", lambda *_: None)
     found = SolutionList(page).load(entry(page, "orbit 0: order 4 (what-if)"))
-    assert found == Request(0, FitSettings(order=4), is_step=True)
+    assert found == Request(0, FitSettings(order=4), is_what_if=True)
 
 
 def test_named_solution_is_there_again_after_a_reload(page):
@@ -154,7 +154,7 @@ def test_named_solution_is_there_again_after_a_reload(page):
 
 def test_what_was_made_before_the_browser_told_its_key_stays(page):
     store = page.session.store.made
-    store.remember(KEY, MadeSolution(1, FitSettings(), is_step=False))
+    store.remember(KEY, MadeSolution(1, FitSettings(), is_what_if=False))
     page.session.journal.resume(KEY)
     assert [(one.orbit, one.settings.order) for one in store.of(KEY)] == [(1, 5), (0, 4)]
 
@@ -218,6 +218,6 @@ def test_journal_is_bounded(monkeypatch):
     assert [one.orbit for one in store.of(KEY)] == [1, 2]
     assert {len(one.name) for one in store.of(KEY)} == {60}
     for last in "123":
-        store.remember(KEY[:-1] + last, MadeSolution(0, FitSettings(), is_step=False))
+        store.remember(KEY[:-1] + last, MadeSolution(0, FitSettings(), is_what_if=False))
     assert store.of(KEY) == []
     assert Journal(store).made == []

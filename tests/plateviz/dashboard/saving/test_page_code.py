@@ -91,7 +91,7 @@ def test_compared_solution_is_made_too(solved, make_fit_result):
     session = solved.session
     fitted, settings = session.shown, FitSettings(order=3)
     what_if = fitted._replace(
-        settings=settings, is_replaceable=True, is_step=True, result=make_fit_result(2)[0]
+        settings=settings, is_replaceable=True, is_what_if=True, result=make_fit_result(2)[0]
     )
     solved.known.append(what_if)
     session.param.update(shown=what_if, other=fitted)

@@ -21,7 +21,7 @@ from plateviz.solving.solver_queue import SolverQueue
 from solver.data.settings import FitSettings
 from solver.io.disk import writing
 from solver.io.lock import locked
-from solver.io.survey import HEADER
+from solver.io.survey_header import HEADER
 from solver.runtime.threads import count_cores
 from solver.runtime.versions import versions_of
 from solver.simulate.settings import SurveySettings

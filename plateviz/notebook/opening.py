@@ -20,7 +20,7 @@ from solver.errors import InputError
 from solver.io.atomic import sha256_of
 from solver.io.result import read_result
 from solver.io.result_instrument import instrument_of
-from solver.io.survey import HEADER, read_header, section
+from solver.io.survey_header import HEADER, read_header, section
 from solver.simulate.settings import SurveySettings
 
 _Path = str | PathLike[str]

@@ -28,7 +28,7 @@ from plateviz.verdict.run_verdict import run_verdict
 from plateviz.verdict.verdict import source_verdict
 from solver.data.result import FitResult
 from solver.errors import InputError
-from solver.io.survey import section
+from solver.io.survey_header import section
 
 
 def survey_report(

@@ -19,13 +19,12 @@ from solver.io.consistency import repeated_orbits
 from solver.io.parquet import count_rows
 from solver.io.survey import (
     EXPOSURES,
-    HEADER,
     MEASUREMENTS,
     measurement_path,
-    read_header,
     read_survey_table,
     survey_orbits,
 )
+from solver.io.survey_header import HEADER, read_header
 from solver.io.survey_manifest import MANIFEST, listed_files
 from solver.io.survey_problems import misnamed_orbits
 

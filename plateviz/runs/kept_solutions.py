@@ -27,7 +27,8 @@ from solver.io.atomic import flush
 from solver.io.disk import writing
 from solver.io.result_instrument import require_instrument
 from solver.io.scratch import scratch_beside
-from solver.io.survey import HEADER, read_survey_instrument
+from solver.io.survey import read_survey_instrument
+from solver.io.survey_header import HEADER
 from solver.simulate.settings import SurveySettings
 from solver.simulate.simulated import simulation_of
 

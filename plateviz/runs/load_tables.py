@@ -13,15 +13,8 @@ from plateviz.verdict.verdict import Verdict
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.errors import InputError
 from solver.io.settings import parse_settings
-from solver.io.survey import (
-    HEADER,
-    REFERENCE,
-    TRUTH_FILE,
-    has_survey_table,
-    read_header,
-    read_survey_table,
-    section,
-)
+from solver.io.survey import REFERENCE, TRUTH_FILE, has_survey_table, read_survey_table
+from solver.io.survey_header import HEADER, read_header, section
 
 
 def survey_tables(run: SurveyRun, read: RunTables | None = None) -> SurveyTables:

@@ -10,16 +10,8 @@ from solver.errors import InputError
 from solver.io.atomic import sha256_of
 from solver.io.disk import writing
 from solver.io.scratch import is_scratch
-from solver.io.survey import (
-    EXPOSURES,
-    HEADER,
-    REFERENCE,
-    TRUTH_FILE,
-    read_header,
-    section,
-    survey_orbits,
-    write_header,
-)
+from solver.io.survey import EXPOSURES, REFERENCE, TRUTH_FILE, survey_orbits
+from solver.io.survey_header import HEADER, read_header, section, write_header
 from solver.runtime.versions import versions_of
 
 # Their versions belong to a run: results may differ between versions.

@@ -42,7 +42,8 @@ from solver.io.failures import reading
 from solver.io.manifest import changes, manifest_of, read_manifest, require_unchanged
 from solver.io.scratch import remove_abandoned
 from solver.io.settings import parse_settings
-from solver.io.survey import read_header, survey_orbits
+from solver.io.survey import survey_orbits
+from solver.io.survey_header import read_header
 
 DEFAULT_RUN = "default"
 RUN_FILE = "run.toml"

@@ -14,7 +14,6 @@ from solver.data.instrument import MINI_MOCK, Instrument, read_instrument
 from solver.data.orbit import OrbitData
 from solver.io.read_orbit import observation_files, read_orbit
 from solver.io.survey import (
-    HEADER,
     REFERENCE,
     TRUTH_FILE,
     measurement_path,
@@ -22,6 +21,7 @@ from solver.io.survey import (
     read_survey_orbit,
     survey_orbits,
 )
+from solver.io.survey_header import HEADER
 from solver.simulate.settings import SurveySettings
 from solver.simulate.simulated import simulation_of
 

@@ -20,7 +20,8 @@ from solver.io.formats import has_reader, is_fits, place, read_tables
 from solver.io.parquet import count_rows
 from solver.io.read_orbit import names_of
 from solver.io.result import is_result, to_result
-from solver.io.survey import measurement_path, read_header, section, survey_orbits
+from solver.io.survey import measurement_path, survey_orbits
+from solver.io.survey_header import read_header, section
 from solver.io.survey_manifest import survey_changes
 from solver.io.survey_problems import survey_problems
 from solver.io.table_check import examine, matched_names

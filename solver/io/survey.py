@@ -27,7 +27,6 @@ from solver.data.columns import Column
 from solver.data.instrument import Instrument, instrument_from
 from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
-from solver.data.toml import parse_toml, toml_text
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
 from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
@@ -36,11 +35,10 @@ from solver.io.manifest import (
 )
 from solver.io.parquet import write_parquet
 from solver.io.read_orbit import find_catalogue
+from solver.io.survey_header import HEADER, header_text, read_header
 from solver.io.survey_manifest import MANIFEST, listed_files, require_unchanged_files
 from solver.io.table_check import conform, matched_names, refuse
 
-FORMAT = 1
-HEADER = "survey.toml"
 REFERENCE = "reference.parquet"
 TRUTH_FILE = "truth.parquet"
 EXPOSURES = "exposures.parquet"
@@ -132,61 +130,9 @@ def write_manifest(directory: Path, content: Mapping[str, object]) -> None:
     folders = (".", MEASUREMENTS, DEFECTS)
     tables = [path for name in folders for path in (directory / name).glob("*.parquet")]
     names = [path.relative_to(directory).as_posix() for path in tables]
-    header = hashlib.sha256(_header_text(content).encode()).hexdigest()
+    header = hashlib.sha256(header_text(content).encode()).hexdigest()
     with write_atomically(directory / MANIFEST) as path:
         path.write_text(f"{manifest_of(directory, names)}{header}  {HEADER}\n", encoding="utf-8")
-
-
-def read_header(directory: Path, name: str = HEADER, of: str = "survey") -> dict[str, object]:
-    """Return the content of a header, such as a survey's.
-
-    Parameters
-    ----------
-    name : file name; differs for an unfinished survey
-    of : what the directory is
-
-    Raises
-    ------
-    InputError
-        If the file is missing or unreadable, or its format is not supported.
-    """
-    path = Path(directory) / name
-    if name == HEADER and path.is_file():
-        require_unchanged_files(Path(directory), [path])
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise InputError(f"{directory}: expected a {of} with a file {name}, found none") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: expected the header of a {of}, found: {error}") from error
-    content = parse_toml(text, path, f"the header of a {of}")
-    if content.get("format") != FORMAT:
-        raise InputError(
-            f"{path}: expected format = {FORMAT}, found {content.get('format', 'no format')!r}"
-        )
-    return content
-
-
-def section(header: Mapping[str, object], name: str) -> Mapping[str, object]:
-    """Return a section of a header; an empty one if it is absent."""
-    found = header.get(name)
-    return found if isinstance(found, Mapping) else {}
-
-
-def write_header(directory: Path, content: Mapping[str, object], name: str = HEADER) -> None:
-    """Write a survey's header; values are text, numbers, lists and mappings (TOML tables).
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
-    with write_atomically(Path(directory) / name) as path:
-        path.write_text(_header_text(content), encoding="utf-8")
-
-
-def _header_text(content: Mapping[str, object]) -> str:
-    return toml_text({"format": FORMAT, **content})
 
 
 def read_survey_instrument(directory: Path) -> Instrument:

@@ -20,10 +20,10 @@ from solver.io.survey import (
     EXPOSURES,
     REFERENCE,
     measurement_path,
-    read_header,
     read_survey_table,
     write_survey_table,
 )
+from solver.io.survey_header import read_header
 from solver.io.survey_manifest import MANIFEST, listed_files
 from solver.io.table_check import conform, refuse
 

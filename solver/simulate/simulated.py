@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from solver.errors import InputError
-from solver.io.survey import TRUTH_FILE, has_survey_table, read_header, section
+from solver.io.survey import TRUTH_FILE, has_survey_table
+from solver.io.survey_header import read_header, section
 from solver.simulate.settings import SurveySettings
 
 

@@ -17,18 +17,15 @@ from solver.io.scratch import is_scratch, remove_abandoned
 from solver.io.survey import (
     DEFECTS,
     EXPOSURES,
-    HEADER,
     MEASUREMENTS,
     REFERENCE,
     TRUTH_FILE,
     measurement_path,
-    read_header,
     read_survey_table,
-    section,
-    write_header,
     write_manifest,
     write_survey_table,
 )
+from solver.io.survey_header import HEADER, read_header, section, write_header
 from solver.runtime.device import require_device
 from solver.runtime.versions import versions_of
 from solver.simulate.catalogue import (

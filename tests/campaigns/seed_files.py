@@ -38,10 +38,10 @@ from solver.io.survey import (
     REFERENCE,
     TRUTH_FILE,
     measurement_path,
-    write_header,
     write_manifest,
     write_survey_table,
 )
+from solver.io.survey_header import write_header
 from tests.solver.io_samples import FIRST_ID, N_SOURCES, random_table, small_result, write_fits
 
 SAMPLE = Path(__file__).resolve().parents[1] / "data"

@@ -36,7 +36,7 @@ from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_queue import SolverQueue
 from solver.data.settings import FitSettings
 from solver.io.scratch import is_scratch
-from solver.io.survey import HEADER
+from solver.io.survey_header import HEADER
 from solver.io.survey_manifest import survey_changes
 from solver.runtime.termination import ending_on_sigterm
 from tests.campaigns.forked import Forked, run_and_exit

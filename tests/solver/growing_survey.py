@@ -7,7 +7,6 @@ from solver.data.schema import ENVIRONMENT
 from solver.io.manifest import manifest_of
 from solver.io.survey import (
     EXPOSURES,
-    HEADER,
     REFERENCE,
     TRUTH_FILE,
     measurement_path,
@@ -16,6 +15,7 @@ from solver.io.survey import (
     write_survey_table,
 )
 from solver.io.survey_growth import append_orbit
+from solver.io.survey_header import HEADER
 from solver.io.survey_manifest import MANIFEST
 
 

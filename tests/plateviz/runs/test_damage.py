@@ -18,14 +18,13 @@ from solver.errors import InputError
 from solver.io.survey import (
     EXPOSURES,
     measurement_path,
-    read_header,
     read_survey_instrument,
     read_survey_orbit,
     read_survey_table,
     survey_orbits,
-    write_header,
     write_survey_table,
 )
+from solver.io.survey_header import read_header, write_header
 
 pytestmark = pytest.mark.slow
 

@@ -9,12 +9,7 @@ import pytest
 from solver.data.schema import ENVIRONMENT
 from solver.errors import InputError
 from solver.io import survey_growth
-from solver.io.survey import (
-    EXPOSURES,
-    read_survey_orbit,
-    read_survey_table,
-    survey_orbits,
-)
+from solver.io.survey import EXPOSURES, read_survey_orbit, read_survey_table, survey_orbits
 from solver.io.survey_growth import append_orbit
 from solver.io.survey_manifest import MANIFEST, survey_changes
 from tests.solver.growing_survey import GrowingSurvey

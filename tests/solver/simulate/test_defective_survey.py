@@ -12,7 +12,8 @@ from solver.data.defect_schema import AFFECTED
 from solver.errors import InputError
 from solver.io.inspect import inspect_files
 from solver.io.manifest import read_manifest
-from solver.io.survey import read_header, read_survey_orbit
+from solver.io.survey import read_survey_orbit
+from solver.io.survey_header import read_header
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import read_affected, simulate_survey
 

@@ -12,7 +12,8 @@ from pyarrow import parquet
 
 from solver.data.instrument import MINI_MOCK, parse_instrument
 from solver.errors import InputError
-from solver.io.survey import read_header, read_survey_orbit, survey_orbits, write_header
+from solver.io.survey import read_survey_orbit, survey_orbits
+from solver.io.survey_header import read_header, write_header
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
 from solver.simulate.measure import measure_orbit
 from solver.simulate.settings import SurveySettings

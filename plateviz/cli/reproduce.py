@@ -29,7 +29,7 @@ def reproduce(
     """Print the paper's numbers beside those of a survey of 100 orbits."""
     from plateviz.cache import cache_directory
     from plateviz.cli.output import print_json, print_reproduction
-    from plateviz.solving.reproduction import reproduced
+    from plateviz.cli.paper_survey import reproduced
 
     survey = directory or cache_directory() / "paper-survey"
     table = reproduced(survey, run, workers)

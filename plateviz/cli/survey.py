@@ -6,7 +6,7 @@ from pathlib import Path
 import typer
 
 from plateviz.cli.output import print_json
-from plateviz.solving.survey_progress import fit_and_report, require_all, require_trust
+from plateviz.cli.survey_progress import fit_and_report, require_all, require_trust
 from plateviz.tables.counts import orbits_text
 from plateviz.verdict.verdict import as_plain
 from solver.data.settings import FitSettings

@@ -6,15 +6,7 @@ from typing import NamedTuple
 
 from plateviz.dashboard.navigation.exploration import Exploration
 from plateviz.dashboard.navigation.navigation import Navigation, View
-from plateviz.dashboard.session.orbit_figures import chosen_of, figures_of
-from plateviz.dashboard.session.session import Session
-from plateviz.dashboard.session.solution import Solution
-from plateviz.dashboard.session.solution_address import run_settings
-from plateviz.plots.diagnostic import Chosen
-from plateviz.plots.gallery import source_figures, survey_figures
-from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace, title_of
-from plateviz.runs.queries import SurveyRun
-from plateviz.solving.as_code import (
+from plateviz.dashboard.saving.as_code import (
     NAME,
     PREAMBLE,
     FigureCall,
@@ -25,6 +17,14 @@ from plateviz.solving.as_code import (
     report_command,
     report_of_run,
 )
+from plateviz.dashboard.session.orbit_figures import chosen_of, figures_of
+from plateviz.dashboard.session.session import Session
+from plateviz.dashboard.session.solution import Solution
+from plateviz.dashboard.session.solution_address import run_settings
+from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.gallery import source_figures, survey_figures
+from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace, title_of
+from plateviz.runs.queries import SurveyRun
 from plateviz.solving.origin import SurveyFolder
 from plateviz.verdict.verdict import orbit_verdict
 from solver.data.settings import FitSettings

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from plateviz.dashboard.navigation.navigation import FoundSource, Navigation, View
+from plateviz.dashboard.saving.as_code import as_command, report_of_run
 from plateviz.dashboard.saving.downloads import Download, Later, Progress, file_name
 from plateviz.dashboard.session.solution import Solution
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
@@ -15,7 +16,6 @@ from plateviz.reports.page import page_of
 from plateviz.reports.report import Facts, Report
 from plateviz.reports.survey import source_report, survey_report
 from plateviz.runs.queries import SurveyRun
-from plateviz.solving.as_code import as_command, report_of_run
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.turns import Turns
 from solver.errors import InputError

@@ -12,13 +12,13 @@ import pandas as pd
 import pytest
 from distributed import LocalCluster
 
+from plateviz.cli.paper_survey import reproduced
 from plateviz.cli.survey import parse_orbits
 from plateviz.runs.fit_survey import fit_survey
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
 from plateviz.runs.run import Run
 from plateviz.runs.run_tables import read_run_tests, read_run_verdict
-from plateviz.solving.reproduction import reproduced
 from solver.data.run_schema import RUN_TABLES
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS

@@ -12,7 +12,15 @@ import typer
 from typer.testing import CliRunner
 
 import plateviz
+from plateviz.cli.main import main
 from plateviz.cli.options import fit_settings, takes_settings
+from plateviz.dashboard.saving.as_code import (
+    as_command,
+    as_python,
+    explored_as_python,
+    figures_as_python,
+    report_command,
+)
 from plateviz.notebook.keywords import settings_with
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.explore import explored_figure
@@ -21,13 +29,6 @@ from plateviz.plots.explored_text import text_of
 from plateviz.plots.gallery import diagnostics
 from plateviz.reports.summary_strip import strip
 from plateviz.runs.queries import open_run
-from plateviz.solving.as_code import (
-    as_command,
-    as_python,
-    explored_as_python,
-    figures_as_python,
-    report_command,
-)
 from plateviz.solving.origin import OrbitFiles, SurveyFolder
 from plateviz.tables import summary_strip
 from plateviz.tables.explore import EXPLORABLE
@@ -170,7 +171,7 @@ def test_report_is_of_what_the_commands_make(origin, words):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("few_figures")
-def test_command_and_python_make_the_same_numbers(small_survey, tmp_path, run, monkeypatch):
+def test_command_and_python_make_the_same_numbers(small_survey, tmp_path, monkeypatch):
     survey = tmp_path / "a sky"
     survey.symlink_to(small_survey)
     origin = SurveyFolder(str(survey))
@@ -202,7 +203,10 @@ def test_command_and_python_make_the_same_numbers(small_survey, tmp_path, run, m
     np.testing.assert_allclose(marks.values("y"), frame["rows by class"].values("y"), rtol=1e-6)
     monkeypatch.chdir(tmp_path)
     more = ["--explore", text_of("sources", explored)]
-    assert run(*words_of(report_command(origin, 1, more=more))[1:])[0] == 0
+    monkeypatch.setattr(sys, "argv", words_of(report_command(origin, 1, more=more)))
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code
     page = (tmp_path / "reproduced.html").read_text(encoding="utf-8")
     assert "<title>Orbit 1 " in page
     assert 'id="figure-explore-0"' in page

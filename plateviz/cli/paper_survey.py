@@ -1,20 +1,20 @@
-"""Reproduction of the paper's numbers: simulate and fit its survey, and compare."""
+"""The paper's survey: simulated and fitted as needed, and its numbers compared."""
 
 from pathlib import Path
 
 import pandas as pd
 
 from plateviz.cache import keep_compilations
+from plateviz.cli.survey_progress import fit_and_report, require_all
 from plateviz.runs.queries import SurveyRun, open_run
 from plateviz.runs.run import Run
 from plateviz.solving.origin import SurveyFolder
 from plateviz.solving.progress import reporting
-from plateviz.solving.survey_progress import fit_and_report, require_all
 from plateviz.tables.reproduction import OFTEN, SurveyFigures, reproduction
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.disk import writing
-from solver.io.survey import HEADER
+from solver.io.survey_header import HEADER
 from solver.simulate.settings import SurveySettings
 from solver.units import RAD_PER_MAS
 

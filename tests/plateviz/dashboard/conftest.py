@@ -4,7 +4,7 @@ import pytest
 
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.session.session import Session
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 
 
 @pytest.fixture

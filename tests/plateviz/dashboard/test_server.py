@@ -27,7 +27,7 @@ from plateviz.dashboard.serving import limits
 from plateviz.dashboard.serving.limits import Rate
 from plateviz.dashboard.serving.rooms import Rooms
 from plateviz.dashboard.serving.websocket import CheckedWebsocket
-from tests.plateviz.dashboard.navigation.test_navigation import SurveyStore
+from tests.plateviz.dashboard.fake_survey import SurveyStore
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ from plateviz.notebook.survey import OpenSurvey
 from plateviz.tables.survey_tables import SurveyTables
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun
+from tests.plateviz.dashboard.fake_survey import FakeRun
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.controls.refit import RefitView
 from plateviz.tables.orders import preferred_order
-from tests.plateviz.dashboard.navigation.test_navigation import SurveyStore
+from tests.plateviz.dashboard.fake_survey import SurveyStore
 
 
 @pytest.fixture(scope="module")

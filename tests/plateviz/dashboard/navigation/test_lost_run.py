@@ -16,7 +16,7 @@ from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import survey_runs
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 
 
 def test_removed_run_is_said_until_it_is_there_again(fit_result, survey_folder):

@@ -15,7 +15,8 @@ from plateviz.plots.workspace import OrbitWorkspace
 from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore, end_job
+from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
+from tests.plateviz.dashboard.navigation.test_navigation import end_job
 
 
 @pytest.fixture

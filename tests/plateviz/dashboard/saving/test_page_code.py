@@ -24,7 +24,7 @@ from plateviz.tables.explore import EXPLORABLE
 from solver.data.instrument import MINI_MOCK
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun
+from tests.plateviz.dashboard.fake_survey import FakeRun
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from plateviz.dashboard.saving.page_report import page_report
 from plateviz.dashboard.session.session import Session
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 
 pytestmark = pytest.mark.usefixtures("few_figures")
 

@@ -12,7 +12,7 @@ from plateviz.dashboard.saving.selected_tables import (
 )
 from plateviz.dashboard.session.session import Session
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from plateviz.dashboard.views.elements.notice import NoticeView
 from plateviz.runs.kept_selections import KeptSelections
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import SurveyStore
+from tests.plateviz.dashboard.fake_survey import SurveyStore
 from tests.plateviz.dashboard.session.test_session import FakeStore, finish
 
 

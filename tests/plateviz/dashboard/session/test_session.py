@@ -2,7 +2,6 @@
 
 from concurrent.futures import Executor, Future
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -34,6 +33,26 @@ class AtOnce(Executor):
         return answer
 
 
+class NoSelections:
+    """Keeps no selection."""
+
+    def all(self):
+        return {}
+
+    def keep(self, name, items, before):
+        pass
+
+    def forget(self, name, before):
+        pass
+
+
+class JudgedAll:
+    """Has judged every solution."""
+
+    def has_judged(self, result):
+        return True
+
+
 class FakeStore:
     """A store without a solver, which records its requests."""
 
@@ -46,12 +65,12 @@ class FakeStore:
         self._result = result
         self.requested, self.prepared, self.cancelled, self.abandoned = [], [], [], []
         self.left, self.pauses = [], 0
-        self.judge = SimpleNamespace(has_judged=lambda _: True)
+        self.judge = JudgedAll()
         self.background = AtOnce()
         self.run_reader = RunReader(self.background)
         self.is_shared, self.reports = False, Turns()
         self.made, self.kept = MadeSolutions(), KeptSolutions(Path("nowhere"))
-        self.selections = SimpleNamespace(all=dict, keep=lambda *_: None, forget=lambda *_: None)
+        self.selections = NoSelections()
 
     def request(self, orbit, settings, what_if=False):
         self.requested.append((orbit, settings, Job({"do": "fit", "what_if": what_if})))

@@ -25,7 +25,7 @@ from plateviz.runs.scratch_result import (
 )
 from plateviz.solving.run_reader import RunReader
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 from tests.plateviz.dashboard.session.test_session import finish
 from tests.plateviz.solving.waiting import Waiting
 
@@ -224,9 +224,8 @@ class LostRun(FakeRun):
 
     is_lost = False
 
-    def __init__(self, *arguments):
-        super().__init__(*arguments)
-        self.stamp = lambda: self.is_lost
+    def stamp(self):
+        return self.is_lost
 
     def orbits(self):
         if self.is_lost:

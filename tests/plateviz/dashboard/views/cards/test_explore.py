@@ -23,7 +23,7 @@ from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.tables.explore import ExplorableTable, explorable
 from solver.data.schema import RESIDUALS
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 from tests.plateviz.dashboard.session.test_latest_answer import Executor
 
 SIZE = 30_000

@@ -4,7 +4,7 @@ from plateviz.dashboard.navigation.navigation import Navigation, View
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.pages.survey import SurveyPage
 from plateviz.plots.workspace import SurveyWorkspace
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 
 
 def test_figures_of_many_frames_have_a_row_each(fit_result, survey):

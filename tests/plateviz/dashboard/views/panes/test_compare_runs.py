@@ -18,7 +18,7 @@ from plateviz.solving.run_reader import RunReader
 from plateviz.tables.survey_tables import SurveyTables
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from tests.plateviz.dashboard.navigation.test_navigation import FakeRun, SurveyStore
+from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 from tests.plateviz.solving.waiting import Waiting
 
 CARDS = ["both-runs", "motion-differences"]
@@ -28,10 +28,6 @@ class ComparedRun(FakeRun):
     """A run that may be removed, and that counts how often it is read."""
 
     is_lost, n_read = False, 0
-
-    def __init__(self, name, survey, result, settings=None, is_complete=True):
-        super().__init__(name, survey, result, settings, is_complete)
-        self.stamp = self._stamp
 
     def is_there(self):
         return not self.is_lost
@@ -47,7 +43,7 @@ class ComparedRun(FakeRun):
         found = super().motions()
         return found if self.is_gathered else found.head(0)
 
-    def _stamp(self):
+    def stamp(self):
         if self.is_lost:
             raise InputError(f"runs/{self.name}: expected a run, found nothing")
         return self.written()

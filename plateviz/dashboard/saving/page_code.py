@@ -82,41 +82,53 @@ def _of_solution(navigation: Navigation) -> PageCode:
     chosen, shown = chosen_of(session), session.shown
     if chosen is None or shown is None:
         raise InputError("no solution is shown yet")
-    figures = [one for one in figures_of(session, workspace) if one.has_data(chosen)]
-    is_compared = workspace is OrbitWorkspace.ORDERS and session.other is not None
-    other = session.other if is_compared else None
-    calls: list[FigureCall] = [
-        (one.name, _keywords(session, chosen if one.follows_shown else None)) for one in figures
-    ]
-    more = _explored(navigation.exploration) if workspace is OrbitWorkspace.EXPLORE else []
-    if other is not None:
-        name = session.figure_of_both
-        calls.insert(0, (name, {"both": True, **_keywords(session, chosen)}))
-        more = ["--both", name] if other.orbit == shown.orbit else []
-    origin = session.store.origin
-    made = _free_name(navigation, NAME, shown.settings)
-    commands = [as_command(origin, shown.orbit, shown.settings, made, _is_distrusted(shown))]
-    compared = other is not None and other.orbit == shown.orbit
-    second = None
-    if other is not None and compared:
-        second = _free_name(navigation, f"{NAME}-other", other.settings)
-        accept = _is_distrusted(other)
-        commands.append(as_command(origin, other.orbit, other.settings, second, accept))
-    commands.append(report_command(origin, shown.orbit, second, more, made))
+    other = session.other if workspace is OrbitWorkspace.ORDERS else None
+    origin, drawn = session.store.origin, _drawn_of_solution(navigation, chosen, other)
     python = [as_python(origin, shown.orbit, shown.settings)]
     if other is not None:
         code = as_python(origin, other.orbit, other.settings, "other").removeprefix(PREAMBLE)
         python += [code, "solution = solution.compared_with(other)"]
-    if workspace is OrbitWorkspace.EXPLORE:
-        drawn = _explored_as_python(navigation.exploration, "solution", session)
-    else:
-        drawn = figures_as_python("solution", calls)
-    python.append(drawn)
+    python += [drawn] if drawn else []
     words = [_about(navigation, f"the solution ({shown.settings.describe()})", drawn)]
     words += [_OF_WHAT_IF] if _is_what_if(shown, other) else []
     words += [_OF_ONE_ORBIT] if isinstance(origin, SurveyFolder) else []
-    words += [_OF_OTHER_ORBIT] if other is not None and not compared else []
-    return PageCode(" ".join(words), " &&\n".join(commands), "\n".join(filter(None, python)))
+    words += [_OF_OTHER_ORBIT] if other is not None and other.orbit != shown.orbit else []
+    commands = _commands(navigation, shown, other)
+    return PageCode(" ".join(words), " &&\n".join(commands), "\n".join(python))
+
+
+def _drawn_of_solution(navigation: Navigation, chosen: Chosen, other: Solution | None) -> str:
+    """Return Python that draws what the workspace shows; `other` if it compares two solutions."""
+    session, workspace = navigation.session, navigation.orbit_workspace
+    if workspace is OrbitWorkspace.EXPLORE:
+        return _explored_as_python(navigation.exploration, "solution", session)
+    calls: list[FigureCall] = [
+        (one.name, _keywords(session, chosen if one.follows_shown else None))
+        for one in figures_of(session, workspace)
+        if one.has_data(chosen)
+    ]
+    if other is not None:
+        calls.insert(0, (session.figure_of_both, {"both": True, **_keywords(session, chosen)}))
+    return figures_as_python("solution", calls)
+
+
+def _commands(navigation: Navigation, shown: Solution, other: Solution | None) -> list[str]:
+    """Return the command lines that make the solutions and the report.
+
+    The other solution is made if it is of the same orbit: a report compares no other.
+    """
+    session, origin = navigation.session, navigation.session.store.origin
+    made = _free_name(navigation, NAME, shown.settings)
+    commands = [as_command(origin, shown.orbit, shown.settings, made, _is_distrusted(shown))]
+    second, more = None, list[str]()
+    if navigation.orbit_workspace is OrbitWorkspace.EXPLORE:
+        more = _explored(navigation.exploration)
+    if other is not None and other.orbit == shown.orbit:
+        second = _free_name(navigation, f"{NAME}-other", other.settings)
+        accept = _is_distrusted(other)
+        commands.append(as_command(origin, other.orbit, other.settings, second, accept))
+        more = ["--both", session.figure_of_both]
+    return [*commands, report_command(origin, shown.orbit, second, more, made)]
 
 
 def _is_distrusted(solution: Solution) -> bool:

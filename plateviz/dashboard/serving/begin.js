@@ -9,5 +9,12 @@
     const milliseconds = 3000 + 4000 * Math.random()
     if (answer.status === 429) setTimeout(() => is_empty() && location.reload(), milliseconds)
   }
+  // What is shown until the page is drawn would stay behind it.
+  const forget = () => {
+    const is_drawn = window.Bokeh?.index?.roots?.[0]?.is_idle
+    if (is_drawn) document.getElementById("opening").remove()
+    else setTimeout(forget, 50)
+  }
+  document.addEventListener("DOMContentLoaded", forget)
   fetch("session", { method: "POST", body, keepalive: true }).then(look_again).catch(() => {})
 })()

@@ -10,6 +10,7 @@ import re
 import secrets
 import time
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -36,10 +37,16 @@ WINDOW = "window"
 _FULL = Path(__file__).with_name("full.html")
 _BEGIN = Path(__file__).with_name("begin.js")
 _COMPONENTS = Path(__file__).with_name("components.js")
+_OPENING = Path(__file__).with_name("opening.html")
 # The scripts with which Panel loads components in old browsers; `components.js` has another way.
 _LOADER = re.compile(
     r'<script type="esms-options">.*?</script>|<script[^>]*/es-module-shims[^>]*></script>'
 )
+# Scripts in the head keep the browser from drawing anything before it has run them; deferred, they
+# run in the same order, after the body is drawn.
+_SCRIPT_FILE, _DEFERRED = re.compile(r'<script type="text/javascript" src='), "<script defer src="
+# The level is that of Bokeh anyway; where it is written, Bokeh is not loaded yet.
+_LOG_LEVEL = re.compile(r"<script[^>]*>\s*Bokeh\.set_log_level\([^<]*</script>")
 # Id of the element that the page is put into.
 _PLACE = "page"
 _MOST_BYTES = 2**16
@@ -183,9 +190,11 @@ class EmptyPage:
         load = f"importShim({json.dumps(components)}).catch(() => {{}})"
         scripts = "\n".join(f"<script>{one}</script>" for one in (begin, of_components, load))
         html = _LOADER.sub("", html).replace("</title>", f"</title>\n{scripts}", 1)
+        html = _LOG_LEVEL.sub("", _SCRIPT_FILE.sub(_DEFERRED, html))
+        opening = _OPENING.read_text(encoding="utf-8").replace("TITLE", escape(document.title))
         # A page straight in the body would be taken for a part of another page, and leave the
         # body without the colours of its theme.
-        html = html.replace("<body>", f'<body>\n<div id="{_PLACE}"></div>', 1)
+        html = html.replace("<body>", f'<body>\n{opening}<div id="{_PLACE}"></div>', 1)
         html = html.replace('"use_for_title":', f'"elementid":"{_PLACE}","use_for_title":', 1)
         self._parts = html.split(token)
 

@@ -1,7 +1,7 @@
 """Vectors drawn to a stated scale: shafts, heads, and a key arrow."""
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 import pandas as pd
@@ -40,6 +40,23 @@ class Field(NamedTuple):
     def ylim(self) -> tuple[float, float]:
         """Limits of the y axis: those of the data, and a strip below for the key."""
         return self.y[0] - _KEY_STRIP * self.width, self.y[1]
+
+    def holding(self, table: pd.DataFrame, scale: float) -> Self:
+        """Return the area, enlarged about its middle until it holds all arrows with their heads.
+
+        Parameters
+        ----------
+        table, scale : as in `arrows`
+        """
+        if table.empty:
+            return self
+        grown = 1.0
+        for limits, at, vector in ((self.x, "x", "u"), (self.y, "y", "v")):
+            middle, half = 0.5 * (limits[0] + limits[1]), 0.5 * abs(limits[1] - limits[0])
+            reach = np.abs(table[at] + scale * table[vector] - middle).max()
+            # A head is wider than its shaft.
+            grown = max(grown, float(reach) / half * (1.0 + _LARGEST_HEAD))
+        return type(self)(_about_middle(self.x, grown), _about_middle(self.y, grown))
 
 
 def round_125(value: float) -> float:
@@ -116,6 +133,11 @@ def key(length: float, text: str, *, scale: float, field: Field) -> list[Glyphs]
         segments(*strokes, name="key", color="text", width=2.0),
         texts([tip + direction * 0.015 * field.width], [y], [text], name="key text", align="left"),
     ]
+
+
+def _about_middle(limits: tuple[float, float], factor: float) -> tuple[float, float]:
+    middle = 0.5 * (limits[0] + limits[1])
+    return middle + factor * (limits[0] - middle), middle + factor * (limits[1] - middle)
 
 
 def _strokes(

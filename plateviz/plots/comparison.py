@@ -63,6 +63,7 @@ def plot_comparison_map(
     field = Field((half, -half), (-half, half))
     shown, what = _thinned(_vectors(table), half)
     scale = arrow_scale or automatic_scale(shown, field)
+    field = field.holding(shown, scale)
     mas = round_125(2.0 * rms_length(shown) * MAS_PER_ARCMIN)
     length = angle_text(mas)
     single = [("source", "@{id}"), ("class", "@{source_class}")]

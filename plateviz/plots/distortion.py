@@ -44,6 +44,7 @@ def plot_distortion(
         return message(_TITLE, "No distortion fitted", width=width, xlabel=XLABEL, ylabel=YLABEL)
     field = field_about(table, _MARGIN)
     scale = arrow_scale or automatic_scale(table, field)
+    field = field.holding(table, scale)
     rms_um = 1000.0 * rms_length(table)
     length_um = round_125(2.0 * rms_um) if rms_um > 0 else 1.0
     mas = length_um / 1000.0 * float(table["mas_per_unit"].iloc[0])

@@ -52,18 +52,26 @@ def plot_distortion_comparison(
     if table.empty:
         text = "No detector has measurements in both solutions"
         return message(_TITLE, text, width=width, xlabel=XLABEL, ylabel=YLABEL)
-    field = field_about(table, _MARGIN)
+    parts = [(str(part), rows) for part, rows in table.groupby("part", sort=False)]
+    area = field = field_about(table, _MARGIN)
+    for _, rows in parts:
+        field = field.holding(rows, automatic_scale(rows, area))
     panels = [
-        _panel(rows, titles[str(part)], detectors, field, width)
-        for part, rows in table.groupby("part", sort=False)
+        _panel(rows, titles[part], detectors, automatic_scale(rows, area), field, width)
+        for part, rows in parts
     ]
     return side_by_side(panels, columns=2)
 
 
 def _panel(
-    rows: pd.DataFrame, title: str, detectors: Sequence[Detector], field: Field, width: int
+    rows: pd.DataFrame,
+    title: str,
+    detectors: Sequence[Detector],
+    scale: float,
+    field: Field,
+    width: int,
 ) -> Figure:
-    scale, rms = automatic_scale(rows, field), rms_length(rows)
+    rms = rms_length(rows)
     length = round_125(2.0 * rms)
     mas_per_mm = float(rows["mas_per_unit"].iloc[0])
     length_text = f"{_length(1000.0 * length)} = {angle_text(length * mas_per_mm)}"

@@ -42,19 +42,28 @@ def plot_eigenmode_shifts(table: pd.DataFrame, *, width: int = _WIDTH) -> Figure
     field = Field((half, -half), (-half, half))
     # One scale for all panels, so that lengths can be compared.
     scale = automatic_scale(table, field)
+    maps = {f"Direction {mode}": rows for mode, rows in table.groupby("mode")}
+    shown = {title: _thinned(rows, field) for title, rows in maps.items()}
+    for rows in shown.values():
+        field = field.holding(rows, scale)
     panels = [
-        _panel(rows, f"Direction {mode}", scale, field, width)
-        for mode, rows in table.groupby("mode")
+        _panel(rows, shown[title], title, scale, field, width) for title, rows in maps.items()
     ]
     return side_by_side(panels, columns=_COLUMNS)
 
 
-def _panel(rows: pd.DataFrame, title: str, scale: float, field: Field, width: int) -> Figure:
-    shown = rows
-    if len(rows) > _ARROWS_OF_A_MAP:
-        shown = binned_vectors(
-            rows, x_range=field.y, y_range=field.y, bins=_BINS, least_share=_LEAST_SHARE
-        )
+def _thinned(rows: pd.DataFrame, field: Field) -> pd.DataFrame:
+    """Return the shifts, or their means in bins if there are many."""
+    if len(rows) <= _ARROWS_OF_A_MAP:
+        return rows
+    return binned_vectors(
+        rows, x_range=field.y, y_range=field.y, bins=_BINS, least_share=_LEAST_SHARE
+    )
+
+
+def _panel(
+    rows: pd.DataFrame, shown: pd.DataFrame, title: str, scale: float, field: Field, width: int
+) -> Figure:
     length = round_125(_KEY_SHARE * field.width / scale * MAS_PER_ARCMIN)
     length_text = angle_text(length)
     return framed(

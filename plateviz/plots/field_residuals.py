@@ -46,6 +46,7 @@ def plot_field_residuals(
     corners = [table[["x", "y"]], *(one.corners_um() / 1000.0 for one in detectors)]
     area = field_about(pd.DataFrame(np.concatenate(corners), columns=["x", "y"]), _MARGIN)
     scale, rms = automatic_scale(vectors, area), rms_length(vectors)
+    area = area.holding(vectors, scale)
     length = round_125(2.0 * rms)
     panels = [
         _panel(rows, detectors, area, scale, length, width, is_first=number == 0)

@@ -48,6 +48,7 @@ def plot_residual_map(
     field = _field(detector)
     shown, binning = _thinned(table, detector, field)
     scale = arrow_scale or automatic_scale(shown, field)
+    field = field.holding(shown, scale)
     length, length_text = _key(shown, unit)
     return framed(
         [

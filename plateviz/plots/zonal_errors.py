@@ -49,6 +49,7 @@ def plot_zonal_errors(
     area = _area(zonal)
     scale = arrow_scale or _scale(zonal)
     length = round_125(2.0 * _TYPICAL_SHARE * area.width / scale)
+    area = area.holding(vectors, scale)
     return framed(
         [
             *arrows(vectors, scale=scale, field=area, colour="mark", hover=_HOVER),

@@ -84,3 +84,19 @@ def test_key_arrow_has_its_true_length_and_is_below_the_data(x):
     assert _lengths(segment).iloc[0] == pytest.approx(2.0)
     assert field.ylim[0] < segment["y0"].iloc[0] < field.y[0]
     assert label.values("text").tolist() == ["2 milli"]
+
+
+@pytest.mark.parametrize("x", [(-10.0, 10.0), (10.0, -10.0)], ids=["upwards", "East to the left"])
+def test_area_is_enlarged_to_hold_the_heads_of_all_arrows(vectors, x):
+    long = pd.DataFrame({"x": [9.0, 0.0], "y": [0.0, -9.5], "u": [4.0, 0.0], "v": [0.0, -2.0]})
+    field = Field(x, FIELD.y).holding(long, 2.0)
+    (strokes, _) = arrows(long, scale=2.0, field=field, colour="#000000", hover=[])
+    ends = _table(strokes)
+    for axis, limits in (("x", field.x), ("y", field.y)):
+        drawn = ends[[f"{axis}0", f"{axis}1"]].to_numpy()
+        assert min(limits) < drawn.min() < drawn.max() < max(limits)
+    assert (field.x[0] > 0) == (x[0] > 0)
+
+
+def test_area_that_holds_all_arrows_stays_as_it_is(vectors):
+    assert FIELD.holding(vectors, 1.0) == FIELD

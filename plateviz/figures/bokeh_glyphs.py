@@ -10,6 +10,7 @@ from bokeh.core.property.vectorization import Field, Value
 from bokeh.models.glyph import Glyph
 
 from plateviz.figures.figure import HANDLES, By, Glyphs, Look, Ramp
+from plateviz.figures.hover_numbers import hover_formatters
 from plateviz.figures.packed_texts import PackedTexts
 from plateviz.figures.theme import FONT, Theme
 from plateviz.figures.tick_numbers import with_tick_numbers
@@ -118,7 +119,8 @@ class BokehGlyphs:
             self._faded.update(**glyphs.at, **(values | _faded_looks(values, theme)))
         self.renderer.visible = True
         if self.hover is not None:
-            self.hover.tooltips = list(glyphs.hover)
+            formatters: Any = hover_formatters(glyphs.hover, self.hover.formatters)
+            self.hover.update(tooltips=list(glyphs.hover), formatters=formatters)
 
     def _send(self, columns: dict[str, np.ndarray]) -> None:
         """Replace the columns that differ, which alone are sent to the browser."""
@@ -165,7 +167,7 @@ class BokehGlyphs:
         if self.bar is not None:
             self.bar.update(color_mapper=self._mapper, title=ramp.label or None)
             if not ramp.is_log:
-                with_tick_numbers(self.bar, ramp.limits)
+                with_tick_numbers(self.bar, ramp.limits, ramp.label or "")
         if self.kind == "image":
             return {"color_mapper": self._mapper}
         return {name: Field(ramp.column, transform=self._mapper)}

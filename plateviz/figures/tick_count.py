@@ -35,7 +35,7 @@ def _label(axis: Axis) -> str:
     decimals = max(0, -math.floor(math.log10(step))) if step > 0 else 0
     sign = "−" if min(axis.limits) < 0 else ""
     most = max(map(abs, axis.limits))
-    return f"{sign}{most:{',' if is_grouped(axis.limits) else ''}.{decimals}f}"
+    return f"{sign}{most:{',' if is_grouped(axis.limits, axis.label) else ''}.{decimals}f}"
 
 
 def _limited(number: float) -> int:

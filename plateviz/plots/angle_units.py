@@ -199,7 +199,7 @@ def _scaled_text(text: str, factor: float) -> str:
     """Return a number times a factor, to as many digits."""
     digits = len(re.sub(r"e.*|\D", "", text).lstrip("0"))
     value = float(text.replace(",", "").replace("−", "-"))
-    return number_text(factor * value, max(digits, 2)).replace("-", text[0] if value < 0 else "-")
+    return number_text(factor * value, max(digits, 2))
 
 
 def _scaled(values: np.ndarray, factor: float) -> np.ndarray:

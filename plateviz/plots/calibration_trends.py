@@ -85,7 +85,7 @@ def _subtitle(first: pd.Series, unit: str) -> str:
     return (
         f"{first['label']}: change {change} {unit},\n"
         f"scatter {scatter} {unit}; trend {first['sigma']:.1f} sigma"
-    ).replace("-", "−")
+    )
 
 
 def _spread(values: pd.Series, share: float) -> Limits:

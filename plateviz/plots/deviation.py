@@ -12,6 +12,7 @@ from plateviz.plots.points import class_points
 from plateviz.plots.style import PANEL_WIDTH
 from plateviz.plots.units import angle_unit
 from plateviz.plots.workspace import OrbitWorkspace
+from plateviz.tables.rounded import with_minus_signs
 from plateviz.tables.sources import CLASSES, deviation, deviation_statistics
 
 _TITLE = "Deviation from the truth"
@@ -100,6 +101,7 @@ def _subtitle(statistics: pd.Series, unit: str, factor: float, hidden: int) -> s
         for name in ("mean", "rms")
     )
     pulls = f"{statistics['pull_rms_ra']:.2f}, {statistics['pull_rms_dec']:.2f}"
+    mean = with_minus_signs(mean)
     return (
         f"mean {mean} {unit}; rms {spread} {unit} (α, δ)\n"
         f"n = {statistics['n']:,.0f}; rms of deviation / σ: {pulls}\n"

@@ -266,11 +266,7 @@ def _in_numbers(counts: Counts, unit: str) -> list[str]:
     median = counts.medians().median
     if not len(median):
         return []
-    return [
-        f"medians from {rounded(median.min(), 3)} to {rounded(median.max(), 3)}{unit}".replace(
-            "-", "−"
-        )
-    ]
+    return [f"medians from {rounded(median.min(), 3)} to {rounded(median.max(), 3)}{unit}"]
 
 
 def _counted(table: ExplorableTable, extent: Extent, chosen: Columns) -> list[str]:

@@ -18,7 +18,7 @@ from plateviz.figures.figure import (
 from plateviz.figures.glyphs import horizontal, line, points, strip
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.points import error_bars
-from plateviz.plots.units import number_text
+from plateviz.plots.units import angle_text, number_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.exposure_tracks import exposure_tracks
 
@@ -106,17 +106,18 @@ def _limits(rows: pd.DataFrame, prior: float) -> Limits:
 def _subtitle(rows: pd.DataFrame, unit: str, prior: float) -> str:
     mean, scatter = float(rows["offset"].mean()), float(rows["offset"].std(ddof=0))
     conditional, marginal = (
-        _number(float(rows[f"sigma_{kind}"].median())) for kind in ("conditional", "marginal")
+        _size(float(rows[f"sigma_{kind}"].median()), unit) for kind in ("conditional", "marginal")
     )
-    width = f"± {_number(prior)} {unit}" if math.isfinite(prior) else "flat"
+    width = f"± {_size(prior, unit)}" if math.isfinite(prior) else "flat"
     return (
-        f"mean {_number(mean)} {unit}, scatter {_number(scatter)} {unit}; prior {width}\n"
-        f"σ conditional {conditional} {unit}, marginal {marginal} {unit}"
+        f"mean {_size(mean, unit)}, scatter {_size(scatter, unit)}; prior {width}\n"
+        f"σ conditional {conditional}, marginal {marginal}"
     )
 
 
-def _number(value: float) -> str:
-    return number_text(value, 3).replace("-", "−")
+def _size(value: float, unit: str) -> str:
+    """Return a number with its unit; small angles are in µas, as in all other words."""
+    return angle_text(value) if unit == "mas" else f"{number_text(value, 3)} {unit}"
 
 
 def _plot(chosen: Chosen) -> Figure:

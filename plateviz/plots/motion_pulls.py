@@ -8,6 +8,7 @@ from plateviz.plots.style import PANEL_WIDTH, SERIES_COLOURS
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.motion_pulls import CHI2, LEAST_ORBITS, motion_pulls
+from plateviz.tables.rounded import with_minus_signs
 from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Pulls of the fitted motions"
@@ -59,8 +60,9 @@ def _panel(rows: pd.DataFrame, name: str, width: int) -> Figure:
 
 
 def _subtitle(first: pd.Series, limit: float) -> str:
+    mean = with_minus_signs(f"{first['mean']:.3f}")
     return (
-        f"sd {first['sd']:.3f}, mean {first['mean']:.3f}\n"
+        f"sd {first['sd']:.3f}, mean {mean}\n"
         f"n = {first['n']:,}; {first['outside']:,} beyond ± {limit:g}"
     )
 

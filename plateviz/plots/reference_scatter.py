@@ -21,6 +21,7 @@ from plateviz.plots.ticks import log_ticks
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.histogram import pull_bins
 from plateviz.tables.reference_scatter import LEAST_ORBITS, reference_scatter, scatter_cells
+from plateviz.tables.rounded import with_minus_signs
 from plateviz.tables.survey_tables import SurveyTables
 
 _TITLE = "Scatter of the reference sources"
@@ -114,8 +115,9 @@ def _deviations(table: pd.DataFrame, width: int) -> Figure:
     normal = unit_normal(float(bins["n"].iloc[0] * (bins["right"] - bins["left"]).iloc[0]), limit)
     counts = [part["count"].max() for part in parts.values()]
     top = 1.1 * max(*map(float, counts), float(normal.values("y").max()))
+    means = {axis: with_minus_signs(f"{part['mean'].iloc[0]:.2f}") for axis, part in parts.items()}
     subtitle = "\n".join(
-        f"{_NAMES[axis]}: mean {part['mean'].iloc[0]:.2f}, sd {part['sd'].iloc[0]:.2f}, "
+        f"{_NAMES[axis]}: mean {means[axis]}, sd {part['sd'].iloc[0]:.2f}, "
         f"{part['outside'].iloc[0]:,} beyond ± {limit:g}"
         for axis, part in parts.items()
     )

@@ -2,8 +2,6 @@
 
 import math
 
-from plateviz.figures.tick_numbers import is_grouped
-
 _STEPS = (1, 2, 3, 5)
 _FINE_STEPS = (1, 1.5, 2, 2.5, 3, 4, 5, 6, 8)
 _FINE_BELOW = 6.0
@@ -30,6 +28,4 @@ def log_ticks(
 
 
 def _label(tick: float) -> str:
-    if tick != int(tick):
-        return f"{tick:g}"
-    return f"{tick:,.0f}" if is_grouped((tick, tick)) else f"{tick:.0f}"
+    return f"{tick:,.0f}" if tick == int(tick) else f"{tick:g}"

@@ -2,6 +2,7 @@
 
 import math
 
+from plateviz.tables.rounded import with_minus_signs
 from solver.units import UAS_PER_MAS
 
 _UAS_BELOW_MAS = 0.5
@@ -42,10 +43,10 @@ def power_text(value: float, digits: int) -> str:
 
     Such as "0.026", or "7.2 × 10⁻¹²" where seven digits or leading zeros would be needed.
     """
-    text = f"{value:,.{digits}g}"
+    text = with_minus_signs(f"{value:,.{digits}g}")
     if value and math.isfinite(value) and not _PLAIN[0] <= abs(value) < _PLAIN[1]:
         number, power = f"{value:.{digits - 1}e}".split("e")
-        text = f"{number} × 10{str(int(power)).translate(_RAISED)}"
+        text = f"{with_minus_signs(number)} × 10{str(int(power)).translate(_RAISED)}"
     return text
 
 
@@ -53,4 +54,4 @@ def number_text(value: float, digits: int) -> str:
     """Return a number to so many digits, or more if it is large, with at most six decimals."""
     known = value and math.isfinite(value)
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(value)))) if known else 0
-    return f"{value:,.{min(decimals, 6)}f}"
+    return with_minus_signs(f"{value:,.{min(decimals, 6)}f}")

@@ -119,7 +119,7 @@ def _camera(instrument: Instrument) -> dict[str, str]:
     """Return what tells an instrument from others."""
     return {
         "name": instrument.name,
-        "nominal focal length": f"{instrument.focal_length_um:,.12g} um",
+        "nominal focal length": f"{instrument.focal_length_um:,.12g} µm",
         "detectors": ", ".join(map(str, instrument.detector_ids)),
     }
 

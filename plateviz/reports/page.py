@@ -14,6 +14,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plateviz.reports.figure import dark_colours, packed_document
 from plateviz.reports.report import Link, Report, ReportFigure
 from plateviz.reports.summary_strip import STYLE, strip
+from plateviz.tables.rounded import with_minus_signs
 
 _FOLDER = files("plateviz.reports")
 
@@ -66,7 +67,9 @@ def _cell(title: str, value: object) -> str | Link:
     if not isinstance(value, float):
         return value if isinstance(value, Link) else str(value)
     # Coordinates need ten decimals to resolve a microarcsecond; other numbers five digits.
-    return "" if math.isnan(value) else f"{value:.10f}" if "[deg]" in title else f"{value:.5g}"
+    if math.isnan(value):
+        return ""
+    return with_minus_signs(f"{value:.10f}" if "[deg]" in title else f"{value:,.5g}")
 
 
 def _text(name: str) -> str:

@@ -5,6 +5,8 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from plateviz.tables.rounded import with_minus_signs
+
 _ALPHA, _DELTA = "Reference sources, α", "Reference sources, δ"
 _CATALOGUE, _TRUTH, _SIGMA = "− catalogue, mas", "− truth, mas", "marginal σ, mas"
 _PRIOR = "minus prior, mas"
@@ -24,11 +26,11 @@ ORBITS_OF_RUN: Mapping[str, Heading] = {
     "date": Heading("mean epoch (TCB)"),
     "status": Heading("status"),
     "verdict": Heading("verdict"),
-    "chi2_per_dof": Heading("χ²/dof", "0.000"),
-    "normalised_deviation_ra": Heading("deviation/σ", "0.000", _ALPHA),
-    "expected_normalised_deviation_ra": Heading("expected", "0.000", _ALPHA),
-    "normalised_deviation_dec": Heading("deviation/σ", "0.000", _DELTA),
-    "expected_normalised_deviation_dec": Heading("expected", "0.000", _DELTA),
+    "chi2_per_dof": Heading("χ²/dof", "0,0.000"),
+    "normalised_deviation_ra": Heading("deviation/σ", "0,0.000", _ALPHA),
+    "expected_normalised_deviation_ra": Heading("expected", "0,0.000", _ALPHA),
+    "normalised_deviation_dec": Heading("deviation/σ", "0,0.000", _DELTA),
+    "expected_normalised_deviation_dec": Heading("expected", "0,0.000", _DELTA),
     "n_measurements": Heading("measurements", "0,0"),
     "n_sources": Heading("sources", "0,0"),
     "n_reference": Heading("reference", "0,0"),
@@ -39,25 +41,25 @@ ORBITS_OF_RUN: Mapping[str, Heading] = {
 MOTION: Mapping[str, Heading] = {
     "parameter": Heading("parameter"),
     "unit": Heading("unit"),
-    "value": Heading("fitted", "0.000"),
-    "fit": Heading("fitted − catalogue", "0.000"),
-    "sigma_noise": Heading("σ noise", "0.000"),
-    "sigma_catalogue": Heading("σ from references", "0.000"),
-    "sigma": Heading("σ", "0.000"),
-    "true": Heading("truth − catalogue", "0.000"),
-    "pull": Heading("pull", "0.000"),
+    "value": Heading("fitted", "0,0.000"),
+    "fit": Heading("fitted − catalogue", "0,0.000"),
+    "sigma_noise": Heading("σ noise", "0,0.000"),
+    "sigma_catalogue": Heading("σ from references", "0,0.000"),
+    "sigma": Heading("σ", "0,0.000"),
+    "true": Heading("truth − catalogue", "0,0.000"),
+    "pull": Heading("pull", "0,0.000"),
 }
 ORBITS_OF_SOURCE: Mapping[str, Heading] = {
     "orbit_id": Heading("orbit", "0"),
     "date": Heading("mean epoch (TCB)"),
-    "n_obs": Heading("measurements", "0"),
-    "offset_ra": Heading("Δα cos δ", "0.000", _CATALOGUE),
-    "offset_dec": Heading("Δδ", "0.000", _CATALOGUE),
-    "deviation_ra": Heading("Δα cos δ", "0.000", _TRUTH),
-    "deviation_dec": Heading("Δδ", "0.000", _TRUTH),
-    "sigma_ra_marginal": Heading("α cos δ", "0.000", _SIGMA),
-    "sigma_dec_marginal": Heading("δ", "0.000", _SIGMA),
-    "chi2_per_dof": Heading("χ²/dof", "0.000"),
+    "n_obs": Heading("measurements", "0,0"),
+    "offset_ra": Heading("Δα cos δ", "0,0.000", _CATALOGUE),
+    "offset_dec": Heading("Δδ", "0,0.000", _CATALOGUE),
+    "deviation_ra": Heading("Δα cos δ", "0,0.000", _TRUTH),
+    "deviation_dec": Heading("Δδ", "0,0.000", _TRUTH),
+    "sigma_ra_marginal": Heading("α cos δ", "0,0.000", _SIGMA),
+    "sigma_dec_marginal": Heading("δ", "0,0.000", _SIGMA),
+    "chi2_per_dof": Heading("χ²/dof", "0,0.000"),
 }
 SELECTED_SOURCES: Mapping[str, Heading] = {
     "id": Heading("source"),
@@ -66,10 +68,10 @@ SELECTED_SOURCES: Mapping[str, Heading] = {
     "n_obs": Heading("measurements", "0,0"),
     "ra": Heading("α (deg)", "0.000000"),
     "dec": Heading("δ (deg)", "0.000000"),
-    "offset_ra": Heading("Δα cos δ", "0.000", _PRIOR),
-    "offset_dec": Heading("Δδ", "0.000", _PRIOR),
-    "sigma_ra_marginal": Heading("α cos δ", "0.000", _SIGMA),
-    "sigma_dec_marginal": Heading("δ", "0.000", _SIGMA),
+    "offset_ra": Heading("Δα cos δ", "0,0.000", _PRIOR),
+    "offset_dec": Heading("Δδ", "0,0.000", _PRIOR),
+    "sigma_ra_marginal": Heading("α cos δ", "0,0.000", _SIGMA),
+    "sigma_dec_marginal": Heading("δ", "0,0.000", _SIGMA),
     "chi2_per_dof": Heading("χ²/dof", "0.00"),
 }
 SELECTED_EXPOSURES: Mapping[str, Heading] = {
@@ -82,8 +84,8 @@ SELECTED_EXPOSURES: Mapping[str, Heading] = {
 SELECTED_DETECTORS: Mapping[str, Heading] = {
     "detector_id": Heading("detector", "0"),
     "n_obs": Heading("measurements", "0,0"),
-    "rms_x": Heading("x", "0.000", _STANDARDISED),
-    "rms_y": Heading("y", "0.000", _STANDARDISED),
+    "rms_x": Heading("x", "0,0.000", _STANDARDISED),
+    "rms_y": Heading("y", "0,0.000", _STANDARDISED),
 }
 CHANGES: Mapping[str, Heading] = {
     "what": Heading(""),
@@ -122,4 +124,4 @@ def _text(value: Any, form: str) -> str:  # noqa: ANN401 a cell of any type
     if not form:
         return str(value)
     thousands, decimals = "," if "," in form else "", len(form.partition(".")[2])
-    return f"{float(value):{thousands}.{decimals}f}"
+    return with_minus_signs(f"{float(value):{thousands}.{decimals}f}")

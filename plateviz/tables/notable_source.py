@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from plateviz.tables.rounded import with_minus_signs
+
 _MOTION = ("parallax", "pmra", "pmdec")
 
 
@@ -27,7 +29,7 @@ class NotableSource(NamedTuple):
     @property
     def text(self) -> str:
         """What is notable about it, in one line."""
-        parallax = f"{self.parallax:+.2f}".replace("-", "−")
+        parallax = with_minus_signs(f"{self.parallax:+.2f}")
         return (
             f"{self.proper_motion:.2f} mas/yr and {parallax} mas parallax off its catalogue, in "
             f"{self.n_orbits:,} orbits"

@@ -7,6 +7,7 @@ import pandas as pd
 
 from plateviz.tables.headings import ORBITS_OF_SOURCE, SOURCES_OF_RUN
 from plateviz.tables.labels import dates, id_strings
+from plateviz.tables.rounded import with_minus_signs
 from plateviz.tables.source_track import catalogue_motion
 from plateviz.tables.sources import ordered_by_class
 from plateviz.tables.summary import SummaryItem
@@ -50,7 +51,7 @@ def source_strip(history: pd.DataFrame, motion: pd.Series | None) -> list[Summar
 
 
 def _plain(label: str, value: str, hint: str = "of the source in this run") -> SummaryItem:
-    return SummaryItem(label, value, hint, "neutral")
+    return SummaryItem(label, with_minus_signs(value), hint, "neutral")
 
 
 def _parallax(history: pd.DataFrame, motion: pd.Series) -> SummaryItem:
@@ -68,9 +69,9 @@ def _separation(motion: pd.Series, other: str) -> SummaryItem:
     ra, dec = motion[f"rms_{other}_ra"], motion[f"rms_{other}_dec"]
     hint = (
         f"Rms separation of the orbits' positions from the {other} at their epochs; "
-        f"{ra:.3f} mas in α cos δ and {dec:.3f} mas in δ."
+        f"{ra:,.3f} mas in α cos δ and {dec:,.3f} mas in δ."
     )
-    return _plain(f"Rms from the {other}", f"{motion[f'rms_{other}_2d']:.3f} mas", hint)
+    return _plain(f"Rms from the {other}", f"{motion[f'rms_{other}_2d']:,.3f} mas", hint)
 
 
 def _scatter(motion: pd.Series, axis: str, symbol: str) -> SummaryItem:

@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 
 from scipy.special import chdtrc
 
+from plateviz.tables.rounded import with_minus_signs
 from solver.data.result import FitResult
 
 State = Literal["good", "warn", "bad", "neutral"]
@@ -154,10 +155,9 @@ def _from_truth(result: FitResult) -> list[SummaryItem]:
             f"Rms of deviation over marginal sigma in α, δ of {figures['n']} sources with 10 or "
             "more measurements and a simulated truth; expected 1. It is not judged, because the "
             "sources of one orbit share the calibration's error; about their mean it is "
-            f"{figures['pull_sd_ra']:.2f}, {figures['pull_sd_dec']:.2f}. "
-            f"Mean deviation {figures['mean_ra']:.3f}, {figures['mean_dec']:.3f} mas, of which "
-            f"{figures['induced_ra']:.3f}, {figures['induced_dec']:.3f} mas come from the "
-            "reference sources' errors.",
+            f"{figures['pull_sd_ra']:.2f}, {figures['pull_sd_dec']:.2f}. Mean deviation "
+            f"{_pair(figures, 'mean')} mas, of which {_pair(figures, 'induced')} mas come from "
+            "the reference sources' errors.",
             "neutral",
         )
         for name, figures in truth.items()
@@ -167,6 +167,11 @@ def _from_truth(result: FitResult) -> list[SummaryItem]:
 def _pull(figures: Mapping[str, float], axis: str) -> float:
     # Older results lack the first.
     return figures.get(f"pull_rms_{axis}", figures[f"pull_sd_{axis}"])
+
+
+def _pair(figures: Mapping[str, float], name: str) -> str:
+    pair = (figures[f"{name}_{axis}"] for axis in ("ra", "dec"))
+    return ", ".join(with_minus_signs(f"{value:.3f}") for value in pair)
 
 
 def _rms(figures: Mapping[str, float]) -> float:

@@ -2,6 +2,7 @@
 
 import math
 
+from plateviz.tables.rounded import with_minus_signs
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 
 COLUMNS = ("what", "a", "b", "change")
@@ -29,7 +30,7 @@ def merit(label: str, a: object, b: object, decimals: int) -> Row:
     change = numbers[1] - numbers[0]
     # A count that is the same has no sign; other numbers are the same to so many decimals only.
     sign = "" if decimals == 0 and change == 0.0 else "+"
-    difference = "" if math.isnan(change) else f"{change:{sign},.{decimals}f}"
+    difference = "" if math.isnan(change) else with_minus_signs(f"{change:{sign},.{decimals}f}")
     return label, _number(numbers[0], decimals), _number(numbers[1], decimals), difference
 
 

@@ -173,7 +173,7 @@ def test_colours_of_an_image_are_those_of_the_same_cells():
         ("1,500 µas/yr", "1.500 mas/yr"),
         ("3 orbits, 2 massive stars", "3 orbits, 2 massive stars"),
         ("2.0 mpix = 1.1 mas", "1.0 mas"),
-        ("-5 mpix", "-2.5 mas"),
+        ("-5 mpix", "−2.5 mas"),
     ],
 )
 def test_texts_keep_their_digits(text, shown):

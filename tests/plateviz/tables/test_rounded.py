@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plateviz.tables.rounded import rounded
+from plateviz.tables.rounded import rounded, with_minus_signs
 
 
 @pytest.mark.parametrize(
@@ -14,7 +14,7 @@ from plateviz.tables.rounded import rounded
         (np.float64(146.2), 2, "150"),
         (12345.0, 3, "12,300"),
         (1.23e-7, 2, "0.00000012"),
-        (-0.5, 2, "-0.5"),
+        (-0.5, 2, "−0.5"),
         (0.0, 2, "0"),
         (float("nan"), 2, "nan"),
         (float("inf"), 3, "inf"),
@@ -22,3 +22,17 @@ from plateviz.tables.rounded import rounded
 )
 def test_number_has_a_few_digits_and_no_exponent(value, digits, text):
     assert rounded(value, digits) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("mean -0.00, -1.25 mas", "mean 0.00, −1.25 mas"),
+        ("-1,200 (-0.001 to -0)", "−1,200 (−0.001 to 0)"),
+        ("1 ± -2e-05", "1 ± −2e-05"),
+        ("fields 0-3 at 2028-02-01, --drift -2", "fields 0-3 at 2028-02-01, --drift −2"),
+        ("−0.5 and +0.3", "−0.5 and +0.3"),
+    ],
+)
+def test_negative_numbers_have_a_minus_sign_and_zero_has_none(text, expected):
+    assert with_minus_signs(text) == expected

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 import panel as pn
 import panel_material_ui as pmui
-from bokeh.models.widgets.tables import NumberFormatter
+from bokeh.models.widgets.tables import HTMLTemplateFormatter
 
 from plateviz.dashboard.session.units import OWN, Units
 from plateviz.tables.headings import Heading
@@ -23,7 +23,29 @@ _COLOURS: Mapping[str, Mapping[State, str]] = MappingProxyType(
 # Tabulator makes its tables visible even in a hidden view; this prevents it.
 TABLE_STYLE = ":host .tabulator { font-size: 13px; visibility: inherit !important; }"
 _NO_ROWS = "There are no rows to show yet."
+# Bokeh's own formatter writes a hyphen before negative numbers, and before a zero that is rounded.
+_CELL = """<%=
+  value == null || Number.isNaN(value) ? "–" :
+  new Intl.NumberFormat("en-US", {{
+    minimumFractionDigits: {decimals}, maximumFractionDigits: {decimals}, useGrouping: {is_grouped}
+  }}).format(value).replace(/^-(?=[0.,]*$)/, "").replace("-", "\u2212")
+%>"""
+_SHORT = """<%= value == null || Number.isNaN(value) ? "" :
+  new Intl.NumberFormat("en-US", {{{digits}}}).format(value).replace("-", "\u2212") %>"""
 _CLICKABLE = ".tabulator-row { cursor: pointer; }"
+
+
+def number_cells(form: str) -> HTMLTemplateFormatter:
+    """Return what writes numbers as `Heading.format` says, with minus signs."""
+    decimals = len(form.partition(".")[2])
+    template = _CELL.format(decimals=decimals, is_grouped="true" if "," in form else "false")
+    return HTMLTemplateFormatter(template=template)
+
+
+def short_cells(title: str) -> HTMLTemplateFormatter:
+    """Return what writes numbers with as many digits as a report of their column `title` does."""
+    digits = "minimumFractionDigits: 10" if "[deg]" in title else "maximumSignificantDigits: 5"
+    return HTMLTemplateFormatter(template=_SHORT.format(digits=digits))
 
 
 class DataTable(pn.viewable.Viewer):
@@ -88,7 +110,7 @@ class DataTable(pn.viewable.Viewer):
             pd.DataFrame(columns=list(headings)),
             titles={name: heading.title for name, heading in headings.items()},
             formatters={
-                name: NumberFormatter(format=heading.format, nan_format="–")
+                name: number_cells(heading.format)
                 for name, heading in headings.items()
                 if heading.format
             },

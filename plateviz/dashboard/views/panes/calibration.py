@@ -14,7 +14,7 @@ from plateviz.dashboard.selection.selected import KINDS
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.cards.state_text import empty_text, outdated_text
 from plateviz.dashboard.views.elements.markup import markup_pane, paragraph
-from plateviz.dashboard.views.elements.table import TABLE_STYLE
+from plateviz.dashboard.views.elements.table import TABLE_STYLE, short_cells
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
 from plateviz.tables import calibration_tables, outlier_list
@@ -117,6 +117,8 @@ class CalibrationView(pn.viewable.Viewer):
             selectable=False if items is None else "checkbox",
             pagination="remote",
             page_size=12,
+            formatters={name: short_cells(name) for name in rows.select_dtypes("float")},
+            text_align={name: "right" for name in rows.select_dtypes("number")},
             layout="fit_data_fill",
             sizing_mode="stretch_width",
             stylesheets=[TABLE_STYLE],

@@ -37,7 +37,7 @@ class Explores(ABC):
 
         Parameters
         ----------
-        rows : what a row is, such as "measurements" of a solution or "residuals" of a run
+        rows : what a row is, such as "measurements" of a solution or of a run
         x, y : names of columns
         colour : column that decides the colour; the class of the source or the number by default
         only : column whose values `between` two limits are drawn; all by default

@@ -3,11 +3,26 @@
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Glyphs, Limits, Ramp, framed, message
+from plateviz.figures.figure import (
+    FRAME_WIDTH,
+    Axis,
+    Figure,
+    Glyphs,
+    Limits,
+    Ramp,
+    framed,
+    message,
+)
 from plateviz.figures.glyphs import band, line, points, rectangles
 from plateviz.plots.cells import Counts, cells, scaled, unscaled
+from plateviz.plots.explored_points import (
+    RowsInFrame,
+    explored_points,
+    named,
+    span_of,
+    unit_behind,
+)
 from plateviz.plots.explored_rows import (
     Columns,
     Extent,
@@ -15,20 +30,16 @@ from plateviz.plots.explored_rows import (
     extent_of,
     rows_in_frame,
 )
-from plateviz.plots.style import CLASS_COLOURS, COLOUR_OF_CLASS, ROW_LIMIT
+from plateviz.plots.style import CLASS_COLOURS, ROW_LIMIT
 from plateviz.tables.explore import ExplorableTable
-from plateviz.tables.labels import exposure_labels, id_strings, unit_text
 from plateviz.tables.rounded import rounded
 from plateviz.tables.sources import REFERENCE
-from solver.data.columns import Column
 
 # Right ascension increases to the left, as on the sky.
 _LEFTWARDS = ("ra", "prior_ra")
 _MARGIN = 0.04
 # Share of the frame that the highest bin of a histogram reaches.
 _HIGHEST = 0.1
-# Colours span these percentiles: a few extreme values must not decide them.
-_SPAN = (1.0, 99.0)
 
 
 def explored_figure(
@@ -53,7 +64,7 @@ def explored_figure(
     title = f"{chosen.y} against {chosen.x}"
     extent = extent or extent_of(table, chosen)
     columns = [table.columns[name] for name in (chosen.x, chosen.y)]
-    labels = [_named(column.meaning, column) for column in columns]
+    labels = [named(column.meaning, column) for column in columns]
     if not extent.n_shown:
         text = f"No {table.rows} to draw"
         return message(title, text, width=width, xlabel=labels[0], ylabel=labels[1])
@@ -70,10 +81,11 @@ def explored_figure(
     else:
         # All rows, if they are few, so that the frame can be moved without a new figure.
         limits = (x.limits, y.limits) if extent.n_shown > ROW_LIMIT else None
-        drawn = [_points(_Data(table, chosen, rows_in_frame(table, chosen, limits)), chosen)]
+        rows = rows_in_frame(table, chosen, limits)
+        drawn = [explored_points(RowsInFrame(table, chosen, rows), chosen)]
     if chosen.has_median:
         drawn += _medians(counts)
-        words += _in_numbers(counts, _behind(table, chosen.y))
+        words += _in_numbers(counts, unit_behind(table, chosen.y))
     return framed(
         [*_histograms(counts, x, y), *drawn],
         title=title,
@@ -84,44 +96,6 @@ def explored_figure(
         height=round(0.6 * width),
         legend_columns=3,
     )
-
-
-class _Data:
-    """The rows that are drawn one by one."""
-
-    def __init__(self, table: ExplorableTable, chosen: Columns, rows: np.ndarray) -> None:
-        self.table, self.rows = table, rows
-        self.frame = pd.DataFrame({"x": self.column(chosen.x), "y": self.column(chosen.y)})
-        kind = table.kind(chosen.selects)
-        if table.has_sources:
-            sources = table.sources()
-            codes = sources.codes[rows]
-            # Rows are selected by the column of this name.
-            self.source = "id" if kind == "sources" else "source"
-            self.frame[self.source] = id_strings(pd.Series(sources.ids[codes]))
-            if sources.classes is not None:
-                self.frame["source_class"] = sources.classes[codes]
-        for name, words in table.words.items():
-            self.frame[name] = words(rows)
-        if kind == "exposures":
-            keys = {name: table.read(name)[rows] for name in ("field_id", "plate_id")}
-            self.frame["exposure"] = exposure_labels(pd.DataFrame(keys))
-        elif kind == "detectors":
-            self.frame["detector_id"] = table.read("detector_id")[rows]
-
-    def column(self, name: str) -> np.ndarray:
-        return self.table.numbers(name)[self.rows]
-
-
-def _named(name: str, column: Column) -> str:
-    """Return a name with the unit of a column in brackets."""
-    return f"{name} ({unit_text(column.unit)})" if column.unit else name
-
-
-def _behind(table: ExplorableTable, name: str) -> str:
-    """Return the unit of a column as it stands behind a number; empty without one."""
-    unit = table.columns[name].unit if name else ""
-    return f" {unit_text(unit)}" if unit else ""
 
 
 def _axis(
@@ -165,52 +139,11 @@ def _histograms(counts: Counts, x: Axis, y: Axis) -> list[Glyphs]:
     return found
 
 
-def _points(data: _Data, chosen: Columns) -> Glyphs:
-    table, has_sources = data.frame, data.table.has_sources
-    hover = [("source", f"@{{{data.source}}}")] if has_sources else []
-    hover += [(name, f"@{{{name}}}") for name in data.table.words]
-    units = {name: _behind(data.table, name) for name in (chosen.x, chosen.y, chosen.colour)}
-    hover += [(chosen.x, f"@{{x}}{{0.0000}}{units[chosen.x]}")]
-    hover += [(chosen.y, f"@{{y}}{{0.0000}}{units[chosen.y]}")]
-    keep = [name for name in table if name not in ("x", "y", "source_class")]
-    if chosen.colour:
-        values = data.column(chosen.colour)
-        table["colour"] = values
-        label = _named(chosen.colour, data.table.columns[chosen.colour])
-        ramp = Ramp("colour", "count", _span(values), label=label)
-        hover.append((chosen.colour, f"@{{colour}}{{0.0000}}{units[chosen.colour]}"))
-        return points(
-            table, "x", "y", name="rows by value", color=ramp, size=4.5, hover=hover, keep=keep
-        )
-    if "source_class" in table:
-        return points(
-            table,
-            "x",
-            "y",
-            name="rows by class",
-            color=COLOUR_OF_CLASS,
-            size=4.0,
-            alpha=0.7,
-            hover=hover,
-            label="@source_class",
-            keep=keep,
-        )
-    return points(table, "x", "y", name="rows", color="mark", size=6.0, hover=hover, keep=keep)
-
-
-def _span(values: np.ndarray) -> Limits:
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return 0.0, 1.0
-    low, high = (float(end) for end in np.percentile(finite, _SPAN))
-    return (low, high) if high > low else (low - 0.5, low + 0.5)
-
-
 def _cells(
     table: ExplorableTable, chosen: Columns, counts: Counts, axes: tuple[Axis, Axis]
 ) -> Glyphs:
     at = [
-        (name, f"${axis}{{0.0000}}{_behind(table, name)}")
+        (name, f"${axis}{{0.0000}}{unit_behind(table, name)}")
         for axis, name in (("x", chosen.x), ("y", chosen.y))
     ]
     if not chosen.colour:
@@ -221,9 +154,9 @@ def _cells(
         hover = [*at, (label, "@count{0,0}")]
         return cells(numbers, *axes, name="cells by number", ramp=ramp, hover=hover)
     means, label = counts.means(), f"mean {chosen.colour} per cell"
-    named = _named(label, table.columns[chosen.colour])
-    ramp = Ramp("value", "count", _span(means.ravel()), label=named)
-    hover = [*at, (label, f"@{{value}}{{0.0000}}{_behind(table, chosen.colour)}")]
+    with_unit = named(label, table.columns[chosen.colour])
+    ramp = Ramp("value", "count", span_of(means.ravel()), label=with_unit)
+    hover = [*at, (label, f"@{{value}}{{0.0000}}{unit_behind(table, chosen.colour)}")]
     return cells(means, *axes, name="cells by value", ramp=ramp, hover=hover)
 
 
@@ -245,7 +178,7 @@ def _selected(
         return []
     # Under names that are not selected by: these points show what is selected.
     names = {"id": "source", "exposure": "in exposure", "detector_id": "on detector"}
-    marks = _Data(table, chosen, rows).frame.rename(columns=names)
+    marks = RowsInFrame(table, chosen, rows).frame.rename(columns=names)
     label = f"selected {kind}"
     colour = CLASS_COLOURS[REFERENCE]  # visible on dark and on light cells
     hover = [(name, f"@{{{name}}}") for name in names.values() if name in marks]

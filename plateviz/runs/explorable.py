@@ -1,6 +1,6 @@
 """Tables of a run whose columns can be drawn against each other, of which little is in memory.
 
-The residuals of a run are tens of millions of rows. Of them and of the sources per orbit, only
+The measurements of a run are tens of millions of rows. Of them and of the sources per orbit, only
 columns that are asked for are read, and kept as long as others are not asked for.
 """
 
@@ -37,14 +37,15 @@ from solver.data.survey_schema import HISTORY, MOTIONS, RUN_ORBITS
 from solver.io.parquet import count_rows, read_columns
 
 MOST_ROWS = 2**25
-"""Of more residuals, those of one orbit in two or in more are shown."""
+"""Of more measurements, those of one orbit in two or in more are shown."""
 
 _EXPOSURES, _CALIBRATION = "exposures.parquet", "calibration.parquet"
+_SOURCES = "sources.parquet"
 _ADDED = {column.name: column for column in (*OF_MEASUREMENTS, *OF_DEVIATION)}
 
 
 def _per_exposure(name: str) -> Callable[[Mapping[str, np.ndarray], Path], np.ndarray]:
-    """Return the function that computes a number of the exposure of each residual."""
+    """Return the function that computes a number of the exposure of each measurement."""
 
     def compute(columns: Mapping[str, np.ndarray], folder: Path) -> np.ndarray:
         keys = ["field_id", "plate_id"]
@@ -73,6 +74,11 @@ def _n_obs(columns: Mapping[str, np.ndarray], _: Path) -> np.ndarray:
     return np.bincount(codes)[codes]
 
 
+def _magnitude(columns: Mapping[str, np.ndarray], folder: Path) -> np.ndarray:
+    sources = read_columns(folder / _SOURCES, ["source_id", "magnitude"]).to_pandas()
+    return sources.set_index("source_id")["magnitude"].reindex(columns["source_id"]).to_numpy()
+
+
 def _phase(axis: str) -> Derived:
     name = f"n{axis}"
     return Derived(_ADDED[f"phase_{axis}"], (name,), lambda c, _: c[name] - np.floor(c[name]))
@@ -92,7 +98,7 @@ def _pull(axis: str) -> Derived:
     return Derived(_ADDED[f"pull_{axis}"], needs, lambda c, _: (c[estimate] - c[true]) / c[sigma])
 
 
-_RESIDUALS = Kind(
+_MEASUREMENTS = Kind(
     RESIDUALS,
     (
         Derived(
@@ -103,6 +109,7 @@ _RESIDUALS = Kind(
         _phase("x"),
         _phase("y"),
         Derived(_ADDED["n_obs"], ("source_id",), _n_obs),
+        Derived(_ADDED["magnitude"], ("source_id",), _magnitude),
         Derived(_ADDED["minutes"], ("field_id", "plate_id"), _per_exposure("minutes")),
         Derived(EXPOSURES["obstime"], ("field_id", "plate_id"), _per_exposure("obstime")),
     ),
@@ -137,7 +144,7 @@ def _columns(table: Table, added: tuple[Column, ...] = ()) -> Mapping[str, Colum
 
 COLUMNS_OF_RUN: Mapping[str, Mapping[str, Column]] = MappingProxyType(
     {
-        "residuals": _columns(RESIDUALS, tuple(one.column for one in _RESIDUALS.derived)),
+        "measurements": _columns(RESIDUALS, tuple(one.column for one in _MEASUREMENTS.derived)),
         "exposures": _columns(EXPOSURES, tuple(one.column for one in _EXPOSURE_ROWS.derived)),
         "sources per orbit": _columns(HISTORY, tuple(one.column for one in _HISTORY.derived)),
         "motions": _columns(MOTIONS, (CHI2_PER_DOF,)),
@@ -168,7 +175,7 @@ def explorable_of_run(run: SurveyRun, rows: str, kept: ColumnCache) -> Explorabl
         return _orbits(run)
     if rows == "exposures":
         return _exposures(run, kept)
-    return _residuals(run, kept) if rows == "residuals" else _history(run, kept)
+    return _measurements(run, kept) if rows == "measurements" else _history(run, kept)
 
 
 def _orbits(run: SurveyRun) -> ExplorableTable:
@@ -200,18 +207,18 @@ def _exposures(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
     )
 
 
-def _residuals(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
+def _measurements(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
     of_run = Run(run.survey, run.name)
     every, orbits = _thinned(of_run)
     files = [of_run.orbit_directory(orbit) / "residuals.parquet" for orbit in orbits]
-    rows = FileRows(_RESIDUALS, files, _state(files), kept)
+    rows = FileRows(_MEASUREMENTS, files, _state(files), kept)
     names = np.array(orbits).astype(str)
 
     def orbit_of(numbers: np.ndarray) -> np.ndarray:
         return names[np.searchsorted(rows.starts, numbers, side="right") - 1]
 
     note = f"those of one orbit in {every}, which fit into the memory" if every > 1 else ""
-    return _of_files("residuals", rows, run, orbit_of)._replace(note=note)
+    return _of_files("measurements", rows, run, orbit_of)._replace(note=note)
 
 
 def _history(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
@@ -250,7 +257,7 @@ def _of_files(
 
 
 def _thinned(run: Run) -> tuple[int, list[int]]:
-    """Return n, and every nth fitted orbit, so that the residuals are not too many."""
+    """Return n, and every nth fitted orbit, so that the measurements are not too many."""
     orbits = run.complete_orbits()
     if not orbits:
         return 1, []

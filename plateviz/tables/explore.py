@@ -1,6 +1,7 @@
 """Tables whose columns can be drawn against each other: sources, measurements and exposures."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -29,6 +30,7 @@ OF_MEASUREMENTS = (
     Column("phase_x", "float64", "pix", "measured x minus the next lower whole pixel"),
     Column("phase_y", "float64", "pix", "measured y minus the next lower whole pixel"),
     Column("n_obs", "int64", "", "number of measurements of the source"),
+    schema.SOURCES["magnitude"],
     _TIME,
 )
 
@@ -163,6 +165,8 @@ def explorable_measurements(result: FitResult) -> ExplorableTable:
         phase_x=rows["nx"] - np.floor(rows["nx"]),
         phase_y=rows["ny"] - np.floor(rows["ny"]),
         n_obs=sources["n_obs"].to_numpy()[of_source],
+        # Results of old versions have no magnitudes.
+        magnitude=sources.get("magnitude", sources["n_obs"] * np.nan).to_numpy()[of_source],
         minutes=minutes_since_first(result.exposures)[result.exposure_index],
         source_class=sources["source_class"].to_numpy()[of_source],
     )
@@ -202,13 +206,14 @@ def fitted_columns(groups: Sequence[Group]) -> list[FittedColumn]:
     """Return the columns that parameter groups with a value per exposure give these."""
     return [
         FittedColumn(
-            Column(f"{group.name}_{kind}", "float64", group.unit, f"{group.label}, {of_kind}"),
+            Column(name.format(group.name), "float64", unit(group), f"{group.label}, {of_kind}"),
             group.name,
             kind,
         )
-        for kind, of_kind in (
-            ("offset", "estimate minus prior"),
-            ("sigma_marginal", "marginal sigma"),
+        for kind, name, unit, of_kind in (
+            ("value", "{}", attrgetter("value_unit"), "estimate"),
+            ("offset", "{}_offset", attrgetter("unit"), "estimate minus prior"),
+            ("sigma_marginal", "{}_sigma_marginal", attrgetter("unit"), "marginal sigma"),
         )
         for group in groups
     ]

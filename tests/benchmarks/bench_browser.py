@@ -46,7 +46,7 @@ _KEY_MS = 200
 # Sources in the box that is drawn in the footprint.
 _MANY = 1000
 _ALL_NEW = "strip and all visible figures"
-_EXPLORE = "?view=survey&workspace=explore&rows=residuals"
+_EXPLORE = "?view=survey&workspace=explore&rows=measurements"
 # More columns of the residuals than the server keeps in memory.
 _COLUMNS = (
     *("nx", "residual_y", "ny", "leverage", "focal_x", "residual_x", "ideal_x"),

@@ -23,7 +23,6 @@ _FIRST: Mapping[str, tuple[str, str]] = {
     "measurements": ("focal_x", "residual_x"),
     "sources": ("n_obs", "sigma_ra_marginal"),
     "exposures": ("minutes", "chi2_per_dof"),
-    "residuals": ("focal_x", "residual_x"),
     "sources per orbit": ("epoch", "offset_ra"),
     "motions": ("n_orbits", "sigma_parallax"),
     "orbits": ("epoch", "chi2_per_dof"),

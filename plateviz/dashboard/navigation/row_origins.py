@@ -17,7 +17,7 @@ _COMMON = (
     "name, which all other figures show. The wheel zooms, and the cells become finer."
 )
 _OF_RUN = (
-    f" Only the columns that are drawn are read. Above {MOST_ROWS:,} residuals, those of one "
+    f" Only the columns that are drawn are read. Above {MOST_ROWS:,} measurements, those of one "
     "orbit in two, or in more, are shown. For a survey a hundred times as large, numbers in cells "
     "would be made when its run is gathered, and one level of detail read at a time."
 )
@@ -97,7 +97,7 @@ class RunRows:
     """The rows of the run on the screen, which are read by another thread."""
 
     caption = _COMMON + _OF_RUN
-    document = "assets/docs/survey-diagnostics.md, “Explore all residuals”"
+    document = "assets/docs/survey-diagnostics.md, “Explore all measurements”"
 
     def __init__(self, navigation: Navigation) -> None:
         """Follow `navigation`."""

@@ -1,13 +1,15 @@
 """Any column against any other: what is drawn of how many rows, and between which limits."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from plateviz.figures.figure import Ramp
 from plateviz.plots.explore import explored_figure
 from plateviz.plots.explored_rows import Columns
 from plateviz.plots.style import ROW_LIMIT
-from plateviz.tables.explore import EXPLORABLE, ExplorableTable
+from plateviz.tables.explore import EXPLORABLE, ExplorableTable, explorable
+from solver.data import schema
 from solver.data.columns import Column
 
 
@@ -204,3 +206,15 @@ def test_median_stands_out_from_cells_and_is_said_in_numbers(many):
     assert frame["edge of the median"].looks["line_color"] == "background"
     low, high = frame["median"].values("y").min(), frame["median"].values("y").max()
     assert f"medians from {low:.3g} to {high:.3g}" in frame.subtitle
+
+
+def test_detectors_have_a_colour_each_and_a_legend():
+    detectors, nx = [2, 0, 2, 5], [1.0, 2.0, 3.0, 4.0]
+    rows = pd.DataFrame({"field_id": 0, "plate_id": 1, "detector_id": detectors, "nx": nx})
+    table = explorable("measurements", rows, schema.RESIDUALS)
+    (frame,) = explored_figure(table, Columns("nx", "nx", colour="detector_id"))
+    drawn = frame["rows by detector"]
+    assert drawn.labels == {"detector 0", "detector 2", "detector 5"}
+    colours = drawn.looks["fill_color"]
+    assert len(set(colours.looks.values())) == 3
+    assert drawn.columns["colour"].tolist() == [f"detector {n}" for n in (2, 0, 2, 5)]

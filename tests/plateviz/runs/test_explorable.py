@@ -69,7 +69,7 @@ def copied(made, tmp_path):
 
 
 def residuals(run, kept=None):
-    return explorable_of_run(run, "residuals", kept or ColumnCache())
+    return explorable_of_run(run, "measurements", kept or ColumnCache())
 
 
 def test_residuals_of_all_orbits_have_the_columns_of_an_orbit(run, results):
@@ -98,11 +98,11 @@ def test_residuals_have_orbit_time_and_number_of_measurements(run, results):
     assert table.words["orbit"](last).tolist() == ["0", "2"]
 
 
-@pytest.mark.parametrize("rows", ["residuals", "sources per orbit"])
+@pytest.mark.parametrize("rows", ["measurements", "sources per orbit"])
 def test_rows_have_their_sources_and_classes(rows, run, results):
     table = explorable_of_run(run, rows, ColumnCache())
     ids, codes, classes = table.sources()
-    name = "residuals" if rows == "residuals" else "sources"
+    name = "residuals" if rows == "measurements" else "sources"
     expected = {
         "residuals": [r.residuals["source_id"] for r in results.values()],
         "sources": [history_of(r, orbit)["source_id"] for orbit, r in results.items()],
@@ -161,6 +161,7 @@ def test_exposures_of_a_run_are_those_of_its_orbits(run, results):
     for name in alone[0].columns:
         expected = np.concatenate([one.numbers(name) for one in alone])
         np.testing.assert_allclose(table.numbers(name), expected, err_msg=name)
+    assert {"focal_length", "position_angle"} <= set(table.columns)
     # What the orbits do not fit has no values.
     assert np.isnan(table.numbers("focal_anisotropy_offset")).all()
     last = np.array([table.size - 1])
@@ -188,7 +189,7 @@ def test_orbit_that_is_added_is_there(copied, results):
 def test_run_without_an_orbit_has_no_rows(copied):
     for orbit in ORBITS:
         shutil.rmtree(copied.orbit_directory(orbit))
-    for rows in ("residuals", "sources per orbit"):
+    for rows in ("measurements", "sources per orbit"):
         table = explorable_of_run(SurveyRun(copied), rows, ColumnCache())
         assert (table.size, len(table.numbers("chi2" if "orbit" in rows else "nx"))) == (0, 0)
 

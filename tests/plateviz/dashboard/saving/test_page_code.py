@@ -166,10 +166,10 @@ def test_view_of_a_run_reads_the_run(navigation, survey):
     assert "survey.figure('orbit-health')" in code.python
     navigation.turn_to_workspace(SurveyWorkspace.EXPLORE)
     assert "figures" not in page_code(navigation).python
-    navigation.survey_exploration.offer(list(COLUMNS_OF_RUN["residuals"]))
+    navigation.survey_exploration.offer(list(COLUMNS_OF_RUN["measurements"]))
     code = page_code(navigation)
-    assert "\n    survey.explore('residuals', 'focal_x', 'residual_x'),\n" in code.python
-    wanted = "'rows=residuals&x=focal_x&y=residual_x'"
+    assert "\n    survey.explore('measurements', 'focal_x', 'residual_x'),\n" in code.python
+    wanted = "'rows=measurements&x=focal_x&y=residual_x'"
     assert f"--survey --explore {wanted} -o REPORT.html" in code.command
     source = int(survey.history["source_id"].iloc[0])
     navigation.open_source(str(source))

@@ -178,6 +178,8 @@ def kept_table(directory: Path, name: str, unchanged: UnchangedFiles) -> Path:
 
 def orbit_changes(directory: Path) -> list[str]:
     """Return a message for each file of a fitted orbit that is not as it was written."""
+    if not is_complete(directory):
+        return [f"{directory / _COMPLETE}: the manifest of a fitted orbit is missing; {_REMEDY}"]
     found = list(changes(directory, directory / _COMPLETE, _REMEDY))
     try:
         _read_timings(directory)

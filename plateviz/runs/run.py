@@ -21,6 +21,7 @@ import json
 import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -144,9 +145,7 @@ class Run:
 
     def complete_orbits(self) -> list[int]:
         """Return the fitted orbits, sorted."""
-        found = (_ORBIT.fullmatch(path.name) for path in self.directory.glob("orbit=*"))
-        numbers = sorted(int(match[1]) for match in found if match)
-        return [number for number in numbers if is_complete(self.orbit_directory(number))]
+        return [one for one in self._orbits_there() if is_complete(self.orbit_directory(one))]
 
     def failures(self) -> dict[int, str]:
         """Return the reasons why orbits have no solution, by orbit."""
@@ -173,12 +172,8 @@ class Run:
 
     def changes(self) -> list[str]:
         """Return a message for each file of the run that is not as it was written."""
-        found = [
-            message
-            for orbit in self.complete_orbits()
-            for message in orbit_changes(self.orbit_directory(orbit))
-        ]
-        return found + self._table_changes()
+        orbits = map(self.orbit_directory, self._orbits_there())
+        return [*chain.from_iterable(map(orbit_changes, orbits)), *self._table_changes()]
 
     def remove_damaged(self, also: Collection[int] = ()) -> list[int]:
         """Remove orbits and tables over all orbits that are not as they were written.
@@ -272,6 +267,11 @@ class Run:
             except InputError as error:
                 found.append(str(error))
         return found
+
+    def _orbits_there(self) -> list[int]:
+        """Return the orbits that have a directory, whether they are complete or not."""
+        found = (_ORBIT.fullmatch(path.name) for path in self.directory.glob("orbit=*"))
+        return sorted(int(match[1]) for match in found if match)
 
     def _failure_path(self, orbit: int) -> Path:
         return self.directory / _FAILED / f"orbit={orbit:04d}.json"

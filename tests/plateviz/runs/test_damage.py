@@ -111,6 +111,14 @@ def test_missing_measurements_are_found(run, survey):
     assert "  orbits solved in the run default: 3\n" in out
 
 
+def test_fitted_orbit_without_a_manifest_is_named(run, survey):
+    manifest = survey / "runs" / "default" / "orbit=0001" / "COMPLETE"
+    manifest.unlink()
+    code, out, _ = run("inspect", survey)
+    assert code == 2
+    assert f"{manifest}: the manifest of a fitted orbit is missing" in out.replace("\n", "")
+
+
 @pytest.mark.parametrize(
     "name",
     [

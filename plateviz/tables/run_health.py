@@ -1,5 +1,6 @@
 """Tables of a run: the quality of each orbit's fit, and summary numbers of all orbits."""
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -8,12 +9,14 @@ import pandas as pd
 
 from plateviz.tables.headings import ORBITS_OF_RUN
 from plateviz.tables.labels import dates
-from plateviz.tables.summary import State, SummaryItem, deviation_state, state_of
+from plateviz.tables.summary import State, SummaryItem, deviation_state, rule, state_of
 
 COMPLETE, FAILED, MISSING = "complete", "failed", "missing"
 _OF_STATUS: Mapping[str, State] = MappingProxyType(
     {COMPLETE: "good", FAILED: "bad", MISSING: "warn"}
 )
+# Variance of a median over that of a mean, of normal numbers.
+_OF_MEDIAN = math.pi / 2.0
 _VERDICTS = {"good": "trusted", "warn": "with care", "bad": "not trusted"}
 
 
@@ -116,13 +119,20 @@ def _converged(orbits: pd.DataFrame) -> SummaryItem:
 
 
 def _chi2(orbits: pd.DataFrame) -> SummaryItem:
-    values = orbits["chi2_per_dof"].dropna()
-    label = "χ² per degree of freedom"
-    hint = "median over the orbits, lowest and highest; expected 1"
+    fitted = orbits[orbits["chi2_per_dof"].notna()]
+    values, label = fitted["chi2_per_dof"], "χ² per degree of freedom"
+    hint = "median over the orbits, lowest and highest"
     if values.empty:
-        return SummaryItem(label, "–", hint, "neutral")
+        return SummaryItem(label, "–", f"{hint}; expected 1", "neutral")
     value = f"{values.median():.3f} ({values.min():.3f} to {values.max():.3f})"
-    return SummaryItem(label, value, hint, "neutral")
+    of_one = math.sqrt((2.0 / _positive(fitted["dof"])).median())
+    scatter = of_one * math.sqrt(_OF_MEDIAN / len(values))
+    return SummaryItem(
+        label,
+        value,
+        f"{hint}. {rule(1.0, scatter, 'of the median, for normal noise')}",
+        state_of(float(values.median()), 1.0, scatter),
+    )
 
 
 def _totals(orbits: pd.DataFrame) -> SummaryItem:

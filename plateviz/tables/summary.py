@@ -93,7 +93,8 @@ def deviation_state(value: float, expected: float, dof: float) -> State:
     return "bad" if abs(value - expected) > _BAD_SHARE * expected else "warn"
 
 
-def _rule(expected: float, scatter: float, origin: str) -> str:
+def rule(expected: float, scatter: float, origin: str) -> str:
+    """Return the rule of `state_of` in words."""
     return (
         f"Expected {expected:.3f} ± {scatter:.3f} ({origin}). "
         f"Good within {_GOOD_SIGMAS:.0f} times that scatter; bad if beyond it and more than "
@@ -120,7 +121,7 @@ def _chi2(result: FitResult) -> SummaryItem:
     return SummaryItem(
         "χ² per degree of freedom",
         f"{value:.3f}",
-        _rule(1.0, scatter, origin),
+        rule(1.0, scatter, origin),
         state_of(value, 1.0, scatter),
     )
 
@@ -140,7 +141,7 @@ def _normalised_deviation(result: FitResult, coordinate: str, symbol: str) -> Su
         f"Reference sources, {symbol}",
         f"{value:.3f} (expected {expected:.3f})",
         "Rms of estimate minus catalogue over the catalogue's sigma. "
-        + _rule(expected, scatter, origin),
+        + rule(expected, scatter, origin),
         deviation_state(value, expected, dof),
     )
 

@@ -70,6 +70,13 @@ def test_run_strip_summarises_the_orbits_and_motions(survey):
     assert values(items)["Motions fitted"] == f"{fitted} (of {len(survey.motions)})"
 
 
+@pytest.mark.parametrize(("chi2", "state"), [(1.0, "good"), (1.1, "warn"), (1.3, "bad")])
+def test_chi2_of_a_run_is_judged_by_its_median(survey, chi2, state):
+    row = survey.orbits[survey.orbits["status"] == "complete"].iloc[[0, 0, 0]]
+    orbits = row.assign(chi2_per_dof=[0.5, chi2, 2.0])
+    assert states(run_strip(orbits, survey.motions))["χ² per degree of freedom"] == state
+
+
 def test_run_strip_of_a_run_without_orbits_has_no_numbers(survey):
     orbits = survey.orbits.assign(status="missing", chi2_per_dof=np.nan, n_measurements=np.nan)
     found = values(run_strip(orbits, survey.motions.iloc[:0]))

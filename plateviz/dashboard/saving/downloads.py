@@ -80,7 +80,8 @@ def as_file(tables: Mapping[str, Table], stem: str, suffix: str) -> Download:
         raise InputError("there is nothing to save: no row is shown")
     with tempfile.TemporaryDirectory() as folder:
         if suffix in OF_ONE_TABLE and len(tables) > 1:
-            return Download(file_name(stem, ".zip"), _zipped(tables, Path(folder), suffix))
+            # Files of different formats must not replace each other.
+            return Download(file_name(stem, f"{suffix}.zip"), _zipped(tables, Path(folder), suffix))
         path = Path(folder) / f"table{suffix}"
         write_tables(_in_ascii(tables) if suffix == ".fits" else tables, path)
         return Download(file_name(stem, suffix), path.read_bytes())

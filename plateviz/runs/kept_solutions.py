@@ -121,11 +121,7 @@ class KeptSolutions:
         InputError
             If the name is not valid or not free, or too many solutions are kept.
         """
-        if not _NAME.fullmatch(name):
-            raise InputError(
-                "expected a name of up to 60 letters, digits, '.', '-' and '_' that begins with a "
-                f"letter or digit, found {name[:60]!r}"
-            )
+        require_name(name)
         if len(self.all()) >= MOST:
             raise InputError(f"{self.folder}: {MOST} solutions are kept; remove some first")
         target = self.folder / name
@@ -140,6 +136,15 @@ class KeptSolutions:
                 staging.rename(target)
             flush(self.folder)
         return KeptSolution(target / directory, orbit, is_what_if)
+
+
+def require_name(name: str) -> None:
+    """Raise `InputError` if a solution cannot be kept under a name, which is that of a folder."""
+    if not _NAME.fullmatch(name):
+        raise InputError(
+            "expected a name of up to 60 letters A to Z or a to z, digits, '.', '-' and '_' that "
+            f"begins with a letter or digit, found {name[:60]!r}"
+        )
 
 
 def survey_instrument_of(kept: KeptSolution) -> Instrument:

@@ -15,6 +15,7 @@ from plateviz.dashboard.session.solution import Request
 from plateviz.dashboard.views.dialogs.window import window
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
+from plateviz.runs.kept_solutions import KeptSolution, require_name
 from plateviz.runs.note import MOST_BYTES, Note, NoteChangedError, read_note, write_note
 from plateviz.solving.made_solutions import MadeSolution
 from solver.errors import InputError
@@ -81,6 +82,7 @@ class SolutionWindow(pn.viewable.Viewer):
             width="md",
         )
         self._choice.param.watch(self._choose, "value")
+        self._name.param.watch(self._check_name, "value_input")
         self._text.param.watch(self._take_draft, "value_input")
         self._session.journal.param.watch(self._follow, "made")
         self._session.param.watch(self._follow, "shown")
@@ -113,13 +115,15 @@ class SolutionWindow(pn.viewable.Viewer):
         if self._window.open:
             self._fill()
 
-    def _fill(self) -> None:
+    def _fill(self) -> dict[str, Entry]:
+        """List the solutions; return them by their labels."""
         options = by_label(self._list.entries())
         before = self._chosen
         same = (one for one in options.values() if before and one.what == before.what)
         value = next(same, next(iter(options.values()), None))
         self._choice.param.update(options=options, value=value)
         self._choose()
+        return options
 
     def _choose(self, *_: object) -> None:
         entry, before = self._chosen, self._described
@@ -186,7 +190,25 @@ class SolutionWindow(pn.viewable.Viewer):
 
     def _keep_on_disk(self) -> None:
         if (entry := self._chosen) is not None:
-            self._try(lambda: self._list.keep(entry, self._name.value.strip()))
+            self._try(lambda: self._keep_as(entry, (self._name.value or "").strip()))
+
+    def _keep_as(self, entry: Entry, name: str) -> None:
+        self._list.keep(entry, name)
+        # The list has it as one of the kept solutions, too, with its name and a note.
+        options = self._fill()
+        kept = (one for one in options.values() if _is_kept(one, name))
+        self._choice.value = next(kept, self._choice.value)
+        self._say(f"It is kept on disk as {name}.", "success")
+
+    def _check_name(self, *_: object) -> None:
+        """Say below a name while it is typed whether a solution can be kept under it."""
+        name, why = (self._name.value_input or "").strip(), ""
+        try:
+            if name:
+                require_name(name)
+        except InputError as error:
+            why = f"To be kept on disk: {error}"
+        self._name.param.update(error_state=bool(why), helper_text=why)
 
     def _save_note(self) -> None:
         path = self._path
@@ -217,6 +239,10 @@ class SolutionWindow(pn.viewable.Viewer):
         # It is taken for Markdown, in which HTML would be kept.
         text = text[:1].upper() + text[1:]
         self._message.param.update(object=escape(text), visible=bool(text), severity=severity)
+
+
+def _is_kept(entry: Entry, name: str) -> bool:
+    return isinstance(entry.what, KeptSolution) and entry.what.name == name
 
 
 def _button(label: str, act: Callable[[], None]) -> pmui.Button:

@@ -107,3 +107,21 @@ def test_name_that_is_written_stays_while_the_list_is_filled_again(page, window)
     window._name.value = "half"
     page.session.journal.param.trigger("made")
     assert window._name.value == "half"
+
+
+def test_name_that_no_kept_solution_can_have_is_refused_while_it_is_typed(window):
+    window._name.value_input = "é"
+    assert window._name.error_state
+    assert window._name.helper_text.startswith("To be kept on disk: expected a name of up to 60")
+    window._name.value_input = "e"
+    assert (window._name.error_state, window._name.helper_text) == (False, "")
+
+
+def test_kept_solution_is_shown_by_its_name_and_said_to_be_kept(
+    page, window, monkeypatch, fit_result
+):
+    kept = page.session.store.kept
+    monkeypatch.setattr(window._list, "keep", lambda _, name: kept.keep(name, 0, False, fit_result))
+    window._name.value = " new "
+    window._keep_on_disk()
+    assert (window._chosen.name, window._message.object) == ("new", "It is kept on disk as new.")

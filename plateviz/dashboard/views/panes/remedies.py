@@ -85,7 +85,7 @@ class _Row:
         """Show a cause; its remedy is tried when the button is pressed."""
         self._remedy = remedy
         self._button.param.update(
-            description=f"Try it: solve the orbit with {_options(remedy.cause)}.",
+            description=_what_it_does(remedy.cause),
             visible=remedy.settings is not None,
             disabled=False,
         )
@@ -112,6 +112,13 @@ def _words(cause: Cause) -> str:
     return (
         f"<p class='cause'><b>{escape(cause.heading())}</b>, {cause.significance:.0f} sigma. "
         f"{escape(action)}.{options}{_and_more(cause)}<br><span>{escape(cause.spoils)}</span></p>"
+    )
+
+
+def _what_it_does(cause: Cause) -> str:
+    return (
+        f"Try it: solve the orbit with {_options(cause)}. The page shows that solution and its "
+        "verdict, and the controls of the refit follow; no file is changed."
     )
 
 

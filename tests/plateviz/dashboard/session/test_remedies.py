@@ -111,7 +111,7 @@ def test_each_cause_has_a_row_and_each_remedy_a_button(live, fit_result):
     assert "&lt;b&gt; is unknown" in shown(view)
     assert f"<code>{ids[2]}</code> and 2 more" in shown(view)
     first, last = buttons(view)
-    assert first.description == "Try it: solve the orbit with --drift 2."
+    assert first.description.startswith("Try it: solve the orbit with --drift 2. ")
     last.clicks += 1
     left_out = Exclusions(sources=frozenset(fit_result.sources["source_id"][:5].tolist()))
     assert live.store.requested[-1][1].exclusions == left_out

@@ -252,7 +252,7 @@ def _follow_axis(
     start, end = axis.limits
     limits.update(start=start, end=end, reset_start=start, reset_end=end)
     if not axis.is_log:
-        with_tick_numbers(drawn, axis.limits, axis.label)
+        with_tick_numbers(drawn, axis.limits, is_grouped=axis.is_grouped)
     if axis.ticks is not None:
         places = [place for place, _ in axis.ticks]
         if not isinstance(drawn.ticker, models.FixedTicker):

@@ -38,6 +38,8 @@ _DASHES: Mapping[str, str] = MappingProxyType(
     {"solid": "", "dashed": "6", "dotted": "2 4", "dotdash": "2 4 6 4"}
 )
 _TRANSPARENT = "rgba(0, 0, 0, 0)"
+# In the label of a colour bar.
+_YEARS = "(yr)"
 # Maximum number of glyphs that one hover describes.
 _HOVER_LIMIT = 3
 # Columns by which rows are selected: the first one that they have.
@@ -167,7 +169,8 @@ class BokehGlyphs:
         if self.bar is not None:
             self.bar.update(color_mapper=self._mapper, title=ramp.label or None)
             if not ramp.is_log:
-                with_tick_numbers(self.bar, ramp.limits, ramp.label or "")
+                is_grouped = _YEARS not in (ramp.label or "")
+                with_tick_numbers(self.bar, ramp.limits, is_grouped=is_grouped)
         if self.kind == "image":
             return {"color_mapper": self._mapper}
         return {name: Field(ramp.column, transform=self._mapper)}

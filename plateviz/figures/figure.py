@@ -130,6 +130,7 @@ class Axis:
     is_log : whether the axis is logarithmic
     ticks : values and labels; None for automatic ones
     rotation : of the labels, deg
+    is_grouped : whether digits of large numbers stand in groups of three; those of years do not
     """
 
     label: str
@@ -137,6 +138,7 @@ class Axis:
     is_log: bool = False
     ticks: Ticks | None = None
     rotation: float = 0.0
+    is_grouped: bool = True
 
     @property
     def length(self) -> float:

@@ -67,7 +67,7 @@ def _free(figure: Figure, columns: int, corner: int) -> Figure:
 
 def _arranged(figure: Figure, columns: int, width: int, height: int) -> Figure:
     """Return the figure with its words, without those that would take much of the height."""
-    figure = _with_one_legend(figure, columns)
+    figure = _with_shared_legends(figure, columns)
     no_subtitle, no_legend = {"subtitle": ""}, {"legend_columns": 0}
     candidates = []
     for without in ({}, no_subtitle, no_legend, no_subtitle | no_legend):
@@ -78,20 +78,21 @@ def _arranged(figure: Figure, columns: int, width: int, height: int) -> Figure:
     return next((one for one in wordy if _least_height(one) >= enough), bare)
 
 
-def _with_one_legend(figure: Figure, columns: int) -> Figure:
-    """Return the figure with a legend that all frames share below the first frame of the last row.
+def _with_shared_legends(figure: Figure, columns: int) -> Figure:
+    """Return the figure with one legend for all frames that have the same labels.
 
-    A legend of its own below each would say the same.
+    It is below the first of them in the last row that has any: a legend below each would say the
+    same.
     """
-    labels = {frozenset(_labels(frame)) for frame in figure}
-    if len(labels) > 1 or not any(frame.legend_columns for frame in figure):
-        return figure
-    last = (len(figure) - 1) // columns * columns
-    legend_columns = max(frame.legend_columns for frame in figure)
-    frames = [
-        replace(frame, legend_columns=legend_columns if n == last else 0)
-        for n, frame in enumerate(figure)
-    ]
+    alike: dict[frozenset[str], list[int]] = {}
+    for n, frame in enumerate(figure):
+        if frame.legend_columns:
+            alike.setdefault(frozenset(_labels(frame)), []).append(n)
+    keepers = {}
+    for numbers in alike.values():
+        keeper = next(n for n in numbers if n // columns == numbers[-1] // columns)
+        keepers[keeper] = max(figure[n].legend_columns for n in numbers)
+    frames = [replace(frame, legend_columns=keepers.get(n, 0)) for n, frame in enumerate(figure)]
     return replace(figure, frames=tuple(frames))
 
 

@@ -5,7 +5,7 @@ import math
 from plateviz.figures.figure import Axis
 from plateviz.figures.text_width import text_width
 from plateviz.figures.theme import SMALL_SIZE
-from plateviz.figures.tick_numbers import is_grouped
+from plateviz.figures.tick_numbers import has_groups
 
 _LEAST, _MOST = 2, 6
 # Screen pixels between two labels beside each other, and for a label above another.
@@ -34,8 +34,9 @@ def _label(axis: Axis) -> str:
     step = axis.length / _TYPICAL
     decimals = max(0, -math.floor(math.log10(step))) if step > 0 else 0
     sign = "−" if min(axis.limits) < 0 else ""
+    comma = "," if axis.is_grouped and has_groups(axis.limits) else ""
     most = max(map(abs, axis.limits))
-    return f"{sign}{most:{',' if is_grouped(axis.limits, axis.label) else ''}.{decimals}f}"
+    return f"{sign}{most:{comma}.{decimals}f}"
 
 
 def _limited(number: float) -> int:

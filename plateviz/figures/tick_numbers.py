@@ -6,7 +6,6 @@ from plateviz.figures.figure import Limits
 
 # From here on digits stand in groups of three.
 _GROUPED = 1e3
-_YEAR = "year"
 # With as many decimals as a date needs in the smallest frame, none that are zero at the end, and
 # with the minus of BokehJS's other numbers.
 _WRITE = """
@@ -15,27 +14,24 @@ _WRITE = """
 """
 
 
-def with_tick_numbers(drawn: models.Axis | models.ColorBar, limits: Limits, label: str) -> None:
+def with_tick_numbers(
+    drawn: models.Axis | models.ColorBar, limits: Limits, *, is_grouped: bool
+) -> None:
     """Let a linear axis or colour bar write its numbers as those between two limits are written.
 
     Parameters
     ----------
-    label : of the axis or colour bar
+    is_grouped : as in `Axis`
     """
-    grouped = is_grouped(limits, label)
-    if isinstance(drawn.formatter, models.CustomJSTickFormatter) is not grouped:
+    is_large = is_grouped and has_groups(limits)
+    if isinstance(drawn.formatter, models.CustomJSTickFormatter) is not is_large:
         drawn.update(
             formatter=models.CustomJSTickFormatter(code=_WRITE)
-            if grouped
+            if is_large
             else models.BasicTickFormatter()
         )
 
 
-def is_grouped(limits: Limits, label: str) -> bool:
-    """Return whether the digits of numbers between two limits stand in groups; those of years not.
-
-    Parameters
-    ----------
-    label : what the numbers are, with their unit
-    """
-    return max(map(abs, limits)) >= _GROUPED and _YEAR not in label
+def has_groups(limits: Limits) -> bool:
+    """Return whether the digits of numbers between two limits can stand in groups."""
+    return max(map(abs, limits)) >= _GROUPED

@@ -59,7 +59,7 @@ def _panel(rows: pd.DataFrame, group: str, width: int) -> Figure:
         [*marks, trend],
         title=f"{group[0].upper()}{group[1:]}",
         subtitle=_subtitle(rows.iloc[0], unit),
-        x=Axis(_XLABEL, _spread(rows["year"], 0.04)),
+        x=Axis(_XLABEL, _spread(rows["year"], 0.04), is_grouped=False),
         y=Axis(f"{_YLABEL} ({unit})", _spread(rows["offset"], 0.12)),
         width=width,
         height=round(0.62 * width),

@@ -106,7 +106,7 @@ def _axis(
     is_leftwards: bool = False,
 ) -> Axis:
     limits = _valid(zoomed, is_log) or _limits(ends, is_log, is_leftwards)
-    return Axis(label, limits, is_log=is_log)
+    return Axis(label, limits, is_log=is_log, is_grouped="(yr)" not in label)
 
 
 def _valid(limits: tuple[float, ...], is_log: bool) -> Limits | None:

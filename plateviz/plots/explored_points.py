@@ -105,7 +105,8 @@ def _by_name(
     labels = {value: f"{word} {value:.0f}" for value in names.tolist()}
     table["colour"] = [labels[value] for value in values.tolist()]
     return points(
-        table,
+        # The legend has the names in the order of the rows.
+        table.iloc[np.argsort(values, kind="stable")],
         "x",
         "y",
         name=f"rows by {word}",

@@ -132,7 +132,7 @@ DIAGNOSTICS = (
         "Footprint",
         "The sources on the sky, and the fields of this orbit. Good: reference sources in every "
         "field. They tie the solution to the sky; a field with few of them depends on the other "
-        "fields. A tap on an outline selects its detector.",
+        "fields.",
         OrbitWorkspace.SKY,
         10,
         _plot,

@@ -76,7 +76,7 @@ def _chi2(table: pd.DataFrame, xlim: Limits, width: int) -> Figure:
         title=_TITLE,
         subtitle=f"{_states(table)}\n{outside} of {len(fitted)} beyond ± 1σ = √(2/dof), "
         f"{0.317 * len(fitted):.1f} expected",
-        x=Axis(_XLABEL, xlim),
+        x=Axis(_XLABEL, xlim, is_grouped=False),
         y=Axis(_YLABEL, (low, high)),
         width=width,
         height=round(0.6 * width),
@@ -143,7 +143,7 @@ def _deviations(table: pd.DataFrame, xlim: Limits, width: int) -> Figure:
             f"expected {fitted[f'expected_{axis}'].mean():.3f}"
             for axis, name in _NAMES.items()
         ),
-        x=Axis(_XLABEL, xlim),
+        x=Axis(_XLABEL, xlim, is_grouped=False),
         y=Axis("normalised deviation (σ of the prior)", (0.0, top)),
         width=width,
         height=round(0.6 * width),

@@ -20,7 +20,7 @@ from plateviz.figures.tick_numbers import with_tick_numbers
 def test_numbers_of_four_digits_are_grouped(kind, limits, expected):
     drawn = kind()
     for _ in range(2):
-        with_tick_numbers(drawn, limits, "x (mm)")
+        with_tick_numbers(drawn, limits, is_grouped=True)
         assert isinstance(drawn.formatter, expected) or (
             kind is ColorBar and expected is BasicTickFormatter and drawn.formatter == "auto"
         )
@@ -28,19 +28,19 @@ def test_numbers_of_four_digits_are_grouped(kind, limits, expected):
 
 def test_formatter_follows_the_limits_and_stays_where_it_fits():
     drawn = LinearAxis()
-    with_tick_numbers(drawn, (0.0, 2.0e4), "x")
+    with_tick_numbers(drawn, (0.0, 2.0e4), is_grouped=True)
     grouped = drawn.formatter
     # A frame of a few seconds of a date still has other labels at each tick.
     assert "maximumFractionDigits: 9" in grouped.code
-    with_tick_numbers(drawn, (0.0, 3.0e4), "x")
+    with_tick_numbers(drawn, (0.0, 3.0e4), is_grouped=True)
     assert drawn.formatter is grouped
-    with_tick_numbers(drawn, (0.0, 3.0), "x")
+    with_tick_numbers(drawn, (0.0, 3.0), is_grouped=True)
     assert isinstance(drawn.formatter, BasicTickFormatter)
 
 
 def test_years_are_never_grouped():
     drawn = LinearAxis()
-    with_tick_numbers(drawn, (2028.0, 2031.5), "epoch (Julian year, TCB)")
+    with_tick_numbers(drawn, (2028.0, 2031.5), is_grouped=False)
     assert isinstance(drawn.formatter, BasicTickFormatter)
 
 

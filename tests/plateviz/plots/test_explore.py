@@ -217,4 +217,4 @@ def test_detectors_have_a_colour_each_and_a_legend():
     assert drawn.labels == {"detector 0", "detector 2", "detector 5"}
     colours = drawn.looks["fill_color"]
     assert len(set(colours.looks.values())) == 3
-    assert drawn.columns["colour"].tolist() == [f"detector {n}" for n in (2, 0, 2, 5)]
+    assert drawn.columns["colour"].tolist() == [f"detector {n}" for n in (0, 2, 2, 5)]

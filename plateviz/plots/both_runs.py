@@ -23,7 +23,7 @@ BOTH_RUNS = SurveyFigure(
     lambda tables: figure_of_both_runs(comparable_survey_figures()[0], tables),
     is_wide=True,
     equation="the figure of each run, as in its own workspace",
-    least_height=520,
+    narrow_height=520,
 )
 """The card of the Survey page, which chooses the figure; a report has none."""
 

@@ -19,7 +19,8 @@ _HOVER = [
     ("shift in δ", "@{shift_dec_mas}{0.0000} mas"),
 ]
 _MEAN = ("sources in the bin", "@{n}")
-_MAPS, _COLUMNS, _WIDTH = 9, 3, 270
+# More maps than these are too small to be read on a page.
+_MAPS, _COLUMNS, _WIDTH = 6, 3, 270
 _ARROWS_OF_A_MAP, _BINS = 200, 12
 _LEAST_SHARE = 0.2
 _MARGIN = 1.2
@@ -77,8 +78,8 @@ def _panel(
             ),
             *key(length / MAS_PER_ARCMIN, length_text, scale=scale, field=field),
         ],
-        title=f"{title}: {angle_text(rms_length(rows) * MAS_PER_ARCMIN)} rms",
-        subtitle=f"Arrows enlarged {scale:,.0f} times\n{rows['name'].iloc[0]}",
+        title=f"{title}: {angle_text(rms_length(rows) * MAS_PER_ARCMIN)}",
+        subtitle=f"rms; arrows enlarged {scale:,.0f} times\n{rows['name'].iloc[0]}",
         x=Axis(_XLABEL, field.x),
         y=Axis(_YLABEL, field.ylim),
         width=width,
@@ -93,7 +94,7 @@ DIAGNOSTICS = (
     Diagnostic(
         "eigenmode-shifts",
         _TITLE,
-        "How all sources move together per sigma along a weak direction, for the up to nine "
+        "How all sources move together per sigma along a weak direction, for the up to six "
         "directions that shift them most. More measurements do not reduce such common shifts, "
         "rolls and stretches; only more or better reference sources do.",
         OrbitWorkspace.WEAK_DIRECTIONS,
@@ -102,6 +103,7 @@ DIAGNOSTICS = (
         is_wide=True,
         needs_eigenmodes=True,
         least_height=450,
+        narrow_height=640,
         equation="shift of a source = J v, with the shift J per parameter, and vᵀ S v = 1",
     ),
 )

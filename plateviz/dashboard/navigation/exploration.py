@@ -12,6 +12,8 @@ from plateviz.dashboard.selection.selected import KINDS
 from plateviz.plots.explored_rows import Columns
 from plateviz.plots.explored_text import parts_of, read_parts, text_of
 
+# Tables under the names that they have in addresses of older versions.
+_RENAMED = {"residuals": "measurements"}
 PARTS = ("rows", "x", "y", "colour", "only", "between", "with", "selects", "zoom")
 """Parts of an address."""
 # A control shows an empty value as if nothing were chosen.
@@ -105,6 +107,7 @@ class Exploration(param.Parameterized):
         """
         problems: list[str] = []
         if "rows" in address:
+            address = {**address, "rows": _RENAMED.get(address["rows"], address["rows"])}
             table = chosen("rows", address, self.param["table"].objects, None, problems)
             if table is not None:
                 self.table, self._requested = table, dict(address)

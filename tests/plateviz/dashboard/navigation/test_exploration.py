@@ -55,6 +55,11 @@ def test_address_is_read_back(exploration, between):
     assert other.address() == exploration.address()
 
 
+def test_table_has_its_former_name_in_older_addresses(exploration):
+    assert exploration.restore({"rows": "residuals", "x": "dec"}) == []
+    assert exploration.table == "measurements"
+
+
 @pytest.mark.parametrize(
     ("nonsense", "told"),
     [

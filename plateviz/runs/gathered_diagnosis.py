@@ -34,7 +34,10 @@ _OF_FRAMES = (
     *("source_id", "orbit_id", "epoch", "is_reference", "ra", "dec", "offset_ra", "offset_dec"),
     *("sigma_ra_conditional", "sigma_dec_conditional", "corr_conditional"),
 )
-_NO_CAUSE = {"name": "", "title": "", "significance": 0.0, "spoils": "", "action": ""}
+_NO_CAUSE = {
+    **dict.fromkeys(("name", "title", "words", "spoils", "action"), ""),
+    "significance": 0.0,
+}
 
 
 def write_test_tables(run: Run) -> None:

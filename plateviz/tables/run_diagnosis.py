@@ -17,7 +17,8 @@ from solver.results.diagnosis.rate import (
     sigmas,
 )
 from solver.results.diagnosis.survey.trends import Series, Trend, all_series, trend_tests
-from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Test, discovered
+from solver.results.diagnosis.table import BAD_RATE, CARE_RATE
+from solver.results.diagnosis.test import Test, discovered
 
 # Orbits share the catalogue and the distortion, so that these tests are not independent.
 _SHARED = ("reference star", "other star", "against their prior")

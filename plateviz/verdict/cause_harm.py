@@ -1,27 +1,30 @@
 """What a cause spoils, by how much, and whether that is so much that nobody should trust it."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.labels import id_strings
-from plateviz.tables.reference_influence import reference_influence
 from plateviz.tables.rounded import rounded
 from plateviz.verdict.cause_case import Case
-from solver.data.result import FitResult
+from plateviz.verdict.star_cause_harm import (
+    LARGE_SHARE,
+    are_references_off,
+    frame_shift,
+    harm_of_epoch,
+    harm_of_others,
+    harm_of_references,
+    shared_error,
+    typical_sigma,
+)
 from solver.results.diagnosis.exposures import WAVES
 from solver.results.diagnosis.scatter import FEWEST
 from solver.results.diagnosis.table import BAD_RATE
 
-# Sources with fewer measurements do not say how good a solution is.
-_MIN_OBS = 10
-# A pattern larger than this share of the positions' uncertainty makes it wrong by a tenth.
-_LARGE_SHARE = 0.5
 # Uncertainties wrong by more than this share.
 _LARGE_ERROR = 0.1
 # Outliers of so many of the sources are not few.
 _LARGE_PARTS = {"outliers": 0.02, "swapped": 0.02}
-# Rms deviation of the reference stars over its expected value, beyond which the frame is wrong.
-_LARGE_DEVIATION = 1.2
 # Groups of sources of similar magnitudes.
 _MAGNITUDE_GROUPS = 8
 
@@ -38,37 +41,31 @@ def harm(case: Case) -> tuple[str, bool]:
     if np.isfinite(size):
         # On the sky, along one axis.
         error = case.diagnosis.camera.on_sky(size)
-        typical = _typical_sigma(case.result)
+        typical = typical_sigma(case.result)
         spoils = (
             f"It spoils the positions, by up to {rounded(error)} mas rms where their "
             f"uncertainty is {rounded(typical)} mas, and the calibration."
         )
-        return spoils, error > _LARGE_SHARE * typical
+        return spoils, error > LARGE_SHARE * typical
     if subject in of_parts:
         return _harm_of_parts(case, of_parts[subject])
-    if subject == "swing":
-        return _harm_of_swings(case)
-    if subject in ("others", "other"):
-        return _harm_of_others(case)
-    if subject == "references" and found.test.statistic < found.test.expected:
-        return "It spoils the error that all positions share, which is smaller than stated.", False
-    if subject == "references":
-        spoils = (
-            "It spoils the error that all positions share, which is up to "
-            f"{rounded(found.size)} times as large as stated."
-        )
-        return spoils, _references_off(case.result)
-    if subject == "kurtosis":
-        spoils = (
-            "It spoils no uncertainty as a root mean square, but a position that rests on few "
-            f"measurements is {'more' if found.test.statistic > 0.0 else 'less'} often far off "
-            "than its uncertainty says."
-        )
-        return spoils, False
-    if subject == "prior":
-        return _harm_of_prior(case)
-    if subject == "noise":
-        error, extent = abs(float(np.sqrt(found.test.statistic)) - 1.0), ""
+    return _HARM.get(subject, _harm_of_noise)(case)
+
+
+def _harm_of_tails(case: Case) -> tuple[str, bool]:
+    """Return the same for noise that is not normal."""
+    spoils = (
+        "It spoils no uncertainty as a root mean square, but a position that rests on few "
+        f"measurements is {'more' if case.found.test.statistic > 0.0 else 'less'} often far off "
+        "than its uncertainty says."
+    )
+    return spoils, False
+
+
+def _harm_of_noise(case: Case) -> tuple[str, bool]:
+    """Return the same for noise that is not as stated, everywhere or in groups."""
+    if case.found.test.subject == "noise":
+        error, extent = abs(float(np.sqrt(case.found.test.statistic)) - 1.0), ""
     else:
         error, extent = _noise_error(case)
     return (
@@ -93,12 +90,12 @@ def _harm_of_prior(case: Case) -> tuple[str, bool]:
 
 def _harm_of_swings(case: Case) -> tuple[str, bool]:
     """Return the same for exposures whose pointing jittered."""
-    error, typical = _shift_by_swings(case), _typical_sigma(case.result)
+    error, typical = _shift_by_swings(case), typical_sigma(case.result)
     spoils = (
         f"It spoils the positions of the sources in these exposures, by {rounded(error)} mas rms "
         f"where a typical uncertainty is {rounded(typical)} mas."
     )
-    return spoils, error > _LARGE_SHARE * typical
+    return spoils, error > LARGE_SHARE * typical
 
 
 def _harm_of_parts(case: Case, total: int) -> tuple[str, bool]:
@@ -107,63 +104,19 @@ def _harm_of_parts(case: Case, total: int) -> tuple[str, bool]:
     count = len(found.items) or int(found.size)
     is_large = count > _LARGE_PARTS.get(subject, 0.0) * total
     if subject == "reference":
-        shared = _shared_error(case.result)
+        shared = shared_error(case.result)
         return (
-            f"It spoils all positions alike, by about {rounded(_frame_shift(case))} mas where "
+            f"It spoils all positions alike, by about {rounded(frame_shift(case))} mas where "
             "the error "
             f"that they share is {rounded(shared)} mas: the frame follows the reference stars.",
-            _references_off(case.result),
+            are_references_off(case.result),
         )
     return (
         f"It spoils the positions of up to {count:,} sources, by at most "
         f"{rounded(_largest_shift_of_one(case))} mas, where a typical uncertainty is "
-        f"{rounded(_typical_sigma(case.result))} mas.",
+        f"{rounded(typical_sigma(case.result))} mas.",
         is_large,
     )
-
-
-def _harm_of_others(case: Case) -> tuple[str, bool]:
-    """Return the same for stars other than references that the catalogue has elsewhere.
-
-    A catalogue position counts with the inverse of its variance, against that of the measurements.
-    """
-    rows, items = case.result.sources, case.found.items
-    chosen = rows["source_id"].isin(items) if items else ~rows["is_reference"].astype(bool)
-    sigma, prior, offset = (
-        rows.loc[chosen, [name.format(axis) for axis in ("ra", "dec")]].to_numpy(dtype=float)
-        for name in ("sigma_{}_marginal", "prior_sigma_{}", "offset_{}")
-    )
-    shift = float(np.sqrt(np.nanmean(np.square(offset * (sigma / prior) ** 2))))
-    typical = float(np.nanmedian(sigma))
-    frame, shared = _pull_on_frame(rows, offset, prior), _shared_error(case.result)
-    words = (
-        f"these positions by {rounded(shift)} mas rms, where their uncertainty is "
-        f"{rounded(typical)} mas, "
-        f"and the frame by about {rounded(frame)} mas, where the error that all positions share is "
-        f"{rounded(shared)} mas."
-    )
-    is_large = shift > _LARGE_SHARE * typical or frame > _LARGE_SHARE * shared
-    if not items:
-        return f"It shifts {words}", is_large
-    is_large |= len(items) > _LARGE_PARTS["outliers"] * len(rows)
-    return (
-        "If the identification is wrong, these positions are wrong altogether; if the catalogue "
-        f"is, it shifts {words}",
-        is_large,
-    )
-
-
-def _pull_on_frame(rows: pd.DataFrame, offset: np.ndarray, prior: np.ndarray) -> float:
-    """Return by how much some stars pull the mean of all, against the reference stars, mas."""
-    names = ["prior_sigma_ra", "prior_sigma_dec"]
-    references = rows.loc[rows["is_reference"].astype(bool), names].to_numpy(dtype=float)
-    weight = np.maximum(np.sum(references**-2.0, axis=0), np.finfo(float).tiny)
-    return float(np.linalg.norm(np.nansum(offset / prior**2, axis=0) / weight))
-
-
-def _shared_error(result: FitResult) -> float:
-    """Return the error that all positions share, mas."""
-    return float(np.linalg.norm([result.summary[f"mean_error_{axis}"] for axis in ("ra", "dec")]))
 
 
 def _noise_error(case: Case) -> tuple[float, str]:
@@ -228,31 +181,6 @@ def _shift_by_swings(case: Case) -> float:
     )
 
 
-def _frame_shift(case: Case) -> float:
-    """Return by how much reference stars that are wrong shift the mean of all, mas.
-
-    Each counts with the inverse variance of its catalogue position against the fit without it.
-    """
-    table = reference_influence(case.result).dropna()
-    wrong = table["id"].isin(id_strings(pd.Series(case.found.items, dtype=np.int64)))
-    shift = []
-    for axis in ("ra", "dec"):
-        residual = table[f"residual_{axis}"].to_numpy()
-        weight = (table[f"pull_{axis}"].to_numpy() / residual) ** 2
-        shift.append(float(np.nansum((weight * residual)[wrong]) / np.nansum(weight)))
-    return float(np.linalg.norm(shift))
-
-
-def _references_off(result: FitResult) -> bool:
-    """Return whether the reference stars deviate from the catalogue by much more than expected."""
-    summary = result.summary
-    return any(
-        float(summary[f"normalised_deviation_{axis}"])
-        > _LARGE_DEVIATION * float(summary[f"expected_normalised_deviation_{axis}"])
-        for axis in ("ra", "dec")
-    )
-
-
 def _rms(case: Case) -> float:
     """Return the rms displacement, um, of patterns that each exposure has of its own, or NaN.
 
@@ -268,9 +196,12 @@ def _rms(case: Case) -> float:
     return float(np.sqrt(excess / case.diagnosis.rows.weight.sum()))
 
 
-def _typical_sigma(result: FitResult) -> float:
-    """Return the median marginal uncertainty of the positions, mas."""
-    sources = result.sources
-    many = ~sources["is_reference"] & (sources["n_obs"] >= _MIN_OBS)
-    rows = sources[many] if many.any() else sources
-    return float(np.median(rows[["sigma_ra_marginal", "sigma_dec_marginal"]]))
+_HARM: dict[str, Callable[[Case], tuple[str, bool]]] = {
+    "swing": _harm_of_swings,
+    "others": harm_of_others,
+    "other": harm_of_others,
+    "epoch": harm_of_epoch,
+    "references": harm_of_references,
+    "kurtosis": _harm_of_tails,
+    "prior": _harm_of_prior,
+}

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from plateviz.tables.rounded import rounded
 from plateviz.verdict.cause_case import Case, Said
 from plateviz.verdict.data_cause_words import (
+    said_of_epoch,
     said_of_kurtosis,
     said_of_noise,
     said_of_noise_of,
@@ -219,6 +220,7 @@ _WORDS: dict[str, Callable[[Case], Said]] = {
         "some sources scatter by more than their noise",
         "look at the sources that scatter most; they may be double or wrongly identified",
     ),
+    "epoch": said_of_epoch,
     "kurtosis": said_of_kurtosis,
     "outliers": said_of_outliers,
     "swapped": said_of_swapped,

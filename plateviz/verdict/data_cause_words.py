@@ -16,10 +16,7 @@ _MOST_LEFT_OUT = 20
 # Few catalogues state errors that are so many times too small, and none so many: something else is
 # wrong with them.
 DOUBTFUL_FACTOR, WRONG_FACTOR = 5.0, 30.0
-_OTHER_ERRORS = (
-    "Positions of another epoch, wrong proper motions, wrong times of the exposures, smooth errors "
-    "or wrong units do this"
-)
+_OTHER_ERRORS = "Wrong proper motions, smooth errors or wrong units do this"
 
 
 def said_of_noise(case: Case) -> Said:
@@ -148,8 +145,22 @@ def said_of_wrong_catalogue(evidence: str) -> Said:
         "wrong-catalogue",
         "the reference stars are much further from the catalogue than it states",
         f"{evidence} {_OTHER_ERRORS}.",
-        "check the epochs, proper motions and units of the catalogue, and the times of the "
-        "exposures",
+        "check the proper motions and the units of the catalogue",
+    )
+
+
+def said_of_epoch(case: Case) -> Said:
+    """Return what is said of stars that are where they are at another time."""
+    days, sigma = case.found.size, case.found.test.scatter
+    # Later than the times say is as if these were too early.
+    how, instead = ("early", "late") if days > 0.0 else ("late", "early")
+    offset = f"{rounded(abs(days), 3)} ± {rounded(sigma)} days"
+    return Said(
+        "wrong-epoch",
+        "the stars are measured at another time than the exposures say",
+        f"They are off the catalogue along their own proper motions: the times of all exposures "
+        f"are {offset} too {how}, or the epoch of the catalogue is as much too {instead}.",
+        "check the times of the exposures, their scale and unit, and the epoch of the catalogue",
     )
 
 

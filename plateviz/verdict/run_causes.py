@@ -10,7 +10,8 @@ from plateviz.tables.labels import id_strings, unit_text
 from plateviz.tables.rounded import rounded
 from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests
 from plateviz.verdict.causes import Cause
-from solver.results.diagnosis.table import CARE_RATE, Test
+from solver.results.diagnosis.table import CARE_RATE
+from solver.results.diagnosis.test import Test
 
 # A cause after the first one is named if it has this share of its sigmas: it may be a result of it.
 _OF_ITS_OWN = 0.5
@@ -18,8 +19,8 @@ _OF_ITS_OWN = 0.5
 _LEAST_SHARE, _LEAST_ORBITS = 0.1, 2
 # Zonal errors larger than this share of the positions' uncertainty make it wrong by a tenth.
 _LARGE_SHARE = 0.5
-_MOST_NAMED = 8
-_MIN_ORBITS_OF_SOURCE = 4
+_MOST_NAMED, _MIN_ORBITS_OF_SOURCE = 8, 4
+_OF_CATALOGUE = ("wrong-epoch", "wrong-references", "reference-errors", "wrong-catalogue")
 # χ² per degree of freedom of the motions from which their uncertainties are a fifth too small.
 _LARGE_SCATTER = 1.5
 # Tests of what orbits find, which say less than the causes that orbits name.
@@ -86,12 +87,13 @@ def _of_orbits(diagnosis: RunDiagnosis, tables: RunTests) -> list[Cause]:
 
 
 def _repeated(rows: pd.DataFrame, total: int, diagnosis: RunDiagnosis) -> Cause:
-    """Return a cause that many orbits name; significances of independent orbits add in squares."""
+    """Return a cause that many orbits name; sigmas add in squares, but all share the catalogue."""
     worst = rows.loc[rows["significance"].idxmax()]
-    significance = float(np.sqrt(np.square(rows["significance"]).sum()))
+    combined = max if worst["name"] in _OF_CATALOGUE else sum
     orbits = ", ".join(map(str, rows["orbit_id"].head(_MOST_NAMED)))
     more = " and more" if len(rows) > _MOST_NAMED else ""
     n_bad = int((diagnosis.states.loc[rows["orbit_id"]] == "bad").sum())
+    evidence = f"{worst['words']} " if worst.get("words") else ""
     words = (
         f"{len(rows):,} of {total:,} orbits name it ({orbits}{more}), with up to "
         f"{worst['significance']:.0f} sigma; {n_bad:,} of these should not be trusted."
@@ -100,8 +102,8 @@ def _repeated(rows: pd.DataFrame, total: int, diagnosis: RunDiagnosis) -> Cause:
         str(worst["name"]),
         f"in many orbits, {worst['title']}",
         words,
-        significance,
-        f"In orbit {worst['orbit_id']}, where it is most certain: {worst['spoils']}",
+        float(np.sqrt(combined(np.square(rows["significance"])))),
+        f"In orbit {worst['orbit_id']}, where it is most certain: {evidence}{worst['spoils']}",
         str(worst["action"]),
         tuple(str(worst["options"]).splitlines()),
         bool(rows["is_large"].mean() > 0.5),

@@ -12,7 +12,8 @@ from plateviz.verdict.causes import Cause
 from plateviz.verdict.run_causes import run_causes
 from plateviz.verdict.tests_in_words import TestInWords, discoveries_in_words
 from plateviz.verdict.verdict import Verdict, worst
-from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Test
+from solver.results.diagnosis.table import BAD_RATE, CARE_RATE
+from solver.results.diagnosis.test import Test
 
 _MOST_ORBITS = 20
 _HEADLINES = {

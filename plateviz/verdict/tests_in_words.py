@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from solver.results.diagnosis.rate import discoveries
-from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test
+from solver.results.diagnosis.table import CARE_RATE, Diagnosis
+from solver.results.diagnosis.test import Test
 from solver.units import NM_PER_UM
 
 _MOST_NAMED = 3

@@ -4,9 +4,10 @@ import numpy as np
 
 from plateviz.tables.rounded import rounded
 from solver.data.result import FitResult
+from solver.results.diagnosis.epoch import epoch_offset
 from solver.units import RAD_PER_MAS
 
-# Sigmas beyond which the deviation of the reference stars is a discovery among all tests.
+# Sigmas beyond which a deviation of the reference stars is a discovery among all tests.
 _NOTICED = 3.0
 # Share of reference stars that are left out from which the others are in doubt, too.
 _MANY = 0.1
@@ -24,9 +25,20 @@ def unseen_sentences(result: FitResult, are_noticed: bool = False) -> list[str]:
     sentences = [
         "No test of one orbit shows smooth errors of the reference catalogue. Those that shift, "
         "turn or stretch the field are taken for pointing, and move all positions by as much as "
-        "they are large. Nor is a time tested that is wrong in all exposures alike: it moves each "
-        "star against the reference stars by its own motion in that time."
+        "they are large."
     ]
+    epoch = epoch_offset(result.sources)
+    if epoch.sigma > 0.0 and not abs(epoch.days) > _NOTICED * epoch.sigma:
+        sentences.append(
+            "A time that is wrong in all exposures alike, by less than "
+            f"{rounded(_NOTICED * epoch.sigma)} days, is not noticed: it moves each star against "
+            "the reference stars by its own motion in that time."
+        )
+    elif not epoch.sigma > 0.0:
+        sentences.append(
+            "Nor is a time tested that is wrong in all exposures alike, for want of reference "
+            "stars with proper motions."
+        )
     quadratic = quadratic_mas(result)
     if np.isfinite(quadratic):
         sentences.append(

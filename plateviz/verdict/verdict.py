@@ -114,7 +114,8 @@ def _judge(result: FitResult) -> Verdict:
     causes = causes_in_words(result, diagnosis, find_causes(diagnosis)) if has_causes else []
     state: State = "warn" if found else "good"
     is_large = any(cause.is_large for cause in causes if not cause.instead_of)
-    catalogue = wrong_catalogue(result)
+    is_epoch = any(cause.name == "wrong-epoch" for cause in causes)
+    catalogue = [] if is_epoch else wrong_catalogue(result)
     if not converged or (certain and is_large) or any(cause.is_large for cause in catalogue):
         state = "bad"
     causes = [*catalogue, *causes]

@@ -88,6 +88,15 @@ ORBIT_CAUSES = Table(
         Column("name", "str", "", "of the cause; empty where there is none"),
         Column("title", "str", "", "the cause as a clause"),
         Column("significance", "float64", "", "in sigmas"),
+        Column(
+            "words",
+            "str",
+            "",
+            "the evidence, in sentences",
+            # Runs of older versions lack it.
+            required=False,
+            default="",
+        ),
         Column("spoils", "str", "", "what it spoils, and by how much"),
         Column("action", "str", "", "what to do"),
         Column("options", "str", "", "options of `plateviz fit` that do it, a line each"),

@@ -42,6 +42,19 @@ SOURCES = Table(
             required=False,
             default=0.0,
         ),
+        *(
+            # Results of older versions lack them.
+            Column(
+                f"prior_pm{axis}",
+                "float64",
+                "mas / yr",
+                f"proper motion in {words}, with which the prior is at the mean epoch; NaN if none",
+                required=False,
+                default=math.nan,
+                may_be_nan=True,
+            )
+            for axis, words in (("ra", "RA times cos(dec)"), ("dec", "Dec"))
+        ),
         Column("offset_ra", "float64", "mas", "estimate minus prior, ra cos(dec)"),
         Column("offset_dec", "float64", "mas", "estimate minus prior, dec"),
         Column("chi2", "float64", "", "sum of squared whitened residuals"),

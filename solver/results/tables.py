@@ -94,6 +94,8 @@ def source_table(solution: SolvedProblem) -> pd.DataFrame:
         "prior_sigma_ra": prior["sigma_ra_prior"],
         "prior_sigma_dec": prior["sigma_dec_prior"],
         "prior_corr": prior["corr_prior"],
+        "prior_pmra": sources["pmra"].to_numpy(float),
+        "prior_pmdec": sources["pmdec"].to_numpy(float),
         "offset_ra": solution.mode.sources[:, 0],
         "offset_dec": solution.mode.sources[:, 1],
         "chi2": np.bincount(index, chi2, n_src),

@@ -62,6 +62,7 @@ CASES = (
     DefectCase("reference-errors", 440.0, ("reference-errors",), {"reference_scale": True}),
     # At five times that no more than the reference stars about the target.
     DefectCase("binaries", 7.0, ("wrong-references",)),
+    DefectCase("exposure-times", 1.2e6, ("wrong-epoch",)),
 )
 
 

@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 _PARTS = (
     "solver/results/diagnosis/*.py",
     "plateviz/verdict/causes.py",
-    "plateviz/verdict/cause_harm.py",
+    "plateviz/verdict/*cause_harm.py",
     "plateviz/verdict/*cause_words.py",
     "plateviz/verdict/verdict.py",
     "solver/engines/moves.py",

@@ -254,6 +254,7 @@ def _sources(
         table[f"offset_{coordinate}"] = off_truth - off_prior
     table["corr_conditional"] = table["prior_corr"] = 0.0
     table["corr_marginal"] = correlation
+    table["prior_pmra"], table["prior_pmdec"] = random.normal(0.0, 5.0, (2, n))
     table["magnitude"] = random.uniform(10.0, 18.0, n)
     weight = 1.0 - 0.5 * residuals["leverage"]
     table["chi2"] = table["source_id"].map(_chi2(residuals).groupby(residuals["source_id"]).sum())

@@ -6,12 +6,17 @@ import pandas as pd
 from solver.data.run_schema import FIELD_DEGREES, ORBIT_CAUSES, ZONAL_FIELD
 
 N_ORBITS = 40
-GOOD = {"state": "good", "name": "", "title": "", "significance": 0.0, "spoils": "", "action": ""}
+GOOD = {
+    **dict.fromkeys(("name", "title", "words", "spoils", "action"), ""),
+    "state": "good",
+    "significance": 0.0,
+}
 DRIFTS = {
     "state": "bad",
     "name": "distortion-drifts",
     "title": "the distortion drifts",
     "significance": 6.0,
+    "words": "The terms of the second degree change steadily.",
     "spoils": "It spoils the positions, by up to 0.3 mas rms.",
     "action": "let the distortion drift in the fit",
 }

@@ -15,6 +15,7 @@ from solver.results.diagnosis.contradictions import (
     STARS,
     beyond_shift,
     is_beyond_noise,
+    of_epoch,
     of_others,
     of_priors,
     of_references,
@@ -69,6 +70,7 @@ def find_causes(diagnosis: Diagnosis) -> FoundCauses:
     of_exposures, of_each = _of_exposures(diagnosis, explained)
     found = [*_swinging(diagnosis), *patterns, *of_exposures]
     found += [*_of_outliers(diagnosis), *of_priors(diagnosis), *of_others(diagnosis)]
+    found += of_epoch(diagnosis)
     rows, left = diagnosis.rows, None
     if explained + of_each <= _MOST_LINEAR * float(rows.chi2[~rows.is_far].sum()):
         left, *_ = scatter = scatter_tests(
@@ -116,7 +118,8 @@ def _of_their_own(found: list[Found], diagnosis: Diagnosis) -> tuple[list[Found]
 
     def is_named(one: Found) -> bool:
         is_pattern = one.test.subject in PATTERNS
-        if is_pattern and subject in PATTERNS:
+        if (is_pattern and subject in PATTERNS) or one.test.subject == "epoch":
+            # No other cause moves each star along its own proper motion.
             return True
         if one.test.subject == "prior" and subject in SCATTER:
             return is_beyond_noise(one, diagnosis.scale, limit_of(diagnosis))
@@ -134,7 +137,7 @@ def _of_their_own(found: list[Found], diagnosis: Diagnosis) -> tuple[list[Found]
     sizes = [one.test.size_um for one in found if one.test.subject in PATTERNS]
     shift = diagnosis.camera.on_sky(float(np.hypot.reduce(sizes))) if sizes else 0.0
     for one in others:
-        is_shifted = subject in PATTERNS and one.test.subject in STARS
+        is_shifted = subject in PATTERNS and one.test.subject in (*STARS, "epoch")
         rest = beyond_shift(diagnosis, one, shift) if is_shifted else [one]
         its_own = list(filter(is_named, rest))
         named += its_own

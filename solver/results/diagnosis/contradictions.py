@@ -4,10 +4,13 @@ import numpy as np
 from scipy.special import chdtri
 
 from solver.results.diagnosis import gains
+from solver.results.diagnosis.epoch import epoch_offset
 from solver.results.diagnosis.found import Found, limit_of
 from solver.results.diagnosis.rate import log_chance, sigmas
 from solver.results.diagnosis.references import MEDIAN_CHI2, CatalogueChi2, catalogue_chi2
-from solver.results.diagnosis.table import Diagnosis, Test, furthest_test, prior_test
+from solver.results.diagnosis.star_tests import epoch_tests, furthest_test
+from solver.results.diagnosis.table import Diagnosis, prior_test
+from solver.results.diagnosis.test import Test
 
 _STAR_LIMIT = 0.01
 # If the errors of the other stars are so much larger than stated, no single ones are named.
@@ -15,6 +18,23 @@ _ALL_ARE_OFF = 3.0
 # The tests of all stars of a kind, and of the one that is furthest off.
 _REFERENCES, _OTHERS = ("references", "reference"), ("others", "other")
 STARS = (*_REFERENCES, *_OTHERS)
+
+
+def of_epoch(diagnosis: Diagnosis, shift: float = 0.0) -> list[Found]:
+    """Return whether the stars are where they were, or will be, at another time.
+
+    Parameters
+    ----------
+    shift : of the positions by an error of the model, rms along each axis, mas
+    """
+    tests = [one for one in diagnosis.tests if one.subject == "epoch"]
+    if shift:
+        tests = epoch_tests(epoch_offset(diagnosis.result.sources, shift))
+    return [
+        Found(one, one.sigma**2 - gains.PER_PARAMETER, size=one.statistic)
+        for one in tests
+        if one.log_chance < limit_of(diagnosis)
+    ]
 
 
 def of_references(diagnosis: Diagnosis) -> list[Found]:
@@ -28,27 +48,40 @@ def of_others(diagnosis: Diagnosis) -> list[Found]:
 
 
 def beyond_shift(diagnosis: Diagnosis, found: Found, shift: float) -> list[Found]:
-    """Return what is left of wrong stars if an error of the model has shifted all stars.
+    """Return what is left of a wrong epoch, or wrong stars, if an error of the model shifts all.
 
     Parameters
     ----------
-    found : the cause without the shift; its subject is one of `STARS`
+    found : the cause without the shift; its subject is "epoch" or one of `STARS`
     shift : of the positions, rms along each axis, mas
     """
-    kind = _REFERENCES if found.test.subject in _REFERENCES else _OTHERS
-    rows = diagnosis.result.sources
-    is_reference = rows["is_reference"].to_numpy(dtype=bool)
-    stars = catalogue_chi2(rows[is_reference == (kind is _REFERENCES)], shift)
-    chi2, dof = float(stars.chi2.sum()), 2.0 * len(stars.chi2)
-    chance = log_chance(chi2, dof)
-    numbers = chi2, dof, float(np.sqrt(2.0 * dof)), chance, sigmas(chance)
-    of_one = next(one.name for one in diagnosis.tests if one.subject == kind[1])
-    tests = [Test(found.test.name, kind[0], (), *numbers), furthest_test(of_one, kind[1], stars)]
-    return _of_stars(diagnosis, stars, tests, kind)
+    if found.test.subject == "epoch":
+        return of_epoch(diagnosis, shift)
+    return _anew(diagnosis, _REFERENCES if found.test.subject in _REFERENCES else _OTHERS, shift)
 
 
 def _of_kind(diagnosis: Diagnosis, stars: CatalogueChi2, kind: tuple[str, str]) -> list[Found]:
+    if of_epoch(diagnosis):
+        return _anew(diagnosis, kind, 0.0)
     tests = [one for one in diagnosis.tests if one.subject in kind]
+    return _of_stars(diagnosis, stars, tests, kind)
+
+
+def _anew(diagnosis: Diagnosis, kind: tuple[str, str], shift: float) -> list[Found]:
+    """Return whether stars are wrong beyond a shift, and beyond an epoch that is wrong."""
+    names = {one.subject: one.name for one in diagnosis.tests if one.subject in kind}
+    if len(names) < len(kind):
+        return []
+    rows = diagnosis.result.sources
+    rows = rows[rows["is_reference"].to_numpy(dtype=bool) == (kind is _REFERENCES)]
+    if of_epoch(diagnosis):
+        rows = diagnosis.epoch.moved(rows)
+    stars = catalogue_chi2(rows, shift)
+    chi2, dof = float(stars.chi2.sum()), 2.0 * len(stars.chi2)
+    chance = log_chance(chi2, dof)
+    numbers = chi2, dof, float(np.sqrt(2.0 * dof)), chance, sigmas(chance)
+    of_all = Test(names[kind[0]], kind[0], (), *numbers)
+    tests = [of_all, furthest_test(names[kind[1]], kind[1], stars)]
     return _of_stars(diagnosis, stars, tests, kind)
 
 

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.results.diagnosis.table import CARE_RATE, Diagnosis, Test
+from solver.results.diagnosis.table import CARE_RATE, Diagnosis
+from solver.results.diagnosis.test import Test
 
 # Causes whose gains differ by less are nearly as likely: at most ninety times, three sigmas.
 CLOSE = 9.0

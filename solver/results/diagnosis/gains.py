@@ -10,7 +10,8 @@ from solver.results.diagnosis.exposures import WAVES
 from solver.results.diagnosis.patterns import Family
 from solver.results.diagnosis.projection import Projection
 from solver.results.diagnosis.scatter import Scatter
-from solver.results.diagnosis.table import Diagnosis, Test
+from solver.results.diagnosis.table import Diagnosis
+from solver.results.diagnosis.test import Test
 
 PER_PARAMETER = 4.0
 # Phases of an oscillation that are tried.

@@ -7,7 +7,8 @@ from solver.results.diagnosis.courses import COURSES, Courses, are_alternatives
 from solver.results.diagnosis.found import CLOSE, Found, limit_of
 from solver.results.diagnosis.patterns import Family
 from solver.results.diagnosis.projection import Projection
-from solver.results.diagnosis.table import Diagnosis, Test, pattern_test
+from solver.results.diagnosis.table import Diagnosis, pattern_test
+from solver.results.diagnosis.test import Test
 
 # A pattern after the first one is named if it explains this share of what the first one does.
 LEAST_SHARE = 0.1

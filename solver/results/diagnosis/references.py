@@ -47,8 +47,48 @@ def catalogue_chi2(rows: pd.DataFrame, shift: float = 0.0) -> CatalogueChi2:
     rows : of `schema.SOURCES`
     shift : of the fitted positions by an error of the model, rms along each axis, mas
     """
+    stars = against_catalogue(rows)
+    along = np.square(stars.along)
+    inverse_root = stars.axes.transpose(0, 2, 1) @ stars.inverse_root
+    shifts = shift**2 * np.sum(np.square(inverse_root), axis=2)
+    factor = error_factor(along, stars.shares, shifts)
+    return CatalogueChi2(
+        rows["source_id"].to_numpy()[stars.place],
+        _chi2(along, stars.shares, shifts, 1.0),
+        factor,
+        _chi2(along, stars.shares, shifts, factor),
+    )
+
+
+class AgainstCatalogue(NamedTuple):
+    """Deviations of stars from the catalogue, in axes in which they are independent.
+
+    Attributes
+    ----------
+    place : of the stars in their table, shape (n,)
+    along : deviations in units of the catalogue's errors, shape (n, 2)
+    shares : of the catalogue's variance that the measurements remove, shape (n, 2)
+    axes : columns are the axes, shape (n, 2, 2)
+    inverse_root : takes displacements, mas, to units of the catalogue's errors, shape (n, 2, 2)
+    """
+
+    place: np.ndarray
+    along: np.ndarray
+    shares: np.ndarray
+    axes: np.ndarray
+    inverse_root: np.ndarray
+
+
+def against_catalogue(rows: pd.DataFrame) -> AgainstCatalogue:
+    """Return the deviations of those stars from the catalogue that the measurements determine.
+
+    Parameters
+    ----------
+    rows : of `schema.SOURCES`
+    """
     used = rows[["prior_sigma_ra", "prior_sigma_dec", "sigma_ra_marginal", "sigma_dec_marginal"]]
-    rows = rows[np.isfinite(used.to_numpy(dtype=float)).all(axis=1)]
+    place = np.flatnonzero(np.isfinite(used.to_numpy(dtype=float)).all(axis=1))
+    rows = rows.iloc[place]
     prior = covariance(rows, "prior_sigma_ra", "prior_sigma_dec", "prior_corr")
     marginal = covariance(rows, "sigma_ra_marginal", "sigma_dec_marginal", "corr_marginal")
     offset = rows[["offset_ra", "offset_dec"]].to_numpy(dtype=float)
@@ -57,15 +97,8 @@ def catalogue_chi2(rows: pd.DataFrame, shift: float = 0.0) -> CatalogueChi2:
     known = np.linalg.eigvalsh(share)[:, 0] > _LEAST_SHARE
     scaled = (inverse_root[known] @ offset[known, :, None])[:, :, 0]
     shares, axes = np.linalg.eigh(share[known])
-    along = np.square(np.einsum("nik,ni->nk", axes, scaled))
-    shifts = shift**2 * np.sum(np.square(axes.transpose(0, 2, 1) @ inverse_root[known]), axis=2)
-    factor = _error_factor(along, shares, shifts)
-    return CatalogueChi2(
-        rows["source_id"].to_numpy()[known],
-        _chi2(along, shares, shifts, 1.0),
-        factor,
-        _chi2(along, shares, shifts, factor),
-    )
+    along = np.einsum("nik,ni->nk", axes, scaled)
+    return AgainstCatalogue(place[known], along, shares, axes, inverse_root[known])
 
 
 def _chi2(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray, factor: float) -> np.ndarray:
@@ -85,8 +118,11 @@ def _chi2(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray, factor: flo
     return np.sum(along / (shares + (factor**2 - 1.0 + shifts) * shares**2), axis=1)
 
 
-def _error_factor(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray) -> float:
-    """Return the factor on the catalogue's errors for which the median chi2 is as expected."""
+def error_factor(along: np.ndarray, shares: np.ndarray, shifts: np.ndarray) -> float:
+    """Return the factor on the catalogue's errors for which the median chi2 is as expected.
+
+    Parameters as in `_chi2`.
+    """
 
     def excess(log_factor: float) -> float:
         chi2 = _chi2(along, shares, shifts, float(np.exp(log_factor)))

@@ -1,6 +1,5 @@
 """All tests of one solution, with their chance, in one table."""
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -9,6 +8,7 @@ import pandas as pd
 from scipy.special import chdtri
 
 from solver.data.result import FitResult
+from solver.results.diagnosis.epoch import EpochOffset, epoch_offset
 from solver.results.diagnosis.exposures import WAVES, ExposureChi2, exposure_chi2
 from solver.results.diagnosis.modelled import is_adjusted
 from solver.results.diagnosis.patterns import Family, Patterns
@@ -16,21 +16,19 @@ from solver.results.diagnosis.priors import PriorRms, prior_rms
 from solver.results.diagnosis.products import products
 from solver.results.diagnosis.projection import Projection, covariance_of_products
 from solver.results.diagnosis.rate import (
-    discoveries,
     log_chance,
-    log_chance_binomial,
     of_many,
     sigmas,
 )
 from solver.results.diagnosis.references import (
-    MEDIAN_CHI2,
     CatalogueChi2,
     catalogue_chi2,
-    deviation_chance,
 )
 from solver.results.diagnosis.rows import Camera, Rows, camera_rows
 from solver.results.diagnosis.scatter import scatter_tests
+from solver.results.diagnosis.star_tests import epoch_tests, other_star_tests, reference_tests
 from solver.results.diagnosis.swapped import Swapped, swapped
+from solver.results.diagnosis.test import Test, discovered
 from solver.runtime.threads import one_blas_thread
 
 # If all is well, the probability that any test is a discovery: a solution to be used with care,
@@ -42,40 +40,6 @@ _OF_EXPOSURES = np.log(1e-3)
 _MOST_SWINGING = 0.3
 # Of the size of a normal value.
 _PRIOR_SCATTER = float(np.sqrt(1.0 - 2.0 / np.pi))
-
-
-class Test(NamedTuple):
-    """One test of a solution.
-
-    Attributes
-    ----------
-    name : of the test
-    subject : what it is about, the key of its meaning
-    what : degree, step, detector, axis, or place of the group in `solver.data.parameters`
-    statistic, expected, scatter : value, and what a good solution has
-    log_chance : logarithm of the probability of a value as far by chance
-    sigma : the same as the distance of a normal value
-    size_um : rms displacement of the pattern, um; NaN if the test is not about one
-    """
-
-    # pytest collects classes with this name otherwise.
-    __test__ = False
-
-    name: str
-    subject: str
-    what: tuple[int, ...]
-    statistic: float
-    expected: float
-    scatter: float
-    log_chance: float
-    sigma: float
-    size_um: float = float("nan")
-
-
-def discovered(tests: Sequence[Test], rate: float) -> tuple[Test, ...]:
-    """Return the tests that are discoveries at a rate of false alarms over all of them."""
-    far = discoveries(np.array([test.log_chance for test in tests]), rate)
-    return tuple(test for test, is_far in zip(tests, far, strict=True) if is_far)
 
 
 class Diagnosis(NamedTuple):
@@ -92,6 +56,7 @@ class Diagnosis(NamedTuple):
     exposures : chi2 of patterns of each exposure
     swinging : indices of the exposures whose pointing changed while they were read
     references, others : chi2 of each reference star, and of each other star
+    epoch : how much later the stars are measured than the times of the exposures say
     swapped : measurements with each other's identification
     priors : chi2 of the values of each group of parameters against their prior
     """
@@ -108,6 +73,7 @@ class Diagnosis(NamedTuple):
     swinging: np.ndarray
     references: CatalogueChi2
     others: CatalogueChi2
+    epoch: EpochOffset
     swapped: Swapped
     priors: list[PriorRms]
 
@@ -131,16 +97,19 @@ def diagnose(result: FitResult) -> Diagnosis:
         covariance = thread.submit(covariance_of_products, result, camera, rows, patterns)
         exposures = exposure_chi2(rows)
         swings, swinging = _swings(exposures, camera.field)
-        of_others = np.where(result.sources["is_reference"].to_numpy(bool), np.nan, magnitude)
-        scatter = scatter_tests(rows, of_others, without=swinging)
+        is_reference = result.sources["is_reference"].to_numpy(bool)
+        magnitude_of_others = np.where(
+            result.sources["is_reference"].to_numpy(bool), np.nan, magnitude
+        )
+        scatter = scatter_tests(rows, magnitude_of_others, without=swinging)
         scale = max(scatter[0].value, 1.0)
         still = np.isin(rows.exposure, swinging, invert=True)
         rows = rows._replace(residual=rows.residual * still[:, None])
         pairs = swapped(result)
-        is_reference = result.sources["is_reference"].to_numpy(bool)
         references, others = (
             catalogue_chi2(result.sources[chosen]) for chosen in (is_reference, ~is_reference)
         )
+        epoch = epoch_offset(result.sources)
         along, weight = products(patterns, rows), float(rows.weight.sum())
         projection = Projection(along, *covariance.result(), weight)
     priors = prior_rms(result)
@@ -150,8 +119,9 @@ def diagnose(result: FitResult) -> Diagnosis:
         *(pattern_test(projection, family, scale) for family in patterns.families),
         *_of_exposures(exposures, swinging),
         swings,
-        *_of_references(result, references),
-        *_of_others(others),
+        *reference_tests(result, references),
+        *other_star_tests(others),
+        *epoch_tests(epoch),
         *(prior_test(one) for one in sorted(priors, key=lambda one: one.log_chance)[:1]),
     ]
     # A test that the fit itself adjusts counts, but never alarms.
@@ -166,12 +136,13 @@ def diagnose(result: FitResult) -> Diagnosis:
         rows,
         patterns,
         projection,
-        of_others,
+        magnitude_of_others,
         scale,
         exposures,
         swinging,
         references,
         others,
+        epoch,
         pairs,
         priors,
     )
@@ -263,37 +234,3 @@ def _induced(swing: np.ndarray, field: np.ndarray) -> np.ndarray:
     root, count = np.sqrt(swing), np.bincount(field)
     others = np.bincount(field, root)[field] - root
     return np.square(others / count[field])
-
-
-def _of_references(result: FitResult, found: CatalogueChi2) -> list[Test]:
-    """Return the tests of the reference stars."""
-    tests = []
-    for number, axis in enumerate(("ra", "dec")):
-        value, expected, scatter, chance = deviation_chance(result, axis)
-        numbers = value, expected, scatter, chance, sigmas(chance)
-        tests.append(Test("reference stars, all", "references", (number,), *numbers))
-    if len(found.chi2):
-        tests.append(furthest_test("reference star that is furthest off", "reference", found))
-    return tests
-
-
-def _of_others(found: CatalogueChi2) -> list[Test]:
-    """Return the tests of the other stars, whose catalogue errors may be no more than bounds."""
-    n = len(found.chi2)
-    if not n:
-        return []
-    many = int((found.chi2 > MEDIAN_CHI2).sum())
-    chance = log_chance_binomial(many, n, 0.5)
-    numbers = many / n, 0.5, float(np.sqrt(0.25 / n)), chance, sigmas(chance)
-    return [
-        Test("other stars beyond the median of their errors", "others", (), *numbers),
-        furthest_test("other star that is furthest off", "other", found),
-    ]
-
-
-def furthest_test(name: str, subject: str, found: CatalogueChi2) -> Test:
-    """Return the test of the star that is furthest from its catalogue position."""
-    largest, n = float(found.chi2.max()), len(found.chi2)
-    chance = of_many(-0.5 * largest, n)
-    numbers = largest, 2.0 * float(np.log(n / np.log(2.0))), 2.6, chance, sigmas(chance)
-    return Test(name, subject, (), *numbers)

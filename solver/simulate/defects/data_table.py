@@ -104,8 +104,8 @@ DATA_DEFECTS = (
         unit="s",
         example="1h",
         does="The table of exposures has times that are too late, all by the amplitude.",
-        stands_for="an error of the clock or of the time scale; the same sources, and the Earth's "
-        "velocity, at another time",
+        stands_for="an error of the clock or of the time scale, or another epoch of the catalogue; "
+        "the same sources, and the Earth's velocity, at another time",
         reference="Klioner 2003, AJ 125, 1580",
         stage=Stage.EXPOSURES,
         apply=observer.exposure_times,

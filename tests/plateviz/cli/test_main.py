@@ -1,6 +1,7 @@
 """The command line: exit codes, messages and printed output."""
 
 import json
+import re
 import socket
 
 import pytest
@@ -152,6 +153,7 @@ def test_simulate_puts_defects_in_and_inspect_names_them(run, tmp_path):
     defects = ("--defect", "noise=10 %", "--defect", "distortion-drift=100nm", "--magnitudes")
     assert run("simulate", folder, *SMALL, *defects)[0] == 0
     code, out, _ = run("inspect", folder)
+    assert re.search(r"obstime .* d, \d{4}-\d\d-\d\d \d\d:\d\d to .* TCB", out)
     assert code == 0
     assert "  simulated with the defect distortion-drift=0.1um\n" in out
     assert "  simulated with the defect noise=10%\n" in out

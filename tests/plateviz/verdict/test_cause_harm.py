@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from plateviz.verdict import cause_harm
+from plateviz.verdict import star_cause_harm
 from plateviz.verdict.cause_case import Case
 from plateviz.verdict.cause_harm import harm
 from solver.results.diagnosis.causes import find_causes
@@ -74,7 +74,7 @@ def test_wrong_reference_star_shifts_the_frame_by_its_share(fit_result, monkeypa
     influence = {"id": ["7", "8"], "residual_ra": [10.0, 1e-6], "pull_ra": [5.0, 1e-6]}
     influence |= {"residual_dec": [1e-6, 1e-6], "pull_dec": [1e-6, 1e-6]}
     table = pd.DataFrame(influence)
-    monkeypatch.setattr(cause_harm, "reference_influence", lambda _: table)
+    monkeypatch.setattr(star_cause_harm, "reference_influence", lambda _: table)
     spoils, _ = harm_of(fit_result, "reference", 7)
     assert number_after(spoils, "by about ") == pytest.approx(2.0)
 

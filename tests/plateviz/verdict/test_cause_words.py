@@ -6,7 +6,7 @@ import pytest
 
 from plateviz.verdict.cause_words import said_of
 from solver.data.settings import FitSettings
-from solver.results.diagnosis.table import Test
+from solver.results.diagnosis.test import Test
 
 
 @pytest.mark.parametrize(("step", "field"), [(0, 7), (1, 2)])
@@ -65,7 +65,7 @@ def test_no_option_makes_a_catalogue_right_that_is_far_off(size, settings, optio
     said = said_of_stars("references", size, **settings)
     assert said.options == options
     assert said.name == ("reference-errors" if options else "wrong-catalogue")
-    assert ("check the epochs" in said.action) == (not options)
+    assert ("check the proper motions" in said.action) == (not options)
 
 
 def test_reference_stars_that_are_too_near_the_catalogue_are_not_said_to_be_far():

@@ -7,7 +7,7 @@ from plateviz.verdict.prior_words import narrowed_priors
 from plateviz.verdict.remedy import remedied
 from solver.data.parameters import BY_NAME, PARAMETERS
 from solver.data.settings import FitSettings
-from solver.results.diagnosis.table import Test
+from solver.results.diagnosis.test import Test
 
 
 def said_with(name="distortion_x", **settings):

@@ -72,9 +72,13 @@ def test_cause_that_many_orbits_name_is_that_of_the_run(good):
     assert [cause.name for cause in verdict.causes] == ["distortion-drifts"]
     cause = verdict.causes[0]
     assert cause.title == "in many orbits, the distortion drifts"
+    assert "The terms of the second degree change steadily. It spoils" in cause.spoils
     assert cause.options == ("--drift 2",)
     assert "30 of 40 orbits" in cause.words
     assert cause.significance == pytest.approx(6.0 * np.sqrt(30))
+    of_catalogue = causes(30).replace("distortion-drifts", "wrong-epoch")
+    (cause,) = judged(good, orbit_causes=of_catalogue, orbit_tests=orbit_tests(5.0)).causes
+    assert cause.significance == pytest.approx(6.0)
 
 
 @pytest.mark.parametrize(

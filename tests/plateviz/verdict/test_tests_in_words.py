@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import pytest
 
 from plateviz.verdict.tests_in_words import tests_in_words as in_words
-from solver.results.diagnosis.table import Test
+from solver.results.diagnosis.test import Test
 
 
 @pytest.mark.parametrize(

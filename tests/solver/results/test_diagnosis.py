@@ -231,6 +231,7 @@ def test_cause_is_named(defect, subject):
         ("noise-magnitude=30%", "magnitudes"),
         ("binaries=5", "reference"),
         ("reference-errors=500%", "references"),
+        ("exposure-times=100d", "epoch"),
     ],
 )
 def test_every_cause_is_named(defect, subject):

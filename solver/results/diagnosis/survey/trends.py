@@ -12,7 +12,7 @@ import pandas as pd
 from jaxtyping import Bool, Float
 
 from solver.results.diagnosis.rate import log_chance_normal, of_many, sigmas
-from solver.results.diagnosis.table import Test
+from solver.results.diagnosis.test import Test
 
 # With fewer orbits there is no scatter to compare with.
 LEAST_ORBITS = 8

@@ -5,6 +5,7 @@ import lzma
 import os
 from pathlib import Path
 
+import hypothesis
 import jax
 import pytest
 from xdist.scheduler import LoadFileScheduling
@@ -13,6 +14,10 @@ from solver.errors import InputError
 from solver.runtime.device import require_device
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
+
+# A process that waits for others is no fault.
+hypothesis.settings.register_profile("tests", deadline=None)
+hypothesis.settings.load_profile("tests")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 

@@ -6,7 +6,6 @@ from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message
 from plateviz.figures.glyphs import band, points, vertical
 from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.workspace import OrbitWorkspace
-from plateviz.tables.chance import largest_by_chance
 from plateviz.verdict.solution_tests import solution_tests
 
 _TITLE = "Tests of the solution"
@@ -22,7 +21,7 @@ _LEAST_RANGE = 6.0
 
 
 def plot_solution_tests(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
-    """Draw the significance of each test, and the largest that chance makes in 99 of 100 orbits.
+    """Draw the significance of each test, and up to which chance explains it.
 
     Parameters
     ----------
@@ -32,7 +31,7 @@ def plot_solution_tests(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Fig
     if table.empty:
         return message(_TITLE, "No tests", width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     total = int(table["total"].iloc[0])
-    limit, count = largest_by_chance(total), int(table["total_found"].iloc[0])
+    limit, count = float(table["limit"].iloc[0]), int(table["total_found"].iloc[0])
     cut = f"; the first {len(table)} are shown" if len(table) < total else ""
     most = max(1.08 * float(table["sigma"].max()), _LEAST_RANGE)
     low, high = len(table) - 0.4, -0.6
@@ -56,8 +55,8 @@ def plot_solution_tests(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Fig
             *shown.values(),
         ],
         title=_TITLE,
-        subtitle=f"{count} of {total} find more than chance{cut}; band: the largest of all by "
-        f"chance, {limit:.1f} σ",
+        subtitle=f"{count} of {total} find more than chance{cut}; band: what chance explains, "
+        f"up to {limit:.1f} σ",
         x=Axis(_XLABEL, (0.0, most)),
         y=Axis(_YLABEL, (low, high), ticks=ticks),
         width=width,

@@ -20,7 +20,8 @@ from plateviz.verdict.verdict import (
 )
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.found import Found
-from solver.results.diagnosis.table import diagnose
+from solver.results.diagnosis.rate import discoveries, log_chance_normal
+from solver.results.diagnosis.table import CARE_RATE, diagnose
 
 
 def with_summary(result, **values):
@@ -261,3 +262,21 @@ def test_table_of_the_tests_counts_those_that_are_cut_off(monkeypatch, fit_resul
     assert (table[["total", "total_found"]] == len(found)).all(axis=None)
     subtitle = plot_solution_tests(table).frames[0].subtitle
     assert subtitle.startswith(f"{len(found)} of {len(found)} find more than chance; the first 5 ")
+
+
+@pytest.mark.parametrize(
+    "largest", [[], [3.6], [9.0, 3.5, 3.3], [20.0, 9.0, 3.5, 3.2, 3.1]], ids=len
+)
+def test_limit_lies_between_the_tests_that_are_found_and_all_others(
+    fit_result, monkeypatch, largest
+):
+    judged = orbit_verdict(fit_result)
+    far = np.array([*largest, *np.ones(len(judged.tests) - len(largest))])
+    found = discoveries(np.array([log_chance_normal(one) for one in far]), CARE_RATE)
+    tests = [
+        one._replace(sigma=sigma, is_found=is_found)
+        for one, sigma, is_found in zip(judged.tests, far.tolist(), found.tolist(), strict=True)
+    ]
+    monkeypatch.setitem(fit_result.derived, "verdict", judged._replace(tests=tests))
+    table = solution_tests(fit_result)
+    assert ((table["sigma"] > table["limit"]) == table["is_found"]).all()

@@ -27,7 +27,7 @@ def test_columns_of_angles_and_their_headings_are_in_the_unit(units):
     units.unit = "µas"
     table = pd.DataFrame({name: [1.5] for name in ORBITS_OF_SOURCE})
     shown, headings = units.columns(table, ORBITS_OF_SOURCE), units.headings(ORBITS_OF_SOURCE)
-    assert headings["offset_ra"] == ("Δα cos δ", "0", "− catalogue, µas")
+    assert headings["offset_ra"] == ("Δα cos δ", "0,0", "− catalogue, µas")
     assert headings["chi2_per_dof"] == ORBITS_OF_SOURCE["chi2_per_dof"]
     angles = [name for name, one in ORBITS_OF_SOURCE.items() if one.group.endswith(", mas")]
     assert len(angles) == 6
@@ -64,7 +64,7 @@ def test_changes_have_the_unit_of_their_labels(units):
         "Sources",
     ]
     assert shown.iloc[0, 1:].tolist() == ["1,200.0", "", "+50.0"]
-    assert shown.iloc[1, 1:].tolist() == ["200", "100", "-100"]
+    assert shown.iloc[1, 1:].tolist() == ["200", "100", "−100"]
     assert shown.iloc[2].tolist() == list(rows[2])
 
 

@@ -23,6 +23,10 @@ def served(tmp_path, chromium_path):
 def test_cause_is_named_and_its_remedy_is_a_click(served, open_page):
     page = open_page(served)
     expect(page.locator("details.verdict")).to_contain_text("the distortion drifts")
+    row = page.locator("p.cause").first
+    expect(row).to_contain_text("change steadily from the first exposure to the last")
+    expect(row).to_contain_text("It spoils the positions")
+    expect(row).not_to_contain_text("It is not noise")
     page.get_by_role("button", name="Try it: solve the orbit with --drift 2.").click()
     expect(page.locator(".outdated").first).to_contain_text("Another solution is being computed: ")
     solutions = page.locator(".solution")

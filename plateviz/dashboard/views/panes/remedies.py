@@ -109,9 +109,12 @@ class _Row:
 def _words(cause: Cause) -> str:
     options = "".join(f" <code>{escape(one)}</code>" for one in cause.options[:_MOST_OPTIONS])
     action = f"{cause.action[0].upper()}{cause.action[1:]}"
+    # All of it is in the verdict above.
+    evidence = f"{cause.words.partition('. ')[0].rstrip('.')}."
     return (
         f"<p class='cause'><b>{escape(cause.heading())}</b>, {cause.significance:.0f} sigma. "
-        f"{escape(action)}.{options}{_and_more(cause)}<br><span>{escape(cause.spoils)}</span></p>"
+        f"{escape(action)}.{options}{_and_more(cause)}<br>"
+        f"<span>{escape(evidence)} {escape(cause.spoils)}</span></p>"
     )
 
 

@@ -36,8 +36,8 @@ def unseen_sentences(result: FitResult, are_noticed: bool = False) -> list[str]:
         )
     elif not epoch.sigma > 0.0:
         sentences.append(
-            "Nor is a time tested that is wrong in all exposures alike, for want of reference "
-            "stars with proper motions."
+            "Nor is a time tested that is wrong in all exposures alike: the solution has no "
+            "proper motions of reference stars."
         )
     quadratic = quadratic_mas(result)
     if np.isfinite(quadratic):

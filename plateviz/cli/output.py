@@ -158,18 +158,18 @@ def _column(column: Mapping[str, Any]) -> str:
     values = f"{column['min']} to {column['max']}" if column.get("min") is not None else ""
     unit = f" {column['unit']}" if column.get("unit") else ""
     is_date = meaning == "obstime" and unit == " d" and values
-    dates = f", {_dates(column)}" if is_date else ""
+    dates = _dates(column) if is_date else ""
     return f"{column['name']:<18} {column['type']:<8} {values}{unit}{dates}  ({meaning})"
 
 
 def _dates(column: Mapping[str, Any]) -> str:
-    """Return the first and last time of a column of modified Julian dates as dates."""
+    """Return the first and last of a column of modified Julian dates; empty if one is no date."""
     import pandas as pd
 
     from plateviz.tables.labels import dates
 
     first, last = dates(pd.Series([column["min"], column["max"]], dtype=float))
-    return f"{first} to {last} TCB"
+    return f", {first} to {last} TCB" if first and last else ""
 
 
 def _outlier_row(summary: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -186,7 +186,7 @@ class Run:
         -------
         The removed orbits, which have to be fitted again.
         """
-        there = self.complete_orbits()
+        there = self._orbits_there()
         damaged = [o for o in there if o in also or orbit_changes(self.orbit_directory(o))]
         if damaged or self._table_changes():
             for name in (_COMPLETE, _GATHERED):

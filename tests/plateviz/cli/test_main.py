@@ -6,6 +6,7 @@ import socket
 
 import pytest
 
+from plateviz.cli.output import print_inspection
 from plateviz.solving.origin import SurveyFolder
 from solver.io.result import read_result
 
@@ -109,6 +110,17 @@ def test_inspect_lists_tables_and_columns(run, sample):
     assert code == 0
     assert "36312 rows" in out
     assert "source_id" in out
+
+
+@pytest.mark.parametrize(
+    ("last", "dates"), [(62202.5, ", 2029-03-07 00:00 to 2029-03-07 12:00 TCB"), (1e300, "")]
+)
+def test_inspect_prints_dates_where_times_are_some(capsys, last, dates):
+    times = {"name": "obstime", "type": "float64", "unit": "d", "canonical": "obstime"}
+    table = {"name": "exposures", "rows": 2, "columns": [{**times, "min": 62202.0, "max": last}]}
+    nothing = {"defects": [], "problems": [], "counts": {}}
+    print_inspection([{"file": "a.csv", "kind": "observation", "tables": [table], **nothing}])
+    assert f"62202.0 to {last} d{dates}  (obstime)" in capsys.readouterr().out
 
 
 def test_inspect_of_an_unreadable_file_exits_with_two(run, tmp_path):

@@ -117,6 +117,8 @@ def test_fitted_orbit_without_a_manifest_is_named(run, survey):
     code, out, _ = run("inspect", survey)
     assert code == 2
     assert f"{manifest}: the manifest of a fitted orbit is missing" in out.replace("\n", "")
+    assert Run(survey, "default").remove_damaged() == [1]
+    assert not manifest.parent.exists()
 
 
 @pytest.mark.parametrize(

@@ -154,10 +154,11 @@ def said_of_epoch(case: Case) -> Said:
     days, sigma = case.found.size, case.found.test.scatter
     # Later than the times say is as if these were too early.
     how, instead = ("early", "late") if days > 0.0 else ("late", "early")
+    than = "later" if days > 0.0 else "earlier"
     offset = f"{rounded(abs(days), 3)} ± {rounded(sigma)} days"
     return Said(
         "wrong-epoch",
-        "the stars are measured at another time than the exposures say",
+        f"the stars are measured {rounded(abs(days), 3)} days {than} than the exposures say",
         f"They are off the catalogue along their own proper motions: the times of all exposures "
         f"are {offset} too {how}, or the epoch of the catalogue is as much too {instead}.",
         "check the times of the exposures, their scale and unit, and the epoch of the catalogue",

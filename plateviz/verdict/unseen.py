@@ -4,7 +4,7 @@ import numpy as np
 
 from plateviz.tables.rounded import rounded
 from solver.data.result import FitResult
-from solver.results.diagnosis.epoch import epoch_offset
+from solver.results.diagnosis.epoch import EpochOffset
 from solver.units import RAD_PER_MAS
 
 # Sigmas beyond which a deviation of the reference stars is a discovery among all tests.
@@ -15,11 +15,12 @@ _MANY = 0.1
 _MOST_PLACES = 50_000
 
 
-def unseen_sentences(result: FitResult, are_noticed: bool = False) -> list[str]:
+def unseen_sentences(result: FitResult, epoch: EpochOffset, are_noticed: bool = False) -> list[str]:
     """Return sentences on the errors of the reference catalogue that a solution cannot show.
 
     Parameters
     ----------
+    epoch : how much later the stars are measured than the times of the exposures say
     are_noticed : whether the reference stars are known to be further off than stated
     """
     sentences = [
@@ -27,7 +28,6 @@ def unseen_sentences(result: FitResult, are_noticed: bool = False) -> list[str]:
         "turn or stretch the field are taken for pointing, and move all positions by as much as "
         "they are large."
     ]
-    epoch = epoch_offset(result.sources)
     if epoch.sigma > 0.0 and not abs(epoch.days) > _NOTICED * epoch.sigma:
         sentences.append(
             "A time that is wrong in all exposures alike, by less than "

@@ -127,7 +127,7 @@ def _judge(result: FitResult) -> Verdict:
     reasons = [_converged(result), *(cause.sentence() for cause in causes), *left_out[1:]]
     reasons += [discoveries_in_words(diagnosis.tests, found), *map(_sentence, _judged(items))]
     are_noticed = any(cause.name in _OF_REFERENCES for cause in causes)
-    reasons += [*_common_error(result), *unseen_sentences(result, are_noticed)]
+    reasons += [*_common_error(result), *unseen_sentences(result, diagnosis.epoch, are_noticed)]
     faults = [] if converged else [_converged(result)]
     faults += [f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes]
     faults += left_out[1:]

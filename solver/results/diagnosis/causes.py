@@ -32,7 +32,8 @@ _MAKES_PATTERNS = (
     "swing",
     "outliers",
     "swapped",
-    *("references", "reference", "others", "other"),
+    *STARS,
+    "epoch",
     "prior",
 )
 # A cause of another kind is named beside the first one from this share of its sigmas.
@@ -45,7 +46,10 @@ _FAR_OFF = ("outliers", "swapped")
 _OF_OUTLIERS = 0.5
 # Patterns that explain more of chi2 are not linear: what they leave tells nothing about the noise.
 _MOST_LINEAR = 0.5
-SCATTER = ("noise", "exposures", "sources", "detectors", "magnitudes")
+# Those that explain more leave residuals that look like noise: larger in some groups, with tails.
+_MOST_BESIDE_NOISE = 0.1
+_OF_GROUPS = ("exposures", "sources", "detectors", "magnitudes")
+SCATTER = ("noise", *_OF_GROUPS)
 
 
 class FoundCauses(NamedTuple):
@@ -72,11 +76,14 @@ def find_causes(diagnosis: Diagnosis) -> FoundCauses:
     found += [*_of_outliers(diagnosis), *of_priors(diagnosis), *of_others(diagnosis)]
     found += of_epoch(diagnosis)
     rows, left = diagnosis.rows, None
-    if explained + of_each <= _MOST_LINEAR * float(rows.chi2[~rows.is_far].sum()):
+    is_used = ~(rows.is_far | np.isin(rows.exposure, diagnosis.swinging))
+    share = (explained + of_each) / max(float(rows.chi2[is_used].sum()), 1e-300)
+    if share <= _MOST_LINEAR:
         left, *_ = scatter = scatter_tests(
             rows, diagnosis.magnitude, explained + of_each, without=diagnosis.swinging
         )
-        found += [*of_references(diagnosis), *_of_scatter(diagnosis, scatter)]
+        found += of_references(diagnosis)
+        found += _of_scatter(diagnosis, scatter) if share <= _MOST_BESIDE_NOISE else []
     # Tails spoil no positions, and make nothing but scatter.
     spoils = any(one.test.subject not in (*SCATTER, "kurtosis") for one in found)
     found.sort(key=lambda one: (spoils and one.test.subject == "kurtosis", -one.gain))
@@ -151,7 +158,7 @@ def _is_of_tails(subject: str, leads: str) -> bool:
     Whatever spoils some residuals more than others gives all of them tails, and noise with tails
     makes groups scatter; but it does not change their size as a whole.
     """
-    return subject == "kurtosis" or (leads == "kurtosis" and subject in SCATTER[1:])
+    return subject == "kurtosis" or (leads == "kurtosis" and subject in _OF_GROUPS)
 
 
 def _swinging(diagnosis: Diagnosis) -> list[Found]:

@@ -30,11 +30,22 @@ def of_epoch(diagnosis: Diagnosis, shift: float = 0.0) -> list[Found]:
     tests = [one for one in diagnosis.tests if one.subject == "epoch"]
     if shift:
         tests = epoch_tests(epoch_offset(diagnosis.result.sources, shift))
-    return [
-        Found(one, one.sigma**2 - gains.PER_PARAMETER, size=one.statistic)
-        for one in tests
-        if one.log_chance < limit_of(diagnosis)
-    ]
+    is_off = any(one.log_chance < limit_of(diagnosis) for one in tests)
+    gain = _gain_of_epoch(diagnosis, shift) if is_off else 0.0
+    # A star that was left out of the test may move most, and contradict it.
+    return [Found(one, gain, size=one.statistic) for one in tests if gain > 0.0]
+
+
+def _gain_of_epoch(diagnosis: Diagnosis, shift: float) -> float:
+    """Return by how much the reference stars agree better with the catalogue at the other time.
+
+    With the errors that it states, as the fit takes them: what bends the fit is not their scatter.
+    """
+    rows = diagnosis.result.sources
+    rows = rows[rows["is_reference"].to_numpy(dtype=bool)]
+    at_each = (catalogue_chi2(one, shift).chi2.sum() for one in (rows, diagnosis.epoch.moved(rows)))
+    as_stated, moved = (float(one) / diagnosis.scale for one in at_each)
+    return as_stated - moved - gains.PER_PARAMETER
 
 
 def of_references(diagnosis: Diagnosis) -> list[Found]:

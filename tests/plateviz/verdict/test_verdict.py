@@ -22,6 +22,7 @@ from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.found import Found
 from solver.results.diagnosis.rate import discoveries, log_chance_normal
 from solver.results.diagnosis.table import CARE_RATE, diagnose
+from tests.solver.results.test_diagnosis import fitted
 
 
 def with_summary(result, **values):
@@ -114,12 +115,13 @@ def test_catalogue_whose_errors_had_to_be_multiplied_by_much_is_not_trusted(
     assert ("much further from the catalogue" in found.headline) == (state != "good")
 
 
-def test_noise_that_could_not_be_estimated_is_not_said_to_be_in_the_fit(fit_result):
-    even = fit_result.exposure_index % 2 == 0
-    residuals = fit_result.residuals.copy()
-    residuals.loc[even, ["residual_x", "residual_y"]] *= 4.0
-    settings = fit_result.settings.with_(noise_by_exposure=True)
-    noisy = replace(fit_result, residuals=residuals, settings=settings)
+def test_noise_that_could_not_be_estimated_is_not_said_to_be_in_the_fit():
+    result = fitted()
+    residuals = result.residuals.copy()
+    even = result.exposure_index % 2 == 0
+    residuals.loc[even, ["residual_x", "residual_y"]] *= 2.0
+    settings = result.settings.with_(noise_by_exposure=True)
+    noisy = replace(result, residuals=residuals, settings=settings)
     first = orbit_verdict(noisy).causes[0]
     assert first.name == "noise-of-exposures"
     assert "--noise-by-exposure, but could not estimate the noise" in first.action

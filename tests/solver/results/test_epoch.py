@@ -1,16 +1,19 @@
 """A wrong time of all exposures: found from the proper motions of the reference stars."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from plateviz.verdict.verdict import orbit_verdict
 from solver.results.diagnosis.causes import find_causes
-from solver.results.diagnosis.contradictions import beyond_shift
+from solver.results.diagnosis.contradictions import beyond_shift, of_epoch
 from solver.results.diagnosis.epoch import EpochOffset, epoch_offset
 from solver.results.diagnosis.found import Found
 from solver.results.diagnosis.references import catalogue_chi2
 from solver.results.diagnosis.table import diagnose
+from solver.units import DAYS_PER_JULIAN_YEAR
 from tests.solver.results.test_diagnosis import fitted
 
 # Of the catalogue and of the measurements without it, mas.
@@ -99,6 +102,21 @@ def test_verdict_says_by_how_much_the_times_are_wrong(defect, how):
     assert f"days {how}, or the epoch of the catalogue" in cause.words
     days = float(cause.words.partition("exposures are ")[2].split()[0])
     assert days == pytest.approx(100.0, abs=20.0)
+
+
+def test_star_that_moves_most_may_contradict_the_others():
+    """It is further off than doubles are, and left out of the test."""
+    diagnosis = diagnose(fitted("exposure-times=60d"))
+    (found,) = of_epoch(diagnosis)
+    rows = diagnosis.result.sources.copy()
+    stars = rows[rows["is_reference"] & (rows["n_obs"] > 20)]
+    fastest = np.hypot(stars["prior_pmra"], stars["prior_pmdec"]).idxmax()
+    years = -found.size / DAYS_PER_JULIAN_YEAR
+    for axis in ("ra", "dec"):
+        rows.loc[fastest, f"offset_{axis}"] += 20.0 * years * rows.loc[fastest, f"prior_pm{axis}"]
+    result = replace(diagnosis.result, sources=rows)
+    assert epoch_offset(rows).days == pytest.approx(found.size, abs=found.test.scatter)
+    assert of_epoch(diagnosis._replace(result=result)) == []
 
 
 def test_good_solution_says_which_time_it_would_not_notice():

@@ -57,3 +57,12 @@ def test_noise_does_not_make_stars_wrong():
         for found in (diagnosis, diagnosis._replace(scale=2.0))
     ]
     assert gains[0] > 1.9 * gains[1]
+
+
+@pytest.mark.parametrize(
+    ("defect", "subject"),
+    [("detector-shift=3um", "shift"), ("exposure-times=1000d", "epoch")],
+)
+def test_large_error_is_named_alone(defect, subject):
+    """It bends the fit, and leaves residuals that look like noise and like other patterns."""
+    assert subjects(fitted(defect)) == [subject]

@@ -13,6 +13,7 @@ from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.calibration import distortion
 from plateviz.tables.rounded import rounded
 from solver.data.instrument import Detector
+from solver.units import UM_PER_MM
 
 _TITLE = "Fitted distortion, distorted minus ideal position"
 _HOVER = [
@@ -45,15 +46,15 @@ def plot_distortion(
     field = field_about(table, _MARGIN)
     scale = arrow_scale or automatic_scale(table, field)
     field = field.holding(table, scale)
-    rms_um = 1000.0 * rms_length(table)
+    rms_um = UM_PER_MM * rms_length(table)
     length_um = round_125(2.0 * rms_um) if rms_um > 0 else 1.0
-    mas = length_um / 1000.0 * float(table["mas_per_unit"].iloc[0])
+    mas = length_um / UM_PER_MM * float(table["mas_per_unit"].iloc[0])
     length = f"{length_um:g} µm = {angle_text(mas)}"
     return framed(
         [
             detector_outlines(detectors, "muted"),
             *arrows(table, scale=scale, field=field, colour="mark", hover=_HOVER),
-            *key(length_um / 1000.0, length, scale=scale, field=field),
+            *key(length_um / UM_PER_MM, length, scale=scale, field=field),
         ],
         title=_TITLE,
         subtitle=f"Zero at the optical centre; rms {rounded(rms_um, 3)} µm.\n"

@@ -22,6 +22,7 @@ from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.distortion_comparison import ALONE, TOGETHER, distortion_comparison
 from plateviz.tables.rounded import rounded
 from solver.data.instrument import Detector
+from solver.units import NM_PER_UM, UM_PER_MM
 
 _TITLE = "Difference of the distortion, B minus A"
 _TITLES = {ALONE: _TITLE, TOGETHER: "Difference of distortion and detectors, B minus A"}
@@ -74,7 +75,7 @@ def _panel(
     rms = rms_length(rows)
     length = round_125(2.0 * rms)
     mas_per_mm = float(rows["mas_per_unit"].iloc[0])
-    length_text = f"{_length(1000.0 * length)} = {angle_text(length * mas_per_mm)}"
+    length_text = f"{_length(UM_PER_MM * length)} = {angle_text(length * mas_per_mm)}"
     return framed(
         [
             detector_outlines(detectors, "muted"),
@@ -82,7 +83,7 @@ def _panel(
             *key(length, length_text, scale=scale, field=field),
         ],
         title=title,
-        subtitle=f"rms {_length(1000.0 * rms)} = {angle_text(rms * mas_per_mm)}"
+        subtitle=f"rms {_length(UM_PER_MM * rms)} = {angle_text(rms * mas_per_mm)}"
         f"{_unmeasured(rows, detectors)}; {_removed(rows)}{_left_out(rows)}\n"
         f"Arrows enlarged {scale:,.12g} times; key: {length_text}",
         x=Axis(XLABEL, field.x),
@@ -112,7 +113,7 @@ def _left_out(rows: pd.DataFrame) -> str:
 
 def _length(um: float) -> str:
     """Return a length to two digits or more: "12 µm", "0.05 nm"."""
-    return f"{rounded(um, 3)} µm" if um >= 0.001 or um == 0.0 else f"{rounded(1000.0 * um)} nm"
+    return f"{rounded(um, 3)} µm" if um >= 0.001 or um == 0.0 else f"{rounded(NM_PER_UM * um)} nm"
 
 
 def _plot(chosen: Chosen) -> Figure:

@@ -14,6 +14,7 @@ from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.field_residuals import field_residuals, field_statistics
 from plateviz.tables.rounded import rounded
 from solver.data.instrument import Detector
+from solver.units import UM_PER_MM
 
 _TITLE = "Residuals of each field against the others"
 _MARGIN, _MOST_COLUMNS = 1.07, 4
@@ -43,7 +44,7 @@ def plot_field_residuals(
         return message(_TITLE, text, width=FRAME_WIDTH, xlabel=XLABEL, ylabel=YLABEL)
     vectors = table.assign(u=table["difference_x_mpix"], v=table["difference_y_mpix"])
     # Bins may be large, and end far from their middle.
-    corners = [table[["x", "y"]], *(one.corners_um() / 1000.0 for one in detectors)]
+    corners = [table[["x", "y"]], *(one.corners_um() / UM_PER_MM for one in detectors)]
     area = field_about(pd.DataFrame(np.concatenate(corners), columns=["x", "y"]), _MARGIN)
     scale, rms = automatic_scale(vectors, area), rms_length(vectors)
     area = area.holding(vectors, scale)

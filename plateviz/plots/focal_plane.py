@@ -10,6 +10,7 @@ from plateviz.figures.figure import Glyphs
 from plateviz.figures.glyphs import paths
 from plateviz.plots.arrows import Field
 from solver.data.instrument import Detector
+from solver.units import UM_PER_MM
 
 XLABEL, YLABEL = "focal-plane x (mm)", "focal-plane y (mm)"
 
@@ -17,7 +18,7 @@ XLABEL, YLABEL = "focal-plane x (mm)", "focal-plane y (mm)"
 def detector_outlines(detectors: Iterable[Detector], colour: str = "line") -> Glyphs:
     """Return the outlines of detectors, mm; those of selected detectors stand out."""
     shown = list(detectors)
-    outlines = [d.corners_um()[[0, 1, 2, 3, 0]] / 1000.0 for d in shown]
+    outlines = [d.corners_um()[[0, 1, 2, 3, 0]] / UM_PER_MM for d in shown]
     drawn = paths(outlines, name="outlines", color=colour)
     return of_detectors(drawn, [d.detector_id for d in shown])
 

@@ -22,6 +22,7 @@ from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.mean_residuals import MapStatistics, map_statistics, mean_residuals
 from plateviz.tables.rounded import rounded
 from solver.data.instrument import Instrument
+from solver.units import UM_PER_MM
 
 _TITLE = "Mean residual over the focal plane"
 _MARGIN = 1.06
@@ -43,7 +44,7 @@ def plot_mean_residual_map(
     if table.empty:
         text = "No bins in which the fit leaves enough of the residuals"
         return message(_TITLE, text, width=width, xlabel=XLABEL, ylabel=YLABEL)
-    corners = [d.corners_um() / 1000.0 for d in instrument.detectors]
+    corners = [d.corners_um() / UM_PER_MM for d in instrument.detectors]
     low, high = np.min(corners, axis=(0, 1)), np.max(corners, axis=(0, 1))
     middle, half = 0.5 * (low + high), 0.5 * _MARGIN * float((high - low).max())
     limits = [(float(at - half), float(at + half)) for at in middle]

@@ -13,6 +13,7 @@ from plateviz.plots.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.residuals import binned_vectors, residual_map
 from solver.data.instrument import Detector, Instrument
+from solver.units import UM_PER_MM
 
 _BINS_ON_DETECTOR, _BINS_ON_FOCAL_PLANE = 16, 24
 _LEAST_SHARE = 0.25
@@ -79,7 +80,7 @@ def _axis_label(detector: Detector | Instrument, axis: str) -> str:
 
 def _field(detector: Detector | Instrument) -> Field:
     if isinstance(detector, Instrument):
-        half = max(np.abs(d.corners_um()).max() for d in detector.detectors) / 1000.0
+        half = max(np.abs(d.corners_um()).max() for d in detector.detectors) / UM_PER_MM
         x = y = half
     else:
         x, y = 0.5 * detector.n_x, 0.5 * detector.n_y
@@ -114,7 +115,7 @@ def _key(shown: pd.DataFrame, unit: str) -> tuple[float, str]:
     """Return the length of the key arrow in axis units, and as text."""
     mas_per_unit = float(shown["mas_per_unit"].mean())
     length = round_125(2.0 * rms_length(shown)) if rms_length(shown) > 0 else 1.0
-    text = f"{length:g} pix" if unit == "pix" else f"{1000.0 * length:g} µm"
+    text = f"{length:g} pix" if unit == "pix" else f"{UM_PER_MM * length:g} µm"
     return length, f"{text} = {angle_text(length * mas_per_unit)}"
 
 

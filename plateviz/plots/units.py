@@ -9,8 +9,9 @@ _UAS_BELOW_MAS = 0.5
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Sizes of numbers that need no power of ten.
 _PLAIN = (1e-3, 1e6)
-# Units in steps of a factor of a thousand.
+# Units, each a thousandth of the one before it.
 _FINER = {"arcsec": ("arcsec", "mas", "µas"), "µm": ("µm", "nm", "pm")}
+_PER_STEP = 1000.0
 
 
 def angle_unit(size_mas: float) -> tuple[str, float]:
@@ -35,7 +36,7 @@ def finer_unit(size: float, unit: str) -> tuple[str, float]:
     """
     units = _FINER.get(unit, (unit,))
     step = min(max(0, math.ceil(-math.log10(size) / 3.0 - 1e-9)), len(units) - 1)
-    return units[step], 1000.0**step
+    return units[step], _PER_STEP**step
 
 
 def power_text(value: float, digits: int) -> str:

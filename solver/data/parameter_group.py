@@ -63,8 +63,8 @@ class Group:
     family : prior distribution about its centre
     width : standard deviation of the default prior, in `width_unit`
     relative : whether `width` is a fraction of the centre
-    origin : origin of the prior's centre: the catalogue, a column of the environment table,
-        an attribute of the instrument's detectors, or zero
+    centre_from : where the prior's centre comes from: the catalogue, a column of the environment
+        table, an attribute of the instrument's detectors, or zero
     column : that column or attribute
     published : columns of the published layout; by default one named after the group
     setting : setting of a fit that adds the group; "" for a group that every fit has
@@ -79,7 +79,7 @@ class Group:
     family: PriorFamily
     width: float
     relative: bool = False
-    origin: Literal["catalogue", "environment", "instrument", "zero"] = "zero"
+    centre_from: Literal["catalogue", "environment", "instrument", "zero"] = "zero"
     column: str = ""
     published: tuple[Published, ...] = ()
     setting: str = ""

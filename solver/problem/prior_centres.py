@@ -34,9 +34,9 @@ def calibration_centres(
     # The settings give a shift of the pointing in RA as a distance on the sky.
     stretch = {"pointing_ra": 1.0 / np.cos(np.radians(exposures["dec_est"].to_numpy()))}
     for group in layout.groups:
-        if group.origin == "environment":
+        if group.centre_from == "environment":
             values = exposures[group.column].to_numpy(dtype=np.float64)
-        elif group.origin == "instrument":
+        elif group.centre_from == "instrument":
             values = np.array([getattr(d, group.column) for d in instrument.detectors], float)
         else:
             values = np.zeros(len(layout.columns(group)))

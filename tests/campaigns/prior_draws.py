@@ -194,7 +194,7 @@ def tangent_offset(
 def _displacements(placed: Instrument) -> dict[str, np.ndarray]:
     """Return the offsets of the true detectors from the nominal ones."""
     columns = {
-        name: group.column for name, group in BY_NAME.items() if group.origin == "instrument"
+        name: group.column for name, group in BY_NAME.items() if group.centre_from == "instrument"
     }
     pairs = list(zip(placed.detectors, MINI_MOCK.detectors, strict=True))
     return {

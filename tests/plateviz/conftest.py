@@ -281,7 +281,7 @@ def _values(group: Group, pointings: pd.DataFrame, random: np.random.Generator) 
     if group.axis == "coef":
         degrees = [d for d in range(2, ORDER + 1) for _ in range(d + 1)]
         return random.normal(0.0, 1.0, len(degrees)) * 2.0 ** (3 - np.array(degrees))
-    if group.origin == "instrument":
+    if group.centre_from == "instrument":
         return np.array([getattr(d, group.column) for d in MINI_MOCK.detectors])
     return np.zeros(len(pointings if group.axis == "exp" else MINI_MOCK.detectors))
 

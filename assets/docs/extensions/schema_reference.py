@@ -264,4 +264,4 @@ def _prior(group: Group) -> str:
 
 
 def _centre(group: Group) -> str:
-    return f"{group.origin}, `{group.column}`" if group.column else group.origin
+    return f"{group.centre_from}, `{group.column}`" if group.column else group.centre_from

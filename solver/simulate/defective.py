@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from solver.data.instrument import Instrument
 from solver.model.forward import Geometry, Index, directions, ideal_position, image
-from solver.simulate.defects.defect import Altered, Rows, Stage
+from solver.simulate.defects.defect import Altered, DefectStage, TrueRows
 from solver.simulate.defects.stages import (
     defective_table,
     displaced_pixels,
@@ -70,10 +70,10 @@ def _rows(
     instrument: Instrument,
     settings: SurveySettings,
     orbit_id: int,
-) -> Rows:
+) -> TrueRows:
     """Return the measurements before noise, with the defects up to the focal plane."""
     index, attitude = exposed.index, exposed.attitude
-    rows = Rows(
+    rows = TrueRows(
         exposure=index.exposure,
         detector=index.detector,
         ideal=np.zeros_like(exposed.pixel),
@@ -82,7 +82,7 @@ def _rows(
         attitude=attitude,
         instrument=place_detectors(instrument, settings),
     )
-    if not has_stage(settings, Stage.OBSERVER, Stage.FOCAL_PLANE):
+    if not has_stage(settings, DefectStage.OBSERVER, DefectStage.FOCAL_PLANE):
         return rows
     actual = true_observer(attitude, settings, orbit_id)
     geometry = true_geometry(padded(exposed.frame), actual, instrument, settings)

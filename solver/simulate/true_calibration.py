@@ -11,10 +11,10 @@ from jaxtyping import Bool, Float
 
 from solver.data.distortion_terms import terms
 from solver.data.instrument import Detector, Instrument
-from solver.simulate.defects.defect import Case, Defect, Stage
+from solver.simulate.defects.defect import AppliedDefect, Defect, DefectStage
 from solver.simulate.defects.detectors import motion
 from solver.simulate.defects.distortion_terms import ADDED_TERMS
-from solver.simulate.defects.stages import cases
+from solver.simulate.defects.stages import applied_defects
 from solver.simulate.placement import place_detectors
 from solver.simulate.schedule import orbit_schedule
 from solver.simulate.settings import SurveySettings
@@ -61,20 +61,20 @@ def true_calibration(
     is_used = pd.MultiIndex.from_frame(schedule[pairs]).isin(
         pd.MultiIndex.from_frame(exposures[pairs])
     )
-    found = list(_cases(settings, orbit_id))
+    found = list(_moving(settings, orbit_id))
     by_degrees = {(k, j): np.array([a, b]) for k, j, a, b in settings.distortion_um}
-    for _, case in found:
-        if case.name in ADDED_TERMS:
-            added = ADDED_TERMS[case.name](case, schedule)
+    for _, applied in found:
+        if applied.name in ADDED_TERMS:
+            added = ADDED_TERMS[applied.name](applied, schedule)
             mean = added.coefficients * _mean(added.change, is_used)
             for degrees, pair in zip(added.degrees, mean, strict=True):
                 by_degrees[degrees] = by_degrees.get(degrees, np.zeros(2)) + pair
     detectors = list(place_detectors(instrument, settings).detectors)
-    for _, case in found:
-        if case.name in (_SHIFT, _TURN):
-            moves = motion(case, len(detectors), len(schedule))
+    for _, applied in found:
+        if applied.name in (_SHIFT, _TURN):
+            moves = motion(applied, len(detectors), len(schedule))
             after = np.arange(len(schedule)) >= moves.exposure
-            moved = _moved(detectors[moves.detector], case, moves.angle, _mean(after, is_used))
+            moved = _moved(detectors[moves.detector], applied, moves.angle, _mean(after, is_used))
             detectors[moves.detector] = moved
     known = (*ADDED_TERMS, _SHIFT, _TURN)
     return TrueCalibration(
@@ -85,9 +85,9 @@ def true_calibration(
     )
 
 
-def _cases(settings: SurveySettings, orbit_id: int) -> Iterator[tuple[Defect, Case]]:
-    for stage in (Stage.FOCAL_PLANE, Stage.DETECTOR):
-        yield from cases(settings, stage, orbit_id)
+def _moving(settings: SurveySettings, orbit_id: int) -> Iterator[tuple[Defect, AppliedDefect]]:
+    for stage in (DefectStage.FOCAL_PLANE, DefectStage.DETECTOR):
+        yield from applied_defects(settings, stage, orbit_id)
 
 
 def _all(by_degrees: dict[tuple[int, int], np.ndarray]) -> Float[np.ndarray, "term 2"]:
@@ -100,10 +100,10 @@ def _mean(change: np.ndarray, is_used: Bool[np.ndarray, " exp"]) -> float:
     return float(change[is_used].mean()) if is_used.any() else 0.0
 
 
-def _moved(detector: Detector, case: Case, angle: float, share: float) -> Detector:
+def _moved(detector: Detector, applied: AppliedDefect, angle: float, share: float) -> Detector:
     """Return a detector at its mean place; it has moved for a share of the exposures."""
-    size = share * case.amplitude
-    if case.name == _TURN:
+    size = share * applied.amplitude
+    if applied.name == _TURN:
         return replace(detector, rotation_deg=detector.rotation_deg + size / ARCSEC_PER_DEG)
     return replace(
         detector,

@@ -5,7 +5,7 @@ import pandas as pd
 
 from solver.data.result import FitResult
 from solver.results.diagnosis.rows import detector_spans
-from solver.simulate.defects.defect import Case
+from solver.simulate.defects.defect import AppliedDefect
 from solver.simulate.defects.detectors import motion
 from solver.simulate.defects.distortion_terms import ORBITAL_PERIOD_S, of_higher_order
 from solver.units import SECONDS_PER_DAY
@@ -13,13 +13,13 @@ from solver.units import SECONDS_PER_DAY
 _PERCENT = 0.01
 
 
-def true_terms(case: Case, degree: int) -> np.ndarray:
+def true_terms(case: AppliedDefect, degree: int) -> np.ndarray:
     """Return the coefficients of a defect of the distortion, x and y in rows, um."""
     found = case.survey_rng().standard_normal((degree + 1, 2))
     return (case.amplitude * found / np.linalg.norm(found)).T
 
 
-def all_deviations(case: Case, result: FitResult) -> dict[str, np.ndarray]:
+def all_deviations(case: AppliedDefect, result: FitResult) -> dict[str, np.ndarray]:
     """Return the deviations from the truth of the parameters that a fit with a cause adds, sigmas.
 
     Parameters
@@ -36,7 +36,7 @@ def all_deviations(case: Case, result: FitResult) -> dict[str, np.ndarray]:
     return of_groups | _of_noise(case, result)
 
 
-def true_places(case: Case, result: FitResult) -> dict[str, np.ndarray]:
+def true_places(case: AppliedDefect, result: FitResult) -> dict[str, np.ndarray]:
     """Return group -> true values of a detector that moves, by detectors and spans."""
     if case.name not in ("detector-shift", "detector-turn"):
         return {}
@@ -55,7 +55,7 @@ def true_places(case: Case, result: FitResult) -> dict[str, np.ndarray]:
     }
 
 
-def _of_noise(case: Case, result: FitResult) -> dict[str, np.ndarray]:
+def _of_noise(case: AppliedDefect, result: FitResult) -> dict[str, np.ndarray]:
     """Return the deviations of the logarithms of the factors on the uncertainties."""
     if "noise" not in result.summary:
         return {}
@@ -71,7 +71,7 @@ def _of_noise(case: Case, result: FitResult) -> dict[str, np.ndarray]:
     return {"noise": (values - truth) / sigmas}
 
 
-def truth_of(case: Case, exposures: pd.DataFrame) -> dict[str, np.ndarray | float]:
+def truth_of(case: AppliedDefect, exposures: pd.DataFrame) -> dict[str, np.ndarray | float]:
     """Return group -> true values; empty if the simulator has no such parameters.
 
     Parameters

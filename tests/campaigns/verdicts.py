@@ -30,7 +30,7 @@ from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 from solver.errors import FitError, InputError
 from solver.fit import fit_orbit
-from solver.simulate.defects.defect import Case
+from solver.simulate.defects.defect import AppliedDefect
 from tests.benchmarks.machine import write
 from tests.campaigns.carried import carry_over
 from tests.campaigns.defects import SETTINGS, pulls, sparse_orbit
@@ -104,7 +104,7 @@ def of_truth(wanted: Trial, result: FitResult) -> dict[str, float | int]:
         return {}
     of_survey = replace(SETTINGS, seed=wanted.orbit)
     orbit_id = wanted.orbit % SETTINGS.orbits
-    defect = Case(case.name, wanted.factor * case.amplitude, of_survey, orbit_id)
+    defect = AppliedDefect(case.name, wanted.factor * case.amplitude, of_survey, orbit_id)
     found = all_deviations(defect, result)
     if not found:
         return {}

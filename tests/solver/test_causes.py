@@ -12,7 +12,7 @@ from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
 from solver.fit import fit_orbit
 from solver.simulate.catalogue import reference_catalogue, truth_catalogue
-from solver.simulate.defects.defect import Case
+from solver.simulate.defects.defect import AppliedDefect
 from solver.simulate.measure import measure_orbit
 from tests.campaigns.defects import SETTINGS, pulls
 from tests.campaigns.true_causes import all_deviations, deviations, true_terms
@@ -51,7 +51,7 @@ def pull_of(result):
 def case_of(name, text):
     """Return a defect of the orbit, with the amplitude as a number in its unit."""
     amplitude = float(re.match(r"[\d.]+", text)[0])
-    return Case(name, amplitude, replace(SETTINGS, seed=SEED))
+    return AppliedDefect(name, amplitude, replace(SETTINGS, seed=SEED))
 
 
 @pytest.mark.parametrize("name", CAUSES)

@@ -6,7 +6,7 @@ from jaxtyping import Float
 
 from solver.data.defect_schema import AFFECTED, NO_MEASUREMENT
 from solver.errors import InputError
-from solver.simulate.defects.defect import Altered, Case
+from solver.simulate.defects.defect import Altered, AppliedDefect
 from solver.simulate.sky import icrs_to_galactic
 from solver.units import MAS_PER_DEG
 
@@ -21,16 +21,18 @@ _WAVES = 8
 _WAVELENGTHS_DEG = (1.5, 3.0)
 
 
-def reference_errors(case: Case, catalogue: pd.DataFrame, truth: pd.DataFrame) -> Altered:
+def reference_errors(
+    applied: AppliedDefect, catalogue: pd.DataFrame, truth: pd.DataFrame
+) -> Altered:
     """Enlarge the errors of the reference stars; the stated uncertainties remain."""
     chosen = catalogue["is_reference"].to_numpy()
     result = catalogue.copy()
     error = catalogue.loc[chosen, _ASTROMETRY].to_numpy() - truth.loc[chosen, _ASTROMETRY]
-    result.loc[chosen, _ASTROMETRY] += case.amplitude * error.to_numpy()
+    result.loc[chosen, _ASTROMETRY] += applied.amplitude * error.to_numpy()
     return Altered(result, _sources(catalogue.iloc[:0]))
 
 
-def binaries(case: Case, catalogue: pd.DataFrame, truth: pd.DataFrame) -> Altered:
+def binaries(applied: AppliedDefect, catalogue: pd.DataFrame, truth: pd.DataFrame) -> Altered:
     """Give wrong proper motions to reference stars around the target, which most orbits see.
 
     Raises
@@ -39,7 +41,7 @@ def binaries(case: Case, catalogue: pd.DataFrame, truth: pd.DataFrame) -> Altere
         If there are fewer reference stars around the target.
     """
     del truth
-    settings, number = case.settings, round(case.amplitude)
+    settings, number = applied.settings, round(applied.amplitude)
     l_deg, b_deg = icrs_to_galactic(catalogue["ra"].to_numpy(), catalogue["dec"].to_numpy())
     near = catalogue["is_reference"].to_numpy().copy()
     for value, centre in zip((l_deg, b_deg), settings.target_deg, strict=True):
@@ -47,10 +49,10 @@ def binaries(case: Case, catalogue: pd.DataFrame, truth: pd.DataFrame) -> Altere
     rows = np.flatnonzero(near)
     if len(rows) < number:
         raise InputError(
-            f"defect {case.name}: expected at most {len(rows)}, the number of reference stars "
+            f"defect {applied.name}: expected at most {len(rows)}, the number of reference stars "
             f"within {settings.pair_spread_deg:g} deg of the target, found {number}"
         )
-    rng = case.survey_rng()
+    rng = applied.survey_rng()
     rows = np.sort(rng.permutation(rows)[:number])
     angle = rng.uniform(0.0, 2.0 * np.pi, number)
     result = catalogue.copy()
@@ -61,14 +63,14 @@ def binaries(case: Case, catalogue: pd.DataFrame, truth: pd.DataFrame) -> Altere
     return Altered(result, _sources(catalogue.iloc[rows]))
 
 
-def zonal_errors(case: Case, catalogue: pd.DataFrame, truth: pd.DataFrame) -> Altered:
+def zonal_errors(applied: AppliedDefect, catalogue: pd.DataFrame, truth: pd.DataFrame) -> Altered:
     """Displace all sources by a smooth field; its rms at the reference stars is the amplitude."""
     l_deg, b_deg = icrs_to_galactic(truth["ra"].to_numpy(), truth["dec"].to_numpy())
-    at, rng = np.stack([l_deg, b_deg], axis=1), case.survey_rng()
+    at, rng = np.stack([l_deg, b_deg], axis=1), applied.survey_rng()
     east, north = (_smooth(at, rng) for _ in range(2))
     references = catalogue["is_reference"].to_numpy()
     east, north = (
-        case.amplitude / MAS_PER_DEG * wave / np.sqrt(np.mean(wave[references] ** 2))
+        applied.amplitude / MAS_PER_DEG * wave / np.sqrt(np.mean(wave[references] ** 2))
         for wave in (east, north)
     )
     east = east / np.cos(np.radians(truth["dec"].to_numpy()))

@@ -1,7 +1,7 @@
 """Defects of the data: measurements, observer, reference catalogue and times."""
 
 from solver.simulate.defects import catalogue, measurements, observer
-from solver.simulate.defects.defect import Defect, Stage
+from solver.simulate.defects.defect import Defect, DefectStage
 
 DATA_DEFECTS = (
     Defect(
@@ -13,7 +13,7 @@ DATA_DEFECTS = (
         "Amplitude: their share.",
         stands_for="cosmic rays, defective pixels, neighbours within the image",
         reference="Lindegren et al. 2012, A&A 538, A78 (treatment of outliers in Gaia)",
-        stage=Stage.MEASUREMENTS,
+        stage=DefectStage.MEASUREMENTS,
         apply=measurements.outliers,
         high=90.0,
     ),
@@ -26,7 +26,7 @@ DATA_DEFECTS = (
         "Amplitude: the share of measurements with a wrong id.",
         stands_for="errors of the cross-match, in crowded fields as of Gaia",
         reference="Torra et al. 2021, A&A 649, A10",
-        stage=Stage.MEASUREMENTS,
+        stage=DefectStage.MEASUREMENTS,
         apply=measurements.swapped,
         high=90.0,
     ),
@@ -39,7 +39,7 @@ DATA_DEFECTS = (
         "share. The solution has fewer data and is not wrong.",
         stands_for="incompleteness of detection and cross-match",
         reference="Torra et al. 2021, A&A 649, A10",
-        stage=Stage.MEASUREMENTS,
+        stage=DefectStage.MEASUREMENTS,
         apply=measurements.missing,
         high=90.0,
     ),
@@ -52,7 +52,7 @@ DATA_DEFECTS = (
         "phase, and the table of exposures has the velocity zero. Amplitude: its speed.",
         stands_for="aberration by JASMINE's orbital motion (paper, section Discussion)",
         reference="Klioner 2003, AJ 125, 1580",
-        stage=Stage.OBSERVER,
+        stage=DefectStage.OBSERVER,
         apply=observer.satellite_velocity,
         high=100.0,
     ),
@@ -65,7 +65,7 @@ DATA_DEFECTS = (
         "uncertainties allow. Amplitude: actual over stated error, less one.",
         stands_for="Gaia's formal uncertainties, which are too small by 5 to 30 %",
         reference="Fabricius et al. 2021, A&A 649, A5",
-        stage=Stage.CATALOGUE,
+        stage=DefectStage.CATALOGUE,
         apply=catalogue.reference_errors,
         low=-100.0,
         high=1e4,
@@ -79,7 +79,7 @@ DATA_DEFECTS = (
         "6.5 mas at 13 yr, in random directions. Amplitude: their number.",
         stands_for="binaries whose photocentre moved during Gaia's observations",
         reference="Kervella et al. 2019, A&A 623, A72; Halbwachs et al. 2023, A&A 674, A9",
-        stage=Stage.CATALOGUE,
+        stage=DefectStage.CATALOGUE,
         apply=catalogue.binaries,
         low=1.0,
         high=1e4,
@@ -94,7 +94,7 @@ DATA_DEFECTS = (
         "1.5 to 3 deg. Amplitude: its rms at the reference stars, along each axis.",
         stands_for="errors of Gaia that neighbouring stars share",
         reference="Lindegren et al. 2021, A&A 649, A2; Vasiliev & Baumgardt 2021, MNRAS 505, 5978",
-        stage=Stage.CATALOGUE,
+        stage=DefectStage.CATALOGUE,
         apply=catalogue.zonal_errors,
         high=1e3,
     ),
@@ -107,7 +107,7 @@ DATA_DEFECTS = (
         stands_for="an error of the clock or of the time scale, or another epoch of the catalogue; "
         "the same sources, and the Earth's velocity, at another time",
         reference="Klioner 2003, AJ 125, 1580",
-        stage=Stage.EXPOSURES,
+        stage=DefectStage.EXPOSURES,
         apply=observer.exposure_times,
         low=-1e8,
         high=1e8,

@@ -14,18 +14,18 @@ from solver.data.instrument import Instrument
 from solver.simulate.streams import Stream, generator
 
 
-class Stage(Enum):
+class DefectStage(Enum):
     """Where a defect acts, in the order of application; the value is the text in the documents.
 
-    The function of a defect gets its `Case` and, for each stage:
+    The function of a defect gets its `AppliedDefect` and, for each stage:
 
     | stage        | further arguments                   | returns                              |
     |--------------|-------------------------------------|--------------------------------------|
     | CATALOGUE    | `CATALOGUE` and `TRUTH` tables      | `Altered` catalogue                  |
     | OBSERVER     | attitude, as from `orbit_attitude`  | attitude                             |
-    | FOCAL_PLANE  | `Rows`                              | displacement, um, shape (obs, 2)     |
-    | DETECTOR     | `Rows`                              | displacement, pixels, shape (obs, 2) |
-    | NOISE        | `Rows`                              | noise over stated sigma, shape (obs,)|
+    | FOCAL_PLANE  | `TrueRows`                          | displacement, um, shape (obs, 2)     |
+    | DETECTOR     | `TrueRows`                          | displacement, pixels, shape (obs, 2) |
+    | NOISE        | `TrueRows`                          | noise over stated sigma, shape (obs,)|
     | MEASUREMENTS | `MEASUREMENT` table                 | `Altered` table                      |
     | EXPOSURES    | `ENVIRONMENT` table                 | table                                |
     """
@@ -53,7 +53,7 @@ class Defect:
     stands_for : the real effect for which it stands
     reference : literature
     stage : where it acts
-    apply : the function that makes it; arguments and result as in `Stage`
+    apply : the function that makes it; arguments and result as in `DefectStage`
     low, high : limits of the amplitude, in `unit`
     is_count : whether the amplitude is a whole number
     needs_magnitudes : whether it depends on the magnitudes of the stars
@@ -66,7 +66,7 @@ class Defect:
     does: str
     stands_for: str
     reference: str
-    stage: Stage
+    stage: DefectStage
     apply: Callable[..., Any]
     low: float = 0.0
     high: float = 1e6
@@ -80,7 +80,7 @@ class Defect:
 
 
 @dataclass(frozen=True)
-class Case:
+class AppliedDefect:
     """A defect with its amplitude in one survey, and its random numbers.
 
     Attributes
@@ -112,7 +112,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Rows:
+class TrueRows:
     """The measurements of one orbit before noise.
 
     Attributes
@@ -133,7 +133,9 @@ class Rows:
     attitude: pd.DataFrame
     instrument: Instrument
 
-    def moved(self, ideal: Float[np.ndarray, "obs 2"], pixel: Float[np.ndarray, "obs 2"]) -> "Rows":
+    def moved(
+        self, ideal: Float[np.ndarray, "obs 2"], pixel: Float[np.ndarray, "obs 2"]
+    ) -> "TrueRows":
         """Return the same measurements at other places."""
         return replace(self, ideal=ideal, pixel=pixel)
 
@@ -156,6 +158,6 @@ def elapsed(attitude: pd.DataFrame) -> Float[np.ndarray, " exp"]:
     return (time - time.min()) / max(float(np.ptp(time)), 1e-9)
 
 
-def survey_time(case: Case) -> float:
+def survey_time(applied: AppliedDefect) -> float:
     """Return the number of the orbit as a fraction: 0 for the survey's first, 1 for its last."""
-    return case.orbit_id / max(case.settings.orbits - 1, 1)
+    return applied.orbit_id / max(applied.settings.orbits - 1, 1)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from solver.simulate.defects.defect import Case, Rows
+from solver.simulate.defects.defect import AppliedDefect, TrueRows
 from solver.simulate.magnitudes import NOISE_MAGNITUDE
 from solver.units import RAD_PER_ARCSEC, RAD_PER_DEG
 
@@ -21,19 +21,19 @@ class Motion(NamedTuple):
     angle: float
 
 
-def motion(case: Case, n_detectors: int, n_exposures: int) -> Motion:
+def motion(applied: AppliedDefect, n_detectors: int, n_exposures: int) -> Motion:
     """Return which detector of the orbit moves, and when."""
-    rng = case.orbit_rng()
+    rng = applied.orbit_rng()
     detector = int(rng.integers(n_detectors))
     exposure = int(np.ceil(rng.uniform(*_MOTION) * n_exposures))
     return Motion(detector, exposure, float(rng.uniform(0.0, 2.0 * np.pi)))
 
 
-def detector_shift(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def detector_shift(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Shift one detector on the focal plane, at a random time in mid-orbit."""
-    moves = _motion(case, rows)
+    moves = _motion(applied, rows)
     # The star stays where it is on the focal plane, and so moves back on the detector.
-    shift = -case.amplitude * np.array([np.cos(moves.angle), np.sin(moves.angle)])
+    shift = -applied.amplitude * np.array([np.cos(moves.angle), np.sin(moves.angle)])
     detector = rows.instrument.detectors[moves.detector]
     pitch = np.array([detector.pitch_x_um, detector.pitch_y_um])
     return (
@@ -43,31 +43,31 @@ def detector_shift(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     )
 
 
-def detector_turn(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def detector_turn(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Turn one detector about its centre, at a random time in mid-orbit."""
-    moves = _motion(case, rows)
+    moves = _motion(applied, rows)
     pitch = rows.of_detector("pitch_x_um", "pitch_y_um")
-    turned = (pitch * rows.pixel) @ _rotation(RAD_PER_ARCSEC * case.amplitude).T / pitch
+    turned = (pitch * rows.pixel) @ _rotation(RAD_PER_ARCSEC * applied.amplitude).T / pitch
     return _after(moves, rows)[:, None] * (turned - rows.pixel)
 
 
-def charge_transfer(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def charge_transfer(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Shift stars along y, in proportion to the rows that their charge crosses and to flux^-1/2."""
     crossed = rows.pixel[:, 1] / rows.of_detector("n_y")[:, 0] + 0.5
     faintness = 10.0 ** (0.2 * (rows.magnitude - NOISE_MAGNITUDE))
-    return np.stack([np.zeros_like(crossed), case.amplitude * crossed * faintness], axis=1)
+    return np.stack([np.zeros_like(crossed), applied.amplitude * crossed * faintness], axis=1)
 
 
-def pixel_phase(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def pixel_phase(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Shift stars by a sine of their position within the pixel, along both axes."""
-    return case.amplitude * np.sin(2.0 * np.pi * rows.pixel)
+    return applied.amplitude * np.sin(2.0 * np.pi * rows.pixel)
 
 
-def _motion(case: Case, rows: Rows) -> Motion:
-    return motion(case, len(rows.instrument.detectors), len(rows.attitude))
+def _motion(applied: AppliedDefect, rows: TrueRows) -> Motion:
+    return motion(applied, len(rows.instrument.detectors), len(rows.attitude))
 
 
-def _after(moves: Motion, rows: Rows) -> Bool[np.ndarray, " obs"]:
+def _after(moves: Motion, rows: TrueRows) -> Bool[np.ndarray, " obs"]:
     """Return which measurements the moved detector took."""
     return (rows.detector == moves.detector) & (rows.exposure >= moves.exposure)
 

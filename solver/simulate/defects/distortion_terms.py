@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from solver.simulate.defects.defect import Case, elapsed, survey_time
+from solver.simulate.defects.defect import AppliedDefect, elapsed, survey_time
 from solver.units import SECONDS_PER_DAY
 
 # Period of a circular orbit 600 km above the Earth, the paper's section "Discussion".
@@ -32,37 +32,37 @@ class AddedTerms(NamedTuple):
     change: Float[np.ndarray, " exp"]
 
 
-def drifting(case: Case, attitude: pd.DataFrame) -> AddedTerms:
+def drifting(applied: AppliedDefect, attitude: pd.DataFrame) -> AddedTerms:
     """Return quadratic terms that change linearly with time; zero in the middle of the orbit."""
-    return _added(case, _QUADRATIC, elapsed(attitude) - 0.5)
+    return _added(applied, _QUADRATIC, elapsed(attitude) - 0.5)
 
 
-def oscillating(case: Case, attitude: pd.DataFrame) -> AddedTerms:
+def oscillating(applied: AppliedDefect, attitude: pd.DataFrame) -> AddedTerms:
     """Return quadratic terms that change with the phase of the satellite's orbit."""
     seconds = SECONDS_PER_DAY * (attitude["obstime"] - attitude["obstime"].min())
-    phase = case.orbit_rng().uniform(0.0, 2.0 * np.pi)
+    phase = applied.orbit_rng().uniform(0.0, 2.0 * np.pi)
     angle = 2.0 * np.pi * seconds.to_numpy() / ORBITAL_PERIOD_S + phase
-    return _added(case, _QUADRATIC, np.cos(angle))
+    return _added(applied, _QUADRATIC, np.cos(angle))
 
 
-def stepping(case: Case, attitude: pd.DataFrame) -> AddedTerms:
+def stepping(applied: AppliedDefect, attitude: pd.DataFrame) -> AddedTerms:
     """Return cubic terms that the second half of the fields has."""
     fields = attitude["field_id"].to_numpy()
     later = fields >= np.unique(fields)[len(np.unique(fields)) // 2]
-    return _added(case, _CUBIC, later.astype(float))
+    return _added(applied, _CUBIC, later.astype(float))
 
 
-def changing_with_orbits(case: Case, attitude: pd.DataFrame) -> AddedTerms:
+def changing_with_orbits(applied: AppliedDefect, attitude: pd.DataFrame) -> AddedTerms:
     """Return quadratic terms that change linearly from orbit to orbit; zero in mid-survey."""
-    return _added(case, _QUADRATIC, np.full(len(attitude), survey_time(case) - 0.5))
+    return _added(applied, _QUADRATIC, np.full(len(attitude), survey_time(applied) - 0.5))
 
 
-def of_higher_order(case: Case, attitude: pd.DataFrame) -> AddedTerms:
+def of_higher_order(applied: AppliedDefect, attitude: pd.DataFrame) -> AddedTerms:
     """Return constant terms of degree 6 and 7, above the fit's default order."""
-    return _added(case, _ABOVE_FIFTH, np.ones(len(attitude)))
+    return _added(applied, _ABOVE_FIFTH, np.ones(len(attitude)))
 
 
-ADDED_TERMS: Mapping[str, Callable[[Case, pd.DataFrame], AddedTerms]] = MappingProxyType(
+ADDED_TERMS: Mapping[str, Callable[[AppliedDefect, pd.DataFrame], AddedTerms]] = MappingProxyType(
     {
         "distortion-drift": drifting,
         "distortion-orbital": oscillating,
@@ -74,13 +74,15 @@ ADDED_TERMS: Mapping[str, Callable[[Case, pd.DataFrame], AddedTerms]] = MappingP
 """Name of a defect of the distortion -> what it adds, for the exposures of an orbit."""
 
 
-def _added(case: Case, degrees: tuple[int, ...], change: Float[np.ndarray, " exp"]) -> AddedTerms:
+def _added(
+    applied: AppliedDefect, degrees: tuple[int, ...], change: Float[np.ndarray, " exp"]
+) -> AddedTerms:
     """Return terms of some degrees.
 
     The coefficients, those of x and y together, are a random direction of the survey with the
     amplitude as length (root of the sum of squares, um).
     """
     terms = [(degree - j, j) for degree in degrees for j in range(degree + 1)]
-    coefficients = case.survey_rng().standard_normal((len(terms), 2))
-    coefficients *= case.amplitude / np.linalg.norm(coefficients)
+    coefficients = applied.survey_rng().standard_normal((len(terms), 2))
+    coefficients *= applied.amplitude / np.linalg.norm(coefficients)
     return AddedTerms(terms, coefficients, change)

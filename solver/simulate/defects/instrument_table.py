@@ -1,7 +1,7 @@
 """Defects of the instrument: its focal plane, its detectors and its noise."""
 
 from solver.simulate.defects import detectors, noise, optics
-from solver.simulate.defects.defect import Defect, Stage
+from solver.simulate.defects.defect import Defect, DefectStage
 
 INSTRUMENT_DEFECTS = (
     Defect(
@@ -14,7 +14,7 @@ INSTRUMENT_DEFECTS = (
         stands_for="slow thermal deformation of the optics, which Plate Analysis neglects "
         "(paper, section Plate Analysis)",
         reference="Anderson 2007, ACS ISR 2007-08 (drift of the distortion of HST's ACS)",
-        stage=Stage.FOCAL_PLANE,
+        stage=DefectStage.FOCAL_PLANE,
         apply=optics.distortion_drift,
         high=1e3,
     ),
@@ -28,7 +28,7 @@ INSTRUMENT_DEFECTS = (
         stands_for="irradiation by the Earth from changing angles (paper, introduction); "
         "the breathing of HST",
         reference="Lallo et al. 2006, Proc. SPIE 6270, 62701N",
-        stage=Stage.FOCAL_PLANE,
+        stage=DefectStage.FOCAL_PLANE,
         apply=optics.distortion_orbital,
         high=1e3,
     ),
@@ -42,7 +42,7 @@ INSTRUMENT_DEFECTS = (
         stands_for="stress that is released when the satellite turns to another field; "
         "jumps of Gaia's basic angle",
         reference="Lindegren et al. 2018, A&A 616, A2",
-        stage=Stage.FOCAL_PLANE,
+        stage=DefectStage.FOCAL_PLANE,
         apply=optics.distortion_step,
         high=1e3,
     ),
@@ -56,7 +56,7 @@ INSTRUMENT_DEFECTS = (
         "to the last, root of the sum of squares.",
         stands_for="ageing of the optics, outgassing; each orbit alone is without flaw",
         reference="Anderson 2007, ACS ISR 2007-08 (drift of the distortion of HST's ACS)",
-        stage=Stage.FOCAL_PLANE,
+        stage=DefectStage.FOCAL_PLANE,
         apply=optics.distortion_trend,
         high=1e3,
     ),
@@ -69,7 +69,7 @@ INSTRUMENT_DEFECTS = (
         "1e-3 between orbits. Amplitude: change from the first orbit of the survey to the last.",
         stands_for="ageing and cooling of the telescope; each orbit alone is without flaw",
         reference="Lallo et al. 2006, Proc. SPIE 6270, 62701N (focus of HST over years)",
-        stage=Stage.FOCAL_PLANE,
+        stage=DefectStage.FOCAL_PLANE,
         apply=optics.focal_trend,
         low=-1e4,
         high=1e4,
@@ -84,7 +84,7 @@ INSTRUMENT_DEFECTS = (
         stands_for="polishing errors of the mirrors; the fine structure that HST's and Euclid's "
         "polynomials leave",
         reference="Bellini et al. 2011, PASP 123, 622; Libralato et al. 2024, A&A 692, A96",
-        stage=Stage.FOCAL_PLANE,
+        stage=DefectStage.FOCAL_PLANE,
         apply=optics.distortion_order,
         high=1e3,
     ),
@@ -97,7 +97,7 @@ INSTRUMENT_DEFECTS = (
         "each exposure; their mean is unchanged. Amplitude: its standard deviation.",
         stands_for="astigmatic deformation; the published code fits a focal length for each axis",
         reference="Anderson 2007, ACS ISR 2007-08 (linear terms of HST's ACS)",
-        stage=Stage.FOCAL_PLANE,
+        stage=DefectStage.FOCAL_PLANE,
         apply=optics.focal_anisotropy,
         high=1e4,
     ),
@@ -111,7 +111,7 @@ INSTRUMENT_DEFECTS = (
         stands_for="errors of the attitude control (paper, section Discussion); Gaia's "
         "micro-clanks",
         reference="Lindegren et al. 2016, A&A 595, A4",
-        stage=Stage.FOCAL_PLANE,
+        stage=DefectStage.FOCAL_PLANE,
         apply=optics.pointing_jitter,
         high=1e5,
     ),
@@ -124,7 +124,7 @@ INSTRUMENT_DEFECTS = (
         "quarters of the exposures. Amplitude: the shift on the focal plane.",
         stands_for="thermal motion of the focal plane; the motion of the chips of HST's WFPC2",
         reference="Anderson & King 2003, PASP 115, 113",
-        stage=Stage.DETECTOR,
+        stage=DefectStage.DETECTOR,
         apply=detectors.detector_shift,
         high=1e3,
     ),
@@ -137,7 +137,7 @@ INSTRUMENT_DEFECTS = (
         "quarters of the exposures. Amplitude: the angle, in the sense of the model's rotation.",
         stands_for="thermal motion of the focal plane; Gaia's geometric calibration in time",
         reference="Lindegren et al. 2012, A&A 538, A78",
-        stage=Stage.DETECTOR,
+        stage=DefectStage.DETECTOR,
         apply=detectors.detector_turn,
         low=-1e4,
         high=1e4,
@@ -151,7 +151,7 @@ INSTRUMENT_DEFECTS = (
         "crosses and to flux^-1/2. Amplitude: shift of a star of magnitude 17 at the far end.",
         stands_for="charge that traps hold back, in HST's ACS and in Gaia",
         reference="Anderson & Bedin 2010, PASP 122, 1035; Short et al. 2013, MNRAS 430, 3078",
-        stage=Stage.DETECTOR,
+        stage=DefectStage.DETECTOR,
         apply=detectors.charge_transfer,
         low=-1e3,
         high=1e3,
@@ -166,7 +166,7 @@ INSTRUMENT_DEFECTS = (
         "edges. Amplitude: that of the sine.",
         stands_for="an imperfect model of an undersampled image, as in HST, Euclid and JASMINE",
         reference="Anderson & King 2000, PASP 112, 1360",
-        stage=Stage.DETECTOR,
+        stage=DefectStage.DETECTOR,
         apply=detectors.pixel_phase,
         low=-1e3,
         high=1e3,
@@ -180,7 +180,7 @@ INSTRUMENT_DEFECTS = (
         "where the amplitude is negative. Amplitude: noise over uncertainty, less one.",
         stands_for="a wrong gain or read-out noise; the excess noise of Gaia's sources",
         reference="Lindegren et al. 2012, A&A 538, A78",
-        stage=Stage.NOISE,
+        stage=DefectStage.NOISE,
         apply=noise.noise,
         low=-99.0,
         high=1e4,
@@ -196,7 +196,7 @@ INSTRUMENT_DEFECTS = (
         stands_for="jitter during the exposure (paper, section Discussion); Gaia's excess "
         "attitude noise",
         reference="Lindegren et al. 2012, A&A 538, A78",
-        stage=Stage.NOISE,
+        stage=DefectStage.NOISE,
         apply=noise.noise_of_exposures,
         high=300.0,
     ),
@@ -209,7 +209,7 @@ INSTRUMENT_DEFECTS = (
         "middle of the range, 13.75. Amplitude: its excess over one at the faint end, 19.5.",
         stands_for="a wrong error model, as found for Gaia's bright and faint stars",
         reference="Fabricius et al. 2021, A&A 649, A5",
-        stage=Stage.NOISE,
+        stage=DefectStage.NOISE,
         apply=noise.noise_of_magnitudes,
         low=-99.0,
         high=99.0,

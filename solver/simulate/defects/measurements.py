@@ -5,16 +5,16 @@ import pandas as pd
 
 from solver.data.defect_schema import AFFECTED
 from solver.data.schema import EXPOSURE_KEY
-from solver.simulate.defects.defect import Altered, Case
+from solver.simulate.defects.defect import Altered, AppliedDefect
 
 # Errors of outliers in sigmas, log-uniform: from what looks like noise to a neighbour's light.
 OUTLIER_SIGMAS = (5.0, 50.0)
 
 
-def outliers(case: Case, table: pd.DataFrame) -> Altered:
+def outliers(applied: AppliedDefect, table: pd.DataFrame) -> Altered:
     """Add errors of many sigmas, in random directions, to a share of the measurements."""
-    rng = case.orbit_rng()
-    rows = _share(case, table, rng)
+    rng = applied.orbit_rng()
+    rows = _share(applied, table, rng)
     low, high = OUTLIER_SIGMAS
     sigmas = np.exp(rng.uniform(np.log(low), np.log(high), len(rows)))
     angle = rng.uniform(0.0, 2.0 * np.pi, len(rows))
@@ -27,16 +27,16 @@ def outliers(case: Case, table: pd.DataFrame) -> Altered:
     return Altered(table.assign(nx=nx, ny=ny), affected)
 
 
-def swapped(case: Case, table: pd.DataFrame) -> Altered:
+def swapped(applied: AppliedDefect, table: pd.DataFrame) -> Altered:
     """Exchange the ids of a share of the measurements with their neighbours on the detector."""
-    rng = case.orbit_rng()
+    rng = applied.orbit_rng()
     group = table.groupby([*EXPOSURE_KEY, "detector_id"]).ngroup().to_numpy()
     order = np.argsort(group, kind="stable")
     starts = np.searchsorted(group[order], np.arange(group.max(initial=-1) + 2))
     place = table[["nx", "ny"]].to_numpy()
     source = table["source_id"].to_numpy().copy()
     is_free = np.ones(len(table), dtype=bool)
-    wanted, changed = round(0.5 * case.amplitude * len(table)), []
+    wanted, changed = round(0.5 * applied.amplitude * len(table)), []
     for row in rng.permutation(len(table)):
         if len(changed) == wanted:
             break
@@ -55,15 +55,15 @@ def swapped(case: Case, table: pd.DataFrame) -> Altered:
     return Altered(result, _affected(result.iloc[both]).assign(true_source_id=truth))
 
 
-def missing(case: Case, table: pd.DataFrame) -> Altered:
+def missing(applied: AppliedDefect, table: pd.DataFrame) -> Altered:
     """Leave a share of the measurements out."""
-    rows = _share(case, table, case.orbit_rng())
+    rows = _share(applied, table, applied.orbit_rng())
     return Altered(table.drop(table.index[rows]), _affected(table.iloc[rows]))
 
 
-def _share(case: Case, table: pd.DataFrame, rng: np.random.Generator) -> np.ndarray:
+def _share(applied: AppliedDefect, table: pd.DataFrame, rng: np.random.Generator) -> np.ndarray:
     """Return the row numbers of a random share of a table, sorted."""
-    number = round(case.amplitude * len(table))
+    number = round(applied.amplitude * len(table))
     return np.sort(rng.permutation(len(table))[:number])
 
 

@@ -4,7 +4,7 @@ import erfa
 import numpy as np
 import pandas as pd
 
-from solver.simulate.defects.defect import Case
+from solver.simulate.defects.defect import AppliedDefect
 from solver.simulate.defects.distortion_terms import ORBITAL_PERIOD_S
 from solver.units import SECONDS_PER_DAY
 
@@ -12,7 +12,7 @@ _MJD_ZERO = 2400000.5
 _VELOCITY = ["satellite_vx", "satellite_vy", "satellite_vz"]
 
 
-def satellite_velocity(case: Case, attitude: pd.DataFrame) -> pd.DataFrame:
+def satellite_velocity(applied: AppliedDefect, attitude: pd.DataFrame) -> pd.DataFrame:
     """Move the observer on a circular orbit about the Earth, which the table does not tell.
 
     The orbit is that of a dawn-to-dusk satellite: its plane is at right angles to the Sun. The
@@ -25,13 +25,13 @@ def satellite_velocity(case: Case, attitude: pd.DataFrame) -> pd.DataFrame:
     first /= np.linalg.norm(first)
     second = np.cross(sun, first)
     turns = SECONDS_PER_DAY * (time - time.min()) / ORBITAL_PERIOD_S
-    phase = 2.0 * np.pi * (turns + case.orbit_rng().random())
-    velocity = case.amplitude * (
+    phase = 2.0 * np.pi * (turns + applied.orbit_rng().random())
+    velocity = applied.amplitude * (
         np.cos(phase)[:, None] * first[None, :] + np.sin(phase)[:, None] * second[None, :]
     )
     return attitude.assign(**dict(zip(_VELOCITY, velocity.T, strict=True)))
 
 
-def exposure_times(case: Case, exposures: pd.DataFrame) -> pd.DataFrame:
+def exposure_times(applied: AppliedDefect, exposures: pd.DataFrame) -> pd.DataFrame:
     """Record times that are too late."""
-    return exposures.assign(obstime=exposures["obstime"] + case.amplitude / SECONDS_PER_DAY)
+    return exposures.assign(obstime=exposures["obstime"] + applied.amplitude / SECONDS_PER_DAY)

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.polynomial import legendre
 
-from solver.simulate.defects.defect import Case, Rows, survey_time
+from solver.simulate.defects.defect import AppliedDefect, TrueRows, survey_time
 from solver.simulate.defects.distortion_terms import (
     AddedTerms,
     changing_with_orbits,
@@ -21,45 +21,45 @@ EXPOSURES_PER_JITTER = 32
 _JITTER_HARMONICS = 4
 
 
-def distortion_drift(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def distortion_drift(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Change the quadratic terms linearly with time; zero in the middle of the orbit."""
-    return _distorted(rows, drifting(case, rows.attitude))
+    return _distorted(rows, drifting(applied, rows.attitude))
 
 
-def distortion_orbital(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def distortion_orbital(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Change the quadratic terms with the phase of the satellite's orbit."""
-    return _distorted(rows, oscillating(case, rows.attitude))
+    return _distorted(rows, oscillating(applied, rows.attitude))
 
 
-def distortion_step(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def distortion_step(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Change the cubic terms between the two halves of the fields."""
-    return _distorted(rows, stepping(case, rows.attitude))
+    return _distorted(rows, stepping(applied, rows.attitude))
 
 
-def distortion_trend(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def distortion_trend(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Change the quadratic terms from orbit to orbit; zero in the middle of the survey."""
-    return _distorted(rows, changing_with_orbits(case, rows.attitude))
+    return _distorted(rows, changing_with_orbits(applied, rows.attitude))
 
 
-def focal_trend(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def focal_trend(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Change the focal length from orbit to orbit; zero in the middle of the survey."""
-    return case.amplitude * (survey_time(case) - 0.5) * rows.ideal
+    return applied.amplitude * (survey_time(applied) - 0.5) * rows.ideal
 
 
-def distortion_order(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def distortion_order(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Add terms of degree 6 and 7, above the fit's default order."""
-    return _distorted(rows, of_higher_order(case, rows.attitude))
+    return _distorted(rows, of_higher_order(applied, rows.attitude))
 
 
-def focal_anisotropy(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def focal_anisotropy(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Let the focal length along y differ from that along x, anew in each exposure."""
-    ratio = case.amplitude * case.orbit_rng().standard_normal(len(rows.attitude))
+    ratio = applied.amplitude * applied.orbit_rng().standard_normal(len(rows.attitude))
     return 0.5 * ratio[rows.exposure, None] * np.array([-1.0, 1.0]) * rows.ideal
 
 
-def pointing_jitter(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
+def pointing_jitter(applied: AppliedDefect, rows: TrueRows) -> Float[np.ndarray, "obs 2"]:
     """Let the telescope swing while the detectors of some exposures are read row by row."""
-    exposures, swings = jitter(case, len(rows.attitude))
+    exposures, swings = jitter(applied, len(rows.attitude))
     number = np.full(len(rows.attitude), -1)
     number[exposures] = np.arange(len(exposures))
     moving = np.flatnonzero(number[rows.exposure] >= 0)
@@ -70,19 +70,19 @@ def pointing_jitter(case: Case, rows: Rows) -> Float[np.ndarray, "obs 2"]:
     swing = np.einsum("nhk,nahk->na", waves, swings[number[rows.exposure[moving]]])
     focal_length = rows.attitude["true_focal_length"].to_numpy()[rows.exposure[moving], None]
     displacement = np.zeros_like(rows.ideal)
-    displacement[moving] = case.amplitude * RAD_PER_MAS * focal_length * swing
+    displacement[moving] = applied.amplitude * RAD_PER_MAS * focal_length * swing
     return displacement
 
 
 def jitter(
-    case: Case, n_exposures: int
+    applied: AppliedDefect, n_exposures: int
 ) -> tuple[Int[np.ndarray, " jitter"], Float[np.ndarray, "jitter 2 2 harmonic"]]:
     """Return the indices of the exposures that jitter, and how.
 
     The coefficients are those of cosines and sines along x and y; the rms of each axis over the
     time of the reading is one.
     """
-    rng = case.orbit_rng()
+    rng = applied.orbit_rng()
     number = max(round(n_exposures / EXPOSURES_PER_JITTER), 1)
     exposures = np.sort(rng.permutation(n_exposures)[:number])
     swings = rng.standard_normal((number, 2, 2, _JITTER_HARMONICS))
@@ -90,7 +90,7 @@ def jitter(
     return exposures, swings / np.sqrt(0.5 * np.sum(swings**2, axis=(2, 3), keepdims=True))
 
 
-def _distorted(rows: Rows, added: AddedTerms) -> Float[np.ndarray, "obs 2"]:
+def _distorted(rows: TrueRows, added: AddedTerms) -> Float[np.ndarray, "obs 2"]:
     """Return the displacement by terms that are added to those of the distortion."""
     at = rows.ideal / rows.instrument.distortion_scale_um
     highest = max(map(max, added.degrees))

@@ -9,7 +9,13 @@ from jaxtyping import Float
 
 from solver.data.columns import numpy_dtype
 from solver.data.defect_schema import AFFECTED
-from solver.simulate.defects.defect import Altered, Case, Defect, Rows, Stage
+from solver.simulate.defects.defect import (
+    Altered,
+    AppliedDefect,
+    Defect,
+    DefectStage,
+    TrueRows,
+)
 from solver.simulate.defects.table import BY_NAME
 from solver.simulate.settings import SurveySettings
 from solver.units import factor_between
@@ -22,20 +28,20 @@ def none_affected() -> pd.DataFrame:
     return pd.DataFrame({name: np.empty(0, kind) for name, kind in _AFFECTED_TYPES.items()})
 
 
-def has_stage(settings: SurveySettings, *stages: Stage) -> bool:
+def has_stage(settings: SurveySettings, *stages: DefectStage) -> bool:
     """Return whether a survey has defects of any of the stages."""
     return any(BY_NAME[name].stage in stages for name in settings.amplitudes)
 
 
-def cases(
-    settings: SurveySettings, stage: Stage, orbit_id: int = 0
-) -> Iterator[tuple[Defect, Case]]:
+def applied_defects(
+    settings: SurveySettings, stage: DefectStage, orbit_id: int = 0
+) -> Iterator[tuple[Defect, AppliedDefect]]:
     """Yield the defects of a stage in the order of the table."""
     for name, amplitude in settings.amplitudes.items():
         defect = BY_NAME[name]
         if defect.stage is stage:
             factor = factor_between(defect.unit, defect.computed_in)
-            yield defect, Case(name, amplitude * factor, settings, orbit_id)
+            yield defect, AppliedDefect(name, amplitude * factor, settings, orbit_id)
 
 
 def defective_catalogue(
@@ -48,51 +54,53 @@ def defective_catalogue(
     catalogue, truth : with the same sources in the same order
     """
     parts = [none_affected()]
-    for defect, case in cases(settings, Stage.CATALOGUE):
-        catalogue, affected = defect.apply(case, catalogue, truth)
+    for defect, applied in applied_defects(settings, DefectStage.CATALOGUE):
+        catalogue, affected = defect.apply(applied, catalogue, truth)
         parts.append(_named(affected, defect))
     return Altered(catalogue, pd.concat(parts, ignore_index=True))
 
 
 def true_observer(attitude: pd.DataFrame, settings: SurveySettings, orbit_id: int) -> pd.DataFrame:
     """Return the attitude as it is, where the one without defects is what is recorded."""
-    for defect, case in cases(settings, Stage.OBSERVER, orbit_id):
-        attitude = defect.apply(case, attitude)
+    for defect, applied in applied_defects(settings, DefectStage.OBSERVER, orbit_id):
+        attitude = defect.apply(applied, attitude)
     return attitude
 
 
 def focal_displacement(
-    rows: Rows, settings: SurveySettings, orbit_id: int
+    rows: TrueRows, settings: SurveySettings, orbit_id: int
 ) -> Float[np.ndarray, "obs 2"]:
     """Return the displacement on the focal plane, um."""
     total = np.zeros_like(rows.ideal)
-    for defect, case in cases(settings, Stage.FOCAL_PLANE, orbit_id):
-        total += defect.apply(case, rows)
+    for defect, applied in applied_defects(settings, DefectStage.FOCAL_PLANE, orbit_id):
+        total += defect.apply(applied, rows)
     return total
 
 
 def displaced_pixels(
-    rows: Rows, settings: SurveySettings, orbit_id: int
+    rows: TrueRows, settings: SurveySettings, orbit_id: int
 ) -> Float[np.ndarray, "obs 2"]:
     """Return the positions on the detectors, each defect after those before it in the table."""
-    for defect, case in cases(settings, Stage.DETECTOR, orbit_id):
-        rows = replace(rows, pixel=rows.pixel + defect.apply(case, rows))
+    for defect, applied in applied_defects(settings, DefectStage.DETECTOR, orbit_id):
+        rows = replace(rows, pixel=rows.pixel + defect.apply(applied, rows))
     return rows.pixel
 
 
-def noise_ratio(rows: Rows, settings: SurveySettings, orbit_id: int) -> Float[np.ndarray, " obs"]:
+def noise_ratio(
+    rows: TrueRows, settings: SurveySettings, orbit_id: int
+) -> Float[np.ndarray, " obs"]:
     """Return the noise over the stated uncertainty."""
     ratio = np.ones(len(rows.exposure))
-    for defect, case in cases(settings, Stage.NOISE, orbit_id):
-        ratio = ratio * defect.apply(case, rows)
+    for defect, applied in applied_defects(settings, DefectStage.NOISE, orbit_id):
+        ratio = ratio * defect.apply(applied, rows)
     return ratio
 
 
 def defective_table(table: pd.DataFrame, settings: SurveySettings, orbit_id: int) -> Altered:
     """Return the table of measurements with its defects, and the measurements affected."""
     parts = [none_affected()]
-    for defect, case in cases(settings, Stage.MEASUREMENTS, orbit_id):
-        table, affected = defect.apply(case, table)
+    for defect, applied in applied_defects(settings, DefectStage.MEASUREMENTS, orbit_id):
+        table, affected = defect.apply(applied, table)
         parts.append(_named(affected, defect))
     return Altered(table, pd.concat(parts, ignore_index=True))
 
@@ -101,8 +109,8 @@ def recorded_exposures(
     exposures: pd.DataFrame, settings: SurveySettings, orbit_id: int
 ) -> pd.DataFrame:
     """Return the table of exposures of an orbit as it is recorded."""
-    for defect, case in cases(settings, Stage.EXPOSURES, orbit_id):
-        exposures = defect.apply(case, exposures)
+    for defect, applied in applied_defects(settings, DefectStage.EXPOSURES, orbit_id):
+        exposures = defect.apply(applied, exposures)
     return exposures
 
 

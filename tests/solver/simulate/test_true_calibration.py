@@ -7,8 +7,8 @@ import pytest
 from numpy.polynomial.legendre import legval2d
 
 from solver.data.instrument import MINI_MOCK
-from solver.simulate.defects.defect import Rows, Stage
-from solver.simulate.defects.stages import cases
+from solver.simulate.defects.defect import DefectStage, TrueRows
+from solver.simulate.defects.stages import applied_defects
 from solver.simulate.placement import place_detectors
 from solver.simulate.schedule import orbit_schedule
 from solver.simulate.settings import SurveySettings
@@ -41,7 +41,7 @@ def rows_of(schedule, settings):
     side = np.linspace(-900.0, 900.0, 5)
     grid = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     one = np.tile(np.repeat(np.arange(4), len(grid)), len(schedule))
-    return Rows(
+    return TrueRows(
         exposure=np.repeat(np.arange(len(schedule)), 4 * len(grid)),
         detector=one,
         ideal=20.0 * np.tile(grid, (4 * len(schedule), 1)),
@@ -56,7 +56,7 @@ def mean_of(settings, stage, is_used):
     """Return the rows of one exposure, and the mean displacement by the defects of a stage."""
     schedule = orbit_schedule(ORBIT, settings)
     rows = rows_of(schedule, settings)
-    total = sum(defect.apply(case, rows) for defect, case in cases(settings, stage, ORBIT))
+    total = sum(defect.apply(one, rows) for defect, one in applied_defects(settings, stage, ORBIT))
     first = rows.exposure == 0
     mean = np.reshape(total, (len(schedule), -1, 2))[is_used].mean(axis=0)
     return rows.ideal[first], rows.pixel[first], rows.detector[first], mean
@@ -86,7 +86,7 @@ def test_distortion_of_defects_is_its_mean_over_the_exposures_used(defects):
     schedule = orbit_schedule(ORBIT, settings)
     # Another part of the orbit has another mean.
     is_used = np.arange(len(schedule)) >= 40
-    places, _, _, mean = mean_of(settings, Stage.FOCAL_PLANE, is_used)
+    places, _, _, mean = mean_of(settings, DefectStage.FOCAL_PLANE, is_used)
     truth = truth_of(settings, schedule[is_used])
     before = displaced(truth_of(SETTINGS).coefficients, places)
     assert np.abs(mean).max() > 1e-3
@@ -99,7 +99,7 @@ def test_distortion_of_defects_is_its_mean_over_the_exposures_used(defects):
 @pytest.mark.parametrize("defect", ["detector-shift=0.1um", "detector-turn=2arcsec"])
 def test_moving_detector_is_at_its_mean_place(defect):
     settings = replace(SETTINGS, defects=(defect,))
-    _, pixel, detector, mean = mean_of(settings, Stage.DETECTOR, slice(None))
+    _, pixel, detector, mean = mean_of(settings, DefectStage.DETECTOR, slice(None))
     before, after = (truth_of(one).instrument.detectors for one in (SETTINGS, settings))
     expected = []
     for (x, y), number in zip(pixel, detector, strict=True):

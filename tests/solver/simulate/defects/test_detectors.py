@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.data.instrument import MINI_MOCK
-from solver.simulate.defects.defect import Case
+from solver.simulate.defects.defect import AppliedDefect
 from solver.simulate.defects.detectors import motion
 from tests.solver.simulate.defects.conftest import KEY, QUIET, on_focal_plane
 
@@ -68,7 +68,10 @@ def test_turn_is_that_of_a_rotated_detector(moved, measure):
 
 
 def test_another_orbit_moves_another_detector_or_at_another_time():
-    chosen = {motion(Case("detector-shift", 1.0, QUIET, number), 4, 96)[:2] for number in range(20)}
+    chosen = {
+        motion(AppliedDefect("detector-shift", 1.0, QUIET, number), 4, 96)[:2]
+        for number in range(20)
+    }
     assert {detector for detector, _ in chosen} == {0, 1, 2, 3}
     assert len(chosen) > 10
 

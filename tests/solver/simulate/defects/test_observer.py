@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from solver.data.instrument import MINI_MOCK
-from solver.simulate.defects.defect import Case
+from solver.simulate.defects.defect import AppliedDefect
 from solver.simulate.defects.observer import satellite_velocity
 from solver.simulate.placement import place_detectors
 from tests.solver.simulate.defects.conftest import ORBIT, QUIET
@@ -17,7 +17,7 @@ VELOCITY = ["satellite_vx", "satellite_vy", "satellite_vz"]
 
 @pytest.fixture
 def velocity(measure):
-    case = Case("satellite-velocity", 7.6, QUIET, ORBIT)
+    case = AppliedDefect("satellite-velocity", 7.6, QUIET, ORBIT)
     return satellite_velocity(case, measure().attitude)[VELOCITY].to_numpy()
 
 

@@ -6,7 +6,7 @@ import pytest
 from numpy.polynomial.legendre import legval2d
 
 from solver.data.instrument import MINI_MOCK
-from solver.simulate.defects.defect import Case, Rows
+from solver.simulate.defects.defect import AppliedDefect, TrueRows
 from solver.simulate.defects.distortion_terms import changing_with_orbits
 from solver.simulate.defects.optics import focal_trend, pointing_jitter
 from tests.solver.simulate.defects.conftest import ORBIT, SETTINGS, on_focal_plane, places
@@ -43,7 +43,7 @@ def test_drift_changes_the_quadratic_terms_by_its_amplitude(compare, measure):
 def test_trend_of_the_distortion_is_that_between_the_first_and_the_last_orbit(measure):
     attitude = measure().attitude
     first, middle, last = (
-        changing_with_orbits(Case("distortion-trend", 0.05, SETTINGS, orbit), attitude)
+        changing_with_orbits(AppliedDefect("distortion-trend", 0.05, SETTINGS, orbit), attitude)
         for orbit in (0, ORBIT, SETTINGS.orbits - 1)
     )
     assert {sum(pair) for pair in first.degrees} == {2}
@@ -56,9 +56,9 @@ def test_trend_of_the_focal_length_is_that_between_the_first_and_the_last_orbit(
     attitude = measure().attitude
     ideal = np.array([[1000.0, -2000.0]])
     one, nothing = np.zeros(1, dtype=int), np.zeros((1, 2))
-    rows = Rows(one, one, ideal, nothing, np.zeros(1), attitude, MINI_MOCK)
+    rows = TrueRows(one, one, ideal, nothing, np.zeros(1), attitude, MINI_MOCK)
     moved = [
-        focal_trend(Case("focal-trend", 1e-3, SETTINGS, orbit), rows)
+        focal_trend(AppliedDefect("focal-trend", 1e-3, SETTINGS, orbit), rows)
         for orbit in (0, SETTINGS.orbits - 1)
     ]
     np.testing.assert_allclose(moved[1] - moved[0], 1e-3 * ideal)
@@ -127,7 +127,7 @@ def test_jitter_has_the_rms_of_its_amplitude_along_each_axis(measure):
     exposure = np.repeat(np.arange(n_exposures), n_rows)
     y = np.tile((np.arange(n_rows) + 0.5) / n_rows * 1920.0 - 960.0, n_exposures)
     pixel = np.stack([np.zeros_like(y), y], axis=1)
-    rows = Rows(
+    rows = TrueRows(
         exposure=exposure,
         detector=np.zeros_like(exposure),
         ideal=np.zeros_like(pixel),
@@ -136,7 +136,7 @@ def test_jitter_has_the_rms_of_its_amplitude_along_each_axis(measure):
         attitude=measure().attitude,
         instrument=MINI_MOCK,
     )
-    shift = pointing_jitter(Case("pointing-jitter", 4.0, SETTINGS, ORBIT), rows)
+    shift = pointing_jitter(AppliedDefect("pointing-jitter", 4.0, SETTINGS, ORBIT), rows)
     focal_length = measure().attitude["true_focal_length"].to_numpy()[exposure]
     mas = np.degrees(shift / focal_length[:, None]) * 3.6e6
     rms = np.sqrt(np.mean(mas.reshape(n_exposures, n_rows, 2) ** 2, axis=1))

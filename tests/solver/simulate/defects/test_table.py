@@ -9,7 +9,7 @@ import pytest
 
 from solver.errors import InputError
 from solver.simulate.catalogue import reference_catalogue
-from solver.simulate.defects.defect import Stage
+from solver.simulate.defects.defect import DefectStage
 from solver.simulate.defects.stages import defective_catalogue
 from solver.simulate.defects.table import BY_NAME, DEFECTS
 from solver.simulate.defects.text import format_defect, parse_defects
@@ -108,11 +108,11 @@ def test_defect_leaves_the_catalogue_and_exposures_of_others(defect, measure, tr
     settings = replace(SETTINGS, defects=(text_of(defect),))
     reference = reference_catalogue(truth, settings)
     catalogue, _ = defective_catalogue(reference, truth, settings)
-    assert catalogue.equals(reference) == (defect.stage is not Stage.CATALOGUE)
+    assert catalogue.equals(reference) == (defect.stage is not DefectStage.CATALOGUE)
     without, orbit = measure(), measure(text_of(defect))
     pd.testing.assert_frame_equal(orbit.attitude, without.attitude)
-    assert orbit.exposures.equals(without.exposures) == (defect.stage is not Stage.EXPOSURES)
-    if defect.stage in (Stage.CATALOGUE, Stage.EXPOSURES):
+    assert orbit.exposures.equals(without.exposures) == (defect.stage is not DefectStage.EXPOSURES)
+    if defect.stage in (DefectStage.CATALOGUE, DefectStage.EXPOSURES):
         pd.testing.assert_frame_equal(orbit.measurements, without.measurements)
 
 
@@ -130,7 +130,7 @@ def test_defect_is_alone_and_changes_no_other_draw(defect, measure):
         for first, second in ((alone, base), (both, other)):
             assert sorted(first["nx"]) == sorted(second["nx"])
         return
-    if BY_NAME[text.partition("=")[0]].stage is Stage.NOISE:
+    if BY_NAME[text.partition("=")[0]].stage is DefectStage.NOISE:
         # Noise is a product, which the tests of the noise show.
         assert not np.allclose(alone, both)
         return

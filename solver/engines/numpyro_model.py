@@ -27,7 +27,7 @@ from solver.problem.problem import Problem
 CALIBRATION, FREE_SOURCES = "calibration", "free_sources"
 
 
-class Evidence(eqx.Module):
+class ModelInput(eqx.Module):
     """Input of the model as JAX arrays: the measurements and priors of one orbit.
 
     Attributes
@@ -53,11 +53,11 @@ class Evidence(eqx.Module):
     flat: frozenset[str] = eqx.field(static=True)
 
 
-def evidence_of(problem: Problem) -> Evidence:
+def model_input(problem: Problem) -> ModelInput:
     """Return the input of the model for a problem."""
     layout, priors, tiles = problem.layout, problem.priors, problem.measurements.tiles
     width = layout.scatter(priors.width)
-    return Evidence(
+    return ModelInput(
         geometry=problem.geometry,
         index=tiles.index,
         measured=tiles.measured,
@@ -73,43 +73,43 @@ def evidence_of(problem: Problem) -> Evidence:
     )
 
 
-def plate_analysis(evidence: Evidence) -> None:
+def plate_analysis(inputs: ModelInput) -> None:
     """Define the posterior of an orbit: the numpyro model."""
-    groups = (SOURCES, *evidence.layout.groups)
-    offsets = {g.name: numpyro.sample(g.name, _prior(evidence, g)) for g in groups}
+    groups = (SOURCES, *inputs.layout.groups)
+    offsets = {g.name: numpyro.sample(g.name, _prior(inputs, g)) for g in groups}
     half_chi2 = half_chi2_of_chunks(
-        _padded(offsets, evidence.geometry),
-        evidence.geometry,
-        evidence.index,
-        evidence.measured,
-        evidence.weight,
+        _padded(offsets, inputs.geometry),
+        inputs.geometry,
+        inputs.index,
+        inputs.measured,
+        inputs.weight,
     )
-    numpyro.factor("measurements", evidence.log_norm - half_chi2)
+    numpyro.factor("measurements", inputs.log_norm - half_chi2)
 
 
-def in_coordinates(evidence: Evidence, coordinates: Coordinates) -> None:
+def in_coordinates(inputs: ModelInput, coordinates: Coordinates) -> None:
     """Define the same model in coordinates that determine the offsets of all groups."""
-    free_theta = numpyro.sample(CALIBRATION, _improper(evidence.layout.size))
-    free_sources = numpyro.sample(FREE_SOURCES, _improper(2, len(evidence.precision)))
+    free_theta = numpyro.sample(CALIBRATION, _improper(inputs.layout.size))
+    free_sources = numpyro.sample(FREE_SOURCES, _improper(2, len(inputs.precision)))
     theta, sources = coordinates.place(free_theta, free_sources)
-    offsets = {**evidence.layout.scatter(theta), SOURCES.name: sources}
+    offsets = {**inputs.layout.scatter(theta), SOURCES.name: sources}
     with numpyro.handlers.condition(data=offsets):
-        plate_analysis(evidence)
+        plate_analysis(inputs)
     numpyro.factor("volume", coordinates.log_volume)
 
 
 _HALF_LOG_2PI = 0.5 * np.log(2.0 * np.pi)
 
 
-def _prior(evidence: Evidence, group: Group) -> dist.Distribution:
+def _prior(inputs: ModelInput, group: Group) -> dist.Distribution:
     if group is SOURCES:
-        mean = jnp.zeros((len(evidence.precision), 2))
-        return dist.MultivariateNormal(mean, precision_matrix=evidence.precision).to_event(1)
-    width, centre = evidence.width[group.name], evidence.centre[group.name]
-    if group.name in evidence.flat:
+        mean = jnp.zeros((len(inputs.precision), 2))
+        return dist.MultivariateNormal(mean, precision_matrix=inputs.precision).to_event(1)
+    width, centre = inputs.width[group.name], inputs.centre[group.name]
+    if group.name in inputs.flat:
         return _improper(len(width))
     if group.axis == "walk":
-        return random_walk(width, evidence.in_order)
+        return random_walk(width, inputs.in_order)
     return _FAMILIES[group.family](width, centre).to_event(1)
 
 

@@ -26,9 +26,9 @@ from solver.engines.gauss_newton import Iteration, Mode, find_mode
 from solver.engines.numpyro_model import (
     CALIBRATION,
     FREE_SOURCES,
-    Evidence,
-    evidence_of,
+    ModelInput,
     in_coordinates,
+    model_input,
 )
 from solver.linear.normal_equations import accumulate
 from solver.linear.source_elimination import eliminate_sources
@@ -93,7 +93,7 @@ def sample(
         trace.append(Iteration(done, chi2, float("nan"), float("nan"), "", 0.0, elapsed))
         progress(trace[-1])
 
-    chains = _run_chains(evidence_of(problem), coordinates, options, report)
+    chains = _run_chains(model_input(problem), coordinates, options, report)
     mixing = _mixing(chains)
     mixed = chains.diverging == 0 and not mixing.r_hat > _LARGEST_R_HAT
     status = FitStatus.SAMPLED if mixed else FitStatus.UNMIXED
@@ -110,14 +110,14 @@ def sample(
 
 
 def _run_chains(
-    evidence: Evidence,
+    inputs: ModelInput,
     coordinates: Coordinates,
     options: NutsSettings,
     report: Callable[[int, float], None],
 ) -> Chains:
     kernel = NUTS(in_coordinates, adapt_mass_matrix=False)
     block = -(-options.samples // -(-options.samples // _BLOCK))
-    arguments = jax.device_put((evidence, coordinates))
+    arguments = jax.device_put((inputs, coordinates))
     blocks: list[list[Mapping[str, np.ndarray]]] = []
     keys = jax.random.split(jax.random.key(options.seed), options.chains)
     shapes = {

@@ -26,7 +26,7 @@ from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import Iteration, Mode, downhill, largest_step
-from solver.engines.numpyro_model import Evidence, evidence_of, in_coordinates
+from solver.engines.numpyro_model import ModelInput, in_coordinates, model_input
 from solver.engines.svi_guide import SITES, Means, MirroredElbo, draws, guide
 from solver.linear.normal_equations import accumulate
 from solver.linear.source_elimination import ReducedSystem, eliminate_sources
@@ -124,7 +124,7 @@ def blocks(problem: Problem, settings: FitSettings, state: SviState) -> Iterator
     """
     options, spent = settings.svi, state.trace[-1].seconds if state.trace else 0.0
     begin = time.perf_counter() - spent
-    evidence = jax.device_put(evidence_of(problem))
+    inputs = jax.device_put(model_input(problem))
     while state.step < options.max_steps:
         ahead = _linearise_ahead(problem, state)
         if ahead.reduced is None:
@@ -137,7 +137,7 @@ def blocks(problem: Problem, settings: FitSettings, state: SviState) -> Iterator
             state = state._replace(cycle=(state.step, min(options.first_rate, ahead.distance)))
         coordinates = _coordinates(problem, ahead.reduced, options)
         moved, losses = _run_block(
-            evidence,
+            inputs,
             jax.device_put(coordinates),
             Means(np.zeros_like(state.theta), np.zeros_like(state.scale), state.scale),
             _limits(problem, coordinates, options),
@@ -251,7 +251,7 @@ def _limits(problem: Problem, coordinates: Coordinates, options: SviSettings) ->
 
 @jax.jit
 def _run_block(
-    evidence: Evidence,
+    inputs: ModelInput,
     coordinates: Coordinates,
     means: Means,
     limits: Means,
@@ -261,7 +261,7 @@ def _run_block(
     """Make a block of Adam's steps, with its averages reset."""
 
     def model(draw: AnyArray) -> None:
-        in_coordinates(evidence, coordinates)
+        in_coordinates(inputs, coordinates)
 
     def guide_with(draw: AnyArray) -> None:
         guide(means, draw)

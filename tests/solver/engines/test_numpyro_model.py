@@ -10,8 +10,8 @@ from solver.engines.gauss_newton import objective
 from solver.engines.numpyro_model import (
     CALIBRATION,
     FREE_SOURCES,
-    evidence_of,
     in_coordinates,
+    model_input,
     plate_analysis,
 )
 from solver.linear.chi2 import gradient
@@ -25,7 +25,7 @@ FLAT = {"detector_x": np.inf, "focal_length": np.inf, "pitch_y": np.inf}
 
 def density(problem, theta, sources):
     values = {**problem.layout.scatter(theta), SOURCES.name: sources}
-    return float(log_density(plate_analysis, (evidence_of(problem),), {}, values)[0])
+    return float(log_density(plate_analysis, (model_input(problem),), {}, values)[0])
 
 
 @pytest.mark.parametrize("widths", [{}, FLAT, {"sources": 2.0}], ids=["default", "flat", "loose"])
@@ -47,7 +47,7 @@ def test_every_group_has_a_site(problem):
     names = {group.name for group in (SOURCES, *problem.layout.groups)}
     values = {**problem.layout.scatter(np.zeros(problem.layout.size))}
     values[SOURCES.name] = np.zeros((problem.n_src, 2))
-    trace = log_density(plate_analysis, (evidence_of(problem),), {}, values)[1]
+    trace = log_density(plate_analysis, (model_input(problem),), {}, values)[1]
     assert names < set(trace)
 
 
@@ -59,7 +59,7 @@ def test_density_in_other_coordinates_differs_by_their_volume(problem, expansion
         CALIBRATION: rng.standard_normal(problem.layout.size),
         FREE_SOURCES: rng.standard_normal((2, problem.n_src)),
     }
-    found = log_density(in_coordinates, (evidence_of(problem), coordinates), {}, free)[0]
+    found = log_density(in_coordinates, (model_input(problem), coordinates), {}, free)[0]
     placed = coordinates.place(*free.values())
     expected = density(problem, *map(np.asarray, placed)) - 0.5 * reduced.log_determinant()
     assert float(found) == pytest.approx(expected, rel=1e-12)

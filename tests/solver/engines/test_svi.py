@@ -13,7 +13,7 @@ from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines.estimate import Estimate
 from solver.engines.gauss_newton import find_mode
-from solver.engines.numpyro_model import evidence_of, in_coordinates
+from solver.engines.numpyro_model import in_coordinates, model_input
 from solver.engines.svi import blocks, rate, start_state, variational
 from solver.engines.svi_guide import Means, MirroredElbo, draws, guide
 from solver.errors import CancelledError
@@ -221,7 +221,7 @@ def test_draws_have_either_sign_equally_often():
 
 def test_mirrored_gradient_does_not_depend_on_the_draw(svi_problem, exact):
     """One sigma from the mode, gradients of single draws scatter by more than their mean."""
-    evidence = jax.device_put(evidence_of(svi_problem))
+    inputs = jax.device_put(model_input(svi_problem))
     coordinates = whitened(replace(exact.reduced, at=(exact.theta, exact.sources)))
     shape = (2, svi_problem.n_src)
     means = Means(np.zeros(svi_problem.layout.size), np.ones(shape), np.ones(shape))
@@ -232,7 +232,7 @@ def test_mirrored_gradient_does_not_depend_on_the_draw(svi_problem, exact):
             return elbo.loss(
                 jax.random.key(0),
                 {},
-                lambda _: in_coordinates(evidence, coordinates),
+                lambda _: in_coordinates(inputs, coordinates),
                 lambda one: guide(means._replace(sources=sources), one),
                 draw,
             )

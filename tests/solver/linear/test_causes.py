@@ -10,7 +10,7 @@ from numpyro.infer.util import log_density
 from solver.data.parameters import OPTIONAL_GROUPS, SOURCES
 from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import objective
-from solver.engines.numpyro_model import evidence_of, plate_analysis
+from solver.engines.numpyro_model import model_input, plate_analysis
 from solver.errors import InputError
 from solver.linear.chi2 import gradient
 from solver.linear.covariances import covariances
@@ -118,7 +118,7 @@ def test_leverage_equals_the_dense_one(problem, expansion_point, dense):
 def test_numpyro_model_has_the_same_posterior(problem, expansion_point):
     def total(theta, sources):
         values = {**problem.layout.scatter(theta), SOURCES.name: sources}
-        density, trace = log_density(plate_analysis, (evidence_of(problem),), {}, values)
+        density, trace = log_density(plate_analysis, (model_input(problem),), {}, values)
         assert {group.name for group in problem.layout.groups} < set(trace)
         return density
 

@@ -9,7 +9,7 @@ import pytest
 from numpyro.infer import Trace_ELBO
 
 from solver.data.parameters import SOURCES
-from solver.engines.numpyro_model import evidence_of, in_coordinates
+from solver.engines.numpyro_model import in_coordinates, model_input
 from solver.engines.svi_guide import SITES, Means, guide
 from solver.linear.covariances import covariances
 from solver.linear.source_elimination import eliminate_sources
@@ -28,7 +28,7 @@ def reduced_at_mode(solution):
 @pytest.fixture(scope="module")
 def loss(solution):
     """Return the function that computes minus the evidence lower bound of a guide by numpyro."""
-    evidence = jax.device_put(evidence_of(solution.problem))
+    inputs = jax.device_put(model_input(solution.problem))
     shape = (2, solution.problem.n_src)
 
     @jax.jit
@@ -36,7 +36,7 @@ def loss(solution):
         return Trace_ELBO().loss(
             jax.random.key(0),
             dict(zip(SITES, means, strict=True)),
-            lambda: in_coordinates(evidence, coordinates),
+            lambda: in_coordinates(inputs, coordinates),
             lambda: guide(means, jnp.broadcast_to(signs[:, None], shape)),
         )
 

@@ -14,7 +14,7 @@ from solver.linear.linearise import Linearised
 from solver.model.forward import Pair
 
 
-class Rows(NamedTuple):
+class TiledDerivatives(NamedTuple):
     """The fields of `Linearised` by tile; the last row of `local` is the residual."""
 
     local: Float[np.ndarray, "tile local 2 slot"]
@@ -22,10 +22,10 @@ class Rows(NamedTuple):
     displacement: Float[np.ndarray, "tile 2 2 slot"]
 
 
-def rows_of(chunk: Linearised) -> Rows:
+def tiled_derivatives(chunk: Linearised) -> TiledDerivatives:
     """Return the rows of a chunk."""
     with_residual = [*chunk.local, chunk.residual]
-    return Rows(*map(side_by_side, (with_residual, chunk.source, chunk.displacement)))
+    return TiledDerivatives(*map(side_by_side, (with_residual, chunk.source, chunk.displacement)))
 
 
 def side_by_side(pairs: list[Pair]) -> Float[np.ndarray, "tile row 2 slot"]:

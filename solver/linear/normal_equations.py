@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from solver.linear.chi2 import Gradient
-from solver.linear.derivative_products import Rows, one_by_one, rows_of
+from solver.linear.derivative_products import TiledDerivatives, one_by_one, tiled_derivatives
 from solver.linear.linearise import Linearised, linearise, turning
 from solver.linear.tile_sums import TileSums
 from solver.linear.walk_sums import add_cross_walk, add_walks
@@ -123,7 +123,7 @@ def accumulate(
     with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
         pending = helper.submit(lambda: None)
         for i, chunk in enumerate(chunks(problem, theta, sources)):
-            chunk_index, rows = Index(*(column[i] for column in index)), rows_of(chunk)
+            chunk_index, rows = Index(*(column[i] for column in index)), tiled_derivatives(chunk)
             sums.keep_slots(chunk, rows, i)
             # One chunk at a time, because chunks are large.
             pending.result()
@@ -156,7 +156,7 @@ def accumulate(
 
 
 def _sum_in_tiles(
-    rows: Rows,
+    rows: TiledDerivatives,
     i: int,
     detector: Int[np.ndarray, "tile 1"],
     sums: TileSums,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from solver.linear.derivative_products import Rows, in_tiles, one_by_one
+from solver.linear.derivative_products import TiledDerivatives, in_tiles, one_by_one
 from solver.linear.linearise import Linearised
 
 
@@ -40,23 +40,23 @@ class TileSums:
             np.empty((*tiles, 2, n_walk, 2, n_coef)),
         )
 
-    def keep_slots(self, chunk: Linearised, rows: Rows, i: int) -> None:
+    def keep_slots(self, chunk: Linearised, rows: TiledDerivatives, i: int) -> None:
         """Fill in `basis` and `shared` of chunk `i`."""
         for term, values in enumerate(chunk.prediction.basis):
             self.basis[i, :, :, term] = values
         self.shared[:, :, i] = one_by_one(rows.displacement, rows.source)
 
-    def sum_local(self, rows: Rows, i: int) -> None:
+    def sum_local(self, rows: TiledDerivatives, i: int) -> None:
         """Fill in `local` of chunk `i`."""
         flat = rows.local.reshape(*rows.local.shape[:2], -1)
         np.matmul(flat, flat.swapaxes(1, 2), out=self.local[i])
 
-    def sum_mixed(self, rows: Rows, i: int) -> None:
+    def sum_mixed(self, rows: TiledDerivatives, i: int) -> None:
         """Fill in `mixed` of chunk `i`, after `keep_slots`."""
         mixed = in_tiles(rows.local, rows.displacement) @ self.basis[i]
         self.mixed[i] = mixed.reshape(self.mixed[i].shape)
 
-    def sum_walk(self, rows: Rows, i: int) -> None:
+    def sum_walk(self, rows: TiledDerivatives, i: int) -> None:
         """Fill in `walk` of chunk `i`, after `keep_slots`."""
         walk, basis = self.walk[i], self.basis[i]
         walking = basis[..., : walk.shape[2]]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from solver.linear.derivative_products import in_tiles, one_by_one, rows_of, side_by_side
+from solver.linear.derivative_products import in_tiles, one_by_one, side_by_side, tiled_derivatives
 from solver.linear.normal_equations import chunks
 from solver.problem.parameter_vector import PER_DETECTOR, PER_EXPOSURE
 
@@ -12,7 +12,7 @@ def chunk(problem, expansion_point):
 
 
 def test_rows_equal_the_fields_of_a_chunk(chunk):
-    rows = rows_of(chunk)
+    rows = tiled_derivatives(chunk)
     assert rows.local.shape[1] == len(PER_EXPOSURE + PER_DETECTOR) + 1
     for found, pairs in (
         (rows.local, [*chunk.local, chunk.residual]),

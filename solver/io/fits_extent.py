@@ -25,7 +25,7 @@ _TEXT = re.compile(rb"= +'([^']*)'")
 _BITS = (8, 16, 32, 64, -32, -64)
 
 
-class Extent(NamedTuple):
+class HduExtent(NamedTuple):
     """Location of one HDU; `end` is the byte after its data, without padding."""
 
     where: str
@@ -33,7 +33,7 @@ class Extent(NamedTuple):
     end: int
 
 
-def extents(path: Path) -> list[Extent]:
+def extents(path: Path) -> list[HduExtent]:
     """Return the extents of the HDUs of a FITS file, all of them within the file.
 
     Raises
@@ -43,7 +43,7 @@ def extents(path: Path) -> list[Extent]:
         than the file contains or more than `MAX_BYTES`, or other bytes follow the HDUs.
     """
     size = path.stat().st_size
-    found: list[Extent] = []
+    found: list[HduExtent] = []
     with path.open("rb") as stream:
         start = 0
         while start < size:
@@ -56,7 +56,7 @@ def extents(path: Path) -> list[Extent]:
     return found
 
 
-def _extent(path: Path, stream: BinaryIO, start: int, index: int, size: int) -> Extent:
+def _extent(path: Path, stream: BinaryIO, start: int, index: int, size: int) -> HduExtent:
     stream.seek(start)
     cards = _cards(stream, f"{path}, HDU {index}")
     name = _TEXT.match(cards.get(b"EXTNAME", b""))
@@ -71,7 +71,7 @@ def _extent(path: Path, stream: BinaryIO, start: int, index: int, size: int) -> 
         )
     if b"TFIELDS" in cards:
         _check_table(cards, where)
-    return Extent(where, data_start, data_start + length)
+    return HduExtent(where, data_start, data_start + length)
 
 
 def _cards(stream: BinaryIO, where: str) -> dict[bytes, bytes]:

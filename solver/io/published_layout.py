@@ -42,7 +42,7 @@ class PublishedTable:
 
 
 @dataclass(frozen=True)
-class Derived:
+class WrittenColumn:
     """A published column computed from other columns; written, never read.
 
     Attributes
@@ -113,7 +113,7 @@ PUBLISHED_ORDER = {
 }
 
 
-def source_sigmas(sources: pd.DataFrame) -> list[Derived]:
+def source_sigmas(sources: pd.DataFrame) -> list[WrittenColumn]:
     """Return the published sigmas of the sources, in degrees of RA and Dec."""
     cos_dec = np.cos(np.radians(sources["dec"].to_numpy()))
     columns = []
@@ -121,27 +121,27 @@ def source_sigmas(sources: pd.DataFrame) -> list[Derived]:
         for axis, letter, scale in (("ra", "a", cos_dec), ("dec", "d", 1.0)):
             sigma = sources[f"sigma_{axis}_{kind}"].to_numpy() / MAS_PER_DEG / scale
             meaning = f"[deg] {kind} sigma of {axis}, as a coordinate"
-            columns.append(Derived(f"src_{letter}_{suffix}", "deg", meaning, sigma))
+            columns.append(WrittenColumn(f"src_{letter}_{suffix}", "deg", meaning, sigma))
     return columns
 
 
-def exposure_columns(result: FitResult) -> list[Derived]:
+def exposure_columns(result: FitResult) -> list[WrittenColumn]:
     """Return the columns of TELESCOPE: one row per exposure, in order."""
     rows = result.values_on("exp").index.to_numpy()
     exposures = result.exposures.iloc[rows]
     ids = [
-        Derived(name, "", schema.EXPOSURES[name].meaning, exposures[name].to_numpy())
+        WrittenColumn(name, "", schema.EXPOSURES[name].meaning, exposures[name].to_numpy())
         for name in schema.EXPOSURES.key
     ]
     return ids + _calibration_columns(result, "exp")
 
 
-def detector_columns(result: FitResult) -> list[Derived]:
+def detector_columns(result: FitResult) -> list[WrittenColumn]:
     """Return the columns of DETECTOR: one row per detector, in order."""
     return _calibration_columns(result, "det")
 
 
-def distortion_columns(result: FitResult) -> list[Derived]:
+def distortion_columns(result: FitResult) -> list[WrittenColumn]:
     """Return the columns of DISTORTION: one row per term, (2,0), (1,1), (0,2), (3,0)..."""
     return _calibration_columns(result, "coef")
 
@@ -154,17 +154,17 @@ _HDUS: dict[Axis, tuple[str, str]] = {
 }
 
 
-def _calibration_columns(result: FitResult, axis: Axis) -> list[Derived]:
+def _calibration_columns(result: FitResult, axis: Axis) -> list[WrittenColumn]:
     """Return the columns that the groups on an axis make, in the order of the published files."""
     hdu, prefix = _HDUS[axis]
     values = result.values_on(axis)
-    columns: dict[str, Derived] = {}
+    columns: dict[str, WrittenColumn] = {}
     for group in result.groups_on(axis):
         value, unit = values[group.name].to_numpy(), group.value_unit
         named = [one for one in group.published if one.factor is None]
         for one in named or [Published(f"{prefix}_{group.name}_loc", group.label)]:
             shown = unit_named(unit).to_string("fits") if hdu == "TELESCOPE" else ""
-            columns[one.column] = Derived(one.column, shown, f"[{unit}] {one.words}", value)
+            columns[one.column] = WrittenColumn(one.column, shown, f"[{unit}] {one.words}", value)
     for group in result.groups_on(axis):
         for one in group.published:
             if one.factor is not None:

@@ -19,7 +19,7 @@ from solver.io.failures import reading
 from solver.io.fits import FitsFile, read_fits, read_primary_header
 from solver.io.header import FORMAT, ORIGIN, primary_header, result_header, versions_in
 from solver.io.outputs import FITS_SUFFIXES, check_output
-from solver.io.published_layout import Derived, PublishedTable
+from solver.io.published_layout import PublishedTable, WrittenColumn
 from solver.io.settings import parse_settings
 
 _SUMMARY = "SUMMARY"
@@ -165,11 +165,11 @@ def _check_count(path: Path, file: FitsFile) -> None:
 def _table_hdu(
     hdu_layout: PublishedTable,
     frame: pd.DataFrame,
-    extra: list[Derived] | None = None,
+    extra: list[WrittenColumn] | None = None,
     header: fits.Header | None = None,
 ) -> fits.BinTableHDU:
     columns = [
-        Derived(
+        WrittenColumn(
             hdu_layout.name(column),
             "" if column.name in hdu_layout.unitless else column.unit,
             f"[{column.unit}] {column.meaning}" if column.unit else column.meaning,
@@ -184,7 +184,7 @@ def _table_hdu(
 
 
 def _derived_hdu(
-    name: str, columns: list[Derived], header: fits.Header | None = None
+    name: str, columns: list[WrittenColumn], header: fits.Header | None = None
 ) -> fits.BinTableHDU:
     table = RawTable({column.name: column.values for column in columns})
     for column in columns:
@@ -218,7 +218,7 @@ def _unescape(text: str) -> str:
     return text.encode("ascii").decode("unicode_escape")
 
 
-def _summary_columns(result: FitResult) -> list[Derived]:
+def _summary_columns(result: FitResult) -> list[WrittenColumn]:
     camera = {_TOML: instrument_text(result.instrument)}
     contents = (result.summary, result.settings.to_dict(), result.provenance, camera)
     rows = [
@@ -228,7 +228,7 @@ def _summary_columns(result: FitResult) -> list[Derived]:
     ]
     columns = zip(*rows, strict=True)
     return [
-        Derived(name, "", meaning, _text_array(list(texts)))
+        WrittenColumn(name, "", meaning, _text_array(list(texts)))
         for (name, meaning), texts in zip(
             (("section", "of what"), ("key", "name"), ("value", "value, as JSON")),
             columns,

@@ -36,7 +36,7 @@ from solver.data.prior_text import format_width
 from solver.io import header
 from solver.io import published_layout as layout
 from solver.io.column_check import limits_text
-from solver.io.published_layout import Derived, PublishedTable
+from solver.io.published_layout import PublishedTable, WrittenColumn
 from solver.simulate.defects.defect import Defect
 from solver.simulate.defects.table import DEFECTS
 
@@ -244,7 +244,7 @@ def _kept(kept: PublishedTable, column: Column) -> tuple[str, str, str, str]:
     return f"`{name}`", unit, _meaning(column), renamed
 
 
-def _derived(column: Derived) -> tuple[str, str, str, str]:
+def _derived(column: WrittenColumn) -> tuple[str, str, str, str]:
     meaning = column.meaning.removeprefix(f"[{column.unit}] ")
     return f"`{column.name}`", column.unit and f"`{column.unit}`", meaning, ""
 

@@ -104,7 +104,7 @@ class StarQuery:
         ]
 
 
-class Stars(NamedTuple):
+class FetchedStars(NamedTuple):
     """Fetched stars, columns `ARCHIVE`, and whether they came from the cache.
 
     The table's `meta` holds QUERY, SERVICE and DATE, the time of the answer in UTC.
@@ -132,7 +132,7 @@ def star_query(
     )
 
 
-def fetch_stars(chosen: StarQuery, url: str | None = None, refresh: bool = False) -> Stars:
+def fetch_stars(chosen: StarQuery, url: str | None = None, refresh: bool = False) -> FetchedStars:
     """Return the stars of a selection, from the user's cache if they are in it.
 
     Parameters
@@ -148,13 +148,13 @@ def fetch_stars(chosen: StarQuery, url: str | None = None, refresh: bool = False
     """
     kept = cached_file(chosen, url)
     if kept.is_file() and not refresh and (table := _read(kept)) is not None:
-        return Stars(table, from_cache=True)
+        return FetchedStars(table, from_cache=True)
     with writing(kept.parent, "to create the folder"):
         kept.parent.mkdir(parents=True, exist_ok=True)
     require_writable(kept)
     table = _fetch(chosen.query, url)
     write_stars(table, kept, overwrite=True)
-    return Stars(table, from_cache=False)
+    return FetchedStars(table, from_cache=False)
 
 
 def cached_file(chosen: StarQuery, url: str | None = None) -> Path:

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from plateviz.runs.column_cache import ColumnCache
-from plateviz.runs.file_rows import Derived, FileRows, Kind
+from plateviz.runs.file_rows import DerivedColumn, FileRows, RowKind
 from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run import Run
 from plateviz.tables.explore import (
@@ -58,7 +58,7 @@ def _per_exposure(name: str) -> Callable[[Mapping[str, np.ndarray], Path], np.nd
     return compute
 
 
-def _fitted(one: FittedColumn) -> Derived:
+def _fitted(one: FittedColumn) -> DerivedColumn:
     """Return the column of a parameter of the exposures, NaN where an orbit does not fit it."""
 
     def compute(columns: Mapping[str, np.ndarray], folder: Path) -> np.ndarray:
@@ -66,7 +66,7 @@ def _fitted(one: FittedColumn) -> Derived:
         rows = rows[rows["group"] == one.group].set_index("element")
         return rows[one.kind].reindex(range(len(columns["plate_id"]))).to_numpy()
 
-    return Derived(one.column, ("plate_id",), compute)
+    return DerivedColumn(one.column, ("plate_id",), compute)
 
 
 def _n_obs(columns: Mapping[str, np.ndarray], _: Path) -> np.ndarray:
@@ -79,54 +79,60 @@ def _magnitude(columns: Mapping[str, np.ndarray], folder: Path) -> np.ndarray:
     return sources.set_index("source_id")["magnitude"].reindex(columns["source_id"]).to_numpy()
 
 
-def _phase(axis: str) -> Derived:
+def _phase(axis: str) -> DerivedColumn:
     name = f"n{axis}"
-    return Derived(_ADDED[f"phase_{axis}"], (name,), lambda c, _: c[name] - np.floor(c[name]))
+    return DerivedColumn(_ADDED[f"phase_{axis}"], (name,), lambda c, _: c[name] - np.floor(c[name]))
 
 
-def _deviation(axis: str) -> Derived:
+def _deviation(axis: str) -> DerivedColumn:
     needs = estimate, true = f"offset_{axis}", f"true_offset_{axis}"
-    return Derived(_ADDED[f"deviation_{axis}_mas"], needs, lambda c, _: c[estimate] - c[true])
+    return DerivedColumn(_ADDED[f"deviation_{axis}_mas"], needs, lambda c, _: c[estimate] - c[true])
 
 
-def _pull(axis: str) -> Derived:
+def _pull(axis: str) -> DerivedColumn:
     needs = estimate, true, sigma = (
         f"offset_{axis}",
         f"true_offset_{axis}",
         f"sigma_{axis}_marginal",
     )
-    return Derived(_ADDED[f"pull_{axis}"], needs, lambda c, _: (c[estimate] - c[true]) / c[sigma])
+    return DerivedColumn(
+        _ADDED[f"pull_{axis}"], needs, lambda c, _: (c[estimate] - c[true]) / c[sigma]
+    )
 
 
-_MEASUREMENTS = Kind(
+_MEASUREMENTS = RowKind(
     RESIDUALS,
     (
-        Derived(
+        DerivedColumn(
             _ADDED["standardised"],
             ("standardised_x", "standardised_y"),
             lambda c, _: np.hypot(c["standardised_x"], c["standardised_y"]),
         ),
         _phase("x"),
         _phase("y"),
-        Derived(_ADDED["n_obs"], ("source_id",), _n_obs),
-        Derived(_ADDED["magnitude"], ("source_id",), _magnitude),
-        Derived(_ADDED["minutes"], ("field_id", "plate_id"), _per_exposure("minutes")),
-        Derived(EXPOSURES["obstime"], ("field_id", "plate_id"), _per_exposure("obstime")),
+        DerivedColumn(_ADDED["n_obs"], ("source_id",), _n_obs),
+        DerivedColumn(_ADDED["magnitude"], ("source_id",), _magnitude),
+        DerivedColumn(_ADDED["minutes"], ("field_id", "plate_id"), _per_exposure("minutes")),
+        DerivedColumn(EXPOSURES["obstime"], ("field_id", "plate_id"), _per_exposure("obstime")),
     ),
     is_single=True,
     precise=("obstime",),
 )
-_CHI2_PER_DOF = Derived(CHI2_PER_DOF, ("chi2", "dof"), lambda c, _: chi2_per_dof(pd.DataFrame(c)))
-_EXPOSURE_ROWS = Kind(
+_CHI2_PER_DOF = DerivedColumn(
+    CHI2_PER_DOF, ("chi2", "dof"), lambda c, _: chi2_per_dof(pd.DataFrame(c))
+)
+_EXPOSURE_ROWS = RowKind(
     EXPOSURES,
     (
-        Derived(_ADDED["minutes"], ("obstime",), lambda c, _: minutes_since_first(pd.DataFrame(c))),
+        DerivedColumn(
+            _ADDED["minutes"], ("obstime",), lambda c, _: minutes_since_first(pd.DataFrame(c))
+        ),
         _CHI2_PER_DOF,
         *map(_fitted, fitted_columns([one for one in PARAMETERS if one.axis == "exp"])),
     ),
     is_single=False,
 )
-_HISTORY = Kind(
+_HISTORY = RowKind(
     HISTORY,
     (
         _CHI2_PER_DOF,

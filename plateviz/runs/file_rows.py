@@ -18,7 +18,7 @@ Compute = Callable[[Mapping[str, np.ndarray], Path], np.ndarray]
 """Columns of a file, and the folder that it is in -> values of another column."""
 
 
-class Derived(NamedTuple):
+class DerivedColumn(NamedTuple):
     """A column that is computed from those of the files.
 
     Attributes
@@ -33,7 +33,7 @@ class Derived(NamedTuple):
     compute: Compute
 
 
-class Kind(NamedTuple):
+class RowKind(NamedTuple):
     """What the rows of the files are.
 
     Attributes
@@ -45,7 +45,7 @@ class Kind(NamedTuple):
     """
 
     table: Table
-    derived: tuple[Derived, ...]
+    derived: tuple[DerivedColumn, ...]
     is_single: bool
     precise: tuple[str, ...] = ()
 
@@ -60,7 +60,7 @@ class FileRows:
     """
 
     def __init__(
-        self, kind: Kind, files: Sequence[Path], state: Hashable, kept: ColumnCache
+        self, kind: RowKind, files: Sequence[Path], state: Hashable, kept: ColumnCache
     ) -> None:
         """Count the rows.
 

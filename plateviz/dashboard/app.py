@@ -13,7 +13,7 @@ from param.parameterized import Watcher
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.selection.large_selections import LargeSelections
 from plateviz.dashboard.serving.page_request import WINDOW
-from plateviz.dashboard.serving.rooms import Rooms, Window, window_from
+from plateviz.dashboard.serving.rooms import BrowserWindow, Rooms, browser_window_from
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.ticker import Ticker
 from plateviz.dashboard.views.browser.accessible_names import AccessibleNames
@@ -123,7 +123,7 @@ def build_part(store: SolutionStore) -> pn.Row:
 
 def _pages(
     store: SolutionStore,
-    window: Window | None = None,
+    window: BrowserWindow | None = None,
     rooms: Rooms | None = None,
     large: LargeSelections | None = None,
 ) -> tuple[Navigation, Ticker, Pages]:
@@ -147,11 +147,11 @@ def _arguments() -> dict[str, str]:
     return {k: v[0].decode("utf-8", "replace") for k, v in pn.state.session_args.items()}
 
 
-def _window() -> Window | None:
+def _window() -> BrowserWindow | None:
     """Return the window of the browser, if its page has told of it."""
     context = pn.state.curdoc.session_context if pn.state.curdoc is not None else None
     # A page that Panel makes elsewhere has no token.
-    return window_from(getattr(context, "token_payload", {}).get(WINDOW))
+    return browser_window_from(getattr(context, "token_payload", {}).get(WINDOW))
 
 
 def _set_theme(session: Session, is_dark: bool) -> None:

@@ -32,7 +32,7 @@ from plateviz.dashboard.serving.limits import Limits
 from plateviz.dashboard.serving.websocket import is_valid_token
 
 WINDOW = "window"
-"""Name under which a session's token has the window of its browser, see `rooms.window_from`."""
+"""Name under which a session's token has the window of its browser: `rooms.browser_window_from`."""
 
 _FULL = Path(__file__).with_name("full.html")
 _BEGIN = Path(__file__).with_name("begin.js")

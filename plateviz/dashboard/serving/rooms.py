@@ -15,7 +15,7 @@ _LARGEST = 20_000
 Room = tuple[int, int]
 
 
-class Window(NamedTuple):
+class BrowserWindow(NamedTuple):
     """The window of a browser: its size in screen pixels, and the theme of its system."""
 
     width: int
@@ -30,11 +30,11 @@ class Rooms:
         """Begin without any."""
         self._rooms: OrderedDict[tuple[Room, tuple[str, ...]], dict[str, Room]] = OrderedDict()
 
-    def of(self, window: Window, cards: Sequence[str]) -> Mapping[str, Room]:
+    def of(self, window: BrowserWindow, cards: Sequence[str]) -> Mapping[str, Room]:
         """Return the room of each card of a grid that was on the screen at first."""
         return dict(self._rooms.get(_key(window, cards), {}))
 
-    def note(self, window: Window, cards: Sequence[str], name: str, room: Room) -> None:
+    def note(self, window: BrowserWindow, cards: Sequence[str], name: str, room: Room) -> None:
         """Remember the room of a card.
 
         Parameters
@@ -48,7 +48,7 @@ class Rooms:
             self._rooms.popitem(last=False)
 
 
-def window_from(told: Any) -> Window | None:  # noqa: ANN401 whatever a client sends
+def browser_window_from(told: Any) -> BrowserWindow | None:  # noqa: ANN401 whatever a client sends
     """Return the window that a client has told of; None if it is no window."""
     match told:
         case {"width": int(width), "height": int(height), "is_dark": bool(is_dark)}:
@@ -56,8 +56,8 @@ def window_from(told: Any) -> Window | None:  # noqa: ANN401 whatever a client s
         case _:
             return None
     is_size = all(0 < length <= _LARGEST for length in (width, height))
-    return Window(width, height, is_dark) if is_size else None
+    return BrowserWindow(width, height, is_dark) if is_size else None
 
 
-def _key(window: Window, cards: Sequence[str]) -> tuple[Room, tuple[str, ...]]:
+def _key(window: BrowserWindow, cards: Sequence[str]) -> tuple[Room, tuple[str, ...]]:
     return (window.width, window.height), tuple(cards)

@@ -7,7 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation, View
-from plateviz.dashboard.serving.rooms import Rooms, Window
+from plateviz.dashboard.serving.rooms import BrowserWindow, Rooms
 from plateviz.dashboard.views.browser.to_the_top import ToTheTop
 from plateviz.dashboard.views.cards.figure_grid import FigureGrid
 from plateviz.dashboard.views.elements.notice import NoticeView
@@ -49,7 +49,7 @@ class Pages(pn.viewable.Viewer):
         self,
         navigation: Navigation,
         wake: Callable[..., object],
-        window: Window | None = None,
+        window: BrowserWindow | None = None,
         rooms: Rooms | None = None,
         **params: object,
     ) -> None:

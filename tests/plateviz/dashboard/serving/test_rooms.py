@@ -3,9 +3,9 @@
 import pytest
 
 from plateviz.dashboard.serving import rooms
-from plateviz.dashboard.serving.rooms import Rooms, Window, window_from
+from plateviz.dashboard.serving.rooms import BrowserWindow, Rooms, browser_window_from
 
-WINDOW = Window(1920, 1080, is_dark=False)
+WINDOW = BrowserWindow(1920, 1080, is_dark=False)
 
 
 def test_rooms_are_those_of_the_same_cards_in_a_window_of_the_same_size():
@@ -28,7 +28,7 @@ def test_windows_that_have_not_been_seen_for_long_are_forgotten(monkeypatch):
 
 def test_window_is_what_a_browser_tells():
     told = {"width": 1920, "height": 1080, "is_dark": True, "more": "ignored"}
-    assert window_from(told) == Window(1920, 1080, is_dark=True)
+    assert browser_window_from(told) == BrowserWindow(1920, 1080, is_dark=True)
 
 
 @pytest.mark.parametrize(
@@ -46,4 +46,4 @@ def test_window_is_what_a_browser_tells():
     ],
 )
 def test_anything_else_is_no_window(told):
-    assert window_from(told) is None
+    assert browser_window_from(told) is None

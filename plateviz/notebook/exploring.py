@@ -53,10 +53,10 @@ class Explores(ABC):
             files of the run cannot be read.
         """
         from plateviz.plots.explored import explored
-        from plateviz.plots.explored_rows import Columns
+        from plateviz.plots.explored_rows import ExploredColumns
 
         lowest, highest = _limits(between)
-        chosen = Columns(x, y, colour, only, lowest, highest, log_x, log_y, median, zoom)
+        chosen = ExploredColumns(x, y, colour, only, lowest, highest, log_x, log_y, median, zoom)
         found = explored(rows, chosen, self._explorable_rows(), self._explorable)
         spec = FigureSpec("explore", *found)
         return figure_collection([spec], theme)["explore"]

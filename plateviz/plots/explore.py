@@ -24,8 +24,8 @@ from plateviz.plots.explored_points import (
     unit_behind,
 )
 from plateviz.plots.explored_rows import (
-    Columns,
-    Extent,
+    DataExtent,
+    ExploredColumns,
     counts_in_frame,
     extent_of,
     rows_in_frame,
@@ -44,10 +44,10 @@ _HIGHEST = 0.1
 
 def explored_figure(
     table: ExplorableTable,
-    chosen: Columns,
+    chosen: ExploredColumns,
     *,
     selected: frozenset[Any] = frozenset(),
-    extent: Extent | None = None,
+    extent: DataExtent | None = None,
     width: int = FRAME_WIDTH,
 ) -> Figure:
     """Draw a column against another; above 20,000 rows in the frame, their number in cells.
@@ -56,8 +56,8 @@ def explored_figure(
     ----------
     table : as `tables.explore` makes it
     chosen : the columns; KeyError if the table has none of that name
-    selected : items of `Columns.selects` that are marked in cells; among points, they are marked
-        where the figure is drawn
+    selected : items of `ExploredColumns.selects` that are marked in cells; among points, they are
+        marked where the figure is drawn
     extent : `extent_of` the table and the columns, if it is known
     width : of the frame, screen pixels
     """
@@ -140,7 +140,7 @@ def _histograms(counts: Counts, x: Axis, y: Axis) -> list[Glyphs]:
 
 
 def _cells(
-    table: ExplorableTable, chosen: Columns, counts: Counts, axes: tuple[Axis, Axis]
+    table: ExplorableTable, chosen: ExploredColumns, counts: Counts, axes: tuple[Axis, Axis]
 ) -> Glyphs:
     at = [
         (name, f"${axis}{{0.0000}}{unit_behind(table, name)}")
@@ -162,7 +162,7 @@ def _cells(
 
 def _selected(
     table: ExplorableTable,
-    chosen: Columns,
+    chosen: ExploredColumns,
     axes: tuple[Axis, Axis],
     selected: frozenset[Any],
     words: list[str],
@@ -202,7 +202,7 @@ def _in_numbers(counts: Counts, unit: str) -> list[str]:
     return [f"medians from {rounded(median.min(), 3)} to {rounded(median.max(), 3)}{unit}"]
 
 
-def _counted(table: ExplorableTable, extent: Extent, chosen: Columns) -> list[str]:
+def _counted(table: ExplorableTable, extent: DataExtent, chosen: ExploredColumns) -> list[str]:
     shown, total = extent.n_shown, table.size
     words = [f"{shown:,} of {total:,} {table.rows}" if shown < total else f"{total:,} {table.rows}"]
     if table.note:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from plateviz.figures.figure import Figure
 from plateviz.plots.explore import explored_figure
-from plateviz.plots.explored_rows import Columns
+from plateviz.plots.explored_rows import ExploredColumns
 from plateviz.plots.explored_text import require_columns, require_rows
 from plateviz.tables.explore import ExplorableTable
 
@@ -27,7 +27,7 @@ class Explored(NamedTuple):
 
 def explored(
     rows: str,
-    chosen: Columns,
+    chosen: ExploredColumns,
     known: Collection[str],
     table_of: Callable[[str], ExplorableTable],
 ) -> Explored:

@@ -5,7 +5,7 @@ import pandas as pd
 
 from plateviz.figures.figure import By, Glyphs, Limits, Ramp
 from plateviz.figures.glyphs import points
-from plateviz.plots.explored_rows import Columns
+from plateviz.plots.explored_rows import ExploredColumns
 from plateviz.plots.style import COLOUR_OF_CLASS, SERIES_COLOURS
 from plateviz.tables.explore import ExplorableTable
 from plateviz.tables.labels import exposure_labels, id_strings, unit_text
@@ -20,7 +20,7 @@ _SPAN = (1.0, 99.0)
 class RowsInFrame:
     """The rows that are drawn one by one."""
 
-    def __init__(self, table: ExplorableTable, chosen: Columns, rows: np.ndarray) -> None:
+    def __init__(self, table: ExplorableTable, chosen: ExploredColumns, rows: np.ndarray) -> None:
         self.table, self.rows = table, rows
         self.frame = pd.DataFrame({"x": self.column(chosen.x), "y": self.column(chosen.y)})
         kind = table.kind(chosen.selects)
@@ -56,7 +56,7 @@ def unit_behind(table: ExplorableTable, name: str) -> str:
     return f" {unit_text(unit)}" if unit else ""
 
 
-def explored_points(data: RowsInFrame, chosen: Columns) -> Glyphs:
+def explored_points(data: RowsInFrame, chosen: ExploredColumns) -> Glyphs:
     """Return the rows as points in the colours of a column, or of the classes of sources."""
     table, has_sources = data.frame, data.table.has_sources
     hover = [("source", f"@{{{data.source}}}")] if has_sources else []

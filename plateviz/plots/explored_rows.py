@@ -21,7 +21,7 @@ _PART = 2**18
 
 
 @dataclass(frozen=True)
-class Columns:
+class ExploredColumns:
     """What is drawn against what.
 
     Attributes
@@ -48,12 +48,12 @@ class Columns:
     selects: str = "sources"
 
 
-class Extent(NamedTuple):
+class DataExtent(NamedTuple):
     """How many rows can be drawn, and their least and largest values.
 
     Attributes
     ----------
-    n_shown : rows between the limits of `Columns.only`, with a value on both axes
+    n_shown : rows between the limits of `ExploredColumns.only`, with a value on both axes
     n_left_out : rows that are not between these limits
     x, y : of the drawn rows; NaN if there is none
     only : of all rows in the column that limits them; NaN if there is none
@@ -76,7 +76,7 @@ class _Part(NamedTuple):
     is_drawable: np.ndarray
 
 
-def kept_rows(table: ExplorableTable, chosen: Columns) -> np.ndarray:
+def kept_rows(table: ExplorableTable, chosen: ExploredColumns) -> np.ndarray:
     """Return whether each row is between the limits of the column that limits them."""
     if not chosen.only:
         return np.ones(table.size, dtype=bool)
@@ -84,7 +84,7 @@ def kept_rows(table: ExplorableTable, chosen: Columns) -> np.ndarray:
     return (values >= chosen.lowest) & (values <= chosen.highest)
 
 
-def extent_of(table: ExplorableTable, chosen: Columns) -> Extent:
+def extent_of(table: ExplorableTable, chosen: ExploredColumns) -> DataExtent:
     """Return how many rows can be drawn, and between which values they lie."""
     n_shown = n_left_out = 0
     x, y, only = _Span(), _Span(), _Span()
@@ -97,10 +97,10 @@ def extent_of(table: ExplorableTable, chosen: Columns) -> Extent:
             values = limiting[part.rows]
             only.extend(values, np.isfinite(values))
             n_left_out += int(np.count_nonzero(~part.is_kept))
-    return Extent(n_shown, n_left_out, x.limits, y.limits, only.limits)
+    return DataExtent(n_shown, n_left_out, x.limits, y.limits, only.limits)
 
 
-def counts_in_frame(table: ExplorableTable, chosen: Columns, x: Axis, y: Axis) -> Counts:
+def counts_in_frame(table: ExplorableTable, chosen: ExploredColumns, x: Axis, y: Axis) -> Counts:
     """Return the rows in each cell of a frame; two threads count, of many rows half each."""
     colours = table.numbers(chosen.colour) if chosen.colour else None
 
@@ -123,7 +123,7 @@ def counts_in_frame(table: ExplorableTable, chosen: Columns, x: Axis, y: Axis) -
 
 def rows_in_frame(
     table: ExplorableTable,
-    chosen: Columns,
+    chosen: ExploredColumns,
     limits: tuple[Limits, Limits] | None,
     selected: Collection[Any] | None = None,
 ) -> np.ndarray:
@@ -149,7 +149,9 @@ def rows_in_frame(
     return np.concatenate(found)
 
 
-def items_within(table: ExplorableTable, chosen: Columns, corners: np.ndarray) -> frozenset[Any]:
+def items_within(
+    table: ExplorableTable, chosen: ExploredColumns, corners: np.ndarray
+) -> frozenset[Any]:
     """Return the sources, exposures or detectors with a drawn row inside a polygon.
 
     Parameters
@@ -167,7 +169,7 @@ def items_within(table: ExplorableTable, chosen: Columns, corners: np.ndarray) -
 
 
 def _parts(
-    table: ExplorableTable, chosen: Columns, among_rows: range | None = None
+    table: ExplorableTable, chosen: ExploredColumns, among_rows: range | None = None
 ) -> Iterator[_Part]:
     """Yield all rows, or some, a part at a time; a part is valid until the next one."""
     x, y = table.numbers(chosen.x), table.numbers(chosen.y)

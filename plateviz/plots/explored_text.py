@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
-from plateviz.plots.explored_rows import Columns
+from plateviz.plots.explored_rows import ExploredColumns
 from solver.errors import InputError
 
 SWITCHES: Mapping[str, str] = MappingProxyType(
@@ -22,7 +22,7 @@ _LONGEST = 80
 _KEYS = ("rows", "x", "y", "colour", "only", "between", "with", "selects", "zoom")
 
 
-def parts_of(rows: str, chosen: Columns) -> dict[str, str]:
+def parts_of(rows: str, chosen: ExploredColumns) -> dict[str, str]:
     """Return what is drawn as parts of an address.
 
     Parameters
@@ -36,19 +36,19 @@ def parts_of(rows: str, chosen: Columns) -> dict[str, str]:
     switches = [name for name in SWITCHES if getattr(chosen, name)]
     if switches:
         parts["with"] = ",".join(switches)
-    if chosen.selects != Columns.selects:
+    if chosen.selects != ExploredColumns.selects:
         parts["selects"] = chosen.selects
     if chosen.limits is not None:
         parts["zoom"] = _joined((*chosen.limits[0], *chosen.limits[1]))
     return parts
 
 
-def text_of(rows: str, chosen: Columns) -> str:
+def text_of(rows: str, chosen: ExploredColumns) -> str:
     """Return what is drawn as one text, "rows=measurements&x=focal_x&y=residual_x"."""
-    return urlencode(parts_of(rows, replace(chosen, selects=Columns.selects)), safe="~,")
+    return urlencode(parts_of(rows, replace(chosen, selects=ExploredColumns.selects)), safe="~,")
 
 
-def parse_explored(text: str) -> tuple[str, Columns]:
+def parse_explored(text: str) -> tuple[str, ExploredColumns]:
     """Return what a row is and what is drawn, from `text_of` or the same part of an address.
 
     Raises
@@ -64,7 +64,7 @@ def parse_explored(text: str) -> tuple[str, Columns]:
             "explore: expected parts such as rows=measurements&x=focal_x&y=residual_x out of "
             f"{', '.join(_KEYS)}, found {_quoted(text)}"
         )
-    chosen = Columns(parts["x"], parts["y"], parts.get("colour", ""), parts.get("only", ""))
+    chosen = ExploredColumns(parts["x"], parts["y"], parts.get("colour", ""), parts.get("only", ""))
     switches, limits, problems = read_parts(parts)
     if problems:
         raise InputError(f"explore: {problems[0]}")
@@ -74,7 +74,7 @@ def parse_explored(text: str) -> tuple[str, Columns]:
 def read_parts(
     parts: Mapping[str, str],
 ) -> tuple[dict[str, bool], dict[str, Any], list[str]]:
-    """Return the switches and the limits of `Columns` in parts of an address.
+    """Return the switches and the limits of `ExploredColumns` in parts of an address.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def read_parts(
     return {name: True for name in SWITCHES if name in wanted}, limits, problems
 
 
-def require_columns(chosen: Columns, rows: str, names: Collection[str]) -> None:
+def require_columns(chosen: ExploredColumns, rows: str, names: Collection[str]) -> None:
     """Raise `InputError` if a column that is drawn is not among those of the rows."""
     for name in filter(None, (chosen.x, chosen.y, chosen.colour, chosen.only)):
         if name not in names:

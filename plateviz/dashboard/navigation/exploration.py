@@ -9,7 +9,7 @@ import param
 
 from plateviz.dashboard.address_parts import chosen, quoted
 from plateviz.dashboard.selection.selected import KINDS
-from plateviz.plots.explored_rows import Columns
+from plateviz.plots.explored_rows import ExploredColumns
 from plateviz.plots.explored_text import parts_of, read_parts, text_of
 
 # Tables under the names that they have in addresses of older versions.
@@ -87,11 +87,13 @@ class Exploration(param.Parameterized):
         self.param.update(**limits)
         return problems + invalid
 
-    def columns(self) -> Columns:
+    def columns(self) -> ExploredColumns:
         """Return what is to be drawn."""
-        values: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(Columns)}
+        values: dict[str, Any] = {
+            one.name: getattr(self, one.name) for one in fields(ExploredColumns)
+        }
         values |= {name: "" for name in _OPTIONAL if values[name] == NONE}
-        return Columns(**values)
+        return ExploredColumns(**values)
 
     def texts(self) -> list[str]:
         """Return what is to be drawn as a text of a report's option; none before it is known."""

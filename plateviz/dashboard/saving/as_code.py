@@ -13,7 +13,7 @@ from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import LeftOut, Texts
 
 if TYPE_CHECKING:
-    from plateviz.plots.explored_rows import Columns
+    from plateviz.plots.explored_rows import ExploredColumns
 
 NAME = "reproduced"
 """Name of the run, or of the result file, that the command writes."""
@@ -109,7 +109,7 @@ def as_python(
     return f"{PREAMBLE}{name} = {opened}.fit({arguments})"
 
 
-def explored_as_python(variable: str, rows: str, chosen: "Columns", theme: str) -> str:
+def explored_as_python(variable: str, rows: str, chosen: "ExploredColumns", theme: str) -> str:
     """Return Python that draws what *Explore* draws of a solution or a run."""
     arguments = [repr(one) for one in (rows, chosen.x, chosen.y)]
     between = tuple(one if math.isfinite(one) else None for one in (chosen.lowest, chosen.highest))

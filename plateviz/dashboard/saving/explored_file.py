@@ -3,7 +3,7 @@
 from astropy.table import Table
 
 from plateviz.dashboard.saving.downloads import rows_of
-from plateviz.plots.explored_rows import Columns, kept_rows, rows_in_frame
+from plateviz.plots.explored_rows import ExploredColumns, kept_rows, rows_in_frame
 from plateviz.tables.explore import ExplorableTable
 from solver.errors import InputError
 
@@ -12,7 +12,7 @@ _KEYS = ("orbit_id", "field_id", "plate_id", "detector_id")
 _MOST_SAVED = 1_000_000
 
 
-def explored_file(table: ExplorableTable, chosen: Columns) -> dict[str, Table]:
+def explored_file(table: ExplorableTable, chosen: ExploredColumns) -> dict[str, Table]:
     """Return the rows between the limits, with the columns that are drawn and those of keys.
 
     Raises

@@ -5,7 +5,7 @@ import pytest
 from plateviz.dashboard.address_parts import unknown_parts
 from plateviz.dashboard.navigation.navigation import View
 from plateviz.dashboard.selection.selected import Selected
-from plateviz.plots.explored_rows import Columns
+from plateviz.plots.explored_rows import ExploredColumns
 from plateviz.plots.explored_text import parts_of
 from plateviz.plots.workspace import OrbitWorkspace
 from tests.plateviz.dashboard.navigation.test_navigation import again
@@ -44,7 +44,9 @@ def test_every_part_that_is_written_is_known(navigation, survey):
     for workspace in OrbitWorkspace:
         navigation.turn_to_workspace(workspace)
         assert "unknown" not in again(navigation).session.notice
-    drawn = Columns("x", "y", "c", "o", 0.0, 1.0, True, True, True, ((0, 1), (0, 1)), "exposures")
+    drawn = ExploredColumns(
+        "x", "y", "c", "o", 0.0, 1.0, True, True, True, ((0, 1), (0, 1)), "exposures"
+    )
     explored = parts_of("sources", drawn)
     assert len(explored) == 9
     navigation.begin({"view": View.SURVEY.value, **explored})

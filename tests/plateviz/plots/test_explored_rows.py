@@ -7,7 +7,7 @@ from plateviz.figures.figure import Axis
 from plateviz.plots import explored_rows
 from plateviz.plots.cells import Counts, edges_of
 from plateviz.plots.explored_rows import (
-    Columns,
+    ExploredColumns,
     counts_in_frame,
     extent_of,
     items_within,
@@ -48,7 +48,7 @@ def counted(table, chosen, x=UNIT, y=UNIT):
 @pytest.mark.parametrize("is_log", [False, True])
 @pytest.mark.parametrize("only", ["", "z"])
 def test_extent_is_that_of_the_rows_that_can_be_drawn(table, is_log, only):
-    chosen = Columns("x", "y", only=only, lowest=0.3, is_log_x=is_log)
+    chosen = ExploredColumns("x", "y", only=only, lowest=0.3, is_log_x=is_log)
     found = extent_of(table, chosen)
     x, y, z = (table.numbers(name) for name in "xyz")
     is_kept = z >= 0.3 if only else np.ones(60, dtype=bool)
@@ -62,13 +62,13 @@ def test_extent_is_that_of_the_rows_that_can_be_drawn(table, is_log, only):
 
 
 def test_extent_without_a_row_is_not_a_number():
-    found = extent_of(table_of(x=np.full(9, np.nan), y=np.ones(9)), Columns("x", "y"))
+    found = extent_of(table_of(x=np.full(9, np.nan), y=np.ones(9)), ExploredColumns("x", "y"))
     assert found.n_shown == 0
     assert np.isnan([*found.x, *found.y]).all()
 
 
 def test_each_row_is_counted_in_its_cell(table):
-    image = counted(table, Columns("x", "y", only="z", lowest=0.3)).image()
+    image = counted(table, ExploredColumns("x", "y", only="z", lowest=0.3)).image()
     x, y, z = (table.numbers(name) for name in "xyz")
     height, width = image.shape
     expected = np.zeros((height, width))
@@ -78,7 +78,7 @@ def test_each_row_is_counted_in_its_cell(table):
 
 
 def test_histograms_count_what_is_in_the_frame(table):
-    counts = counted(table, Columns("x", "y"))
+    counts = counted(table, ExploredColumns("x", "y"))
     x, y = table.numbers("x"), table.numbers("y")
     is_inside = (x >= 0) & (x < 1) & (y >= 0) & (y < 1)
     for axis, values in enumerate((x, y)):
@@ -115,7 +115,7 @@ def test_medians_are_those_of_all_rows_beside_the_bins(is_log):
     y[::151] = -1.0
     table = table_of(x=random.uniform(0.0, 1.0, 3000), y=y)
     axis = Axis("", (0.2, 4.0), is_log=is_log)
-    chosen = Columns("x", "y", has_median=True, is_log_y=is_log)
+    chosen = ExploredColumns("x", "y", has_median=True, is_log_y=is_log)
     found = counted(table, chosen, y=axis).medians()
     among = np.isfinite(y) & ((y > 0) | (not is_log))
     bins = np.floor(32 * table.numbers("x")).astype(int)
@@ -139,10 +139,10 @@ def test_rows_in_a_frame_are_found_by_number(table):
     x, y = table.numbers("x"), table.numbers("y")
     limits = ((0.2, 0.8), (0.9, 0.1))
     expected = np.flatnonzero((x >= 0.2) & (x <= 0.8) & (y >= 0.1) & (y <= 0.9))
-    assert rows_in_frame(table, Columns("x", "y"), limits).tolist() == expected.tolist()
-    found = rows_in_frame(table, Columns("x", "y"), limits, expected[:2].tolist())
+    assert rows_in_frame(table, ExploredColumns("x", "y"), limits).tolist() == expected.tolist()
+    found = rows_in_frame(table, ExploredColumns("x", "y"), limits, expected[:2].tolist())
     assert found.tolist() == expected[:2].tolist()
-    assert len(rows_in_frame(table, Columns("x", "y"), None)) == 57
+    assert len(rows_in_frame(table, ExploredColumns("x", "y"), None)) == 57
 
 
 def test_area_has_the_sources_with_a_row_inside():
@@ -155,10 +155,10 @@ def test_area_has_the_sources_with_a_row_inside():
     )
     # An L, which leaves out its upper right quarter.
     corners = np.array([(0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)], dtype=float)
-    chosen = Columns("x", "y")
+    chosen = ExploredColumns("x", "y")
     assert items_within(table, chosen, corners) == {7, 8, 6}
     assert items_within(table, chosen, corners[::-1]) == {7, 8, 6}
-    without = Columns("x", "y", only="z", highest=0.5)
+    without = ExploredColumns("x", "y", only="z", highest=0.5)
     assert items_within(table, without, corners) == {7, 6}
     assert items_within(table, chosen, corners[:2]) == frozenset()
     assert items_within(table, chosen, corners + 20.0) == frozenset()

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from plateviz.plots.explored_rows import Columns
+from plateviz.plots.explored_rows import ExploredColumns
 from plateviz.plots.explored_text import parse_explored, text_of
 from solver.errors import InputError
 
@@ -12,10 +12,12 @@ from solver.errors import InputError
 @pytest.mark.parametrize(
     "chosen",
     [
-        Columns("x", "y"),
-        Columns("x", "y", colour="z", only="n", lowest=1.0 / 3.0, is_log_x=True, has_median=True),
-        Columns("x", "y", only="n", lowest=-1e-9, highest=61_822.125),
-        Columns("x", "y", limits=((0.0, 1e-7 / 3.0), (-2.5, math.pi))),
+        ExploredColumns("x", "y"),
+        ExploredColumns(
+            "x", "y", colour="z", only="n", lowest=1.0 / 3.0, is_log_x=True, has_median=True
+        ),
+        ExploredColumns("x", "y", only="n", lowest=-1e-9, highest=61_822.125),
+        ExploredColumns("x", "y", limits=((0.0, 1e-7 / 3.0), (-2.5, math.pi))),
     ],
 )
 def test_text_is_read_back(chosen):

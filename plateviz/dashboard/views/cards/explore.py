@@ -27,8 +27,8 @@ from plateviz.dashboard.views.saving.save_choices import Saved
 from plateviz.figures.figure import Figure, Limits
 from plateviz.plots.explore import explored_figure
 from plateviz.plots.explored_rows import (
-    Columns,
-    Extent,
+    DataExtent,
+    ExploredColumns,
     extent_of,
     items_within,
 )
@@ -59,8 +59,8 @@ class _Drawn(NamedTuple):
 
     figure: Figure
     table: ExplorableTable
-    chosen: Columns
-    extent: Extent
+    chosen: ExploredColumns
+    extent: DataExtent
 
 
 class ExploreView(pn.viewable.Viewer):
@@ -91,7 +91,7 @@ class ExploreView(pn.viewable.Viewer):
         self._selecting: LatestAnswer[frozenset[Any]] = LatestAnswer(origin.executor)
         self._drawn: _Drawn | None = None
         self._table: object = None
-        self._extent: tuple[object, Extent] | None = None
+        self._extent: tuple[object, DataExtent] | None = None
         self._area: np.ndarray | None = None
         self._is_following = False
         self._figure = FigureView(
@@ -175,7 +175,7 @@ class ExploreView(pn.viewable.Viewer):
         self._show_controls(drawn)
         return self._session.units.figure(drawn.figure)
 
-    def _make(self, request: TableRequest, chosen: Columns, selected: Selected) -> _Drawn:
+    def _make(self, request: TableRequest, chosen: ExploredColumns, selected: Selected) -> _Drawn:
         """Make a figure; runs on a thread of its own where that takes a while."""
         table = request.make()
         # Neither a zoom nor another colour changes how many rows there are.

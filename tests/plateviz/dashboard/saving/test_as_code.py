@@ -24,7 +24,7 @@ from plateviz.dashboard.saving.as_code import (
 from plateviz.notebook.keywords import settings_with
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.explore import explored_figure
-from plateviz.plots.explored_rows import Columns
+from plateviz.plots.explored_rows import ExploredColumns
 from plateviz.plots.explored_text import text_of
 from plateviz.plots.gallery import diagnostics
 from plateviz.reports.summary_strip import strip
@@ -182,7 +182,9 @@ def test_command_and_python_make_the_same_numbers(small_survey, tmp_path, monkey
     namespace = {}
     drawn = figures_as_python("solution", [("residual-map", {"exposures": [(0, 3)]})])
     exec(f"{as_python(origin, 1, settings)}\n{drawn}", namespace)
-    explored = Columns("n_obs", "sigma_ra_marginal", only="dof", lowest=20.0, has_median=True)
+    explored = ExploredColumns(
+        "n_obs", "sigma_ra_marginal", only="dof", lowest=20.0, has_median=True
+    )
     more = explored_as_python("solution", "sources", explored, "dark")
     exec(more.replace("figures", "more"), namespace)
     by_python = namespace["solution"].sources

@@ -15,11 +15,11 @@ import pandas as pd
 
 from plateviz.plots.diagnostic import Chosen
 from solver.data.engine_settings import SviSettings
-from solver.data.exclusions import Exclusions
 from solver.data.instrument import MINI_MOCK
 from solver.data.orbit import OrbitData
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.fit import fit_orbit
 from solver.io.survey import read_survey_orbit
 from solver.simulate.magnitudes import draw_magnitudes
@@ -193,7 +193,7 @@ def _one_field() -> FitResult:
     """Fit only five exposures of a single field, without overlap with another."""
     kept = {(0, plate) for plate in range(5)}
     exposures = _orbit().exposures[["field_id", "plate_id"]].itertuples(index=False, name=None)
-    return _fitted(exclusions=Exclusions(exposures=frozenset(set(exposures) - kept)))
+    return _fitted(exclusions=Subset(exposures=frozenset(set(exposures) - kept)))
 
 
 def _sparse_distortion() -> FitResult:

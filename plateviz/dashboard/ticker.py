@@ -12,11 +12,11 @@ from tornado.ioloop import IOLoop
 from plateviz.dashboard.at_rest import AtRest
 from plateviz.dashboard.navigation.lost_run import look_for_run
 from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
-from plateviz.dashboard.selection.selected import KINDS
 from plateviz.dashboard.serving.model_search import one_search
 from plateviz.dashboard.session.expected_what_ifs import ExpectedWhatIfs
 from plateviz.dashboard.views.pages.pages import Pages
 from plateviz.solving.job import Job
+from solver.data.subset import KINDS
 
 # Milliseconds between two looks at what a running job says.
 _PROGRESS_MILLISECONDS = 250

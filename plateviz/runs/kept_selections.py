@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from solver.data.exclusions import Exclusions
+from solver.data.subset import KINDS, Subset
 from solver.errors import InputError
 from solver.io.atomic import write_atomically
 from solver.io.disk import writing
@@ -24,10 +24,6 @@ MOST, MOST_ITEMS = 50, 30_000
 """Selections in a file, and items of all of them."""
 _FORMAT, _VERSION = "plateviz selections", 1
 _MOST_BYTES = 2_000_000
-_KINDS = ("sources", "exposures", "detectors")
-
-Items = Exclusions
-"""What is selected, as a fit would leave it out."""
 
 
 class TakenError(InputError):
@@ -41,9 +37,9 @@ class KeptSelections:
         """Look in a folder, which need not exist."""
         self._path = Path(folder) / FILE
         self._lock = threading.Lock()
-        self._read: tuple[object, dict[str, Items]] = (None, {})
+        self._read: tuple[object, dict[str, Subset]] = (None, {})
 
-    def all(self) -> dict[str, Items]:
+    def all(self) -> dict[str, Subset]:
         """Return name -> selection, by name.
 
         Raises
@@ -54,7 +50,7 @@ class KeptSelections:
         with self._lock:
             return dict(self._all())
 
-    def keep(self, name: str, items: Items, before: Items | None) -> None:
+    def keep(self, name: str, selected: Subset, before: Subset | None) -> None:
         """Keep a selection under a name.
 
         Parameters
@@ -74,18 +70,18 @@ class KeptSelections:
             self._path.parent.mkdir(parents=True, exist_ok=True)
         with self._lock, locked(self._path.parent, wait=True):
             found = dict(self._all())
-            if found.get(name) not in (None, before, items):
+            if found.get(name) not in (None, before, selected):
                 raise TakenError(
                     "somebody else has kept another selection under this name; choose another name"
                 )
-            found[name] = items
+            found[name] = selected
             if len(found) > MOST or sum(map(_size, found.values())) > MOST_ITEMS:
                 raise InputError(
                     f"{MOST} selections of {MOST_ITEMS:,} items in all are kept; forget one first"
                 )
             self._write(found)
 
-    def forget(self, name: str, before: Items) -> None:
+    def forget(self, name: str, before: Subset) -> None:
         """Keep nothing under a name any more, unless it is another selection than before.
 
         Raises
@@ -103,7 +99,7 @@ class KeptSelections:
                 del found[name]
                 self._write(found)
 
-    def _all(self) -> dict[str, Items]:
+    def _all(self) -> dict[str, Subset]:
         try:
             status = self._path.stat()
         except OSError:
@@ -114,14 +110,14 @@ class KeptSelections:
             self._read = (state, _parsed(self._path))
         return self._read[1]
 
-    def _write(self, selections: Mapping[str, Items]) -> None:
-        values = {name: _plain(items) for name, items in sorted(selections.items())}
+    def _write(self, selections: Mapping[str, Subset]) -> None:
+        values = {name: one.to_dict() for name, one in sorted(selections.items())}
         content = {"format": _FORMAT, "version": _VERSION, "selections": values}
         with write_atomically(self._path) as temporary:
             temporary.write_text(json.dumps(content), encoding="utf-8")
 
 
-def _parsed(path: Path) -> dict[str, Items]:
+def _parsed(path: Path) -> dict[str, Subset]:
     with reading(str(path), "kept selections"), path.open("rb") as stream:
         text = stream.read(_MOST_BYTES + 1)
         if len(text) > _MOST_BYTES:
@@ -136,17 +132,17 @@ def _parsed(path: Path) -> dict[str, Items]:
     selections = content.get("selections")
     if not isinstance(selections, dict):
         raise InputError(f"{path}: expected selections by their names, found none")
-    found = {name: _items(values) for name, values in selections.items()}
+    found = {name: _subset(values) for name, values in selections.items()}
     if damaged := [name for name, items in found.items() if items is None]:
         raise InputError(f"{path}: expected ids in each selection, found others in {damaged[0]!r}")
     return {name: items for name, items in found.items() if items is not None}
 
 
-def _items(values: Any) -> Items | None:  # noqa: ANN401 as JSON
+def _subset(values: Any) -> Subset | None:  # noqa: ANN401 as JSON
     """Return a selection; None if it is none."""
     if not isinstance(values, dict):
         return None
-    kinds = [values.get(kind, []) for kind in _KINDS]
+    kinds = [values.get(kind, []) for kind in KINDS]
     if not all(isinstance(kind, list) for kind in kinds):
         return None
     sources, exposures, detectors = kinds
@@ -158,12 +154,8 @@ def _items(values: Any) -> Items | None:  # noqa: ANN401 as JSON
     if not all(is_pair):
         return None
     pairs = frozenset((field, plate) for field, plate in exposures)
-    return Exclusions(frozenset(sources), pairs, frozenset(detectors))
+    return Subset(frozenset(sources), pairs, frozenset(detectors))
 
 
-def _plain(items: Items) -> dict[str, list[Any]]:
-    return {kind: sorted(getattr(items, kind)) for kind in _KINDS}
-
-
-def _size(items: Items) -> int:
-    return sum(len(getattr(items, kind)) for kind in _KINDS)
+def _size(selected: Subset) -> int:
+    return sum(len(getattr(selected, kind)) for kind in KINDS)

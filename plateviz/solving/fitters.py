@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from plateviz.solving.capacity import ready_orbits
 from plateviz.solving.origin import origin_from_dict
-from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.engines.start_tables import StartTables
 from solver.errors import InputError
 from solver.fit import OrbitFitter
@@ -85,4 +85,4 @@ def base_settings(settings: FitSettings) -> FitSettings:
 
     A fit without some measurements is no start for a what-if without others; one of all is.
     """
-    return settings.with_(exclusions=Exclusions(), compare_orders=False)
+    return settings.with_(exclusions=Subset(), compare_orders=False)

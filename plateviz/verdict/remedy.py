@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from solver.data.exclusions import Exclusions
 from solver.data.setting_words import setting_values
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 
 
 def remedied(settings: FitSettings, options: Iterable[str]) -> FitSettings | None:
@@ -30,7 +30,7 @@ def remedied(settings: FitSettings, options: Iterable[str]) -> FitSettings | Non
 def _added(settings: FitSettings, name: str, value: Any) -> Any:  # noqa: ANN401 any setting
     """Return a value with that of the settings; degrees and prior widths do not become less."""
     before = getattr(settings, name)
-    if isinstance(value, Exclusions):
+    if isinstance(value, Subset):
         return before | value
     if isinstance(value, Mapping):
         widths = {group: max(settings.width(group), width) for group, width in value.items()}

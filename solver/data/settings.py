@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from solver.data.engine_settings import NutsSettings, SviSettings
-from solver.data.exclusions import Exclusions
 from solver.data.model_settings import MAX_ORDER as MAX_ORDER
 from solver.data.model_settings import ModelSettings
 from solver.data.parameters import BY_NAME, OPTIONAL_GROUPS, PARAMETERS, Group
@@ -21,6 +20,7 @@ from solver.data.setting_kinds import (
     setting,
     settings_of,
 )
+from solver.data.subset import Subset
 from solver.data.text_setting import LeftOut, PriorShifts, PriorWidths
 
 # Engine -> unit of its progress.
@@ -94,8 +94,8 @@ class FitSettings(ModelSettings):
             card="CENTRES",
         ),
     )
-    exclusions: Exclusions = setting(
-        Exclusions(),
+    exclusions: Subset = setting(
+        Subset(),
         LeftOut(
             label="Leave out",
             help="Exclude measurements: source=ID, exposure=FIELD/PLATE or detector=ID; "
@@ -222,7 +222,7 @@ class FitSettings(ModelSettings):
 
     def serves(self, other: "FitSettings") -> bool:
         """Return whether what-ifs with `other`, and those that follow it, can start from a fit."""
-        of_all = other.with_(exclusions=Exclusions())
+        of_all = other.with_(exclusions=Subset())
         has_all = self.selection() in (of_all.selection(), of_all.with_(thin=1).selection())
         return has_all and self.order >= other.order and self.what_if_holds(other)
 

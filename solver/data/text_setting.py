@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from solver.data.exclusions import Exclusions, parse_exclusions
+from solver.data.exclusions import parse_exclusions
 from solver.data.parameters import BY_NAME
 from solver.data.prior_text import (
     check_shift,
@@ -15,6 +15,7 @@ from solver.data.prior_text import (
     parse_width,
 )
 from solver.data.setting_kinds import Setting
+from solver.data.subset import Subset
 from solver.errors import InputError
 
 
@@ -118,23 +119,23 @@ class PriorShifts(Texts):
 class LeftOut(Texts):
     """Sources, exposures and detectors whose measurements a fit does not use."""
 
-    def to_plain(self, value: Exclusions) -> dict[str, list]:
+    def to_plain(self, value: Subset) -> dict[str, list]:
         """Return the ids by kind."""
         return value.to_dict()
 
-    def from_plain(self, plain: Mapping[str, Iterable]) -> Exclusions:
+    def from_plain(self, plain: Mapping[str, Iterable]) -> Subset:
         """Return what `to_plain` wrote."""
-        return Exclusions.from_dict(plain)
+        return Subset.from_dict(plain)
 
-    def parse(self, texts: Iterable[str]) -> Exclusions:
+    def parse(self, texts: Iterable[str]) -> Subset:
         """Read texts such as "detector=2" or "exposure=0/17"."""
         return parse_exclusions(texts)
 
-    def texts(self, value: Exclusions) -> list[str]:
+    def texts(self, value: Subset) -> list[str]:
         """Return a text per exclusion."""
         return [name.replace(" ", "=") for name in value.names()]
 
-    def described(self, value: Exclusions, default: object) -> list[str]:
+    def described(self, value: Subset, default: object) -> list[str]:
         """Return a phrase for each exclusion; of many sources or exposures, their number."""
         del default
         return [self.phrase.format(name) for name in value.short_names()]

@@ -83,7 +83,7 @@ def with_adjustments(result: FitResult, found: Adjustments) -> FitResult:
     """
     summary, outliers = dict(result.summary), result.outliers
     if found.outliers is not None:
-        outliers = found.outliers[~result.settings.exclusions.excludes(found.outliers)]
+        outliers = found.outliers[~result.settings.exclusions.holds(found.outliers)]
         outliers = outliers.reset_index(drop=True)
         summary["n_outliers"] = len(outliers)
     if found.moves:

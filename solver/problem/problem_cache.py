@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solver.data.exclusions import thinned_orbit
+from solver.data.exclusions import thinned_orbit, without_excluded
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
@@ -54,7 +54,7 @@ class ProblemCache:
             if entry.matches(settings, adjustments):
                 self._keep(entry)
                 return entry.data, rebuilt(entry.problem, self._instrument, settings)
-        data = settings.exclusions.without(self._data)
+        data = without_excluded(self._data, settings.exclusions)
         data = thinned_orbit(data, self._data, settings.thin)
         data = adjustments.applied(data)
         problem = self._of_fewer_rows(data, settings, adjustments)

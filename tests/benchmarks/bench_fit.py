@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import solver  # noqa: F401, I001
 
 from plateviz.verdict.verdict import with_verdict
-from solver.data.exclusions import Exclusions
+from solver.data.subset import Subset
 from solver.fit import fit_orbit
 from solver.engines.gauss_newton import Mode, find_mode
 from solver.data.instrument import MINI_MOCK
@@ -138,11 +138,11 @@ def changes(problem: Problem) -> dict[str, tuple[FitSettings, FitSettings]]:
     middle = problem.exposures.iloc[len(problem.exposures) // 2]
     reference = problem.sources.loc[problem.sources["is_reference"], "source_id"]
     exclusions = {
-        "no reference source": Exclusions(sources=frozenset([int(reference.iloc[0])])),
-        "no exposure": Exclusions(
+        "no reference source": Subset(sources=frozenset([int(reference.iloc[0])])),
+        "no exposure": Subset(
             exposures=frozenset([(int(middle["field_id"]), int(middle["plate_id"]))])
         ),
-        "no detector 1": Exclusions(detectors=frozenset([1])),
+        "no detector 1": Subset(detectors=frozenset([1])),
     }
     default = FitSettings()
     return {

@@ -27,7 +27,7 @@ import numpy as np
 
 from plateviz.runs.scratch_result import write_scratch_result, write_verdict
 from plateviz.verdict.verdict import with_verdict
-from solver.data.exclusions import Exclusions
+from solver.data.subset import Subset
 from solver.data.orbit import OrbitData
 from solver.data.settings import FitSettings
 from solver.fit import OrbitFitter
@@ -81,7 +81,7 @@ def changes(data: OrbitData) -> dict[str, Callable[[int], FitSettings]]:
     def corner(number: int) -> FitSettings:
         members = np.random.default_rng(number).choice(ids, _CORNER + number, replace=False)
         return FitSettings(
-            order=6, exclusions=Exclusions(sources=frozenset(map(int, members.tolist())))
+            order=6, exclusions=Subset(sources=frozenset(map(int, members.tolist())))
         )
 
     def widths(name: str, first: float, order: int = 6) -> Callable[[int], FitSettings]:

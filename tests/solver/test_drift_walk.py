@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.fit import OrbitFitter, fit_orbit
 from solver.linear.covariances import covariances
 from solver.linear.leverage import residuals
@@ -124,8 +124,8 @@ def test_a_walk_without_terms_changes_nothing(small_orbit):
     "change",
     [
         {"prior_widths": {**SETTINGS.prior_widths, "drift_walk_x": 0.05}},
-        {"exclusions": Exclusions(exposures=frozenset({(0, 1)}))},
-        {"exclusions": Exclusions(detectors=frozenset({1}))},
+        {"exclusions": Subset(exposures=frozenset({(0, 1)}))},
+        {"exclusions": Subset(detectors=frozenset({1}))},
     ],
     ids=["prior", "exposure", "detector"],
 )

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import MAX_ORDER, FitSettings
+from solver.data.subset import Subset
 from solver.errors import CancelledError, FitError
 from solver.fit import fit_orbit
 from tests.solver.small_orbit import FIRST_ID, make_orbit
@@ -300,6 +300,6 @@ def test_excluded_reference_stars_are_counted(small_orbit, fit):
     known = small_orbit.data.catalogue[small_orbit.data.catalogue["source_id"].isin(measured)]
     of_kind = [known.loc[known["is_reference"] == kind, "source_id"] for kind in (True, False)]
     chosen = frozenset([*of_kind[0].head(2).tolist(), *of_kind[1].head(3).tolist()])
-    summary = fit(small_orbit, exclusions=Exclusions(sources=chosen)).summary
+    summary = fit(small_orbit, exclusions=Subset(sources=chosen)).summary
     assert summary["n_reference_excluded"] == 2
     assert summary["n_reference"] == len(of_kind[0]) - 2

@@ -8,9 +8,9 @@ from typing import Any
 import param
 
 from plateviz.dashboard.address_parts import chosen, quoted
-from plateviz.dashboard.selection.selected import KINDS
 from plateviz.plots.explored_rows import ExploredColumns
 from plateviz.plots.explored_text import parts_of, read_parts, text_of
+from solver.data.subset import KINDS
 
 # Tables under the names that they have in addresses of older versions.
 _RENAMED = {"residuals": "measurements"}

@@ -11,7 +11,6 @@ from plateviz.dashboard.navigation.growth import Growth, how_to_make_a_run
 from plateviz.dashboard.navigation.known_runs import KnownRuns
 from plateviz.dashboard.navigation.next_orbit import NextOrbit
 from plateviz.dashboard.navigation.view import WORKSPACES, View
-from plateviz.dashboard.selection.selected import KINDS
 from plateviz.dashboard.selection.shown_address import SHOWN
 from plateviz.dashboard.session.run_comparison import OF_RUNS
 from plateviz.dashboard.session.selection_actions import look_for_kept
@@ -23,6 +22,7 @@ from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWork
 from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.runs.queries import SurveyRun
 from plateviz.tables.explore import EXPLORABLE
+from solver.data.subset import KINDS
 from solver.errors import InputError
 
 # Parts of an address that name solutions.

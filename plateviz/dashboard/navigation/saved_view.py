@@ -14,9 +14,9 @@ from typing import Any
 
 from plateviz.dashboard.address_parts import quoted
 from plateviz.dashboard.navigation.navigation import Navigation
-from plateviz.dashboard.selection.selected import KINDS, Selected
 from plateviz.dashboard.session.solution_address import settings_text
 from solver.data.ids import is_id
+from solver.data.subset import KINDS, Subset
 from solver.errors import InputError
 
 _FORMAT, _VERSION = "plateviz view", 1
@@ -106,7 +106,7 @@ def _address(found: object) -> dict[str, str]:
     raise InputError("expected the parts of an address as texts, found others")
 
 
-def _selected(content: Mapping[str, Any]) -> Selected:
+def _selected(content: Mapping[str, Any]) -> Subset:
     pairs = content.get("exposures", [])
     if not isinstance(pairs, list) or not all(
         isinstance(pair, list) and len(pair) == 2 and all(type(one) is int for one in pair)
@@ -118,7 +118,7 @@ def _selected(content: Mapping[str, Any]) -> Selected:
         raise InputError(
             f"expected up to {_MOST_SELECTED:,} different ids of sources, found others"
         )
-    return Selected(sources, frozenset((field, plate) for field, plate in pairs), detectors)
+    return Subset(sources, frozenset((field, plate) for field, plate in pairs), detectors)
 
 
 def _ids(found: object) -> frozenset[int] | None:

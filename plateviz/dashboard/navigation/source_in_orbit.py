@@ -5,10 +5,10 @@ from typing import Any
 import pandas as pd
 
 from plateviz.dashboard.navigation.navigation import Navigation
-from plateviz.dashboard.selection.selected import Selected
 from plateviz.dashboard.selection.selection import Selection
 from plateviz.dashboard.session.solution import Solution
 from plateviz.plots.workspace import OrbitWorkspace
+from solver.data.subset import Subset
 
 
 def open_source_in_orbit(navigation: Navigation, source_id: int, orbit: int) -> None:
@@ -19,7 +19,7 @@ def open_source_in_orbit(navigation: Navigation, source_id: int, orbit: int) -> 
     session = navigation.session
     navigation.open_orbit(orbit)
     navigation.turn_to_workspace(OrbitWorkspace.RESIDUALS)
-    session.selection.select(Selected(sources=frozenset({source_id})))
+    session.selection.select(Subset(sources=frozenset({source_id})))
 
     def show(solution: Solution) -> None:
         if solution.orbit == orbit:

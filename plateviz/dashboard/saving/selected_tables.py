@@ -49,8 +49,8 @@ def selected_tables(navigation: Navigation) -> dict[str, Table]:
         exposures, measurements = explorable_exposures(result), explorable_measurements(result)
         tables = {
             "sources": _of_solution(result, selected.sources),
-            "exposures": rows_of(exposures, selected.chosen(result.exposures)),
-            "measurements": rows_of(measurements, selected.chosen(result.residuals)),
+            "exposures": rows_of(exposures, selected.holds(result.exposures)),
+            "measurements": rows_of(measurements, selected.holds(result.residuals)),
         }
         return {name: table for name, table in tables.items() if len(table)}
     return {} if run is None else {"sources": _of_run(run, selected.sources)}

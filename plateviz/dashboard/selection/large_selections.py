@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from plateviz.dashboard.selection.selected import KINDS, Selected
+from plateviz.dashboard.selection.selected import keys_of
+from solver.data.subset import KINDS, Subset
 
 # What is remembered at most, in 16 MB and less: that of a few dozen pages.
 _MOST, _MOST_IDS = 400, 1_000_000
@@ -21,10 +22,10 @@ class LargeSelections:
         # The latest is the last one.
         self._known: dict[tuple[str, str], np.ndarray] = {}
 
-    def remember(self, selected: Selected) -> None:
+    def remember(self, selected: Subset) -> None:
         """Remember the kinds of a selection that are too large; the oldest are forgotten."""
         items = selected.by_kind()
-        for kind, key in selected.keys.items():
+        for kind, key in keys_of(selected).items():
             known = self._known.pop((kind, key), None)
             # A set takes five times the memory.
             self._known[kind, key] = np.array([*items[kind]]) if known is None else known

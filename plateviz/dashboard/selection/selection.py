@@ -7,10 +7,11 @@ import param
 
 from plateviz.dashboard.address_parts import quoted
 from plateviz.dashboard.selection.large_selections import LargeSelections
-from plateviz.dashboard.selection.selected import KINDS, Selected, SelectedIds
+from plateviz.dashboard.selection.selected import NO_IDS, SelectedIds, address_of, ids_of
 from plateviz.dashboard.selection.selection_address import restored
 from plateviz.dashboard.selection.shown_address import SHOWN, read_shown, shown_parts
 from solver.data.result import FitResult
+from solver.data.subset import KINDS, NOTHING, Subset
 from solver.errors import InputError
 
 ALL = "all"
@@ -40,7 +41,7 @@ class Selection(param.Parameterized):
     detectors = param.ClassSelector(
         class_=frozenset, default=frozenset(), doc="ids of the selected detectors"
     )
-    kept = param.Dict(default={}, doc="name -> `Selected` that is kept; replaced, not changed")
+    kept = param.Dict(default={}, doc="name -> `Subset` that is kept; replaced, not changed")
 
     def __init__(self, large: LargeSelections | None = None, **values: Any) -> None:  # noqa: ANN401
         """Start without options.
@@ -50,7 +51,8 @@ class Selection(param.Parameterized):
         large : of the server; None for those of this session alone
         """
         super().__init__(**values)
-        self._requested, self._selected = dict[str, Any](), Selected()
+        self._requested, self._selected = dict[str, Any](), NOTHING
+        self._ids: tuple[Subset, SelectedIds] = (NOTHING, NO_IDS)
         self.large = large or LargeSelections()
         self.param.watch(lambda *_: self.large.remember(self.selected), [*KINDS])
         self.param.watch(self._forget_requested, [*SHOWN])
@@ -142,7 +144,7 @@ class Selection(param.Parameterized):
         What is shown of an orbit is not decided before one is there, unless it was requested.
         """
         shown = {name: getattr(self, name) for name in SHOWN} if self._is_limited else {}
-        query = shown_parts(shown | self._requested) | self.selected.address()
+        query = shown_parts(shown | self._requested) | address_of(self.selected)
         if (name := self.name_of_selected) is not None:
             query["selection"] = name
         return query if self.orbit is None else {"orbit": str(self.orbit), **query}
@@ -153,13 +155,13 @@ class Selection(param.Parameterized):
         return self.param["field"].objects != [ALL]
 
     @property
-    def selected(self) -> Selected:
+    def selected(self) -> Subset:
         """The selected sources, exposures and detectors; the same object until it changes."""
-        now = Selected(self.sources, self.exposures, self.detectors)
+        now = Subset(self.sources, self.exposures, self.detectors)
         self._selected = self._selected if now == self._selected else now
         return self._selected
 
-    def select(self, selected: Selected) -> None:
+    def select(self, selected: Subset) -> None:
         """Select sources, exposures and detectors in place of those selected before."""
         self.param.update(**selected.by_kind())
 
@@ -177,8 +179,11 @@ class Selection(param.Parameterized):
 
     @property
     def ids(self) -> SelectedIds:
-        """The selected sources, exposures and detectors as the marks of figures name them."""
-        return self.selected.ids
+        """What is selected as the marks of figures name it; all figures share it."""
+        selected = self.selected
+        if self._ids[0] is not selected:
+            self._ids = (selected, ids_of(selected))
+        return self._ids[1]
 
     @property
     def name_of_selected(self) -> str | None:

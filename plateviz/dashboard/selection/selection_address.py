@@ -4,14 +4,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from plateviz.dashboard.address_parts import quoted
-from plateviz.dashboard.selection.selected import (
-    KINDS,
-    NOTHING,
-    Find,
-    Selected,
-    checked_name,
-    parsed,
-)
+from plateviz.dashboard.selection.selected import Find, checked_name, keys_of, parsed
+from solver.data.subset import KINDS, NOTHING, Subset
 from solver.errors import InputError
 
 
@@ -25,12 +19,12 @@ class Restored(NamedTuple):
     problems : what of the address is invalid or gone, in words
     """
 
-    selected: Selected
+    selected: Subset
     name: str
     problems: list[str]
 
 
-def restored(address: Mapping[str, str], find: Find, kept: Mapping[str, Selected]) -> Restored:
+def restored(address: Mapping[str, str], find: Find, kept: Mapping[str, Subset]) -> Restored:
     """Return what an address selects.
 
     Parameters
@@ -43,8 +37,10 @@ def restored(address: Mapping[str, str], find: Find, kept: Mapping[str, Selected
     if name in kept and not any(kind in address for kind in KINDS):
         return Restored(of_name, "", problems)
 
+    keys = keys_of(of_name)
+
     def found_or_kept(kind: str, key: str) -> frozenset[Any] | None:
-        is_kept = of_name.keys.get(kind) == key
+        is_kept = keys.get(kind) == key
         return of_name.by_kind()[kind] if is_kept else find(kind, key)
 
     selected, invalid = parsed(address, found_or_kept)
@@ -52,7 +48,7 @@ def restored(address: Mapping[str, str], find: Find, kept: Mapping[str, Selected
     if name in kept:
         if of_name != selected:
             problems.append(f"selection: something else is kept under {quoted(name)} by now")
-    elif name and (selected.keys or invalid or not selected):
+    elif name and (keys_of(selected) or invalid or not selected):
         problems.append(f"selection: nothing is kept under {quoted(name)}")
     is_new = bool(name) and name not in kept and bool(selected) and not problems
     return Restored(selected, name if is_new else "", problems)

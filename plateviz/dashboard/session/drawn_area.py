@@ -1,7 +1,7 @@
 """DrawnArea: what becomes of the selection where a person draws a box or a lasso around nothing."""
 
-from plateviz.dashboard.selection.selected import Selected
 from plateviz.dashboard.session.session import Session
+from solver.data.subset import Subset
 
 _NO_POINTS = "There are no points in that area; "
 
@@ -15,7 +15,7 @@ class DrawnArea:
     def __init__(self, session: Session) -> None:
         """Keep the selection of `session`, and say why in its `remark`."""
         self._session = session
-        self._before: Selected | None = None
+        self._before: Subset | None = None
 
     def begin(self) -> None:
         """Remember the selection, when a person begins to draw."""

@@ -2,12 +2,13 @@
 
 from contextlib import suppress
 
-from plateviz.dashboard.selection.selected import NOTHING, Selected, checked_name
+from plateviz.dashboard.selection.selected import checked_name
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.solution import Solution
 from plateviz.dashboard.session.without_what_if import what_to_do
 from plateviz.runs.kept_selections import TakenError
 from solver.data.settings import FitSettings
+from solver.data.subset import NOTHING, Subset
 from solver.errors import InputError
 
 # Selections that a session keeps.
@@ -20,12 +21,12 @@ class SelectionActions:
     def __init__(self, session: Session) -> None:
         """Act on `session`."""
         self._session, self._selection = session, session.selection
-        self._known: tuple[Solution | None, Selected] = (None, NOTHING)
+        self._known: tuple[Solution | None, Subset] = (None, NOTHING)
         session.param.watch(self._forget_advice, "shown")
         session.choices.param.watch(self._forget_advice, "exclusions")
 
     @property
-    def in_orbit(self) -> Selected:
+    def in_orbit(self) -> Subset:
         """The part of the selection that the orbit on the screen has measured."""
         return self._selection.selected & self._measured
 
@@ -55,8 +56,8 @@ class SelectionActions:
 
     def without_selected(self, settings: FitSettings) -> FitSettings:
         """Return settings with which the selection is left out, too."""
-        left_out = Selected.of(settings.exclusions) | self.in_orbit
-        return settings.with_(exclusions=left_out.exclusions)
+        left_out = settings.exclusions | self.in_orbit
+        return settings.with_(exclusions=left_out)
 
     def put_back(self) -> None:
         """Include the selection in the next fit, which shows a what-if, or say what to do."""
@@ -83,9 +84,7 @@ class SelectionActions:
         selected, before = self._selection.selected, kept.get(name)
         why = ""
         try:
-            self._session.store.selections.keep(
-                name, selected.exclusions, None if before is None else before.exclusions
-            )
+            self._session.store.selections.keep(name, selected, before)
         except TakenError:
             raise
         except InputError as error:
@@ -104,11 +103,11 @@ class SelectionActions:
         if name in kept:
             # What cannot be written is forgotten in this session.
             with suppress(InputError):
-                self._session.store.selections.forget(name, kept[name].exclusions)
+                self._session.store.selections.forget(name, kept[name])
         self._selection.kept = {one: items for one, items in kept.items() if one != name}
 
     @property
-    def _measured(self) -> Selected:
+    def _measured(self) -> Subset:
         """What the orbit on the screen has measured, that which is left out included."""
         shown = self._session.shown
         if self._known[0] is not shown:
@@ -116,13 +115,13 @@ class SelectionActions:
         return self._known[1]
 
     @property
-    def _left_out(self) -> Selected:
+    def _left_out(self) -> Subset:
         try:
-            return Selected.of(self._session.choices.settings().exclusions)
+            return self._session.choices.settings().exclusions
         except InputError:
             return NOTHING
 
-    def _exclude(self, left_out: Selected) -> None:
+    def _exclude(self, left_out: Subset) -> None:
         choices = self._session.choices
         try:
             settings = choices.settings()
@@ -130,7 +129,7 @@ class SelectionActions:
             # Other settings than exclusions may be invalid; nothing is changed for them.
             self._session.refuse(str(error))
             return
-        settings = settings.with_(exclusions=left_out.exclusions)
+        settings = settings.with_(exclusions=left_out)
         choices.load(settings)
         self._advise(settings)
 
@@ -144,7 +143,7 @@ class SelectionActions:
 
     def _forget_advice(self, *_: object) -> None:
         shown = self._session.shown
-        if shown is not None and Selected.of(shown.settings.exclusions) == self._left_out:
+        if shown is not None and shown.settings.exclusions == self._left_out:
             self._session.advice = ""
 
 
@@ -160,17 +159,20 @@ def look_for_kept(session: Session) -> None:
     for name, items in found.items():
         # They come from a file.
         with suppress(InputError):
-            kept[checked_name(name)] = Selected.of(items)
+            kept[checked_name(name)] = items
     merged = {**selection.kept, **kept}
     if merged != selection.kept:
         selection.kept = merged
 
 
-def _measured(solution: Solution) -> Selected:
+def _measured(solution: Solution) -> Subset:
     result = solution.result
     exposures = result.exposures[["field_id", "plate_id"]].itertuples(index=False)
-    return Selected(
-        frozenset(result.sources["source_id"].tolist()),
-        frozenset((int(field), int(plate)) for field, plate in exposures),
-        frozenset(result.residuals["detector_id"].unique().tolist()),
-    ) | Selected.of(solution.settings.exclusions)
+    return (
+        Subset(
+            frozenset(result.sources["source_id"].tolist()),
+            frozenset((int(field), int(plate)) for field, plate in exposures),
+            frozenset(result.residuals["detector_id"].unique().tolist()),
+        )
+        | solution.settings.exclusions
+    )

@@ -13,13 +13,14 @@ import re
 from collections.abc import Mapping
 
 from plateviz.dashboard.selection.large_selections import LargeSelections
-from plateviz.dashboard.selection.selected import KINDS, MANY, Selected, parsed
+from plateviz.dashboard.selection.selected import MANY, keys_of, parsed
 from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.queries import SurveyRun
 from solver.data.ids import ID
 from solver.data.setting_words import parse_setting_words, setting_words
 from solver.data.settings import FitSettings
+from solver.data.subset import KINDS
 from solver.errors import InputError
 from solver.io.settings import parse_settings
 
@@ -148,7 +149,7 @@ def _settings(words: list[str], large: LargeSelections) -> FitSettings:
     selected, problems = parsed(dict(word.split("=", 1) for word in many), large.find)
     if problems:
         raise InputError(_TOO_MANY)
-    return settings.with_(exclusions=settings.exclusions | selected.exclusions)
+    return settings.with_(exclusions=settings.exclusions | selected)
 
 
 def _text(solution: Solution, orbit: int | None, large: LargeSelections | None) -> str:
@@ -166,10 +167,11 @@ def _text(solution: Solution, orbit: int | None, large: LargeSelections | None) 
     text = settings_text(solution)
     if large is None or len(text) <= _MOST_CHARACTERS:
         return text if len(text) <= _MOST_READ else TOO_LONG
-    selected = Selected.of(solution.settings.exclusions)
+    selected = solution.settings.exclusions
     large.remember(selected)
-    few = selected.of_kinds([kind for kind in selected.kinds if kind not in selected.keys])
-    shorter = solution._replace(settings=solution.settings.with_(exclusions=few.exclusions))
-    keys = (f"{kind}={MANY}{key}" for kind, key in selected.keys.items())
+    many = keys_of(selected)
+    few = selected.of_kinds([kind for kind in selected.kinds if kind not in many])
+    shorter = solution._replace(settings=solution.settings.with_(exclusions=few))
+    keys = (f"{kind}={MANY}{key}" for kind, key in many.items())
     text = " ".join([*keys, settings_text(shorter)])
     return text if len(text) <= _MOST_CHARACTERS else TOO_LONG

@@ -4,10 +4,10 @@ import pytest
 
 from plateviz.dashboard.address_parts import unknown_parts
 from plateviz.dashboard.navigation.navigation import View
-from plateviz.dashboard.selection.selected import Selected
 from plateviz.plots.explored_rows import ExploredColumns
 from plateviz.plots.explored_text import parts_of
 from plateviz.plots.workspace import OrbitWorkspace
+from solver.data.subset import Subset
 from tests.plateviz.dashboard.navigation.test_navigation import again
 
 
@@ -37,7 +37,7 @@ def test_every_part_that_is_written_is_known(navigation, survey):
     navigation.open_source(str(survey.motions["source_id"].iloc[0]))
     navigation.open_orbit(0)
     session = navigation.session
-    session.selection.select(Selected(frozenset({1}), frozenset({(0, 1)}), frozenset({2})))
+    session.selection.select(Subset(frozenset({1}), frozenset({(0, 1)}), frozenset({2})))
     session.selection.kept = {"all": session.selection.selected}
     session.units.unit = "mpix"
     session.compare_with(session.shown._replace(run="other"))

@@ -7,13 +7,13 @@ import pytest
 
 from plateviz.runs.kept_selections import FILE, MOST, KeptSelections, TakenError
 from plateviz.runs.kept_solutions import KeptSolutions
-from solver.data.exclusions import Exclusions
+from solver.data.subset import Subset
 from solver.errors import InputError
 
-CORNER = Exclusions(
+CORNER = Subset(
     frozenset({-(2**62), 4_057_482_027_171_038_209}), frozenset({(0, 3), (1, -2)}), frozenset({1})
 )
-OTHER = Exclusions(detectors=frozenset({2}))
+OTHER = Subset(detectors=frozenset({2}))
 NAME = "<img src=x onerror=alert(1)> “corner”"
 
 

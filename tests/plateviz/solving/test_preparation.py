@@ -9,9 +9,9 @@ from plateviz.solving.fitters import Fitters
 from plateviz.solving.origin import SurveyFolder, origin_to_dict
 from plateviz.solving.preparation import prepare
 from plateviz.solving.put_off import PutOff
-from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.errors import InputError
 from solver.runtime.interruption import give_way
 
@@ -67,7 +67,7 @@ def test_orbit_is_fitted_and_its_likely_what_ifs_are_precomputed(prepared_with):
 
 
 def test_all_measurements_are_fitted_and_no_orders_compared(prepared_with, monkeypatch):
-    special = SETTINGS.with_(exclusions=Exclusions(detectors=frozenset([1])), compare_orders=True)
+    special = SETTINGS.with_(exclusions=Subset(detectors=frozenset([1])), compare_orders=True)
     monkeypatch.setitem(PREPARED, "settings", special.to_dict())
     assert prepared_with()[0] == SETTINGS
 
@@ -82,7 +82,7 @@ def test_orbit_whose_fit_serves_is_not_fitted_again(prepared_with):
     [
         FitSettings(order=2),
         FitSettings(order=3, aberration=False),
-        FitSettings(order=3, exclusions=Exclusions(detectors=frozenset([1]))),
+        FitSettings(order=3, exclusions=Subset(detectors=frozenset([1]))),
     ],
     ids=["lower-order", "other-model", "fewer-measurements"],
 )
@@ -139,7 +139,7 @@ def likely(small_survey, tmp_path):
     """A fitted orbit, and a request to prepare two what-ifs of which the first is impossible."""
     origin = origin_to_dict(SurveyFolder(str(small_survey)))
     settings = FitSettings(order=3)
-    nowhere = settings.with_(exclusions=Exclusions(sources=frozenset([-1])))
+    nowhere = settings.with_(exclusions=Subset(sources=frozenset([-1])))
     wanted = [
         {"settings": one.to_dict(), "directory": str(tmp_path / name)}
         for name, one in (("nowhere", nowhere), ("lower", settings.with_(order=2)))

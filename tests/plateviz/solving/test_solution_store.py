@@ -26,9 +26,9 @@ from plateviz.solving.origin import OrbitFiles, SurveyFolder, origin_from_dict, 
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_queue import SolverQueue
 from plateviz.verdict.verdict import with_verdict
-from solver.data.exclusions import Exclusions
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.errors import InputError
 from solver.fit import OrbitFitter
 from tests.solver.growing_survey import GrowingSurvey
@@ -291,7 +291,7 @@ def test_what_if_without_sources_starts_from_all_measurements(store):
     """As for a solution of a run, of which the solver has no fit yet."""
     sources = store.origin.read(1).measurements["source_id"].unique().tolist()
     for excluded in (sources[:3], sources[3:6]):
-        settings = FitSettings(exclusions=Exclusions(frozenset(excluded)))
+        settings = FitSettings(exclusions=Subset(frozenset(excluded)))
         job = store.request(1, settings, what_if=True)
         assert job.wait(LONG) is JobStatus.DONE, job.message
         result = store.result(1, settings, what_if=True)

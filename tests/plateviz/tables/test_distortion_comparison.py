@@ -12,9 +12,9 @@ from plateviz import tables
 from plateviz.plots.distortion_comparison import plot_distortion_comparison
 from plateviz.tables.distortion_comparison import ALONE, TOGETHER
 from plateviz.tables.mean_calibration import fitted_calibration
-from solver.data.exclusions import Exclusions
 from solver.data.parameters import OPTIONAL_GROUPS
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.fit import OrbitFitter
 from solver.model.forward import Index, image
 from solver.problem.problem import build_problem
@@ -161,7 +161,7 @@ def test_left_out_sources_change_the_calibration_within_its_uncertainty():
     fitter = OrbitFitter(orbit.data, orbit.instrument)
     fitted = fitter.fit(FitSettings())
     half = frozenset(fitted.sources["source_id"][::2].tolist())
-    other = fitter.fit(FitSettings(exclusions=Exclusions(sources=half)))
+    other = fitter.fit(FitSettings(exclusions=Subset(sources=half)))
     table = part_of(tables.distortion_comparison(fitted, other, orbit.instrument), TOGETHER)
     rms_mas = np.sqrt(np.mean(table[["dx_mas", "dy_mas"]].to_numpy() ** 2))
     single = np.degrees(0.00942 * 10.0 / orbit.instrument.focal_length_um) * 3.6e6

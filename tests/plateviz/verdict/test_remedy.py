@@ -8,8 +8,8 @@ from plateviz.verdict import causes as module
 from plateviz.verdict.cause_words import Said
 from plateviz.verdict.remedy import remedied
 from plateviz.verdict.verdict import orbit_verdict
-from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.errors import InputError
 from tests.plateviz.verdict.test_verdict import with_chances
 
@@ -29,9 +29,9 @@ def settings(**changes):
         ({"order": 3}, ["--order 5"], {"order": 5}),
         ({}, ["--noise-scale"], {"noise_scale": True}),
         (
-            {"exclusions": Exclusions(sources=frozenset({7}))},
+            {"exclusions": Subset(sources=frozenset({7}))},
             ["--exclude source=7", "--exclude source=-8", "--exclude exposure=0/3"],
-            {"exclusions": Exclusions(sources=frozenset({7, -8}), exposures=frozenset({(0, 3)}))},
+            {"exclusions": Subset(sources=frozenset({7, -8}), exposures=frozenset({(0, 3)}))},
         ),
         (
             {"prior_widths": {"distortion_x": 2.0}},
@@ -51,7 +51,7 @@ def test_options_are_added_to_the_settings(before, options, after):
         ({"drift": 3}, ["--drift 2"]),
         ({"order": 9}, ["--order 9"]),
         ({"robust": True}, ["--robust"]),
-        ({"exclusions": Exclusions(detectors=frozenset({1, 2}))}, ["--exclude detector=1"]),
+        ({"exclusions": Subset(detectors=frozenset({1, 2}))}, ["--exclude detector=1"]),
         ({"prior_widths": {"sources": 2.0}}, ["--prior sources=1.30"]),
     ],
 )

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.data.engine_settings import engine_settings
-from solver.data.exclusions import Exclusions
 from solver.data.setting_words import parse_setting_words, setting_words
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.errors import InputError
 
 SETTINGS = [
@@ -17,7 +17,7 @@ SETTINGS = [
     FitSettings(prior_widths={"distortion_x": 1 / 3, "position_angle": float("inf")}),
     FitSettings(prior_shifts={"focal_length": 100.0, "detector_x[2]": -5.25, "sources[ra]": 0.1}),
     FitSettings(
-        exclusions=Exclusions(frozenset({-(2**63) + 1, 12}), frozenset({(0, 3)}), frozenset({1}))
+        exclusions=Subset(frozenset({-(2**63) + 1, 12}), frozenset({(0, 3)}), frozenset({1}))
     ),
     FitSettings(engine="svi", **engine_settings(seed=2, steps=30)),
     FitSettings(engine="svi", **engine_settings(steps=2000, compat="warpfield")),
@@ -38,7 +38,7 @@ def test_words_are_those_of_the_command_line_and_have_what_differs():
         order=3,
         aberration=False,
         prior_widths={"distortion_x": 0.5},
-        exclusions=Exclusions(detectors=frozenset({1})),
+        exclusions=Subset(detectors=frozenset({1})),
     )
     assert setting_words(changed) == [
         "order=3",

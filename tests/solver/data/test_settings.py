@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from solver.data.engine_settings import WARPFIELD, NutsSettings, SviSettings, svi_settings
-from solver.data.exclusions import Exclusions
 from solver.data.parameters import PARAMETERS
 from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
+from solver.data.subset import Subset
 from solver.errors import InputError
 
 
@@ -177,8 +177,8 @@ def test_what_if_is_valid_unless_the_model_the_outliers_or_the_engine_change(cha
     [
         ({}, {"order": 3}, True),
         ({}, {"order": 6}, False),
-        ({}, {"exclusions": Exclusions(detectors=frozenset({1}))}, True),
-        ({"exclusions": Exclusions(detectors=frozenset({1}))}, {}, False),
+        ({}, {"exclusions": Subset(detectors=frozenset({1}))}, True),
+        ({"exclusions": Subset(detectors=frozenset({1}))}, {}, False),
         ({"thin": 10}, {}, False),
         ({"thin": 10}, {"thin": 10}, True),
         ({}, {"thin": 10}, True),
@@ -194,9 +194,9 @@ def test_what_ifs_start_from_a_fit_of_all_their_measurements(fit, asked, serves)
         ({}, "order 5"),
         ({"thin": 3, "engine": "svi"}, "order 5, svi, one in 3 sources"),
         ({"svi": SviSettings(seed=3)}, "order 5, svi seed 3"),
-        ({"exclusions": Exclusions(detectors=frozenset({1}))}, "order 5, without detector 1"),
+        ({"exclusions": Subset(detectors=frozenset({1}))}, "order 5, without detector 1"),
         (
-            {"exclusions": Exclusions(frozenset(range(132)), detectors=frozenset({1}))},
+            {"exclusions": Subset(frozenset(range(132)), detectors=frozenset({1}))},
             "order 5, without 132 sources, without detector 1",
         ),
         ({"prior_shifts": {"detector_x[2]": -5.0}}, "order 5, detector_x[2]=-5um"),

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.engines import moves
 from solver.fit import OrbitFitter, fit_orbit
 
@@ -125,13 +125,13 @@ def test_a_what_if_keeps_the_moves(shifted):
     fitted = fitter.fit(MOVING)
     for settings in (
         MOVING.with_(prior_widths={"pitch_x": 0.005}),
-        MOVING.with_(exclusions=Exclusions(exposures=frozenset({(field, plate + 1)}))),
+        MOVING.with_(exclusions=Subset(exposures=frozenset({(field, plate + 1)}))),
     ):
         what_if = fitter.what_if(settings)
         assert what_if.summary["detector_moves"] == fitted.summary["detector_moves"]
         assert what_if.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.15)
     # The move has no exposure of its own then.
-    without = MOVING.with_(exclusions=Exclusions(exposures=frozenset({(field, plate)})))
+    without = MOVING.with_(exclusions=Subset(exposures=frozenset({(field, plate)})))
     assert fitter.what_if(without) is None
     assert places(fitter.fit(without)) == [(field, plate + 1)]
 

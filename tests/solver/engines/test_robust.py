@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from solver.data import schema
-from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.errors import CancelledError
 from solver.fit import OrbitFitter, fit_orbit
 
@@ -166,12 +166,12 @@ def test_what_if_leaves_out_the_same_outliers(small_orbit):
     fitted = fitter.fit(ROBUST)
     assert len(fitted.outliers) >= len(bad)
     source = int(fitted.sources["source_id"].iloc[0])
-    changed = fitter.what_if(ROBUST.with_(exclusions=Exclusions(sources=frozenset([source]))))
+    changed = fitter.what_if(ROBUST.with_(exclusions=Subset(sources=frozenset([source]))))
     pd.testing.assert_frame_equal(changed.outliers, fitted.outliers)
     assert changed.summary["n_measurements"] < fitted.summary["n_measurements"]
     detector = int(fitted.outliers["detector_id"].iloc[0])
     others = fitted.outliers[fitted.outliers["detector_id"] != detector]
-    fewer = fitter.what_if(ROBUST.with_(exclusions=Exclusions(detectors=frozenset([detector]))))
+    fewer = fitter.what_if(ROBUST.with_(exclusions=Subset(detectors=frozenset([detector]))))
     assert fewer.summary["n_outliers"] == len(others) < len(fitted.outliers)
     pd.testing.assert_frame_equal(fewer.outliers, others.reset_index(drop=True))
     assert fitter.what_if(FitSettings()) is None

@@ -5,9 +5,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from solver.data.exclusions import Exclusions
+from solver.data.exclusions import without_excluded
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.engines import warm_starts, what_if
 from solver.errors import CancelledError, FitError
 from solver.fit import OrbitFitter, fit_orbit
@@ -88,12 +89,12 @@ CHANGES = {
         }
     },
     "lower-order": lambda data: {"order": 5},
-    "no-source": lambda data: {"exclusions": Exclusions(frozenset(first(data, "source_id")))},
+    "no-source": lambda data: {"exclusions": Subset(frozenset(first(data, "source_id")))},
     "no-exposure": lambda data: {
-        "exclusions": Exclusions(exposures=frozenset([first(data, "field_id", "plate_id")]))
+        "exclusions": Subset(exposures=frozenset([first(data, "field_id", "plate_id")]))
     },
     "no-detector": lambda data: {
-        "exclusions": Exclusions(detectors=frozenset(first(data, "detector_id")))
+        "exclusions": Subset(detectors=frozenset(first(data, "detector_id")))
     },
 }
 
@@ -222,7 +223,7 @@ def test_what_ifs_with_fewer_measurements_have_nothing_to_compile(sample_orbit, 
         {"sources": frozenset(ids[::20])},
         {"exposures": frozenset([first(sample_orbit, "field_id", "plate_id")])},
     ):
-        settings = FitSettings(order=2, exclusions=Exclusions(**excluded))
+        settings = FitSettings(order=2, exclusions=Subset(**excluded))
         assert fitter.what_if(settings) is not None
     assert len(shapes) > 1
     assert shapes <= compiled
@@ -351,15 +352,13 @@ def test_what_if_starts_from_the_fit_not_from_another_what_if(fitter):
 
 
 EXCLUSIONS = {
-    "a-detector": lambda data: Exclusions(detectors=frozenset(first(data, "detector_id"))),
-    "detectors": lambda data: Exclusions(
+    "a-detector": lambda data: Subset(detectors=frozenset(first(data, "detector_id"))),
+    "detectors": lambda data: Subset(
         detectors=frozenset(data.measurements["detector_id"].unique().tolist()[:2])
     ),
-    "a-source": lambda data: Exclusions(frozenset(first(data, "source_id"))),
-    "an-exposure": lambda data: Exclusions(
-        exposures=frozenset([first(data, "field_id", "plate_id")])
-    ),
-    "detector-and-source": lambda data: Exclusions(
+    "a-source": lambda data: Subset(frozenset(first(data, "source_id"))),
+    "an-exposure": lambda data: Subset(exposures=frozenset([first(data, "field_id", "plate_id")])),
+    "detector-and-source": lambda data: Subset(
         frozenset(first(data, "source_id")), detectors=frozenset(first(data, "detector_id"))
     ),
 }
@@ -405,7 +404,7 @@ def test_blocks_of_a_lower_order_equal_those_accumulated_for_it(
 ):
     """This includes blocks between the distortion terms, taken from the higher order."""
     settings = FitSettings(order=problem.order - 1, prior_shifts={"detector_x": 1.0})
-    exclusions = EXCLUSIONS[name](orbit.data) if name else Exclusions()
+    exclusions = EXCLUSIONS[name](orbit.data) if name else Subset()
     lower = without(exclusions, orbit, settings)
     compare_blocks(update_equations(accumulate(problem, *expansion_point), problem, lower), lower)
 
@@ -415,13 +414,13 @@ def test_blocks_between_the_terms_of_a_lower_order_are_reused(
 ):
     equations = accumulate(problem, *expansion_point)
     monkeypatch.setattr("solver.linear.normal_equations._add_coefficients", None)
-    lower = without(Exclusions(), orbit, FitSettings(order=problem.order - 1))
+    lower = without(Subset(), orbit, FitSettings(order=problem.order - 1))
     assert update_equations(equations, problem, lower) is not None
 
 
 def without(exclusions, orbit, settings=None):
     return build_problem(
-        exclusions.without(orbit.data), orbit.instrument, settings or FitSettings()
+        without_excluded(orbit.data, exclusions), orbit.instrument, settings or FitSettings()
     )
 
 

@@ -2,8 +2,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from solver.data.exclusions import Exclusions
+from solver.data.exclusions import without_excluded
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.problem.adjustments import Adjustments
 from solver.problem.priors import Priors
 from solver.problem.problem import build_problem
@@ -19,7 +20,7 @@ def cache(small_orbit):
 
 def without(orbit, rank):
     ids = np.unique(orbit.data.measurements["source_id"])
-    return FitSettings(order=3, exclusions=Exclusions(sources=frozenset([int(ids[rank])])))
+    return FitSettings(order=3, exclusions=Subset(sources=frozenset([int(ids[rank])])))
 
 
 @pytest.mark.parametrize(
@@ -57,13 +58,15 @@ def test_cached_problem_equals_one_built_from_the_tables(cache, small_orbit, set
 def test_other_exclusions_give_another_problem(cache, small_orbit):
     variants = [DEFAULT, *(without(small_orbit, rank) for rank in range(3))]
     exposure = small_orbit.data.measurements[["field_id", "plate_id"]].iloc[0].tolist()
-    exclusions = Exclusions(exposures=frozenset([tuple(exposure)]), detectors=frozenset([1]))
+    exclusions = Subset(exposures=frozenset([tuple(exposure)]), detectors=frozenset([1]))
     variants.append(FitSettings(order=3, exclusions=exclusions))
     variants.append(FitSettings(order=3, thin=2))
     for settings in variants:
         data, problem = cache.get(settings)
         expected = build_problem(
-            settings.exclusions.without(small_orbit.data), small_orbit.instrument, settings
+            without_excluded(small_orbit.data, settings.exclusions),
+            small_orbit.instrument,
+            settings,
         )
         if settings.thin == 1:
             assert_same_measurements(problem, expected)

@@ -6,7 +6,7 @@ import panel as pn
 import param
 
 from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation, View
-from plateviz.dashboard.selection.selected import KINDS
+from solver.data.subset import KINDS
 
 # Parts of an address whose change is a step of the browser's history; others replace the last one.
 _STEPS = ("view", "workspace", "run", "orbit", "source")

@@ -15,7 +15,6 @@ from astropy.table import Table
 
 from plateviz.dashboard.navigation.row_origins import RowsOrigin, TableRequest
 from plateviz.dashboard.saving.explored_file import explored_file
-from plateviz.dashboard.selection.selected import KINDS, Selected
 from plateviz.dashboard.session.latest_answer import PENDING, LatestAnswer, Pending
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.cards.figure import FigureView
@@ -35,6 +34,7 @@ from plateviz.plots.explored_rows import (
 from plateviz.plots.explored_text import SWITCHES
 from plateviz.plots.style import ROW_LIMIT
 from plateviz.tables.explore import ExplorableTable
+from solver.data.subset import KINDS, Subset
 from solver.errors import InputError
 
 MOST_SELECTED = 250_000
@@ -175,7 +175,7 @@ class ExploreView(pn.viewable.Viewer):
         self._show_controls(drawn)
         return self._session.units.figure(drawn.figure)
 
-    def _make(self, request: TableRequest, chosen: ExploredColumns, selected: Selected) -> _Drawn:
+    def _make(self, request: TableRequest, chosen: ExploredColumns, selected: Subset) -> _Drawn:
         """Make a figure; runs on a thread of its own where that takes a while."""
         table = request.make()
         # Neither a zoom nor another colour changes how many rows there are.

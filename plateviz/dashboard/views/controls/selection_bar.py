@@ -18,13 +18,14 @@ from plateviz.dashboard.saving.selected_tables import (
     selection_name,
 )
 from plateviz.dashboard.saving.table_sender import TableSender
-from plateviz.dashboard.selection.selected import KINDS, Selected
+from plateviz.dashboard.selection.selected import words_of
 from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.views.dialogs.kept_selections import KeptSelectionsWindow
 from plateviz.dashboard.views.dialogs.selection_list import SelectionList
 from plateviz.dashboard.views.elements.bar_style import IN_BAR
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
+from solver.data.subset import KINDS, Subset
 from solver.errors import InputError
 
 _WORDS: Mapping[str, Any] = MappingProxyType(
@@ -151,7 +152,7 @@ class SelectionBar(pn.viewable.Viewer):
         return Later(lambda _: Done(self._sender.send(make(), name)))
 
 
-def words(selected: Selected, in_orbit: Selected | None) -> str:
+def words(selected: Subset, in_orbit: Subset | None) -> str:
     """Return the selection in words.
 
     Parameters
@@ -159,11 +160,11 @@ def words(selected: Selected, in_orbit: Selected | None) -> str:
     selected : the selection
     in_orbit : the part that the orbit on the screen has measured; None if no orbit is shown
     """
-    text = f"{selected.words()} selected"
+    text = f"{words_of(selected)} selected"
     if in_orbit is None or in_orbit == selected:
         return text
     return (
-        f"{text}, {in_orbit.words()} in this orbit" if in_orbit else f"{text}, none in this orbit"
+        f"{text}, {words_of(in_orbit)} in this orbit" if in_orbit else f"{text}, none in this orbit"
     )
 
 

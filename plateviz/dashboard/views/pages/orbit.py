@@ -8,7 +8,6 @@ import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.row_origins import OrbitRows
-from plateviz.dashboard.selection.selected import KINDS
 from plateviz.dashboard.session.latest_answer import PENDING, Pending
 from plateviz.dashboard.session.orbit_figures import chosen_of, figures_of
 from plateviz.dashboard.session.stage import Stage
@@ -33,6 +32,7 @@ from plateviz.plots.both_solutions import BOTH, figure_of_both
 from plateviz.plots.diagnostic import Diagnostic
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.runs.scratch_result import are_eigenmodes_to_come
+from solver.data.subset import KINDS
 
 
 class OrbitPage(pn.viewable.Viewer):

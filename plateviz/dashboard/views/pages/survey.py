@@ -12,7 +12,6 @@ from astropy.table import Table
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.row_origins import RunRows
 from plateviz.dashboard.saving.downloads import described
-from plateviz.dashboard.selection.selected import KINDS
 from plateviz.dashboard.session.drawn_area import DrawnArea
 from plateviz.dashboard.session.latest_answer import PENDING, Pending
 from plateviz.dashboard.views.cards.explore import ExploreView
@@ -46,6 +45,7 @@ from plateviz.reports.summary_strip import strip
 from plateviz.solving.run_reader import ReadRun
 from plateviz.tables import orbit_list, orbit_states, run_strip
 from plateviz.tables.headings import ORBITS_OF_RUN
+from solver.data.subset import KINDS
 from solver.data.survey_schema import MOTIONS, RUN_ORBITS
 from solver.errors import InputError
 

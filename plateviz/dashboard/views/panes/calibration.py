@@ -10,7 +10,6 @@ import param
 from astropy.table import Table
 
 from plateviz.dashboard.saving.calibration_files import calibration_files
-from plateviz.dashboard.selection.selected import KINDS
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.cards.state_text import empty_text, outdated_text
 from plateviz.dashboard.views.elements.markup import markup_pane, paragraph
@@ -18,6 +17,7 @@ from plateviz.dashboard.views.elements.table import TABLE_STYLE, short_cells
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
 from plateviz.tables import calibration_tables, outlier_list
+from solver.data.subset import KINDS
 
 
 class _Rows(NamedTuple):
@@ -26,7 +26,7 @@ class _Rows(NamedTuple):
     Attributes
     ----------
     table : on the screen
-    kind : of `Selected` that a row is of
+    kind : of `Subset` that a row is of
     items : what each row is of
     """
 

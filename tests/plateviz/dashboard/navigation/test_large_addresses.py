@@ -4,9 +4,8 @@ import pytest
 
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.selection.large_selections import LargeSelections
-from plateviz.dashboard.selection.selected import Selected
 from plateviz.dashboard.session.session import Session
-from solver.data.exclusions import Exclusions
+from solver.data.subset import Subset
 from tests.plateviz.dashboard.navigation.test_navigation import end_job
 
 MANY = frozenset(range(4_000_000_000_000_000_000, 4_000_000_000_000_000_400))
@@ -48,7 +47,7 @@ def test_what_if_without_many_sources_is_there_again(without_many, on_server):
     assert again.session.notice == ""
     shown = again.session.shown
     assert shown.settings.order == 4
-    assert shown.settings.exclusions == Exclusions(sources=MANY, detectors=frozenset([1]))
+    assert shown.settings.exclusions == Subset(sources=MANY, detectors=frozenset([1]))
     assert shown.is_replaceable
     assert again.address() == address
 
@@ -62,7 +61,7 @@ def test_what_if_without_many_sources_is_told_where_it_is_not_known(without_many
 
 def test_large_selection_is_there_again(on_server):
     page = on_server({"view": "orbit", "orbit": "0"})
-    page.session.selection.select(Selected(sources=MANY))
+    page.session.selection.select(Subset(sources=MANY))
     again = on_server(page.address())
     assert again.session.selection.sources == MANY
     assert again.session.notice == ""

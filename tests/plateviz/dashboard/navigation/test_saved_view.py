@@ -12,8 +12,8 @@ from plateviz.dashboard.navigation.saved_view import MOST_BYTES, open_view, view
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.saving.view_file import ViewFile
 from plateviz.plots.workspace import OrbitWorkspace
-from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from solver.errors import InputError
 from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 from tests.plateviz.dashboard.navigation.test_navigation import end_job
@@ -72,7 +72,7 @@ def test_figure_of_both_solutions_is_in_the_address_and_in_a_view(page):
 
 
 def test_settings_that_are_too_long_for_an_address_are_in_a_view(page):
-    left_out = Exclusions(sources=frozenset(range(10**15, 10**15 + 300)))
+    left_out = Subset(sources=frozenset(range(10**15, 10**15 + 300)))
     page.session.choices.what_if_at_once = False
     page.session.choices.load(FitSettings(exclusions=left_out))
     page.session.refit()

@@ -5,9 +5,9 @@ import pytest
 
 from plateviz.dashboard.navigation.navigation import View
 from plateviz.dashboard.navigation.source_in_orbit import open_source_in_orbit
-from plateviz.dashboard.selection.selected import Selected
 from plateviz.dashboard.views.pages.source import SourcePage
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace
+from solver.data.subset import Subset
 from tests.plateviz.dashboard.navigation.test_navigation import end_job
 
 
@@ -40,7 +40,7 @@ def test_orbit_opens_where_the_source_was_measured_first(navigation, star):
     navigation.turn_to(View.SOURCE)
     open_source_in_orbit(navigation, source, 0)
     assert (navigation.view, navigation.workspace) == (View.ORBIT, OrbitWorkspace.RESIDUALS)
-    assert selection.selected == Selected(sources=frozenset({source}))
+    assert selection.selected == Subset(sources=frozenset({source}))
     assert shown(navigation) == place(row)
 
 

@@ -33,9 +33,9 @@ from plateviz.solving.origin import OrbitFiles, SurveyFolder
 from plateviz.tables import summary_strip
 from plateviz.tables.explore import EXPLORABLE
 from solver.data.engine_settings import engine_settings
-from solver.data.exclusions import Exclusions
 from solver.data.instrument import MINI_MOCK
 from solver.data.settings import SETTINGS, FitSettings
+from solver.data.subset import Subset
 
 SURVEY = SurveyFolder("/data/my sky")
 FILES = OrbitFiles("/data/o'b.fits", "/data/ref.fits", truth="/data/t.fits", orbit=7)
@@ -45,7 +45,7 @@ OF_SURVEYS = [
     FitSettings(prior_widths={"distortion_x": 1 / 3, "position_angle": float("inf")}),
     FitSettings(prior_shifts={"focal_length": 100.0, "detector_x[2]": -5.25, "sources[ra]": 0.1}),
     FitSettings(
-        exclusions=Exclusions(
+        exclusions=Subset(
             sources=frozenset({-(2**62), 12}),
             exposures=frozenset({(0, 3)}),
             detectors=frozenset({1}),

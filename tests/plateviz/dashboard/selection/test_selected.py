@@ -1,18 +1,25 @@
-"""Selected: its words, its address, and which rows it chooses."""
+"""What is selected: its words and its address."""
 
-import pandas as pd
 import pytest
 
 from plateviz.dashboard.selection.large_selections import LargeSelections
-from plateviz.dashboard.selection.selected import FEW, NOTHING, Selected, checked_name, parsed
+from plateviz.dashboard.selection.selected import (
+    FEW,
+    address_of,
+    checked_name,
+    keys_of,
+    parsed,
+    words_of,
+)
 from plateviz.dashboard.selection.selection import Selection
+from solver.data.subset import NOTHING, Subset
 from solver.errors import InputError
 
 LARGEST = 2**63 - 1
 
 
 def of(sources=(), exposures=(), detectors=()):
-    return Selected(frozenset(sources), frozenset(exposures), frozenset(detectors))
+    return Subset(frozenset(sources), frozenset(exposures), frozenset(detectors))
 
 
 @pytest.mark.parametrize(
@@ -34,7 +41,7 @@ def of(sources=(), exposures=(), detectors=()):
     ],
 )
 def test_selection_in_words(selected, text):
-    assert selected.words() == text
+    assert words_of(selected) == text
 
 
 @pytest.mark.parametrize(
@@ -48,15 +55,15 @@ def test_selection_in_words(selected, text):
     ],
 )
 def test_address_of_a_few_is_read_back(selected):
-    assert parsed(selected.address()) == (selected, [])
+    assert parsed(address_of(selected)) == (selected, [])
 
 
 def test_address_has_a_key_of_the_kinds_of_which_many_are_selected():
     selected = of(range(FEW + 1), [(0, 1)], [1])
-    address, key = selected.address(), selected.keys["sources"]
+    address, key = address_of(selected), keys_of(selected)["sources"]
     assert address == {"sources": f"many:{key}", "exposures": "0/1", "detectors": "1"}
-    assert key == of(range(FEW, -1, -1)).keys["sources"]
-    assert key != of(range(1, FEW + 2)).keys["sources"]
+    assert key == keys_of(of(range(FEW, -1, -1)))["sources"]
+    assert key != keys_of(of(range(1, FEW + 2)))["sources"]
     known = LargeSelections()
     known.remember(selected)
     assert parsed(address, known.find) == (selected, [])
@@ -71,14 +78,14 @@ def test_large_selections_are_remembered_up_to_a_number():
     known = LargeSelections()
     for selected in many:
         known.remember(selected)
-    found = [parsed(selected.address(), known.find) for selected in many]
+    found = [parsed(address_of(selected), known.find) for selected in many]
     assert found[-10:] == [(selected, []) for selected in many[-10:]]
     assert found[0][0] == NOTHING
     largest = of(range(2_000_000))
     known.remember(largest)
     # It makes room for itself, and is there.
-    assert parsed(largest.address(), known.find) == (largest, [])
-    assert parsed(many[-5].address(), known.find)[0] == NOTHING
+    assert parsed(address_of(largest), known.find) == (largest, [])
+    assert parsed(address_of(many[-5]), known.find)[0] == NOTHING
 
 
 @pytest.mark.parametrize("kind", ["sources", "exposures", "detectors"])
@@ -99,21 +106,6 @@ def test_key_that_is_not_known_selects_nothing_and_is_told(text):
     (told,) = selection.restore({"sources": text})
     assert told.startswith("sources: ")
     assert selection.selected == NOTHING
-
-
-def test_rows_of_any_selected_source_exposure_or_detector_are_chosen():
-    rows = pd.DataFrame(
-        {
-            "source_id": [1, 2, 3, 4],
-            "field_id": [0, 0, 1, 1],
-            "plate_id": [0, 1, 0, 1],
-            "detector_id": [0, 1, 2, 3],
-        }
-    )
-    assert of([1], [(1, 0)], [3]).chosen(rows).tolist() == [True, False, True, True]
-    assert not NOTHING.chosen(rows).any()
-    exposures = rows[["field_id", "plate_id"]]
-    assert of([1], [(1, 0)], [3]).chosen(exposures).tolist() == [False, False, True, False]
 
 
 def test_name_is_text_that_can_be_seen():

@@ -9,8 +9,8 @@ from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.panes.remedies import RemediesView
 from plateviz.verdict.causes import Cause
 from plateviz.verdict.verdict import Verdict
-from solver.data.exclusions import Exclusions
 from solver.data.settings import FitSettings
+from solver.data.subset import Subset
 from tests.plateviz.dashboard.session.test_session import FakeStore, finish
 
 DRIFT = FitSettings(drift=2)
@@ -113,7 +113,7 @@ def test_each_cause_has_a_row_and_each_remedy_a_button(live, fit_result):
     first, last = buttons(view)
     assert first.description.startswith("Try it: solve the orbit with --drift 2. ")
     last.clicks += 1
-    left_out = Exclusions(sources=frozenset(fit_result.sources["source_id"][:5].tolist()))
+    left_out = Subset(sources=frozenset(fit_result.sources["source_id"][:5].tolist()))
     assert live.store.requested[-1][1].exclusions == left_out
 
 

@@ -3,7 +3,6 @@
 import pytest
 
 from plateviz.dashboard.navigation.navigation import Navigation
-from plateviz.dashboard.selection.selected import NOTHING, Selected
 from plateviz.dashboard.session.prior_widths import default_widths
 from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.session.session import Session
@@ -11,6 +10,7 @@ from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.elements.notice import NoticeView
 from plateviz.runs.kept_selections import KeptSelections
 from solver.data.settings import FitSettings
+from solver.data.subset import NOTHING, Subset
 from solver.errors import InputError
 from tests.plateviz.dashboard.fake_survey import SurveyStore
 from tests.plateviz.dashboard.session.test_session import FakeStore, finish
@@ -39,19 +39,19 @@ def test_selection_is_left_out_and_put_back(live, actions, fit_result):
     live.selection.select_sources(ids | {-7})
     live.selection.select_exposures(frozenset({(0, 1), (99, 0)}))
     live.selection.select_detectors(frozenset({2}))
-    measured = Selected(ids, frozenset({(0, 1)}), frozenset({2}))
+    measured = Subset(ids, frozenset({(0, 1)}), frozenset({2}))
     assert actions.in_orbit == measured
     assert not actions.is_left_out
     actions.leave_out()
     (_, settings, job) = live.store.requested[-1]
-    assert settings.exclusions == measured.exclusions
+    assert settings.exclusions == measured
     assert job.request["what_if"]
     assert actions.is_left_out
     live.selection.select_detectors(frozenset({2, 3}))
     assert not actions.is_left_out
     live.selection.select_detectors(frozenset())
     actions.put_back()
-    assert live.choices.settings().exclusions == Selected(detectors=frozenset({2})).exclusions
+    assert live.choices.settings().exclusions == Subset(detectors=frozenset({2}))
 
 
 def test_what_is_left_out_already_stays_out(live, actions):
@@ -88,7 +88,7 @@ def test_selected_kinds_are_inverted_among_what_is_measured(live, actions, fit_r
     live.selection.select_detectors(frozenset({0, 3}))
     actions.invert()
     measured = frozenset(fit_result.residuals["detector_id"].tolist())
-    assert live.selection.selected == Selected(
+    assert live.selection.selected == Subset(
         ids - ids_of(fit_result, 1), frozenset(), measured - {0, 3}
     )
     actions.clear()
@@ -101,7 +101,7 @@ def test_selection_is_kept_under_a_name_and_taken_up_again(live, actions):
     live.selection.select_exposures(frozenset())
     live.selection.select_sources(frozenset({5}))
     actions.take_up("corner")
-    assert live.selection.selected == Selected(exposures=frozenset({(0, 1)}))
+    assert live.selection.selected == Subset(exposures=frozenset({(0, 1)}))
     assert live.selection.name_of_selected == "corner"
     live.selection.select_detectors(frozenset({1}))
     assert live.selection.name_of_selected is None
@@ -122,7 +122,7 @@ def test_kept_selection_is_there_for_others_and_after_a_reload(live, actions, fi
     other.store.selections = KeptSelections(tmp_path / "solutions")
     others = SelectionActions(other)
     look_for_kept(other)
-    assert other.selection.kept == {"<b>corner</b>": Selected(exposures=corner)}
+    assert other.selection.kept == {"<b>corner</b>": Subset(exposures=corner)}
     # The other one changes it; what the first has in mind under that name is another selection.
     other.selection.select_detectors(frozenset({2}))
     assert others.keep("<b>corner</b>") == ""
@@ -135,7 +135,7 @@ def test_kept_selection_is_there_for_others_and_after_a_reload(live, actions, fi
     # What somebody has changed in the meantime is not forgotten for all.
     others.forget("<b>corner</b>")
     assert KeptSelections(tmp_path / "solutions").all() == {
-        "<b>corner</b>": Selected(frozenset({5}), corner).exclusions
+        "<b>corner</b>": Subset(frozenset({5}), corner)
     }
     actions.forget("<b>corner</b>")
     assert KeptSelections(tmp_path / "solutions").all() == {}

@@ -3,18 +3,18 @@
 import pytest
 from bokeh.events import PanStart, SelectionGeometry
 
-from plateviz.dashboard.selection.selected import Selected
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.cards.figure import FigureView
 from plateviz.dashboard.views.cards.point_actions import session_actions
 from plateviz.plots.gallery import diagnostics
+from solver.data.subset import Subset
 from tests.plateviz.dashboard.session.test_session import FakeStore
 from tests.plateviz.dashboard.views.cards.test_figure import come_near, figure_of, plot
 
 EMPTY = {"type": "rect", "x0": 5.0, "x1": 6.0, "y0": 0.0, "y1": 2.0}
 LASSO = {"type": "poly", "x": [5.0, 6.0, 5.5], "y": [0.0, 0.0, 2.0]}
 FIRST_TWO = {"type": "rect", "x0": -1.0, "x1": 1.5, "y0": 0.0, "y1": 2.0}
-BEFORE = Selected(frozenset({7, 8}), frozenset({(0, 3)}))
+BEFORE = Subset(frozenset({7, 8}), frozenset({(0, 3)}))
 
 
 class Page:
@@ -78,7 +78,7 @@ def test_area_deselects_the_points_in_it(page):
     page.select(BEFORE)
     # With Shift and Ctrl.
     page.drag([], FIRST_TWO)
-    assert page.selection.selected == Selected(exposures=BEFORE.exposures)
+    assert page.selection.selected == Subset(exposures=BEFORE.exposures)
     assert page.session.remark == ""
 
 
@@ -88,9 +88,9 @@ def test_tap_beside_the_points_and_escape_select_nothing(page):
         page.rows.indices, page.session.remark = [], ""
         for geometry in events:
             page.plot._trigger_event(SelectionGeometry(page.plot, geometry=geometry, final=True))
-        assert page.selection.selected == Selected(exposures=BEFORE.exposures)
+        assert page.selection.selected == Subset(exposures=BEFORE.exposures)
         assert page.session.remark == ""
         # What was cleared before somebody draws does not come back.
         page.show()
         page.drag([], EMPTY)
-        assert page.selection.selected == Selected(exposures=BEFORE.exposures)
+        assert page.selection.selected == Subset(exposures=BEFORE.exposures)

@@ -12,7 +12,6 @@ from plateviz.dashboard.navigation import row_origins
 from plateviz.dashboard.navigation.navigation import Navigation, View
 from plateviz.dashboard.navigation.row_origins import OrbitRows, RunRows
 from plateviz.dashboard.saving import explored_file
-from plateviz.dashboard.selection.selected import KINDS
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.cards import explore
 from plateviz.dashboard.views.cards.explore import ExploreView
@@ -22,6 +21,7 @@ from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN
 from plateviz.tables.explore import ExplorableTable, explorable
 from solver.data.schema import RESIDUALS
+from solver.data.subset import KINDS
 from solver.errors import InputError
 from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
 from tests.plateviz.dashboard.session.test_latest_answer import Executor

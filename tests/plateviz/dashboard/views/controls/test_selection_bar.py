@@ -12,22 +12,22 @@ from plateviz.dashboard.navigation.navigation import View
 from plateviz.dashboard.navigation.saved_view import view_text
 from plateviz.dashboard.saving.selected_tables import selected_tables
 from plateviz.dashboard.saving.table_sender import TableSender
-from plateviz.dashboard.selection.selected import NOTHING, Selected
 from plateviz.dashboard.session.drawn_area import DrawnArea
 from plateviz.dashboard.views.controls.selection_bar import SelectionBar, is_read_here, words
 from plateviz.dashboard.views.dialogs.selection_list import SelectionList
 from plateviz.dashboard.views.panes.calibration import CalibrationView
+from solver.data.subset import NOTHING, Subset
 from solver.errors import InputError
 
-SOURCES = Selected(frozenset(range(132)))
-MIXED = Selected(frozenset(range(132)), frozenset({(0, 3)}))
+SOURCES = Subset(frozenset(range(132)))
+MIXED = Subset(frozenset(range(132)), frozenset({(0, 3)}))
 
 
 @pytest.mark.parametrize(
     ("in_orbit", "text"),
     [
         (SOURCES, "132 sources selected"),
-        (Selected(frozenset(range(57))), "132 sources selected, 57 sources in this orbit"),
+        (Subset(frozenset(range(57))), "132 sources selected, 57 sources in this orbit"),
         (NOTHING, "132 sources selected, none in this orbit"),
         (None, "132 sources selected"),
     ],
@@ -38,7 +38,7 @@ def test_selection_in_words(in_orbit, text):
 
 def test_kinds_are_named_one_after_the_other():
     text = "132 sources, exposure 0/3 selected, exposure 0/3 in this orbit"
-    assert words(MIXED, Selected(exposures=MIXED.exposures)) == text
+    assert words(MIXED, Subset(exposures=MIXED.exposures)) == text
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ def test_bar_offers_what_can_be_done(navigation, session):
 
 def test_all_measurements_of_what_is_selected_are_saved(navigation, session, fit_result):
     source = int(fit_result.sources["source_id"].iloc[3])
-    session.selection.select(Selected(frozenset({source}), frozenset({(0, 1)}), frozenset({2})))
+    session.selection.select(Subset(frozenset({source}), frozenset({(0, 1)}), frozenset({2})))
     tables = selected_tables(navigation)
     rows = fit_result.residuals
     expected = (

@@ -52,8 +52,8 @@ class Explores(ABC):
             If there are no such rows, columns or theme, the limits are no numbers in order, or
             files of the run cannot be read.
         """
-        from plateviz.plots.explored import explored
-        from plateviz.plots.explored_rows import ExploredColumns
+        from plateviz.plots.explore.explored import explored
+        from plateviz.plots.explore.explored_rows import ExploredColumns
 
         lowest, highest = _limits(between)
         chosen = ExploredColumns(x, y, colour, only, lowest, highest, log_x, log_y, median, zoom)

@@ -44,7 +44,7 @@ def figures_of_run(other: SurveyRun | None, run: SurveyRun) -> list[FigureSpec]:
 
 def figures_of_both(other: SurveyRun, run: SurveyRun) -> list[FigureSpec]:
     """Return the figures of a run, each drawn of both runs."""
-    from plateviz.plots.both_runs import comparable_survey_figures, of_both_runs
+    from plateviz.plots.comparison.both_runs import comparable_survey_figures, of_both_runs
 
     return _specs(map(of_both_runs, comparable_survey_figures()), _tables(other, run))
 

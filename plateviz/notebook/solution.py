@@ -236,7 +236,7 @@ class OpenSolution(HasFigures, Explores):
     def _figures_of(
         self, chosen: "Chosen", theme: str, both: bool = False
     ) -> LazyCollection[NotebookFigure]:
-        from plateviz.plots.both_solutions import comparable_figures, of_both
+        from plateviz.plots.comparison.both_solutions import comparable_figures, of_both
         from plateviz.plots.gallery import diagnostics
 
         if both and self.other is None:

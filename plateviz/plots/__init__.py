@@ -1,7 +1,7 @@
 """Plots: pure functions from tables to figures as plain values.
 
-Imports `plateviz.verdict`, `plateviz.tables` and `plateviz.figures`. Every
-`plot_<noun>(table, *, options)` of a module in this folder is exported here. It returns a
+Imports `plateviz.verdict`, `plateviz.tables` and `plateviz.figures`. The figures lie in a folder
+per subject. Every `plot_<noun>(table, *, options)` of a module there is exported here. It returns a
 `plateviz.figures.figure.Figure`; for an empty table, one with a message. Dashboard, notebooks and
 reports share them.
 """
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 def _plot_functions() -> dict[str, Callable[..., Any]]:
     modules = [
-        importlib.import_module(f"{__name__}.{module.name}")
-        for module in pkgutil.iter_modules(__path__)
+        importlib.import_module(module.name)
+        for module in pkgutil.walk_packages(__path__, f"{__name__}.")
     ]
     return {
         name: value

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
 
-from plateviz.plots.both_runs import comparable_survey_figures, of_both_runs
-from plateviz.plots.both_solutions import comparable_figures, of_both
+from plateviz.plots.comparison.both_runs import comparable_survey_figures, of_both_runs
+from plateviz.plots.comparison.both_solutions import comparable_figures, of_both
 from plateviz.plots.diagnostic import Chosen, Diagnostic
-from plateviz.plots.explored import explored
-from plateviz.plots.explored_text import parse_explored
+from plateviz.plots.explore.explored import explored
+from plateviz.plots.explore.explored_text import parse_explored
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.reports.report import ReportFigure
 from plateviz.runs.column_cache import ColumnCache
@@ -25,7 +25,7 @@ class MoreFigures(NamedTuple):
     Attributes
     ----------
     both : names of figures that are drawn of both solutions, or of both runs
-    explored : as from `plateviz.plots.explored_text.text_of`
+    explored : as from `plateviz.plots.explore.explored_text.text_of`
     """
 
     both: Sequence[str] = ()

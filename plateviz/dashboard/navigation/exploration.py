@@ -8,8 +8,8 @@ from typing import Any
 import param
 
 from plateviz.dashboard.address_parts import chosen, quoted
-from plateviz.plots.explored_rows import ExploredColumns
-from plateviz.plots.explored_text import parts_of, read_parts, text_of
+from plateviz.plots.explore.explored_rows import ExploredColumns
+from plateviz.plots.explore.explored_text import parts_of, read_parts, text_of
 from solver.data.subset import KINDS
 
 # Tables under the names that they have in addresses of older versions.
@@ -34,7 +34,7 @@ _FIRST: Mapping[str, tuple[str, str]] = {
 class Exploration(param.Parameterized):
     """A table, the columns of it that are drawn, and the limits of the axes.
 
-    The names of the parameters are those of `plots.explore.Columns`.
+    The names of the parameters are those of `ExploredColumns`.
     """
 
     table = param.Selector(doc="what a row is")

@@ -13,7 +13,7 @@ from solver.data.settings import DEFAULTS, SETTINGS, FitSettings
 from solver.data.text_setting import LeftOut, Texts
 
 if TYPE_CHECKING:
-    from plateviz.plots.explored_rows import ExploredColumns
+    from plateviz.plots.explore.explored_rows import ExploredColumns
 
 NAME = "reproduced"
 """Name of the run, or of the result file, that the command writes."""

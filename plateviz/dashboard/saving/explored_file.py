@@ -3,7 +3,7 @@
 from astropy.table import Table
 
 from plateviz.dashboard.saving.downloads import rows_of
-from plateviz.plots.explored_rows import ExploredColumns, kept_rows, rows_in_frame
+from plateviz.plots.explore.explored_rows import ExploredColumns, kept_rows, rows_in_frame
 from plateviz.tables.explore import ExplorableTable
 from solver.errors import InputError
 

@@ -8,7 +8,7 @@ from plateviz.dashboard.address_parts import chosen
 from plateviz.dashboard.session.run_comparison import RunComparison
 from plateviz.dashboard.session.solution import Solution
 from plateviz.dashboard.session.stage import RequestState, Stage
-from plateviz.plots.both_solutions import comparable_figures
+from plateviz.plots.comparison.both_solutions import comparable_figures
 
 
 class SolutionsOnScreen(RequestState):

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import param
 
 from plateviz.dashboard.address_parts import chosen
-from plateviz.plots.both_runs import comparable_survey_figures
+from plateviz.plots.comparison.both_runs import comparable_survey_figures
 from plateviz.runs.queries import SurveyRun
 from solver.errors import InputError
 

@@ -9,7 +9,7 @@ import pandas as pd
 import param
 
 from plateviz.figures.figure import Figure
-from plateviz.plots.angle_units import AngleUnits, mas_per_pixel
+from plateviz.plots.elements.angle_units import AngleUnits, mas_per_pixel
 from plateviz.tables.headings import Heading
 from solver.data.instrument import Instrument
 

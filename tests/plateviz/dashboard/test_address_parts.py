@@ -4,8 +4,8 @@ import pytest
 
 from plateviz.dashboard.address_parts import unknown_parts
 from plateviz.dashboard.navigation.navigation import View
-from plateviz.plots.explored_rows import ExploredColumns
-from plateviz.plots.explored_text import parts_of
+from plateviz.plots.explore.explored_rows import ExploredColumns
+from plateviz.plots.explore.explored_text import parts_of
 from plateviz.plots.workspace import OrbitWorkspace
 from solver.data.subset import Subset
 from tests.plateviz.dashboard.navigation.test_navigation import again

@@ -8,7 +8,7 @@ import pytest
 from plateviz.figures.figure import Axis, Figure, Ramp, framed
 from plateviz.figures.figure_tables import figure_tables
 from plateviz.figures.glyphs import image, points
-from plateviz.plots.angle_units import AngleUnits, mas_per_pixel
+from plateviz.plots.elements.angle_units import AngleUnits, mas_per_pixel
 from solver.data.instrument import MINI_MOCK
 from tests.plateviz.plots.test_every_plot import with_every_plot
 

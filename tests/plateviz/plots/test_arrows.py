@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from plateviz.plots.arrows import Field, arrows, automatic_scale, key, round_125
+from plateviz.plots.elements.arrows import Field, arrows, automatic_scale, key, round_125
 
 FIELD = Field((-10.0, 10.0), (-10.0, 10.0))
 

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 from plateviz import plots
-from plateviz.plots.both_runs import comparable_survey_figures, figure_of_both_runs
+from plateviz.plots.comparison.both_runs import comparable_survey_figures, figure_of_both_runs
+from plateviz.plots.elements.style import ROW_LIMIT
 from plateviz.plots.gallery import survey_figures
-from plateviz.plots.style import ROW_LIMIT
 from plateviz.tables import motion_differences, shared_motions
 from plateviz.tables.run_diagnosis import no_tests
 from plateviz.tables.survey_tables import SurveyTables

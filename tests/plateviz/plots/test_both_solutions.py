@@ -7,7 +7,7 @@ import pytest
 
 from plateviz.figures.alike import beside
 from plateviz.figures.figure import Ramp
-from plateviz.plots.both_solutions import BOTH, comparable_figures, figure_of_both
+from plateviz.plots.comparison.both_solutions import BOTH, comparable_figures, figure_of_both
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.gallery import diagnostics
 from plateviz.verdict.solution_changes import solution_changes

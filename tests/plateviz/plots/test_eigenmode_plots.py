@@ -9,8 +9,8 @@ from plateviz import plots, tables
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.resized import resized
 from plateviz.plots.diagnostic import Chosen
-from plateviz.plots.eigenmode_groups import _amount
 from plateviz.plots.gallery import diagnostics
+from plateviz.plots.weak_directions.eigenmode_groups import _amount
 from tests.plateviz.plots.drawn import shafts_of, texts_of
 
 NAMES = [

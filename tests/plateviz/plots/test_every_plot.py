@@ -28,7 +28,7 @@ def plot_names(*, survey_only=False):
     `survey_only`: only of modules that define figures of a survey or of one source.
     """
     names = []
-    for path in sorted(Path(plots.__file__).parent.glob("*.py")):
+    for path in sorted(Path(plots.__file__).parent.rglob("*.py")):
         text = path.read_text("utf-8")
         if not survey_only or re.search(r"^(SURVEY|SOURCE)_FIGURES\b", text, re.MULTILINE):
             names += re.findall(r"^def plot_(\w+)", text, re.MULTILINE)

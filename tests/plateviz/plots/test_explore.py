@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from plateviz.figures.figure import Ramp
-from plateviz.plots.explore import explored_figure
-from plateviz.plots.explored_rows import ExploredColumns
-from plateviz.plots.style import ROW_LIMIT
+from plateviz.plots.elements.style import ROW_LIMIT
+from plateviz.plots.explore.explore import explored_figure
+from plateviz.plots.explore.explored_rows import ExploredColumns
 from plateviz.tables.explore import EXPLORABLE, ExplorableTable, explorable
 from solver.data import schema
 from solver.data.columns import Column

@@ -5,8 +5,8 @@ import pytest
 
 from plateviz.figures.figure import Axis
 from plateviz.plots import explored_rows
-from plateviz.plots.cells import Counts, edges_of
-from plateviz.plots.explored_rows import (
+from plateviz.plots.elements.cells import Counts, edges_of
+from plateviz.plots.explore.explored_rows import (
     ExploredColumns,
     counts_in_frame,
     extent_of,

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from plateviz.plots.explored_rows import ExploredColumns
-from plateviz.plots.explored_text import parse_explored, text_of
+from plateviz.plots.explore.explored_rows import ExploredColumns
+from plateviz.plots.explore.explored_text import parse_explored, text_of
 from solver.errors import InputError
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from plateviz import tables
 from plateviz.plots import plot_largest_residuals, plot_reference_influence
-from plateviz.plots.style import SERIES_COLOURS
+from plateviz.plots.elements.style import SERIES_COLOURS
 from plateviz.tables.largest_residuals import MEASUREMENT, SOURCE
 from tests.plateviz.plots.drawn import plots_of, renderers_of, subtitle_of
 

@@ -9,7 +9,7 @@ import pytest
 from plateviz import plots, tables
 from plateviz.figures.bokeh_figure import BokehFigure
 from plateviz.figures.theme import THEMES, theme_of
-from plateviz.plots.style import CLASS_COLOURS
+from plateviz.plots.elements.style import CLASS_COLOURS
 from tests.plateviz.plots.drawn import contrast, plots_of, renderers_of, shafts_of
 
 

@@ -6,8 +6,8 @@ import pytest
 from plateviz import plots, tables
 from plateviz.figures.figure import Ramp
 from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.elements.style import SERIES_COLOURS
 from plateviz.plots.gallery import diagnostics
-from plateviz.plots.style import SERIES_COLOURS
 from tests.plateviz.plots.drawn import subtitle_of
 
 NAMES = [

@@ -6,7 +6,7 @@ from bokeh.models import LogScale
 from plateviz import tables
 from plateviz.figures.figure import By
 from plateviz.plots import plot_deviation, plot_residual_scatter, plot_uncertainty
-from plateviz.plots.style import ROW_LIMIT, SERIES_COLOURS
+from plateviz.plots.elements.style import ROW_LIMIT, SERIES_COLOURS
 from tests.plateviz.plots.drawn import plots_of, subtitle_of
 
 

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from plateviz import plots, tables
+from plateviz.plots.elements.style import ROW_LIMIT
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
-from plateviz.plots.style import ROW_LIMIT
 from plateviz.tables.labels import short_id
 from plateviz.tables.run_diagnosis import no_tests
 from plateviz.tables.survey_tables import SourceTables, SurveyTables

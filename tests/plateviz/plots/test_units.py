@@ -2,7 +2,7 @@
 
 import pytest
 
-from plateviz.plots.units import finer_unit, power_text
+from plateviz.plots.elements.units import finer_unit, power_text
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from numpy.polynomial import legendre
 
 from plateviz import tables
-from plateviz.plots.distortion_comparison import plot_distortion_comparison
+from plateviz.plots.comparison.distortion_comparison import plot_distortion_comparison
 from plateviz.tables.distortion_comparison import ALONE, TOGETHER
 from plateviz.tables.mean_calibration import fitted_calibration
 from solver.data.parameters import OPTIONAL_GROUPS

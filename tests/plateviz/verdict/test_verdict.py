@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import chdtri
 
-from plateviz.plots.solution_tests import plot_solution_tests
+from plateviz.plots.residuals.solution_tests import plot_solution_tests
 from plateviz.verdict import verdict
 from plateviz.verdict.solution_tests import solution_tests
 from plateviz.verdict.verdict import (

@@ -24,15 +24,15 @@ from plateviz.dashboard.views.cards.workspace import workspace
 from plateviz.dashboard.views.elements.markup import markup_pane, paragraph
 from plateviz.dashboard.views.saving.save_choices import Saved
 from plateviz.figures.figure import Figure, Limits
-from plateviz.plots.explore import explored_figure
-from plateviz.plots.explored_rows import (
+from plateviz.plots.elements.style import ROW_LIMIT
+from plateviz.plots.explore.explore import explored_figure
+from plateviz.plots.explore.explored_rows import (
     DataExtent,
     ExploredColumns,
     extent_of,
     items_within,
 )
-from plateviz.plots.explored_text import SWITCHES
-from plateviz.plots.style import ROW_LIMIT
+from plateviz.plots.explore.explored_text import SWITCHES
 from plateviz.tables.explore import ExplorableTable
 from solver.data.subset import KINDS, Subset
 from solver.errors import InputError

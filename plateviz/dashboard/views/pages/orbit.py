@@ -28,7 +28,7 @@ from plateviz.dashboard.views.panes.remedies import RemediesView
 from plateviz.dashboard.views.panes.summary import HeadView, StripView
 from plateviz.dashboard.views.saving.save_choices import Saved
 from plateviz.figures.figure import Figure
-from plateviz.plots.both_solutions import BOTH, figure_of_both
+from plateviz.plots.comparison.both_solutions import BOTH, figure_of_both
 from plateviz.plots.diagnostic import Diagnostic
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.runs.scratch_result import are_eigenmodes_to_come

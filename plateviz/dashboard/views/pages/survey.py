@@ -37,7 +37,7 @@ from plateviz.dashboard.views.panes.notable_source import NotableSourceLink
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import Saved, table_choices
 from plateviz.figures.figure import Figure
-from plateviz.plots.both_runs import BOTH_RUNS
+from plateviz.plots.comparison.both_runs import BOTH_RUNS
 from plateviz.plots.gallery import survey_figures
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace

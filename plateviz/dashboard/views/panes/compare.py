@@ -13,7 +13,7 @@ from plateviz.dashboard.session.solution import Request
 from plateviz.dashboard.views.elements.markup import markup_pane, numbers, paragraph, themed
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
-from plateviz.plots.both_solutions import comparable_figures
+from plateviz.plots.comparison.both_solutions import comparable_figures
 from plateviz.plots.diagnostic import Diagnostic
 from plateviz.tables.headings import CHANGES, in_words
 from plateviz.verdict.solution_changes import solution_changes

@@ -16,7 +16,11 @@ from plateviz.dashboard.views.elements.markup import markup_pane, numbers, parag
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
 from plateviz.figures.figure import Figure
-from plateviz.plots.both_runs import BOTH_RUNS, comparable_survey_figures, figure_of_both_runs
+from plateviz.plots.comparison.both_runs import (
+    BOTH_RUNS,
+    comparable_survey_figures,
+    figure_of_both_runs,
+)
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.runs.load_tables import require_same_catalogue

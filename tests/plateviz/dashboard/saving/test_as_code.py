@@ -23,9 +23,9 @@ from plateviz.dashboard.saving.as_code import (
 )
 from plateviz.notebook.keywords import settings_with
 from plateviz.plots.diagnostic import Chosen
-from plateviz.plots.explore import explored_figure
-from plateviz.plots.explored_rows import ExploredColumns
-from plateviz.plots.explored_text import text_of
+from plateviz.plots.explore.explore import explored_figure
+from plateviz.plots.explore.explored_rows import ExploredColumns
+from plateviz.plots.explore.explored_text import text_of
 from plateviz.plots.gallery import diagnostics
 from plateviz.reports.summary_strip import strip
 from plateviz.runs.queries import open_run

@@ -14,9 +14,9 @@ from plateviz.dashboard.saving.page_code import page_code
 from plateviz.dashboard.session.orbit_figures import chosen_of, figures_of
 from plateviz.notebook.keywords import settings_with
 from plateviz.notebook.solution import OpenSolution
-from plateviz.plots.both_solutions import comparable_figures, figure_of_both
+from plateviz.plots.comparison.both_solutions import comparable_figures, figure_of_both
 from plateviz.plots.diagnostic import Chosen
-from plateviz.plots.explore import explored_figure
+from plateviz.plots.explore.explore import explored_figure
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.reports.more_figures import MoreFigures, more_of_orbit
 from plateviz.runs.explorable import COLUMNS_OF_RUN

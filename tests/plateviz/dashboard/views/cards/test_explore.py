@@ -15,7 +15,7 @@ from plateviz.dashboard.saving import explored_file
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.cards import explore
 from plateviz.dashboard.views.cards.explore import ExploreView
-from plateviz.plots.style import ROW_LIMIT
+from plateviz.plots.elements.style import ROW_LIMIT
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN

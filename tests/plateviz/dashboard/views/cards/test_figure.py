@@ -15,8 +15,8 @@ from plateviz.dashboard.views.cards.point_actions import PointActions
 from plateviz.figures import glyphs
 from plateviz.figures.figure import Axis, Figure, Ramp, framed
 from plateviz.figures.glyphs import points
-from plateviz.plots.arrows import Field, arrows
 from plateviz.plots.diagnostic import Chosen
+from plateviz.plots.elements.arrows import Field, arrows
 from plateviz.plots.gallery import diagnostics
 
 

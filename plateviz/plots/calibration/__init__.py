@@ -1,0 +1,1 @@
+"""Figures of the calibration of an orbit: exposures, distortion, detectors and priors."""

@@ -1,0 +1,1 @@
+"""What figures are made of: colours, arrows, marks, outlines, ticks and units."""

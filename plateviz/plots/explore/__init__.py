@@ -1,0 +1,1 @@
+"""The figure of any column of a table against any other."""

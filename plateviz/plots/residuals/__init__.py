@@ -1,0 +1,1 @@
+"""Figures of the residuals of an orbit: maps, distributions, patterns and trends."""

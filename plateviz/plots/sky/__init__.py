@@ -1,0 +1,1 @@
+"""Figures of an orbit on the sky: positions, their deviations and uncertainties."""

@@ -1,0 +1,1 @@
+"""Figures of one source through all orbits of a run."""

@@ -1,0 +1,1 @@
+"""Figures of all orbits of a run."""

@@ -1,0 +1,1 @@
+"""Figures of the weak directions of an orbit: the eigenmodes of its calibration."""

@@ -11,9 +11,9 @@ from plateviz.dashboard.session.prior_widths import default_widths
 from plateviz.dashboard.session.solution import Solution
 from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.controls.fit_controls import TIGHT, controls, width_input
-from plateviz.dashboard.views.dialogs.code_window import code_button
-from plateviz.dashboard.views.dialogs.solution_window import SolutionWindow
-from plateviz.dashboard.views.dialogs.window import window_button
+from plateviz.dashboard.views.dialogs.code_dialog import code_button
+from plateviz.dashboard.views.dialogs.dialog import dialog_button
+from plateviz.dashboard.views.dialogs.solution_dialog import SolutionDialog
 from solver.data.parameter_group import Group
 from solver.data.parameters import OPTIONAL_GROUPS, PARAMETERS
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
@@ -60,7 +60,7 @@ class RefitView(pn.viewable.Viewer):
         )
         self._message = pmui.Alert(object="", sizing_mode="stretch_width", margin=(8, 10))
         self._solutions = pmui.RadioBoxGroup(label="Solution on the screen", options={})
-        open_list, list_place = window_button("All solutions", lambda: SolutionWindow(navigation))
+        open_list, list_place = dialog_button("All solutions", lambda: SolutionDialog(navigation))
         self._reproduce, code_place = code_button(navigation)
         self._column = pmui.Column(
             pmui.Switch.from_param(

@@ -20,7 +20,7 @@ from plateviz.dashboard.saving.selected_tables import (
 from plateviz.dashboard.saving.table_sender import TableSender
 from plateviz.dashboard.selection.selected import words_of
 from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
-from plateviz.dashboard.views.dialogs.kept_selections import KeptSelectionsWindow
+from plateviz.dashboard.views.dialogs.kept_selections import KeptSelectionsDialog
 from plateviz.dashboard.views.dialogs.selection_list import SelectionList
 from plateviz.dashboard.views.elements.bar_style import IN_BAR
 from plateviz.dashboard.views.saving.save_button import SaveButton
@@ -71,7 +71,7 @@ class SelectionBar(pn.viewable.Viewer):
         self._words = pmui.Typography("", **_WORDS)
         self._list, self._kept = (
             SelectionList(self._navigation),
-            KeptSelectionsWindow(self._navigation),
+            KeptSelectionsDialog(self._navigation),
         )
         self._open = self._button("Open", self._open_source)
         self._leave_out = self._button("Leave out of the fit", actions.leave_out)

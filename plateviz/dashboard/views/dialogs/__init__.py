@@ -1,4 +1,4 @@
-"""Windows over the page: lists of solutions and selections, code, notes.
+"""Dialogs over the page: lists of solutions and selections, code, notes.
 
 Imports `cards` and below.
 """

@@ -1,4 +1,4 @@
-"""KeptSelectionsWindow: a window in which selections are kept under names and taken up again."""
+"""KeptSelectionsDialog: a dialog in which selections are kept under names and taken up again."""
 
 from html import escape
 
@@ -8,11 +8,11 @@ import panel_material_ui as pmui
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.selection.selected import words_of
 from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
-from plateviz.dashboard.views.dialogs.window import window
+from plateviz.dashboard.views.dialogs.dialog import dialog
 from solver.errors import InputError
 
 
-class KeptSelectionsWindow(pn.viewable.Viewer):
+class KeptSelectionsDialog(pn.viewable.Viewer):
     """A name for the selection, and the list of those that are kept, by others too."""
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
@@ -30,22 +30,22 @@ class KeptSelectionsWindow(pn.viewable.Viewer):
         self._words = pmui.Alert(object="", severity="info", sizing_mode="stretch_width")
         self._again = pmui.Row(self._kept, self._take_up, self._forget, margin=0)
         self._new = pmui.Row(self._name, self._keep, margin=0)
-        self._window = window("Keep the selection", self._words, self._new, self._again, width="sm")
+        self._dialog = dialog("Keep the selection", self._words, self._new, self._again, width="sm")
         self._keep.on_click(lambda _: self._keep_it())
         self._take_up.on_click(lambda _: self._actions.take_up(self._kept.value))
         self._forget.on_click(lambda _: self._actions.forget(self._kept.value))
         self._selection.param.watch(self._show, ["sources", "exposures", "detectors", "kept"])
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Return the window."""
-        return self._window
+        """Return the dialog."""
+        return self._dialog
 
     def open(self) -> None:
-        """Open the window."""
+        """Open the dialog."""
         look_for_kept(self._session)
         self._name.value = self._selection.name_of_selected or ""
         self._show()
-        self._window.open = True
+        self._dialog.open = True
 
     def _keep_it(self) -> None:
         try:

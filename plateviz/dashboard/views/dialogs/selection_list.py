@@ -1,4 +1,4 @@
-"""SelectionList: a window with a row per selected source, exposure and detector."""
+"""SelectionList: a dialog with a row per selected source, exposure and detector."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import pandas as pd
 import panel as pn
 
 from plateviz.dashboard.navigation.navigation import Navigation
-from plateviz.dashboard.views.dialogs.window import window
+from plateviz.dashboard.views.dialogs.dialog import dialog
 from plateviz.dashboard.views.elements.markup import heading
 from plateviz.dashboard.views.elements.table import DataTable
 from plateviz.tables import selected_detectors, selected_exposures, selected_sources
@@ -45,24 +45,24 @@ class SelectionList(pn.viewable.Viewer):
         super().__init__(**params)
         self._navigation = navigation
         self._tables: dict[str, DataTable] = {}
-        self._window = window("Selection", width="lg")
+        self._dialog = dialog("Selection", width="lg")
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Return the window."""
-        return self._window
+        """Return the dialog."""
+        return self._dialog
 
     def open(self) -> None:
-        """Open the window with new tables.
+        """Open the dialog with new tables.
 
-        The browser drops the tables of a window that is closed, and reports an error where one that
+        The browser drops the tables of a dialog that is closed, and reports an error where one that
         it is still making gets other rows.
         """
         self._make()
-        self._window.open = True
+        self._dialog.open = True
 
     def show(self) -> None:
-        """Show what is selected now, if the window is open."""
-        if not self._window.open:
+        """Show what is selected now, if the dialog is open."""
+        if not self._dialog.open:
             return
         if [*self._tables] == self._navigation.session.selection.selected.kinds:
             self._fill()
@@ -78,7 +78,7 @@ class SelectionList(pn.viewable.Viewer):
             for kind, table in self._tables.items()
             for part in (heading(self._title(kind)), table)
         ]
-        self._window[:] = parts or [heading(_NOTHING)]
+        self._dialog[:] = parts or [heading(_NOTHING)]
 
     def _title(self, kind: str) -> str:
         title = _PARTS[kind].title
@@ -114,5 +114,5 @@ class SelectionList(pn.viewable.Viewer):
         return selected_sources(session.selection.sources, result, counts)
 
     def _open_source(self, row: pd.Series) -> None:
-        self._window.open = False
+        self._dialog.open = False
         self._navigation.open_source(str(row["id"]))

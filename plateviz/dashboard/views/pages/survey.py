@@ -21,7 +21,7 @@ from plateviz.dashboard.views.cards.point_actions import PointActions
 from plateviz.dashboard.views.cards.workspace import workspace
 from plateviz.dashboard.views.controls.run_selector import run_selector
 from plateviz.dashboard.views.controls.unit_selector import unit_selector
-from plateviz.dashboard.views.dialogs.code_window import code_button
+from plateviz.dashboard.views.dialogs.code_dialog import code_button
 from plateviz.dashboard.views.elements.markup import (
     heading,
     judged,

@@ -8,7 +8,7 @@ from astropy.table import Table
 
 from plateviz.dashboard.saving.calibration_files import calibration_files
 from plateviz.dashboard.saving.downloads import FORMATS, as_file
-from plateviz.dashboard.views.dialogs.solution_window import SolutionWindow
+from plateviz.dashboard.views.dialogs.solution_dialog import SolutionDialog
 from plateviz.dashboard.views.panes.calibration import CalibrationView
 from plateviz.dashboard.views.panes.compare import CompareView
 from plateviz.dashboard.views.saving.save_button import SaveButton
@@ -81,9 +81,9 @@ def test_changes_and_list_of_solutions_are_saved(navigation, monkeypatch):
         ["what", "a", "b", "change"],
     )
     assert "Measurements" in list(changes["what"])
-    window = SolutionWindow(navigation)
-    window.open()
-    _, made = saved(window, "CSV", monkeypatch)
+    dialog = SolutionDialog(navigation)
+    dialog.open()
+    _, made = saved(dialog, "CSV", monkeypatch)
     lines = made["content"].decode().splitlines()
     assert lines[0] == "orbit,name,settings,made"
     assert lines[1].startswith('0,"",order 4,') or lines[1].startswith("0,,order 4,")

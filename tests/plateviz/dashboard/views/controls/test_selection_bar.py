@@ -125,7 +125,7 @@ def test_250_000_sources_are_selected_listed_and_refused_where_they_are_too_many
     assert session.selection.ids is session.selection.ids
     assert navigation.address()["sources"].startswith("many:")
     listed.open()
-    assert listed._window[0].object.startswith("Sources (a click opens")
+    assert listed._dialog[0].object.startswith("Sources (a click opens")
     assert len(listed._tables["sources"]._table.value) == len(measured)
     assert len(selected_tables(navigation)["sources"]) == len(measured)
     with pytest.raises(InputError, match="250,000 are selected: save these as a table"):

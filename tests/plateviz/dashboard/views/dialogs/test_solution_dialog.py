@@ -1,8 +1,8 @@
-"""SolutionWindow: what somebody writes stays until it is saved."""
+"""SolutionDialog: what somebody writes stays until it is saved."""
 
 import pytest
 
-from plateviz.dashboard.views.dialogs.solution_window import SolutionWindow
+from plateviz.dashboard.views.dialogs.solution_dialog import SolutionDialog
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.runs.note import read_note, write_note
 
@@ -19,7 +19,7 @@ def page(navigation, run, tmp_path, fit_result):
 
 @pytest.fixture
 def window(page):
-    made = SolutionWindow(page)
+    made = SolutionDialog(page)
     made.open()
     choose(made, "old")
     return made

@@ -1,4 +1,4 @@
-"""A window over the page, and the button that opens it."""
+"""A dialog over the page, and the button that opens it."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -12,19 +12,19 @@ from plateviz.dashboard.views.cards.figure import Part
 _CROSS = {"& .MuiIconButton-root[aria-label=close]": {"color": "text.primary"}}
 
 
-class HasWindow(Protocol):
-    """A part of the page that is a window."""
+class HasDialog(Protocol):
+    """A part of the page that is a dialog."""
 
     def open(self) -> None:
-        """Open the window."""
+        """Open the dialog."""
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Return the window."""
+        """Return the dialog."""
         ...
 
 
-def window(title: str, *contents: Part, width: str) -> pmui.Dialog:
-    """Return a closed window that Escape, its cross and a click beside it close.
+def dialog(title: str, *contents: Part, width: str) -> pmui.Dialog:
+    """Return a closed dialog that Escape, its cross and a click beside it close.
 
     Parameters
     ----------
@@ -41,20 +41,20 @@ def window(title: str, *contents: Part, width: str) -> pmui.Dialog:
     )
 
 
-def window_button(label: str, make: Callable[[], HasWindow]) -> list[pn.viewable.Viewable]:
-    """Return the button that opens a window, and the place of the window.
+def dialog_button(label: str, make: Callable[[], HasDialog]) -> list[pn.viewable.Viewable]:
+    """Return the button that opens a dialog, and the place of the dialog.
 
-    The window is made when it is first opened: a page opens sooner without it.
+    The dialog is made when it is first opened: a page opens sooner without it.
     """
     place = pmui.Column(margin=0)
-    made: list[HasWindow] = []
+    made: list[HasDialog] = []
 
-    def open_window(_: object) -> None:
+    def open_dialog(_: object) -> None:
         if not made:
             made.append(make())
             place.append(made[0])
         made[0].open()
 
     button = pmui.Button(label=label, variant="text", size="small")
-    button.on_click(open_window)
+    button.on_click(open_dialog)
     return [button, place]

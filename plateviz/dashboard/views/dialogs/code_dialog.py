@@ -1,4 +1,4 @@
-"""CodeWindow: a window with the code that makes what is on the screen."""
+"""CodeDialog: a dialog with the code that makes what is on the screen."""
 
 from html import escape
 
@@ -6,14 +6,14 @@ import panel as pn
 
 from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.saving.page_code import page_code
-from plateviz.dashboard.views.dialogs.window import window, window_button
+from plateviz.dashboard.views.dialogs.dialog import dialog, dialog_button
 from plateviz.dashboard.views.elements.markup import markup_pane, paragraph, themed
 from solver.errors import InputError
 
 _TO_COPY = "A click selects the whole text."
 
 
-class CodeWindow(pn.viewable.Viewer):
+class CodeDialog(pn.viewable.Viewer):
     """The command line and the Python that make the solution and the figures on the screen."""
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
@@ -21,23 +21,23 @@ class CodeWindow(pn.viewable.Viewer):
         super().__init__(**params)
         self._navigation, self._session = navigation, navigation.session
         self._text = markup_pane()
-        self._window = window("Reproduce", self._text, width="md")
+        self._dialog = dialog("Reproduce", self._text, width="md")
         self._session.param.watch(self._follow, ["shown", "other", "figure_of_both", "theme"])
         for one in (navigation.exploration, navigation.survey_exploration):
             one.param.watch(self._follow, list(one.param.values()))
         navigation.param.watch(self._follow, ["view", "run_name", "found", *WORKSPACES.values()])
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Return the window."""
-        return self._window
+        """Return the dialog."""
+        return self._dialog
 
     def open(self) -> None:
-        """Open the window."""
-        self._window.open = True
+        """Open the dialog."""
+        self._dialog.open = True
         self._follow()
 
     def _follow(self, *_: object) -> None:
-        if not self._window.open:
+        if not self._dialog.open:
             return
         try:
             code = page_code(self._navigation)
@@ -54,5 +54,5 @@ class CodeWindow(pn.viewable.Viewer):
 
 
 def code_button(navigation: Navigation) -> list[pn.viewable.Viewable]:
-    """Return the button that opens the window, and the place of the window."""
-    return window_button("Reproduce", lambda: CodeWindow(navigation))
+    """Return the button that opens the dialog, and the place of the dialog."""
+    return dialog_button("Reproduce", lambda: CodeDialog(navigation))

@@ -1,4 +1,4 @@
-"""SolutionWindow: the solutions of a page in a window, to be shown, named, kept and noted upon."""
+"""SolutionDialog: the solutions of a page in a dialog, to be shown, named, kept and noted upon."""
 
 from collections.abc import Callable
 from html import escape
@@ -12,7 +12,7 @@ from astropy.table import Table
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.solution_list import Entry, SolutionList, by_label
 from plateviz.dashboard.session.solution import Request
-from plateviz.dashboard.views.dialogs.window import window
+from plateviz.dashboard.views.dialogs.dialog import dialog
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
 from plateviz.runs.kept_solutions import KeptSolution, require_name
@@ -38,8 +38,8 @@ class _Draft(NamedTuple):
     is_theirs_shown: bool
 
 
-class SolutionWindow(pn.viewable.Viewer):
-    """A window with the solutions of the session, the kept ones and those of the runs."""
+class SolutionDialog(pn.viewable.Viewer):
+    """A dialog with the solutions of the session, the kept ones and those of the runs."""
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Begin closed."""
@@ -65,7 +65,7 @@ class SolutionWindow(pn.viewable.Viewer):
         )
         choices = table_choices(lambda: "solutions", self._files)
         self._save_list = SaveButton("solutions", choices, text="Save the list", align="center")
-        self._window = window(
+        self._dialog = dialog(
             "Solutions",
             self._choice,
             pmui.Row(
@@ -88,12 +88,12 @@ class SolutionWindow(pn.viewable.Viewer):
         self._session.param.watch(self._follow, "shown")
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Return the window."""
-        return self._window
+        """Return the dialog."""
+        return self._dialog
 
     def open(self) -> None:
-        """Open the window."""
-        self._window.open = True
+        """Open the dialog."""
+        self._dialog.open = True
         self._session.journal.look()
         self._save_list.theme = self._session.theme
         self._fill()
@@ -112,7 +112,7 @@ class SolutionWindow(pn.viewable.Viewer):
         return {"solutions": Table(texts)}
 
     def _follow(self, *_: object) -> None:
-        if self._window.open:
+        if self._dialog.open:
             self._fill()
 
     def _fill(self) -> dict[str, Entry]:

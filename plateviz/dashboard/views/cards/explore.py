@@ -1,4 +1,4 @@
-"""ExploreView: any column of the tables of an origin against any other."""
+"""ExploreView: any column of the tables of an orbit or a run against any other."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -13,7 +13,7 @@ import panel_material_ui as pmui
 import param
 from astropy.table import Table
 
-from plateviz.dashboard.navigation.row_origins import RowsOrigin, TableRequest
+from plateviz.dashboard.navigation.rows_to_explore import RowsToExplore, TableRequest
 from plateviz.dashboard.saving.explored_file import explored_file
 from plateviz.dashboard.session.latest_answer import PENDING, LatestAnswer, Pending
 from plateviz.dashboard.session.session import Session
@@ -68,14 +68,14 @@ class ExploreView(pn.viewable.Viewer):
 
     def __init__(
         self,
-        origin: RowsOrigin,
+        rows: RowsToExplore,
         session: Session,
         wake: Callable[..., object],
         waiting: str | Callable[[], str],
         links: Links = NO_LINKS,
         **params: object,
     ) -> None:
-        """Draw the rows of `origin`.
+        """Draw columns of `rows`.
 
         Parameters
         ----------
@@ -85,22 +85,22 @@ class ExploreView(pn.viewable.Viewer):
         links : what a tap on a row without a source opens, as in `PointActions`
         """
         super().__init__(**params)
-        self._origin, self._session, self._wake = origin, session, wake
-        self._exploration = origin.exploration
-        self._latest: LatestAnswer[_Drawn] = LatestAnswer(origin.executor)
-        self._selecting: LatestAnswer[frozenset[Any]] = LatestAnswer(origin.executor)
+        self._to_explore, self._session, self._wake = rows, session, wake
+        self._exploration = rows.exploration
+        self._latest: LatestAnswer[_Drawn] = LatestAnswer(rows.executor)
+        self._selecting: LatestAnswer[frozenset[Any]] = LatestAnswer(rows.executor)
         self._drawn: _Drawn | None = None
         self._table: object = None
         self._extent: tuple[object, DataExtent] | None = None
         self._area: np.ndarray | None = None
         self._is_following = False
         self._figure = FigureView(
-            _Text(origin.caption, origin.document),
+            _Text(rows.caption, rows.document),
             self._plot,
             waiting=waiting,
             actions=session_actions(session, links, self._take_area),
             zoom=self._zoom,
-            saved=Saved(origin.subject, self._rows),
+            saved=Saved(rows.subject, self._rows),
             theme=session.theme,
         )
         self.grid = FigureGrid([self._figure], wake, columns=1)
@@ -155,7 +155,7 @@ class ExploreView(pn.viewable.Viewer):
             self._is_following = False
 
     def _plot(self) -> Figure | Pending | None:
-        request = self._origin.request()
+        request = self._to_explore.request()
         if request is None:
             return None
         if request.key != self._table:

@@ -7,7 +7,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation.navigation import Navigation
-from plateviz.dashboard.navigation.row_origins import OrbitRows
+from plateviz.dashboard.navigation.rows_to_explore import OrbitRows
 from plateviz.dashboard.session.latest_answer import PENDING, Pending
 from plateviz.dashboard.session.orbit_figures import chosen_of, figures_of
 from plateviz.dashboard.session.stage import Stage

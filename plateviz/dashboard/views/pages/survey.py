@@ -10,7 +10,7 @@ import panel_material_ui as pmui
 from astropy.table import Table
 
 from plateviz.dashboard.navigation.navigation import Navigation
-from plateviz.dashboard.navigation.row_origins import RunRows
+from plateviz.dashboard.navigation.rows_to_explore import RunRows
 from plateviz.dashboard.saving.downloads import described
 from plateviz.dashboard.session.drawn_area import DrawnArea
 from plateviz.dashboard.session.latest_answer import PENDING, Pending

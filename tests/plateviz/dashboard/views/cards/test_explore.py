@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 from bokeh.events import RangesUpdate, SelectionGeometry
 
-from plateviz.dashboard.navigation import row_origins
+from plateviz.dashboard.navigation import rows_to_explore
 from plateviz.dashboard.navigation.navigation import Navigation, View
-from plateviz.dashboard.navigation.row_origins import OrbitRows, RunRows
+from plateviz.dashboard.navigation.rows_to_explore import OrbitRows, RunRows
 from plateviz.dashboard.saving import explored_file
 from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.cards import explore
@@ -51,7 +51,7 @@ def navigation(fit_result, survey, monkeypatch, broken):
     store = SurveyStore(fit_result, [FakeRun("default", survey, fit_result)])
     store.columns, store.background = ColumnCache(), Executor()
     make = lambda run, name, kept: table_of(name, broken)  # noqa: E731
-    monkeypatch.setattr(row_origins, "explorable_of_run", make)
+    monkeypatch.setattr(rows_to_explore, "explorable_of_run", make)
     made = Navigation(Session(store))
     made.begin({"view": "survey", "workspace": "explore"})
     return made
@@ -258,7 +258,7 @@ def of_orbit(navigation, monkeypatch):
     rows = pd.concat([result.residuals] * (ROW_LIMIT // len(result.residuals) + 2))
     many = replace(result, residuals=rows.reset_index(drop=True))
     monkeypatch.setattr(
-        row_origins,
+        rows_to_explore,
         "EXPLORABLE",
         {"measurements": lambda _: explorable("measurements", many.residuals, RESIDUALS)},
     )

@@ -1,4 +1,4 @@
-"""Origins of the rows that the Explore workspaces draw: a solution of an orbit, and a run."""
+"""RowsToExplore: what the Explore workspaces draw, of a solution of an orbit and of a run."""
 
 from collections.abc import Callable, Hashable
 from concurrent.futures import Executor
@@ -38,8 +38,8 @@ class TableRequest(NamedTuple):
     make: Callable[[], ExplorableTable]
 
 
-class RowsOrigin(Protocol):
-    """Where the rows come from.
+class RowsToExplore(Protocol):
+    """Rows of a solution or of a run, in tables of which a person chooses the columns.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ class OpenOrbit(HasSolver):
     Attributes
     ----------
     number : orbit_id
-    origin : name of its origin
+    origin_title : title of its origin
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class OpenOrbit(HasSolver):
         self._simulation = solver.origin.read_simulation()
         self._solution = None if run is None else self._of_run(run)
         self.number = self._data.orbit_id
-        self.origin = solver.origin.title
+        self.origin_title = solver.origin.title
 
     @property
     def tables(self) -> LazyCollection[pd.DataFrame]:
@@ -88,7 +88,7 @@ class OpenOrbit(HasSolver):
         """
         if self._solution is None:
             raise InputError(
-                f"orbit {self.number} of {self.origin}: expected a solution, found none yet; "
+                f"orbit {self.number} of {self.origin_title}: expected a solution, found none yet; "
                 ".fit() makes one"
             )
         return self._solution
@@ -133,7 +133,7 @@ class OpenOrbit(HasSolver):
 
     def __repr__(self) -> str:
         """Return the title."""
-        return summary_line(f"Orbit {self.number}", self.origin, None)
+        return summary_line(f"Orbit {self.number}", self.origin_title, None)
 
     def _repr_html_(self) -> str:
         data = self._data
@@ -145,7 +145,7 @@ class OpenOrbit(HasSolver):
         }
         items = [SummaryItem(name, f"{count:,}", "", "neutral") for name, count in counts.items()]
         solved = "not fitted" if self._solution is None else f"fitted, {self._label()}"
-        return card(f"Orbit {self.number}", f"{self.origin}, {solved}", None, items)
+        return card(f"Orbit {self.number}", f"{self.origin_title}, {solved}", None, items)
 
     def _label(self) -> str:
         return self.solution.settings.describe()
@@ -155,11 +155,11 @@ class OpenOrbit(HasSolver):
         if orbits.get(self._data.orbit_id) != "complete":
             return None
         result = run.result(self._data.orbit_id)
-        origin = f"{self._solver.origin.title}, run {run.name}"
+        origin_title = f"{self._solver.origin.title}, run {run.name}"
         return OpenSolution(
             result,
             self._instrument,
-            origin,
+            origin_title,
             f"{self._call}.solution",
             what_ifs=_WhatIfs(self),
             simulation=self._simulation,
@@ -175,7 +175,7 @@ class OpenOrbit(HasSolver):
         return OpenSolution(
             result,
             self._instrument,
-            self.origin,
+            self.origin_title,
             call,
             other=base,
             what_ifs=_WhatIfs(self),

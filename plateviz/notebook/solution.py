@@ -52,7 +52,7 @@ class OpenSolution(HasFigures, Explores):
     ----------
     result : result of the solver, `solver.data.result.FitResult`
     instrument : instrument of the orbit
-    origin : name of its origin
+    origin_title : title of its origin
     call : Python code that returns this object, for reports
     other : solution to compare with, or None
     what_ifs : computes what-ifs of the orbit; None for a solution without measurements
@@ -61,7 +61,7 @@ class OpenSolution(HasFigures, Explores):
 
     result: FitResult
     instrument: Instrument
-    origin: str
+    origin_title: str
     call: str
     other: "OpenSolution | None" = None
     what_ifs: WhatIfs | None = None
@@ -189,7 +189,7 @@ class OpenSolution(HasFigures, Explores):
         """
         if self.what_ifs is None:
             raise InputError(
-                f"{self.origin}: expected the measurements of an orbit to fit again, found a "
+                f"{self.origin_title}: expected the measurements of an orbit to fit again, found a "
                 "solution alone; plateviz.open(OBS, REF) opens the orbit"
             )
         return self.what_ifs.what_if(self, settings)
@@ -225,7 +225,10 @@ class OpenSolution(HasFigures, Explores):
 
     def _titles(self) -> tuple[str, str]:
         compared = f", compared with {self.other.settings.describe()}" if self.other else ""
-        return f"Orbit {self.result.orbit_id}, {self.settings.describe()}{compared}", self.origin
+        return (
+            f"Orbit {self.result.orbit_id}, {self.settings.describe()}{compared}",
+            self.origin_title,
+        )
 
     def _tables(self) -> dict[str, OpenTable]:
         return result_tables(self.result)

@@ -108,8 +108,8 @@ class OpenSource(HasFigures):
         return card(*self._titles(), self.verdict, source_strip(self._history, self._motion))
 
     def _titles(self) -> tuple[str, str]:
-        origin = f"{self._run.survey.resolve().name}, run {self._run.name}"
-        return f"{self.kind.capitalize()} source {self.source_id}", origin
+        origin_title = f"{self._run.survey.resolve().name}, run {self._run.name}"
+        return f"{self.kind.capitalize()} source {self.source_id}", origin_title
 
     def _figures(self, theme: str) -> LazyCollection[NotebookFigure]:
         # The plots take seconds to import.

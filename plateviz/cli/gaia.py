@@ -75,8 +75,8 @@ def gaia(
             }
         )
     else:
-        origin = "from the cache" if stars.from_cache else "fetched"
+        fetched = "from the cache" if stars.from_cache else "fetched"
         typer.echo(
-            f"{output}: {len(stars.table)} stars of {meta['SERVICE']}, {origin}, "
+            f"{output}: {len(stars.table)} stars of {meta['SERVICE']}, {fetched}, "
             f"as of {meta['DATE']}"
         )

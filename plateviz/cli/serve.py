@@ -77,10 +77,10 @@ def serve(
     from plateviz.solving.solution_store import SolutionStore
     from plateviz.solving.solver_pool import SolverPool
 
-    origins = tuple(map(check_origin, allow_origin or []))
+    proxies = tuple(map(check_origin, allow_origin or []))
     endpoint = open_endpoint(port, address, password_file, no_password)
     endpoint = endpoint._replace(
-        origins=origins,
+        proxies=proxies,
         prefix=check_prefix(prefix),
         pages=pages,
         pages_per_address=pages_per_address,

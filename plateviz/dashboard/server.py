@@ -52,7 +52,7 @@ class Endpoint(NamedTuple):
     port : TCP port, as from `check_address`
     address : of the interface to listen on; a loopback address cannot be reached from other
         machines
-    origins : hosts of reverse proxies, as browsers address them, from `check_origin`
+    proxies : hosts of reverse proxies, as browsers address them, from `check_origin`
     prefix : URL path of the page, as from `check_prefix`
     password : asked for before the page opens, if there is one
     in_notebook : whether notebooks of this machine show the page in a frame
@@ -62,7 +62,7 @@ class Endpoint(NamedTuple):
 
     port: int
     address: str
-    origins: tuple[str, ...] = ()
+    proxies: tuple[str, ...] = ()
     prefix: str = ""
     password: str | None = None
     in_notebook: bool = False
@@ -122,7 +122,7 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
         port=endpoint.port,
         address=endpoint.address,
         # Websockets from pages of other hosts are refused.
-        websocket_origin=[*(f"{host}:{endpoint.port}" for host in hosts), *endpoint.origins],
+        websocket_origin=[*(f"{host}:{endpoint.port}" for host in hosts), *endpoint.proxies],
         prefix=endpoint.prefix,
         title=f"plateviz · {store.title}",
         show=False,
@@ -140,7 +140,7 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
     keep_no_first_page(server.io_loop)
     application = server._tornado  # noqa: SLF001 it has no public name
     pages = PageLimit(endpoint.pages, endpoint.pages_per_address)
-    limits = application.settings[LIMITS] = Limits(pages, is_proxied=bool(endpoint.origins))
+    limits = application.settings[LIMITS] = Limits(pages, is_proxied=bool(endpoint.proxies))
     send_empty_pages(application, empty_page(store), limits, store.pause)
     refuse_floods(application, limits)
     refuse_paths(application)

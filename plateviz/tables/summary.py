@@ -93,10 +93,15 @@ def deviation_state(value: float, expected: float, dof: float) -> State:
     return "bad" if abs(value - expected) > _BAD_SHARE * expected else "warn"
 
 
-def rule(expected: float, scatter: float, origin: str) -> str:
-    """Return the rule of `state_of` in words."""
+def rule(expected: float, scatter: float, basis: str) -> str:
+    """Return the rule of `state_of` in words.
+
+    Parameters
+    ----------
+    basis : what the scatter follows from, in words
+    """
     return (
-        f"Expected {expected:.3f} ± {scatter:.3f} ({origin}). "
+        f"Expected {expected:.3f} ± {scatter:.3f} ({basis}). "
         f"Good within {_GOOD_SIGMAS:.0f} times that scatter; bad if beyond it and more than "
         f"{100 * _BAD_SHARE:.0f} % off."
     )
@@ -117,11 +122,11 @@ def _chi2(result: FitResult) -> SummaryItem:
     value = _number(result, "chi2_per_dof")
     scatter = math.sqrt(2.0 / dof) if dof > 0 else float("nan")
     parameters = _number(result, "effective_parameters")
-    origin = f"√(2/dof); dof = {dof:,.0f} after {parameters:,.0f} effective parameters"
+    basis = f"√(2/dof); dof = {dof:,.0f} after {parameters:,.0f} effective parameters"
     return SummaryItem(
         "χ² per degree of freedom",
         f"{value:.3f}",
-        rule(1.0, scatter, origin),
+        rule(1.0, scatter, basis),
         state_of(value, 1.0, scatter),
     )
 
@@ -133,7 +138,7 @@ def _normalised_deviation(result: FitResult, coordinate: str, symbol: str) -> Su
     # Older results lack it.
     dof = float(result.summary.get(f"normalised_deviation_dof_{coordinate}", count))
     scatter = expected / math.sqrt(2.0 * dof) if dof > 0.0 else float("nan")
-    origin = (
+    basis = (
         f"{count} reference sources with common errors, which scatter like {dof:.1f} "
         "independent ones"
     )
@@ -141,7 +146,7 @@ def _normalised_deviation(result: FitResult, coordinate: str, symbol: str) -> Su
         f"Reference sources, {symbol}",
         f"{value:.3f} (expected {expected:.3f})",
         "Rms of estimate minus catalogue over the catalogue's sigma. "
-        + rule(expected, scatter, origin),
+        + rule(expected, scatter, basis),
         deviation_state(value, expected, dof),
     )
 

@@ -361,7 +361,7 @@ def test_behind_a_proxy_the_clients_are_those_that_it_states(store):
         for client, status in (("192.0.2.1", 503), ("192.0.2.2", 200)):
             assert (await get(address, headers={"X-Real-IP": client}))[0] == status
 
-    with_server(store, scenario, pages_per_address=1, origins=("astro.example.org",))
+    with_server(store, scenario, pages_per_address=1, proxies=("astro.example.org",))
 
 
 def test_flood_of_requests_is_refused_and_then_forgiven(store, monkeypatch, caplog):

@@ -59,6 +59,11 @@ DASHBOARD = (
 )
 # Folders of its views, too.
 VIEWS = ("elements", "browser", "saving", "cards", "dialogs", "controls", "panes", "pages")
+# Folders and modules of the figures, too.
+PLOTS = (
+    *("workspace", "elements", "diagnostic", "survey_figure", "gallery", "explore", "comparison"),
+    *("residuals", "sky", "calibration", "weak_directions", "survey", "source"),
+)
 # Modules at the top of a package: everybody's, and the front door.
 LOOSE = {"solver.errors", "solver.units", "solver.fit", "plateviz.cache"}
 
@@ -206,6 +211,15 @@ def test_no_import_within_the_dashboard_points_up(module):
         return DASHBOARD.index(folder), VIEWS.index(rest[0]) if folder == "views" and rest else -1
 
     inside = [name for name in _imports(module) if _within(name, ("plateviz.dashboard",))]
+    assert not {name for name in inside if name.count(".") > 1 and height(name) > height(module)}
+
+
+@pytest.mark.parametrize("module", [m for m in PLACED if m.startswith("plateviz.plots.")])
+def test_no_import_within_the_figures_points_up(module):
+    def height(name):
+        return PLOTS.index(name.split(".")[2])
+
+    inside = [name for name in _imports(module) if _within(name, ("plateviz.plots",))]
     assert not {name for name in inside if name.count(".") > 1 and height(name) > height(module)}
 
 

@@ -2,7 +2,7 @@
 
 import gc
 import weakref
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
@@ -15,17 +15,7 @@ from plateviz.runs.scratch_result import (
 )
 from plateviz.solving.judge import Judge
 from plateviz.verdict.verdict import is_judged, orbit_verdict, with_verdict
-
-
-class Waiting(Executor):
-    """Keeps what is to be run."""
-
-    def __init__(self):
-        self.waiting = []
-
-    def submit(self, work, /, *arguments):
-        self.waiting.append((work, arguments))
-        return Future()
+from tests.plateviz.solving.waiting import Waiting
 
 
 def test_solution_is_judged_once_for_all_pages(fit_result):
@@ -33,7 +23,7 @@ def test_solution_is_judged_once_for_all_pages(fit_result):
     judge = Judge(waiting)
     assert not judge.has_judged(result)
     assert not judge.has_judged(result)
-    ((work, arguments),) = waiting.waiting
+    ((work, arguments, _),) = waiting.waiting
     work(*arguments)
     assert is_judged(result)
     assert judge.has_judged(result)
@@ -64,7 +54,7 @@ def test_solution_whose_solver_has_ended_is_judged_here(fit_result, tmp_path, mo
     write_scratch_result(tmp_path / "result", fit_result, is_judged=False)
     result = read_scratch_result(tmp_path / "result", complete=lambda _: False)
     assert not Judge(waiting).has_judged(result)
-    ((work, arguments),) = waiting.waiting
+    ((work, arguments, _),) = waiting.waiting
     work(*arguments)
     assert is_judged(result)
     assert orbit_verdict(result) == orbit_verdict(with_verdict(fit_result))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from plateviz.figures.figure import Axis
-from plateviz.plots import explored_rows
 from plateviz.plots.elements.cells import Counts, edges_of
+from plateviz.plots.explore import explored_rows
 from plateviz.plots.explore.explored_rows import (
     ExploredColumns,
     counts_in_frame,

@@ -41,7 +41,7 @@ def without_excluded(data: OrbitData, excluded: Subset) -> OrbitData:
             f"exclusions: expected some measurements of orbit {data.orbit_id} to remain, "
             f"found that all {len(rows)} are excluded"
         )
-    return of_rows(data, ~is_excluded)
+    return orbit_of_rows(data, ~is_excluded)
 
 
 def thinned_orbit(data: OrbitData, whole: OrbitData, every: int) -> OrbitData:
@@ -59,10 +59,10 @@ def thinned_orbit(data: OrbitData, whole: OrbitData, every: int) -> OrbitData:
     measured = np.unique(whole.measurements["source_id"].to_numpy())
     reference = whole.catalogue.set_index("source_id").loc[measured, "is_reference"].to_numpy(bool)
     kept = np.concatenate([measured[reference][::every], measured[~reference][::every]])
-    return of_rows(data, data.measurements["source_id"].isin(kept).to_numpy())
+    return orbit_of_rows(data, data.measurements["source_id"].isin(kept).to_numpy())
 
 
-def of_rows(data: OrbitData, chosen: np.ndarray) -> OrbitData:
+def orbit_of_rows(data: OrbitData, chosen: np.ndarray) -> OrbitData:
     """Return the orbit with the chosen measurements and their exposures.
 
     Parameters

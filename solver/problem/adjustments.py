@@ -6,7 +6,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from solver.data.detector_spans import Move, with_moves
-from solver.data.exclusions import of_rows
+from solver.data.exclusions import orbit_of_rows
 from solver.data.orbit import OrbitData
 from solver.problem.noise import Noise
 
@@ -36,7 +36,7 @@ class Adjustments(NamedTuple):
     def applied(self, data: OrbitData) -> OrbitData:
         """Return the adjusted tables."""
         if self.outliers is not None:
-            data = of_rows(data, ~data.measurements.index.isin(self.outliers.index))
+            data = orbit_of_rows(data, ~data.measurements.index.isin(self.outliers.index))
         if self.moves:
             data = replace(data, exposures=with_moves(data.exposures, self.moves))
         return data if self.noise is None else self.noise.applied(data)

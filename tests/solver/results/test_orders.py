@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.data.distortion_terms import terms
-from solver.data.exclusions import of_rows
+from solver.data.exclusions import orbit_of_rows
 from solver.data.result import FitStatus
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.engines.gauss_newton import find_mode
@@ -210,7 +210,7 @@ def short_orbit():
     orbit = make_orbit(max_degree=1)
     rows = orbit.data.measurements
     is_kept = rows["field_id"].eq(0) & rows["plate_id"].le(1)
-    return orbit._replace(data=of_rows(orbit.data, is_kept.to_numpy()))
+    return orbit._replace(data=orbit_of_rows(orbit.data, is_kept.to_numpy()))
 
 
 COMPARED = FitSettings(order=HIGHEST, compare_orders=True)

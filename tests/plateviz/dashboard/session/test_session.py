@@ -39,7 +39,7 @@ class NoSelections:
     def all(self):
         return {}
 
-    def keep(self, name, items, before):
+    def keep(self, name, selected, before):
         pass
 
     def forget(self, name, before):

@@ -14,6 +14,8 @@ _GOOD_SIGMAS = 3.0
 _BAD_SHARE = 0.2
 # Probability that a normal number is further than three sigmas from its mean.
 _UNLIKELY = 2.7e-3
+LEAST_OBS = 10
+"""Measurements of a source that counts in the pulls against the truth, as in the solver."""
 
 
 class SummaryItem(NamedTuple):
@@ -155,11 +157,12 @@ def _from_truth(result: FitResult) -> list[SummaryItem]:
     truth: Mapping[str, Mapping[str, float]] = result.summary.get("truth", {})
     return [
         SummaryItem(
-            f"Pulls against truth, {name}",
+            f"Pulls against truth, {name}, ≥ {LEAST_OBS} measurements",
             f"{_pull(figures, 'ra'):.2f}, {_pull(figures, 'dec'):.2f} "
             f"({_rms(figures):.2f} mas rms)",
-            f"Rms of deviation over marginal sigma in α, δ of {figures['n']} sources with 10 or "
-            "more measurements and a simulated truth; expected 1. It is not judged, because the "
+            f"Rms of deviation over marginal sigma in α, δ of {figures['n']} sources with "
+            f"{LEAST_OBS} or more measurements and a simulated truth; expected 1. The figure of "
+            "the deviations has all sources. It is not judged, because the "
             "sources of one orbit share the calibration's error; about their mean it is "
             f"{figures['pull_sd_ra']:.2f}, {figures['pull_sd_dec']:.2f}. Mean deviation "
             f"{_pair(figures, 'mean')} mas, of which {_pair(figures, 'induced')} mas come from "

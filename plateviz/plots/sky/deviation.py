@@ -14,6 +14,7 @@ from plateviz.plots.elements.units import angle_unit
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.rounded import with_minus_signs
 from plateviz.tables.sources import CLASSES, deviation, deviation_statistics
+from plateviz.tables.summary import LEAST_OBS
 
 _TITLE = "Deviation from the truth"
 _HOVER = [
@@ -67,7 +68,7 @@ def _panel(rows: pd.DataFrame, statistics: pd.Series, width: int) -> Figure:
             class_points(scaled, "x", "y", hover=_HOVER),
             ellipse(_covariance(statistics), scale=factor, name="mean covariance"),
         ],
-        title=f"{rows['source_class'].iloc[0].capitalize()} sources",
+        title=f"All {rows['source_class'].iloc[0]} sources",
         subtitle=_subtitle(statistics, unit, factor, hidden),
         x=Axis(f"Δα cos δ ({unit}, East to the left)", (half, -half)),
         y=Axis(f"Δδ ({unit})", (-half, half)),
@@ -93,7 +94,7 @@ def _covariance(statistics: pd.Series) -> np.ndarray:
 
 
 def _subtitle(statistics: pd.Series, unit: str, factor: float, hidden: int) -> str:
-    """Return three lines that fit a narrow frame."""
+    """Return short lines: in a narrow frame, longer ones would take the room of the picture."""
     rms = factor * max(statistics["rms_ra"], statistics["rms_dec"])
     decimals = min(3, max(0, 2 - math.floor(math.log10(rms)))) if rms > 0 else 0
     mean, spread = (
@@ -101,11 +102,11 @@ def _subtitle(statistics: pd.Series, unit: str, factor: float, hidden: int) -> s
         for name in ("mean", "rms")
     )
     pulls = f"{statistics['pull_rms_ra']:.2f}, {statistics['pull_rms_dec']:.2f}"
-    mean = with_minus_signs(mean)
     return (
-        f"mean {mean} {unit}; rms {spread} {unit} (α, δ)\n"
-        f"n = {statistics['n']:,.0f}; rms of deviation / σ: {pulls}\n"
-        f"ellipse: mean marginal 1σ; {f'{hidden:,} beyond' if hidden else 'all within'} the frame"
+        f"rms of Δ/σ: {pulls} (α, δ)\n"
+        f"mean {with_minus_signs(mean)} {unit}\n"
+        f"rms {spread} {unit}; n = {statistics['n']:,.0f}\n"
+        f"ellipse: 1σ; {f'{hidden:,} beyond' if hidden else 'all in'} the frame"
     )
 
 
@@ -122,9 +123,10 @@ DIAGNOSTICS = (
     Diagnostic(
         "deviation",
         "Deviation from the truth",
-        "Estimated minus true position on the sky, for each class of source; only for simulated "
-        "orbits. Good: an rms of deviation / σ of one. A common shift is the mean error of the "
-        "reference sources.",
+        "Estimated minus true position on the sky of all sources of each class; only for simulated "
+        f"orbits. The numbers above the figures are of sources with {LEAST_OBS} or more "
+        "measurements. Good: an rms of Δ/σ of one, so that the points fill the ellipse, the mean "
+        "marginal σ. A common shift is the mean error of the reference sources.",
         OrbitWorkspace.SKY,
         50,
         _plot,

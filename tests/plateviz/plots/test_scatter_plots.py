@@ -87,6 +87,14 @@ def test_deviation_has_a_panel_per_class_with_equal_axes(deviations):
         assert plot.x_range.start == -plot.x_range.end == plot.y_range.end
 
 
+def test_deviation_says_that_it_is_of_all_sources(deviations):
+    figure = plot_deviation(deviations)
+    for frame, name in zip(figure, ("reference", "artificial", "non-reference"), strict=True):
+        rows = deviations[deviations["source_class"] == name]
+        assert frame.title == f"All {name} sources"
+        assert f"n = {len(rows):,}" in frame.subtitle
+
+
 def test_deviation_of_reference_sources_is_in_microarcseconds(deviations):
     frame = plot_deviation(deviations)[0]
     rows = deviations[deviations["source_class"] == tables.REFERENCE]

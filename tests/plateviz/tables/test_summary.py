@@ -5,6 +5,8 @@ import dataclasses
 import pytest
 
 from plateviz.tables import summary_strip
+from plateviz.tables.summary import LEAST_OBS
+from solver.results.summary import MIN_OBS
 
 KINDS = ("mean", "rms", "pull_rms", "pull_sd", "induced")
 
@@ -71,9 +73,13 @@ def test_pulls_against_the_truth_appear_only_with_a_truth(fit_result):
     assert not any("truth" in item.label for item in summary_strip(fit_result))
     figures = {"n": 12, **{f"{kind}_{axis}": 0.5 for kind in KINDS for axis in ("ra", "dec")}}
     with_truth = _with(fit_result, truth={"artificial": figures})
-    item = _item(with_truth, "Pulls against truth, artificial")
+    item = _item(with_truth, f"Pulls against truth, artificial, ≥ {MIN_OBS} measurements")
     assert item.value == "0.50, 0.50 (0.50 mas rms)"
     assert "12 sources" in item.hint
+
+
+def test_pulls_are_said_to_be_of_the_sources_that_the_solver_takes():
+    assert LEAST_OBS == MIN_OBS
 
 
 def test_counts_and_time_are_formatted(fit_result):

@@ -23,7 +23,7 @@ class Heading(NamedTuple):
 
 ORBITS_OF_RUN: Mapping[str, Heading] = {
     "orbit_id": Heading("orbit", "0"),
-    "date": Heading("mean epoch (TCB)"),
+    "date": Heading("epoch (TCB)"),
     "status": Heading("status"),
     "verdict": Heading("verdict"),
     "chi2_per_dof": Heading("χ²/dof", "0,0.000"),
@@ -51,7 +51,7 @@ MOTION: Mapping[str, Heading] = {
 }
 ORBITS_OF_SOURCE: Mapping[str, Heading] = {
     "orbit_id": Heading("orbit", "0"),
-    "date": Heading("mean epoch (TCB)"),
+    "date": Heading("epoch (TCB)"),
     "n_obs": Heading("measurements", "0,0"),
     "offset_ra": Heading("Δα cos δ", "0,0.000", _CATALOGUE),
     "offset_dec": Heading("Δδ", "0,0.000", _CATALOGUE),

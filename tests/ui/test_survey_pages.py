@@ -115,6 +115,20 @@ def test_the_run_is_shown_first_in_both_themes_and_leads_to_an_orbit(page):
     expect(heading(page, f"Solution of orbit {orbit}")).to_be_visible()
 
 
+def test_the_table_of_orbits_fits_a_small_screen_and_is_readable_below_the_mouse(served, open_page):
+    page = open_page(served, width=1366, height=768)
+    rows = page.locator(".tabulator-tableholder")
+    row = rows.locator(".tabulator-row").first
+    row.scroll_into_view_if_needed()
+    row.hover()
+    # It is no wider than the page, and a little narrower where that has a bar to scroll with.
+    width, inner = until(page, lambda: rows.evaluate("e => [e.clientWidth, e.scrollWidth]"))
+    assert inner <= width <= 1366 - 264 - 15
+    # A grey through which the colours of the numbers are seen.
+    behind = row.evaluate("e => getComputedStyle(e).backgroundColor")
+    assert float(re.search(r"/ ([\d.]+)\)", behind)[1]) < 0.2
+
+
 def test_from_the_survey_to_an_orbit_to_a_source_and_back(page):
     row(page, 2).click()
     expect(heading(page, "Solution of orbit 2")).to_be_visible()

@@ -21,7 +21,24 @@ _COLOURS: Mapping[str, Mapping[State, str]] = MappingProxyType(
     }
 )
 # Tabulator makes its tables visible even in a hidden view; this prevents it.
-TABLE_STYLE = ":host .tabulator { font-size: 13px; visibility: inherit !important; }"
+TABLE_STYLE = """
+:host .tabulator { font-size: 13px; visibility: inherit !important; }
+/* The theme has a blue on which the colours of numbers cannot be read. */
+:host .pnx-tabulator.tabulator .tabulator-tableholder .tabulator-row.tabulator-selectable:hover {
+  background-color: color-mix(in srgb, currentColor 12%, transparent); color: inherit; }
+"""
+# The table of orbits fits a window 1366 pixels wide.
+_NARROW_CELLS = """
+:host .tabulator .tabulator-row .tabulator-cell,
+:host .tabulator .tabulator-header .tabulator-col .tabulator-col-content {
+  padding-left: 4px; padding-right: 4px; }
+:host .tabulator .tabulator-header .tabulator-col.tabulator-sortable .tabulator-col-title {
+  padding-right: 11px; font-size: 11.5px; }
+:host .tabulator .tabulator-header .tabulator-col .tabulator-col-content .tabulator-col-sorter {
+  right: 1px; }
+:host .tabulator .tabulator-header .tabulator-col .tabulator-col-sorter .tabulator-arrow {
+  border-left-width: 4px; border-right-width: 4px; }
+"""
 _NO_ROWS = "There are no rows to show yet."
 # Bokeh's own formatter writes a hyphen before negative numbers, and before a zero that is rounded.
 _CELL = """<%=
@@ -106,6 +123,7 @@ class DataTable(pn.viewable.Viewer):
         for name, heading in headings.items():
             if heading.group:
                 groups.setdefault(heading.group, []).append(name)
+        clickable = [_CLICKABLE] if self._on_row is not None else []
         table = pn.widgets.Tabulator(
             pd.DataFrame(columns=list(headings)),
             titles={name: heading.title for name, heading in headings.items()},
@@ -124,7 +142,7 @@ class DataTable(pn.viewable.Viewer):
             page_size=self._page_size,
             layout="fit_data_table",
             margin=(4, 2),
-            stylesheets=[TABLE_STYLE, *([_CLICKABLE] if self._on_row is not None else [])],
+            stylesheets=[TABLE_STYLE, _NARROW_CELLS, *clickable],
         )
         styler: Any = table.style
         styler.apply(self._colours, axis=None)

@@ -13,7 +13,7 @@ from plateviz.figures.figure import HANDLES, By, Glyphs, Look, Ramp
 from plateviz.figures.hover_numbers import hover_formatters
 from plateviz.figures.packed_texts import PackedTexts
 from plateviz.figures.theme import FONT, Theme
-from plateviz.figures.tick_numbers import with_tick_numbers
+from plateviz.figures.tick_numbers import with_tick_numbers, with_whole_ticks
 
 _GLYPHS: Mapping[str, Callable[..., Glyph]] = MappingProxyType(
     {
@@ -171,6 +171,7 @@ class BokehGlyphs:
             if not ramp.is_log:
                 is_grouped = _YEARS not in (ramp.label or "")
                 with_tick_numbers(self.bar, ramp.limits, is_grouped=is_grouped)
+                with_whole_ticks(self.bar, not isinstance(ramp.palette, str))
         if self.kind == "image":
             return {"color_mapper": self._mapper}
         return {name: Field(ramp.column, transform=self._mapper)}

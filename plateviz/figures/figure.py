@@ -59,14 +59,15 @@ class Ramp:
     Attributes
     ----------
     column : name of the column
-    palette : of the theme: "count", "share", or "difference" from a value in the middle
+    palette : of the theme: "count", "share", or "difference" from a value in the middle; or the
+        colours themselves, each for one whole number
     limits : numbers with the first and the last colour
     is_log : whether colours are in logarithmic steps
     label : of the colour bar; None for no bar
     """
 
     column: str
-    palette: Literal["count", "share", "difference"]
+    palette: Literal["count", "share", "difference"] | tuple[str, ...]
     limits: Limits
     is_log: bool = False
     label: str | None = None

@@ -37,8 +37,10 @@ class Theme:
         """Return the colour that a figure names, such as "muted"; other colours as they are."""
         return getattr(self, name) if name in _NAMED else name
 
-    def palette(self, name: str) -> list[str]:
-        """Return the palette that a figure names: "count", "share" or "difference"."""
+    def palette(self, name: str | tuple[str, ...]) -> list[str]:
+        """Return the palette that a figure names: "count", "share" or "difference"; or colours."""
+        if not isinstance(name, str):
+            return list(name)
         return getattr(self, f"{name}_palette")
 
     @property

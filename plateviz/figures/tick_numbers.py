@@ -32,6 +32,12 @@ def with_tick_numbers(
         )
 
 
+def with_whole_ticks(bar: models.ColorBar, is_whole: bool) -> None:
+    """Let a colour bar have ticks at whole numbers only, or where Bokeh has them."""
+    if isinstance(bar.ticker, models.BasicTicker) is not is_whole:
+        bar.ticker = models.BasicTicker(min_interval=1.0) if is_whole else "auto"
+
+
 def has_groups(limits: Limits) -> bool:
     """Return whether the digits of numbers between two limits can stand in groups."""
     return max(map(abs, limits)) >= _GROUPED

@@ -38,7 +38,13 @@ class Counts:
     """Numbers of points in the cells of a frame, of all points that were added."""
 
     def __init__(
-        self, x: Axis, y: Axis, *, has_medians: bool = False, has_values: bool = False
+        self,
+        x: Axis,
+        y: Axis,
+        *,
+        has_medians: bool = False,
+        has_values: bool = False,
+        names: np.ndarray | None = None,
     ) -> None:
         """Begin without points.
 
@@ -47,6 +53,8 @@ class Counts:
         x, y : axes of the frame
         has_medians : whether medians of y are asked for afterwards
         has_values : whether points have values, whose means are asked for afterwards
+        names : values of all points, ascending, the most frequent of which is asked for
+            afterwards; None for values that have a mean
         """
         self._axes = x, y
         self._cell = np.empty(0, np.intp)
@@ -54,6 +62,9 @@ class Counts:
         self._counts = np.zeros((_SHAPE[1] + 2, _SHAPE[0] + 2), dtype=np.int64)
         self._sums = np.zeros(self._counts.shape) if has_values else None
         self._with_value = np.zeros_like(self._counts) if has_values else None
+        self._names = names
+        shape = (*self._counts.shape, 0 if names is None else len(names))
+        self._by_name = np.zeros(shape, dtype=np.int32)
         fine = (_SHAPE[1] * _FINER + 2, _MEDIANS + 2)
         self._fine = np.zeros(fine, dtype=np.int64) if has_medians else None
         self._make_room(1, np.dtype(float))
@@ -86,7 +97,14 @@ class Counts:
             self._count(row, _coarser(column, _SHAPE[0] // _MEDIANS), self._fine)
             row = _coarser(row, _FINER)
         self._count(row, column, self._counts)
-        if self._sums is not None and self._with_value is not None and values is not None:
+        if self._names is not None and values is not None:
+            # The last count has left the cells of the points.
+            cell = self._cell[: len(values)]
+            cell *= len(self._names)
+            cell += np.searchsorted(self._names, values)
+            found = np.bincount(cell, minlength=self._by_name.size)
+            self._by_name += found.reshape(self._by_name.shape).astype(np.int32)
+        elif self._sums is not None and self._with_value is not None and values is not None:
             has_value = np.isfinite(values)
             row *= has_value
             column *= has_value
@@ -96,6 +114,7 @@ class Counts:
     def merge(self, other: "Counts") -> None:
         """Add the points that another one of the same frame has counted."""
         self._counts += other._counts
+        self._by_name += other._by_name
         for own, added in (
             (self._fine, other._fine),
             (self._sums, other._sums),
@@ -122,6 +141,14 @@ class Counts:
         n = self._inside(self._with_value).astype(float)
         n[n == 0] = np.nan
         return (self._inside(self._sums) / n).astype(np.float32)
+
+    def most_frequent(self) -> np.ndarray:
+        """Return the most frequent value in each cell, the least of several; as `image`."""
+        if self._names is None:
+            raise ValueError("expected points with names, found others")
+        found = self._names[self._inside(self._by_name).argmax(axis=2)].astype(np.float32)
+        found[self._inside(self._counts) == 0] = np.nan
+        return found
 
     def histogram(self, axis: int) -> tuple[np.ndarray, np.ndarray]:
         """Return edges and numbers of bins along an axis, 0 for x and 1 for y."""

@@ -6,13 +6,12 @@ import pandas as pd
 from plateviz.figures.figure import By, Glyphs, Limits, Ramp
 from plateviz.figures.glyphs import points
 from plateviz.plots.elements.style import COLOUR_OF_CLASS, SERIES_COLOURS
+from plateviz.plots.explore.explored_names import NAMES, names_in
 from plateviz.plots.explore.explored_rows import ExploredColumns
 from plateviz.tables.explore import ExplorableTable
 from plateviz.tables.labels import exposure_labels, id_strings, unit_text
 from solver.data.columns import Column
 
-# Columns whose numbers are names, and what they name.
-_NAMES = {"detector_id": "detector", "field_id": "field"}
 # Colours span these percentiles: a few extreme values must not decide them.
 _SPAN = (1.0, 99.0)
 
@@ -67,7 +66,9 @@ def explored_points(data: RowsInFrame, chosen: ExploredColumns) -> Glyphs:
     keep = [name for name in table if name not in ("x", "y", "source_class")]
     if chosen.colour:
         values = data.column(chosen.colour)
-        if chosen.colour in _NAMES and len(names := np.unique(values)) <= len(SERIES_COLOURS):
+        # Of all rows: a zoom must not change the colour of a detector.
+        names = names_in(data.table, chosen.colour) if chosen.colour in NAMES else None
+        if names is not None and len(names) <= len(SERIES_COLOURS):
             return _by_name(table, chosen.colour, values, names, hover, keep)
         table["colour"] = values
         label = named(chosen.colour, data.table.columns[chosen.colour])
@@ -101,7 +102,7 @@ def _by_name(
     keep: list[str],
 ) -> Glyphs:
     """Return the rows in a colour for each value of a column that is no size, such as detectors."""
-    word = _NAMES[column]
+    word = NAMES[column]
     labels = {value: f"{word} {value:.0f}" for value in names.tolist()}
     table["colour"] = [labels[value] for value in values.tolist()]
     return points(

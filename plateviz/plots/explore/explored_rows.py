@@ -13,6 +13,7 @@ import numpy as np
 
 from plateviz.figures.figure import Axis, Limits
 from plateviz.plots.elements.cells import Counts
+from plateviz.plots.explore.explored_names import NAMES, names_in
 from plateviz.tables.explore import ExplorableTable
 from plateviz.tables.polygon import Polygon
 
@@ -103,9 +104,11 @@ def extent_of(table: ExplorableTable, chosen: ExploredColumns) -> DataExtent:
 def counts_in_frame(table: ExplorableTable, chosen: ExploredColumns, x: Axis, y: Axis) -> Counts:
     """Return the rows in each cell of a frame; two threads count, of many rows half each."""
     colours = table.numbers(chosen.colour) if chosen.colour else None
+    names = names_in(table, chosen.colour) if chosen.colour in NAMES else None
+    has_means = colours is not None and names is None
 
     def count(rows: range) -> Counts:
-        counts = Counts(x, y, has_medians=chosen.has_median, has_values=bool(chosen.colour))
+        counts = Counts(x, y, has_medians=chosen.has_median, has_values=has_means, names=names)
         for part in _parts(table, chosen, rows):
             is_kept = None if part.is_drawable.all() else part.is_drawable
             counts.add(part.x, part.y, is_kept, None if colours is None else colours[part.rows])

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from plateviz.figures.figure import Ramp
-from plateviz.plots.elements.style import ROW_LIMIT
+from plateviz.plots.elements.style import ROW_LIMIT, SERIES_COLOURS
 from plateviz.plots.explore.explore import explored_figure
 from plateviz.plots.explore.explored_rows import ExploredColumns
 from plateviz.tables.explore import EXPLORABLE, ExplorableTable, explorable
@@ -115,6 +115,33 @@ def test_cells_show_the_mean_of_the_column_that_gives_the_colour(many):
     assert is_filled.sum() > 1000
     assert np.all((means >= edges[:-1])[is_filled])
     assert np.all((means <= edges[1:])[is_filled])
+
+
+def test_cells_show_the_most_frequent_detector_and_no_mean_of_ids():
+    size = ROW_LIMIT + 5_000
+    # At the same place, detector 1 twice as often as detector 5, and detector 3 elsewhere.
+    place = np.repeat([1.0, 2.0], [size - 100, 100])
+    detectors = np.where(place == 2.0, 3, np.where(np.arange(size) % 3, 1, 5))
+    rows = pd.DataFrame({"detector_id": detectors, "nx": place})
+    table = explorable("measurements", rows, schema.RESIDUALS)
+    (frame,) = explored_figure(table, ExploredColumns("nx", "nx", colour="detector_id"))
+    drawn = frame["cells by name"]
+    found = drawn.values("image")[0]
+    assert sorted(found[np.isfinite(found)].tolist()) == [1.0, 3.0]
+    ramp = drawn.looks["color"]
+    assert (ramp.limits, ramp.label) == ((0.5, 5.5), "most frequent detector per cell")
+    # A colour for each whole number, among them those of points of the same detectors.
+    assert [ramp.palette[n] for n in (0, 2, 4)] == list(SERIES_COLOURS[:3])
+
+
+def test_zoom_does_not_change_the_colour_of_a_detector():
+    keys = {"field_id": 0, "plate_id": 1, "detector_id": [0, 1, 2]}
+    rows = pd.DataFrame({**keys, "nx": [1.0, 2.0, 3.0]})
+    table = explorable("measurements", rows, schema.RESIDUALS)
+    chosen = ExploredColumns("nx", "nx", colour="detector_id", only="nx", lowest=2.5)
+    (frame,) = explored_figure(table, chosen)
+    colours = frame["rows by detector"].looks["fill_color"].looks
+    assert colours["detector 2"] == SERIES_COLOURS[2]
 
 
 def test_selected_sources_are_marked_among_cells(many):

@@ -29,7 +29,7 @@ from solver.data.subset import KINDS, Subset
 from solver.errors import InputError
 
 _WORDS: Mapping[str, Any] = MappingProxyType(
-    {"variant": "body2", "margin": (0, 8, 0, 24), "align": "center", "sx": IN_BAR}
+    {"variant": "body2", "margin": (0, 8, 0, 8), "align": "center", "sx": IN_BAR}
 )
 
 
@@ -48,7 +48,8 @@ class SelectionBar(pn.viewable.Viewer):
         self._navigation, self._session = navigation, navigation.session
         self._actions = SelectionActions(navigation.session)
         look_for_kept(self._session)
-        self._row = pmui.Row(margin=0, sx={"alignItems": "center"})
+        # Apart from the title of the page, whatever it begins with.
+        self._row = pmui.Row(margin=(0, 0, 0, 16), sx={"alignItems": "center"})
         self.windows = pmui.Column(margin=0)
         self._parts: list[pn.viewable.Viewable] = []
         self._is_here, self._sender = is_read_here(), TableSender()

@@ -20,14 +20,17 @@ class KeptSelectionsDialog(pn.viewable.Viewer):
         super().__init__(**params)
         self._session, self._selection = navigation.session, navigation.session.selection
         self._actions = SelectionActions(navigation.session)
-        wide = {"sizing_mode": "stretch_width", "size": "small", "margin": (10, 10)}
+        # The words begin where the title does; a label on the border of a field has room above.
+        wide = {"sizing_mode": "stretch_width", "size": "small", "margin": (10, 8)}
         self._name = pmui.TextInput(label="Name", placeholder="such as: lower left corner", **wide)
         self._keep = pmui.Button(label="Keep", margin=(10, 10))
         # The names are a person's text: a menu shows them as text.
         self._kept = pmui.Select(label="Kept selections", options=[], **wide)
         self._take_up = pmui.Button(label="Select again", variant="outlined", margin=(10, 4))
         self._forget = pmui.Button(label="Forget", variant="text", margin=(10, 4))
-        self._words = pmui.Alert(object="", severity="info", sizing_mode="stretch_width")
+        self._words = pmui.Alert(
+            object="", severity="info", sizing_mode="stretch_width", margin=(0, 8, 8, 8)
+        )
         self._again = pmui.Row(self._kept, self._take_up, self._forget, margin=0)
         self._new = pmui.Row(self._name, self._keep, margin=0)
         self._dialog = dialog("Keep the selection", self._words, self._new, self._again, width="sm")

@@ -247,5 +247,6 @@ def _is_kept(entry: Entry, name: str) -> bool:
 
 def _button(label: str, act: Callable[[], None]) -> pmui.Button:
     button = pmui.Button(label=label, variant="outlined", size="small")
-    button.on_click(lambda _: act())
+    # Of several fast clicks, the first may have switched the button off.
+    button.on_click(lambda _: None if button.disabled else act())
     return button

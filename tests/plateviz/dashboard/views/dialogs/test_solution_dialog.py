@@ -2,9 +2,12 @@
 
 import pytest
 
+from plateviz.dashboard.session.solution import Solution
 from plateviz.dashboard.views.dialogs.solution_dialog import SolutionDialog
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.runs.note import read_note, write_note
+from plateviz.solving.made_solutions import MadeSolution
+from solver.data.settings import FitSettings
 
 
 @pytest.fixture
@@ -30,6 +33,12 @@ def choose(window, name):
     window._choice.value = entry
 
 
+def choose_made(window):
+    """Choose a solution of the session."""
+    made = [one for one in window._choice.options.values() if isinstance(one.what, MadeSolution)]
+    window._choice.value = made[0]
+
+
 def write(window, text):
     window._text.param.update(value=text, value_input=text)
 
@@ -46,6 +55,20 @@ def test_note_that_is_not_saved_stays_while_the_list_is_filled_again(page, windo
     write_note(path, "theirs", read_note(path).version)
     page.session.journal.param.trigger("made")
     assert window._text.value == "theirs"
+
+
+def test_fast_clicks_keep_a_solution_once(page, window, fit_result):
+    store = page.session.store
+    store.keep = lambda made, name: store.kept.keep(name, made.orbit, False, fit_result)
+    page.session.show_result(Solution(0, FitSettings(order=3), fit_result))
+    window.open()
+    choose_made(window)
+    window._name.value = "mine"
+    for clicks in range(1, 7):
+        window._keep.clicks = clicks
+    assert [one.name for one in store.kept.all()] == ["mine", "old"]
+    assert window._message.severity == "success"
+    assert window._message.object == "It is kept on disk as mine."
 
 
 def test_typed_characters_are_kept_before_the_browser_has_left_the_field(page, window):

@@ -14,6 +14,9 @@ from solver.data.instrument import Instrument
 from solver.data.result import FitResult
 from solver.simulate.settings import SurveySettings
 
+TO_COMPARE = "Change a setting under Refit, or choose a solution under “Compare with (A)”."
+"""What to do where there is no other solution to compare with."""
+
 
 @dataclass(frozen=True)
 class Chosen:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from plateviz.figures.alike import beside
 from plateviz.figures.figure import Figure, message
-from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.diagnostic import TO_COMPARE, Chosen, Diagnostic
 from plateviz.plots.gallery import diagnostics
 from plateviz.plots.workspace import OrbitWorkspace
 
@@ -47,7 +47,9 @@ def figure_of_both(diagnostic: Diagnostic, chosen: Chosen) -> Figure:
     Limits, colours and lengths of arrows are the same for both.
     """
     if chosen.other is None:
-        return message(_TITLE, "Fit with other settings, or choose what to compare with.")
+        return message(
+            _TITLE, f"The chosen figure of another solution and of this one. {TO_COMPARE}"
+        )
     b = replace(chosen, other=None, beside=chosen.other)
     a = replace(chosen, result=chosen.other, other=None, beside=chosen.result)
     return with_same_limits(diagnostic.title, diagnostic.plot(a), diagnostic.plot(b))

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message, side_by_side
-from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.diagnostic import TO_COMPARE, Chosen, Diagnostic
 from plateviz.plots.elements.arrows import (
     Field,
     arrows,
@@ -146,7 +146,7 @@ def _thinned(vectors: pd.DataFrame, half: float) -> tuple[pd.DataFrame, str]:
 
 def _plot(chosen: Chosen) -> Figure:
     if chosen.other is None:
-        return message(_MAP, "Fit with other settings to compare two solutions.")
+        return message(_MAP, f"How far each source moves from (A) to (B). {TO_COMPARE}")
     return plot_comparison(comparison(chosen.other, chosen.result))
 
 

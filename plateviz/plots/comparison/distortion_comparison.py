@@ -14,7 +14,7 @@ from plateviz.figures.figure import (
     message,
     side_by_side,
 )
-from plateviz.plots.diagnostic import Chosen, Diagnostic
+from plateviz.plots.diagnostic import TO_COMPARE, Chosen, Diagnostic
 from plateviz.plots.elements.arrows import (
     Field,
     arrows,
@@ -125,7 +125,7 @@ def _length(um: float) -> str:
 
 def _plot(chosen: Chosen) -> Figure:
     if chosen.other is None:
-        return message(_TITLE, "Fit with other settings to compare two solutions.")
+        return message(_TITLE, f"How the distortion differs between (A) and (B). {TO_COMPARE}")
     table = distortion_comparison(chosen.other, chosen.result, chosen.instrument)
     return plot_distortion_comparison(table, detectors=chosen.instrument.detectors)
 

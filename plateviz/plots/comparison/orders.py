@@ -65,7 +65,7 @@ def plot_orders(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figure:
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        text = "No orders compared: switch it on under Refit, then fit"
+        text = "No orders compared: switch on “Compare all orders” under Refit, then fit"
         return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_DIFFERENCE_Y)
     return side_by_side([_differences(table, width), _held_out(table, width)], columns=2)
 

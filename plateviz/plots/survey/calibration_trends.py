@@ -15,6 +15,10 @@ from solver.units import ARCSEC_PER_DEG
 
 _TITLE = "Trends of the calibration"
 _XLABEL, _YLABEL = "epoch (Julian year, TCB)", "value minus mean"
+_NONE = (
+    "What changes most from orbit to orbit in each group of the calibration, with its trend. That "
+    f"takes a run of {LEAST_ORBITS} orbits or more, which has ended."
+)
 _HOVER = [("orbit", "@{orbit_id}"), ("value minus mean", "@{offset}{0.000} @{unit}")]
 _ANGLES = {1: "angle of the first orbit", -1: "other angle", 0: "orbits"}
 
@@ -28,7 +32,7 @@ def plot_calibration_trends(table: pd.DataFrame, *, width: int = PANEL_WIDTH) ->
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        text, label = f"No calibration of {LEAST_ORBITS} orbits", f"{_YLABEL} (µm)"
+        text, label = _NONE, f"{_YLABEL} (µm)"
         return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=label)
     panels = [_panel(rows, str(name), width) for name, rows in table.groupby("group", sort=False)]
     return side_by_side(panels, columns=3)

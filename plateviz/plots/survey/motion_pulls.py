@@ -34,7 +34,10 @@ def plot_motion_pulls(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figur
     width : of each panel's frame, screen pixels
     """
     if table.empty:
-        text = f"No source in {LEAST_ORBITS} orbits"
+        text = (
+            f"Of the sources in {LEAST_ORBITS} orbits or more: histograms of fitted minus true "
+            "position, parallax and proper motion over σ. This run has none yet."
+        )
         return message(_TITLE, text, width=width, xlabel=_PULL, ylabel=_YLABEL)
     panels = [
         _panel(rows, str(name), width) for name, rows in table.groupby("parameter", sort=False)

@@ -83,7 +83,8 @@ def test_reversed_axis_stays_reversed(chosen):
 
 def test_without_another_solution_it_says_so(chosen):
     figure = figure_of_both(figure_named("residual-map"), replace(chosen, other=None))
-    assert figure.message == "Fit with other settings, or choose what to compare with."
+    assert figure.message.startswith("The chosen figure of another solution and of this one.")
+    assert "Compare with (A)" in figure.message
     assert BOTH not in diagnostics()
 
 

@@ -118,7 +118,7 @@ def diagnostic():
 def test_difference_needs_another_solution(diagnostic, fit_result, instrument):
     alone = Chosen(fit_result, instrument)
     assert not diagnostic.has_data(alone)
-    assert diagnostic.plot(alone).message.startswith("Fit with other settings")
+    assert diagnostic.plot(alone).message.startswith("How the distortion differs")
 
 
 def test_difference_is_the_current_solution_minus_the_other(

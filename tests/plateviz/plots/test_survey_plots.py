@@ -282,3 +282,21 @@ def test_smooth_errors_have_a_size_if_chance_does_not_explain_them(chi2, words):
 def test_smooth_errors_that_are_not_tested_say_when_they_are():
     figure = plots.plot_zonal_errors(zonal(30.0).head(0))
     assert "eight or more orbits" in figure.message
+
+
+@pytest.mark.parametrize(
+    ("draw", "table", "what"),
+    [
+        (plots.plot_motion_pulls, pd.DataFrame(), "parallax and proper motion over σ"),
+        (plots.plot_calibration_trends, pd.DataFrame(), "takes a run of 8 orbits or more"),
+        (
+            plots.plot_reference_scatter,
+            pd.DataFrame({"scatter_mas": [], "expected_mas": []}),
+            "scatter between orbits",
+        ),
+    ],
+)
+def test_an_empty_card_says_what_it_will_show_and_from_when(draw, table, what):
+    message = draw(table).message
+    assert what in message
+    assert "orbits or more" in message

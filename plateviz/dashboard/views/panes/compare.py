@@ -14,7 +14,7 @@ from plateviz.dashboard.views.elements.markup import markup_pane, numbers, parag
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
 from plateviz.plots.comparison.both_solutions import comparable_figures
-from plateviz.plots.diagnostic import Diagnostic
+from plateviz.plots.diagnostic import TO_COMPARE, Diagnostic
 from plateviz.tables.headings import CHANGES, in_words
 from plateviz.verdict.solution_changes import solution_changes
 from solver.errors import InputError
@@ -119,7 +119,7 @@ class CompareView(pn.viewable.Viewer):
         session = self._session
         shown, other = session.shown, session.other
         if self._message or shown is None or other is None:
-            text = self._message or "Fit with other settings, or choose what to compare with."
+            text = self._message or f"What differs between (A) and (B), in numbers. {TO_COMPARE}"
             self._table.object = paragraph(text, "empty", session.theme)
             return
         if session.judging.is_any_pending:

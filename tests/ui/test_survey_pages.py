@@ -210,6 +210,21 @@ def test_two_runs_are_compared_exchanged_and_carried_by_the_address(page, open_p
     )
 
 
+def test_back_and_forward_lead_through_the_solutions_of_an_orbit(served, open_page):
+    page = open_page(f"{served}?view=orbit&workspace=verdict&orbit=0")
+    order = page.get_by_role("slider", name="Distortion order")
+    order.focus()
+    head = page.locator(".head:visible")
+    expect(head).to_contain_text("order 5")
+    page.keyboard.press("ArrowLeft")
+    page.wait_for_url(re.compile("solution=order=4"))
+    page.go_back()
+    expect(head).to_contain_text("Solution of orbit 0: order 5")
+    assert "order=4" not in page.url
+    page.go_forward()
+    expect(head).to_contain_text("what if: order 4")
+
+
 def test_a_source_is_looked_for_and_carried_by_the_address(page, open_page, tmp_path):
     turn_to(page, "Source")
     expect(page.locator("p.empty:visible")).to_contain_text("Write a source's id")

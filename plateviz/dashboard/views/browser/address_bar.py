@@ -10,6 +10,9 @@ from solver.data.subset import KINDS
 
 # Parts of an address whose change is a step of the browser's history; others replace the last one.
 _STEPS = ("view", "workspace", "run", "orbit", "source")
+# Another solution is a step, too, if so much time has passed since the one before: a slider that is
+# dragged shows many.
+_PAUSE_MILLISECONDS = 1500
 _MOST_CHARACTERS, _MOST_PARTS = 20_000, 100
 
 
@@ -21,19 +24,28 @@ class AddressBar(pn.custom.JSComponent):
 
     query = param.String(doc="of the address, without the question mark")
     steps = param.List(item_type=str, doc="parts whose change is a step of the history")
-    is_blink = param.Boolean(doc="whether the two runs were exchanged, which is no step")
+    pause = param.Integer(doc="ms between two solutions that are steps")
+    is_blink = param.Boolean(doc="whether two runs or solutions were exchanged, which is no step")
 
     _esm = """
     export function render({ model }) {
-      let isFirst = true, timer = null
+      let isFirst = true, timer = null, last = 0
       const places = search => {
         const parts = new URLSearchParams(search)
         return JSON.stringify(model.steps.map(name => parts.get(name)))
       }
+      const solution = search => new URLSearchParams(search).get("solution")
+      const isStepTo = search => {
+        const isOther = solution(search) !== solution(location.search)
+        const isPlace = places(search) !== places(location.search)
+        const isLater = Date.now() - last > model.pause
+        if (isOther || isPlace) last = Date.now()
+        return isPlace || (isOther && isLater)
+      }
       const write = () => {
         const search = `?${model.query}`
         if (!model.query || search === location.search) return
-        const isStep = !isFirst && !model.is_blink && places(search) !== places(location.search)
+        const isStep = isStepTo(search) && !isFirst && !model.is_blink
         isFirst = false
         const url = location.pathname + search + location.hash
         history[isStep ? "pushState" : "replaceState"](history.state, "", url)
@@ -42,6 +54,7 @@ class AddressBar(pn.custom.JSComponent):
       const later = () => { clearTimeout(timer); timer = setTimeout(write, 100) }
       const follow = () => {
         clearTimeout(timer)
+        last = Date.now()
         model.send_msg(location.search.slice(1))
       }
       model.on("query", later)
@@ -54,10 +67,11 @@ class AddressBar(pn.custom.JSComponent):
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow `navigation` and its session."""
-        super().__init__(steps=list(_STEPS), margin=0, **params)
+        super().__init__(steps=list(_STEPS), pause=_PAUSE_MILLISECONDS, margin=0, **params)
         self._navigation = navigation
         session = navigation.session
         self._runs = navigation.run_name, session.run_comparison.other
+        self._solutions = session.shown, session.other
         names = ["view", *WORKSPACES.values(), "run_name", "found"]
         navigation.param.watch(self._write, names)
         for exploration in (navigation.exploration, navigation.survey_exploration):
@@ -80,10 +94,14 @@ class AddressBar(pn.custom.JSComponent):
                 self.param.update(is_blink=self._is_blink(), query=query)
 
     def _is_blink(self) -> bool:
-        """Return whether the run on the screen has become the other one since the last query."""
-        before, other = self._runs, self._navigation.session.run_comparison.other
+        """Return whether what is on the screen has become the other one since the last query."""
+        session = self._navigation.session
+        before, other = self._runs, session.run_comparison.other
         self._runs = self._navigation.run_name, other
-        return other not in ("", before[1]) and other == before[0]
+        if other not in ("", before[1]) and other == before[0]:
+            return True
+        (shown, compared), self._solutions = self._solutions, (session.shown, session.other)
+        return shown is not None and session.shown is compared and session.other is shown
 
     def _handle_msg(self, data: object) -> None:
         """Show what the browser has gone back or forward to."""

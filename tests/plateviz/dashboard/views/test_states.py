@@ -159,6 +159,23 @@ def test_figure_of_both_solutions_follows_the_address(fresh):
     assert "both=residual-map" in bar.query
 
 
+def test_two_solutions_that_are_exchanged_are_no_step_of_the_history(fresh):
+    session = fresh.session
+    finish(session)
+    bar = AddressBar(fresh)
+    first = session.shown
+    session.open_listed(first._replace(settings=first.settings.with_(order=3)))
+    assert "solution=order=3" in bar.query
+    assert not bar.is_blink
+    session.exchange()
+    assert "solution=order=3" not in bar.query
+    assert bar.is_blink
+    session.exchange()
+    assert bar.is_blink
+    session.open_listed(first._replace(settings=first.settings.with_(order=4)))
+    assert not bar.is_blink
+
+
 def test_only_what_shows_eigenmodes_waits_for_them(fresh, tmp_path):
     session, asked = fresh.session, []
     finish(session)

@@ -39,6 +39,8 @@ from plateviz.tables.sources import REFERENCE
 # Right ascension increases to the left, as on the sky.
 _LEFTWARDS = ("ra", "prior_ra")
 _MARGIN = 0.04
+# Of a frame that is zoomed out from the rows, on each side, over the length of that with all rows.
+_FARTHEST = 5.0
 # Share of the frame that the highest bin of a histogram reaches.
 _HIGHEST = 0.1
 
@@ -106,7 +108,8 @@ def _axis(
     is_log: bool,
     is_leftwards: bool = False,
 ) -> Axis:
-    limits = _valid(zoomed, is_log) or _limits(ends, is_log, is_leftwards)
+    whole = _limits(ends, is_log, is_leftwards)
+    limits = _within_reach(_valid(zoomed, is_log) or whole, whole, is_log)
     return Axis(label, limits, is_log=is_log, is_grouped="(yr)" not in label)
 
 
@@ -115,6 +118,18 @@ def _valid(limits: tuple[float, ...], is_log: bool) -> Limits | None:
     if len(limits) != 2 or limits[0] == limits[1] or (is_log and min(limits) <= 0.0):
         return None
     return limits[0], limits[1]
+
+
+def _within_reach(limits: Limits, whole: Limits, is_log: bool) -> Limits:
+    """Return limits that do not leave all rows in a single cell, nor numbers of many digits."""
+    low, high = sorted(scaled(np.array(whole), is_log).tolist())
+    reach = _FARTHEST * (high - low)
+    places = scaled(np.array(limits), is_log)
+    nearer = np.clip(places, low - reach, high + reach)
+    if (nearer == places).all():
+        return limits
+    first, last = map(float, unscaled(nearer, is_log))
+    return whole if first == last else (first, last)
 
 
 def _limits(ends: Limits, is_log: bool, is_leftwards: bool) -> Limits:

@@ -92,6 +92,26 @@ def test_zoom_on_few_rows_shows_these_as_points(many):
     assert frame.subtitle == f"{many.size:,} stars; {len(expected):,} in the frame"
 
 
+@pytest.mark.parametrize("is_log", [False, True])
+def test_zoom_out_ends_near_the_rows(many, is_log):
+    limits = ((1e-300 if is_log else -1e17, 1e17), (-4e14, 4e14))
+    (frame,) = explored_figure(many, Columns("x", "y", is_log_x=is_log, limits=limits))
+    (whole,) = explored_figure(many, Columns("x", "y", is_log_x=is_log))
+    assert frame.y.length == pytest.approx(11.0 * whole.y.length)
+    (low, high), (first, last) = (
+        np.log10([frame.x.limits, whole.x.limits])
+        if is_log
+        else (
+            frame.x.limits,
+            whole.x.limits,
+        )
+    )
+    assert high - low == pytest.approx(11.0 * (last - first))
+    beside = ((1e9, 2e9), (4.0, 6.0))
+    (frame,) = explored_figure(many, Columns("x", "y", limits=beside))
+    assert frame.x.limits[1] < 1e3
+
+
 def test_zoom_beside_all_rows_is_an_empty_frame(many):
     (frame,) = explored_figure(many, ExploredColumns("x", "y", limits=((50.0, 60.0), (4.0, 6.0))))
     assert len(frame["rows"]) == 0

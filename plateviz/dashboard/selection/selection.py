@@ -15,6 +15,8 @@ from solver.data.subset import KINDS, NOTHING, Subset
 from solver.errors import InputError
 
 ALL = "all"
+# Orbits that a message names one by one.
+_MOST_NAMED = 8
 
 
 class Selection(param.Parameterized):
@@ -135,7 +137,9 @@ class Selection(param.Parameterized):
             return self.orbit
         orbits = {str(orbit): orbit for orbit in self.param["orbit"].objects}
         if address["orbit"] not in orbits:
-            raise InputError(f"orbit: expected one of this page, found {quoted(address['orbit'])}")
+            known = [*orbits]
+            words = f"{known[0]} to {known[-1]}" if len(known) > _MOST_NAMED else ", ".join(known)
+            raise InputError(f"orbit: expected one of {words}, found {quoted(address['orbit'])}")
         return orbits[address["orbit"]]
 
     def address(self) -> dict[str, str]:

@@ -26,7 +26,7 @@ def test_removed_run_is_said_until_it_is_there_again(fit_result, survey_folder):
     look_for_run(navigation)
     assert len(notice) == 0
     shutil.move(run.directory, survey_folder / "elsewhere")
-    navigation.session.note(["orbit: expected one of this page, found 'x'"])
+    navigation.session.note(["orbit: expected one of 0, 1, found 'x'"])
     look_for_run(navigation)
     lost, other = notice
     assert "The run default is not on the disk any more" in lost.object

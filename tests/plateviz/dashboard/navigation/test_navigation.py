@@ -390,7 +390,7 @@ def test_address_compares_with_another_run_and_another_orbit(fit_result, survey)
         ),
         ("solution", "run=gone", "solution: expected a run that has orbit 0, found 'gone'"),
         ("against", "run=default orbit=1", "against: expected a run that has orbit 1, found 'def"),
-        ("orbit", "77", "orbit: expected one of this page, found '77'"),
+        ("orbit", "77", "orbit: expected one of 0, 1, found '77'"),
     ],
     ids=["value", "setting", "long", "longer", "run", "orbit-of-run", "orbit"],
 )

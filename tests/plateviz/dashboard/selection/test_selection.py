@@ -68,7 +68,7 @@ def test_address_names_an_orbit(fit_result):
     selection = Session(FakeStore(fit_result)).selection
     assert selection.orbit_of({"orbit": "1"}) == 1
     assert selection.orbit_of({}) == selection.orbit == 0
-    with pytest.raises(InputError, match="orbit: expected one of this page, found '7'"):
+    with pytest.raises(InputError, match="orbit: expected one of 0, 1, found '7'"):
         selection.orbit_of({"orbit": "7"})
 
 

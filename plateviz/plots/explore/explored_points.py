@@ -55,14 +55,21 @@ def unit_behind(table: ExplorableTable, name: str) -> str:
     return f" {unit_text(unit)}" if unit else ""
 
 
+def number_form(table: ExplorableTable, name: str) -> str:
+    """Return how a hover writes a number of a column: whole ones without decimals."""
+    return "{0}" if table.columns[name].dtype == "int64" else "{0.0000}"
+
+
 def explored_points(data: RowsInFrame, chosen: ExploredColumns) -> Glyphs:
     """Return the rows as points in the colours of a column, or of the classes of sources."""
     table, has_sources = data.frame, data.table.has_sources
     hover = [("source", f"@{{{data.source}}}")] if has_sources else []
     hover += [(name, f"@{{{name}}}") for name in data.table.words]
     units = {name: unit_behind(data.table, name) for name in (chosen.x, chosen.y, chosen.colour)}
-    hover += [(chosen.x, f"@{{x}}{{0.0000}}{units[chosen.x]}")]
-    hover += [(chosen.y, f"@{{y}}{{0.0000}}{units[chosen.y]}")]
+    hover += [
+        (name, f"@{{{at}}}{number_form(data.table, name)}{units[name]}")
+        for at, name in (("x", chosen.x), ("y", chosen.y))
+    ]
     keep = [name for name in table if name not in ("x", "y", "source_class")]
     if chosen.colour:
         values = data.column(chosen.colour)
@@ -73,7 +80,8 @@ def explored_points(data: RowsInFrame, chosen: ExploredColumns) -> Glyphs:
         table["colour"] = values
         label = named(chosen.colour, data.table.columns[chosen.colour])
         ramp = Ramp("colour", "count", span_of(values), label=label)
-        hover.append((chosen.colour, f"@{{colour}}{{0.0000}}{units[chosen.colour]}"))
+        form = number_form(data.table, chosen.colour)
+        hover.append((chosen.colour, f"@{{colour}}{form}{units[chosen.colour]}"))
         return points(
             table, "x", "y", name="rows by value", color=ramp, size=4.5, hover=hover, keep=keep
         )

@@ -2,10 +2,9 @@
 
 import pandas as pd
 
-from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, framed, message
+from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Ticks, framed, message
 from plateviz.plots.elements.points import steps
 from plateviz.plots.elements.style import CLASS_COLOURS
-from plateviz.plots.elements.ticks import log_ticks
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.orbit_counts import orbit_counts
@@ -18,6 +17,7 @@ _NONE_YET = "No source is counted before the last orbit of the run is fitted"
 _NONE = 0.1
 _LOWEST = 0.7
 _ALL_TICKS_UP_TO = 200.0
+_FEW = 8
 
 
 def plot_orbit_counts(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figure:
@@ -41,12 +41,18 @@ def plot_orbit_counts(table: pd.DataFrame, *, width: int = FRAME_WIDTH) -> Figur
         ],
         title=_TITLE,
         subtitle=_subtitle(table),
-        x=Axis(_xlabel(step), (-0.01 * last, 1.02 * last)),
+        x=Axis(_xlabel(step), (-0.01 * last, 1.02 * last), ticks=_ticks(last)),
         y=Axis(_YLABEL, (_LOWEST, top), is_log=True, ticks=ticks),
         width=width,
         height=round(0.62 * width),
         legend_columns=3,
     )
+
+
+def _ticks(last: float) -> Ticks | None:
+    """Return a tick at each number of orbits where they are few: there is no half an orbit."""
+    few = range(1, int(last) + 1)
+    return tuple((float(n), str(n)) for n in few) if last < _FEW else None
 
 
 def _xlabel(step: int) -> str:

@@ -68,7 +68,7 @@ def test_numbers_have_the_units_of_their_columns(many, fit_result):
     table = EXPLORABLE["sources"](fit_result)
     (frame,) = explored_figure(table, ExploredColumns("n_obs", "sigma_ra_marginal", colour="chi2"))
     marks = frame["rows by value"]
-    assert ("n_obs", "@{x}{0.0000}") in marks.hover
+    assert ("n_obs", "@{x}{0}") in marks.hover
     assert ("sigma_ra_marginal", "@{y}{0.0000} mas") in marks.hover
     assert [look.label for look in marks.looks.values() if isinstance(look, Ramp)][0] == "chi2"
 
@@ -95,8 +95,8 @@ def test_zoom_on_few_rows_shows_these_as_points(many):
 @pytest.mark.parametrize("is_log", [False, True])
 def test_zoom_out_ends_near_the_rows(many, is_log):
     limits = ((1e-300 if is_log else -1e17, 1e17), (-4e14, 4e14))
-    (frame,) = explored_figure(many, Columns("x", "y", is_log_x=is_log, limits=limits))
-    (whole,) = explored_figure(many, Columns("x", "y", is_log_x=is_log))
+    (frame,) = explored_figure(many, ExploredColumns("x", "y", is_log_x=is_log, limits=limits))
+    (whole,) = explored_figure(many, ExploredColumns("x", "y", is_log_x=is_log))
     assert frame.y.length == pytest.approx(11.0 * whole.y.length)
     (low, high), (first, last) = (
         np.log10([frame.x.limits, whole.x.limits])
@@ -108,7 +108,7 @@ def test_zoom_out_ends_near_the_rows(many, is_log):
     )
     assert high - low == pytest.approx(11.0 * (last - first))
     beside = ((1e9, 2e9), (4.0, 6.0))
-    (frame,) = explored_figure(many, Columns("x", "y", limits=beside))
+    (frame,) = explored_figure(many, ExploredColumns("x", "y", limits=beside))
     assert frame.x.limits[1] < 1e3
 
 

@@ -92,6 +92,12 @@ def test_prior_separation_uses_a_suitable_unit(figures):
     assert "12 of them artificial" in subtitle_of(other)
 
 
+def test_few_orbits_have_a_tick_each_and_none_between(survey):
+    few = survey.motions.assign(n_orbits=np.arange(len(survey.motions)) % 3 + 1)
+    (frame,) = plots.plot_orbit_counts(tables.orbit_counts(few))
+    assert [label for _, label in frame.x.ticks] == ["1", "2", "3"]
+
+
 def test_orbit_counts_have_logarithmic_counts_from_below_one(figures):
     (frame,) = figures("orbit_counts")
     assert frame.y.is_log

@@ -124,6 +124,18 @@ def test_the_table_of_orbits_fits_a_small_screen_and_is_readable_below_the_mouse
     # It is no wider than the page, and a little narrower where that has a bar to scroll with.
     width, inner = until(page, lambda: rows.evaluate("e => [e.clientWidth, e.scrollWidth]"))
     assert inner <= width <= 1366 - 264 - 15
+    # What is in a column begins below its heading.
+    column = page.locator(".tabulator-col:visible", has_text="status")
+    begins = [
+        one.evaluate(
+            "e => e.getBoundingClientRect().x + parseFloat(getComputedStyle(e).paddingLeft)"
+        )
+        for one in (
+            column.locator(".tabulator-col-content"),
+            row.locator('.tabulator-cell[tabulator-field="status"]'),
+        )
+    ]
+    assert begins[0] == pytest.approx(begins[1], abs=1.0)
     # A grey through which the colours of the numbers are seen.
     behind = row.evaluate("e => getComputedStyle(e).backgroundColor")
     assert float(re.search(r"/ ([\d.]+)\)", behind)[1]) < 0.2

@@ -59,7 +59,9 @@ class SolutionDialog(pn.viewable.Viewer):
         self._rename = _button("Rename", self._give_name)
         self._keep = _button("Keep on disk", self._keep_on_disk)
         self._save = _button("Save the note", self._save_note)
-        self._message = pmui.Alert(object="", visible=False, sizing_mode="stretch_width")
+        self._message = pmui.Alert(
+            object="", visible=False, margin=(8, 10), sizing_mode="stretch_width"
+        )
         self._theirs = pmui.TextAreaInput(
             label="The note as somebody else has left it", disabled=True, visible=False, **wide
         )

@@ -29,9 +29,9 @@ TABLE_STYLE = """
 """
 # The table of orbits fits a window 1366 pixels wide.
 _NARROW_CELLS = """
-:host .tabulator .tabulator-row .tabulator-cell,
+:host .pnx-tabulator.tabulator .tabulator-row .tabulator-cell,
 :host .tabulator .tabulator-header .tabulator-col .tabulator-col-content {
-  padding-left: 4px; padding-right: 4px; }
+  padding-left: 4px !important; padding-right: 4px !important; }
 :host .tabulator .tabulator-header .tabulator-col.tabulator-sortable .tabulator-col-title {
   padding-right: 11px; font-size: 11.5px; }
 :host .tabulator .tabulator-header .tabulator-col .tabulator-col-content .tabulator-col-sorter {

@@ -131,6 +131,7 @@ DIAGNOSTICS = (
         50,
         _plot,
         is_wide=True,
+        narrow_height=380,
         has_data=lambda chosen: chosen.result.true_places is not None,
         equation="Δ = estimate − truth; rms of Δ / σ, with the marginal σ",
     ),

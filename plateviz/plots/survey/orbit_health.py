@@ -201,6 +201,7 @@ SURVEY_FIGURES = (
         5,
         _plot,
         is_wide=True,
+        narrow_height=310,
         equation=(
             "χ² / dof, band 1 ± √(2 / dof); rms of (estimate − catalogue) / "
             "σ(catalogue) of the reference sources"

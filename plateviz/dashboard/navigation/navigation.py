@@ -57,9 +57,9 @@ class Navigation(param.Parameterized):
         self.session = session
         self.exploration = Exploration(list(EXPLORABLE))
         self.survey_exploration = Exploration(list(COLUMNS_OF_RUN))
-        self._source_text = ""
-        self._next_orbit = NextOrbit()
+        self._source_text, self._next_orbit = "", NextOrbit()
         self._named: dict[str, str] = {}
+        self._of_address: object = None
         self._growth: tuple[SurveyRun, Growth] | None = None
         runs = self.known_runs = KnownRuns(session.store)
         if runs.first is not None:
@@ -183,16 +183,16 @@ class Navigation(param.Parameterized):
         return query | self._solution_query(is_whole)
 
     def _solution_query(self, is_whole: bool = False) -> dict[str, str]:
-        session = self.session
-        if session.shown is None or session.is_opening:
+        session, coming = self.session, self.session.coming
+        if session.shown is None or (session.is_opening and coming is self._of_address):
             return self._named
-        shown, other, large = session.shown, session.other, session.selection.large
-        return solution_query(shown, other, self.run_name, large, is_whole)
+        shown = coming if session.is_opening and coming is not None else session.shown
+        large = session.selection.large
+        return solution_query(shown, session.other, self.run_name, large, is_whole)
 
     def turn_to(self, view: View) -> None:
         """Show a view; the Orbit view requests its orbit when it is first shown."""
-        self.view = view
-        session = self.session
+        session, self.view = self.session, view
         if view is View.ORBIT and session.shown is None and session.job is None:
             self._open(session.selection.orbit)
 
@@ -235,11 +235,10 @@ class Navigation(param.Parameterized):
         except InputError as error:
             session.refuse(str(error))
             return
-        if isinstance(found, Request):
-            session.show_orbit(orbit)
-        elif last is None or last.settings == found.settings:
+        is_there = isinstance(found, Solution)
+        if is_there and (last is None or last.settings == found.settings):
             session.show_result(found)
-        elif last.is_replaceable:
+        elif is_there and last is not None and last.is_replaceable:
             session.open(Request(orbit, last.settings, is_what_if=True), found)
         else:
             session.show_orbit(orbit)
@@ -261,6 +260,7 @@ class Navigation(param.Parameterized):
             session.selection.orbit = orbit
             session.refuse(str(error))
             return
+        self._of_address = solution
         session.open(solution, other)
 
     def _solution(self, text: str | None, orbit: int | None) -> Solution | Request:

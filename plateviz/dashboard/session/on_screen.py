@@ -6,7 +6,7 @@ import param
 
 from plateviz.dashboard.address_parts import chosen
 from plateviz.dashboard.session.run_comparison import RunComparison
-from plateviz.dashboard.session.solution import Solution
+from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.dashboard.session.stage import RequestState, Stage
 from plateviz.plots.comparison.both_solutions import comparable_figures
 
@@ -29,6 +29,8 @@ class SolutionsOnScreen(RequestState):
         self._fitted: Solution | None = None
         # What all solutions are compared with, in place of the one before each.
         self.chosen: Solution | None = None
+        # What was opened last, which may still be computed.
+        self.coming: Solution | Request | None = None
         self.run_comparison = RunComparison()
 
     @property

@@ -101,7 +101,7 @@ class Session(SolutionsOnScreen):
             if self.shown is not None:
                 self.store.leave(self.shown.orbit)
         self.chosen = self.other = None
-        self._later = solutions
+        self._later, self.coming = solutions, solutions[-1]
         self._show_next()
 
     def _show_next(self) -> None:

@@ -38,7 +38,7 @@ _OF_RUN = re.compile(rf"run=(?P<run>[^ ]+)(?: orbit=(?P<orbit>{ID}))?")
 
 
 def solution_query(
-    shown: Solution,
+    shown: Solution | Request,
     other: Solution | None,
     run: str | None,
     large: LargeSelections,
@@ -53,13 +53,14 @@ def solution_query(
     is_whole : whether settings that are too long for an address are written, too
     """
 
-    def text(solution: Solution) -> str:
+    def text(solution: Solution | Request) -> str:
         return _text(solution, shown.orbit, None if is_whole else large)
 
     query = {"solution": text(shown)}
-    is_default = run is None and not (shown.is_what_if or shown.kept)
+    kept, of_run = _where(shown)
+    is_default = run is None and not (shown.is_what_if or kept)
     is_default = is_default and shown.settings == FitSettings()
-    if is_default or (run is not None and shown.run == run):
+    if is_default or (run is not None and of_run == run):
         query = {}
     if other is not None:
         query["against"] = text(other)
@@ -114,7 +115,12 @@ def find_solution(
     return Request(orbit, settings, is_what_if)
 
 
-def settings_text(solution: Solution) -> str:
+def _where(solution: Solution | Request) -> tuple[str, str]:
+    """Return the names of the kept solution and of the run that it was read from."""
+    return (solution.kept, solution.run) if isinstance(solution, Solution) else ("", "")
+
+
+def settings_text(solution: Solution | Request) -> str:
     """Return the settings of a solution, and whether it is a what-if, in words."""
     return " ".join(
         [*setting_words(solution.settings), *([WHAT_IF] if solution.is_what_if else [])]
@@ -152,18 +158,19 @@ def _settings(words: list[str], large: LargeSelections) -> FitSettings:
     return settings.with_(exclusions=settings.exclusions | selected)
 
 
-def _text(solution: Solution, orbit: int | None, large: LargeSelections | None) -> str:
+def _text(solution: Solution | Request, orbit: int | None, large: LargeSelections | None) -> str:
     """Return a solution as text, in an address of an orbit.
 
     Parameters
     ----------
     large : as of `solution_query`; None for a saved view, which has room for all
     """
-    if solution.kept:
-        return f"{_KEPT}{solution.kept}"
-    if solution.run:
+    kept, run = _where(solution)
+    if kept:
+        return f"{_KEPT}{kept}"
+    if run:
         of_orbit = "" if solution.orbit == orbit else f" orbit={solution.orbit}"
-        return f"run={solution.run}{of_orbit}"
+        return f"run={run}{of_orbit}"
     text = settings_text(solution)
     if large is None or len(text) <= _MOST_CHARACTERS:
         return text if len(text) <= _MOST_READ else TOO_LONG

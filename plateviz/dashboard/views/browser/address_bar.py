@@ -76,7 +76,7 @@ class AddressBar(pn.custom.JSComponent):
         navigation.param.watch(self._write, names)
         for exploration in (navigation.exploration, navigation.survey_exploration):
             exploration.param.watch(self._write, list(exploration.param.values()))
-        session.param.watch(self._write, ["shown", "other", "figure_of_both"])
+        session.param.watch(self._write, ["shown", "other", "stage", "figure_of_both"])
         session.run_comparison.param.watch(self._write, ["other", "figure"])
         session.units.param.watch(self._write, "unit")
         names = ["orbit", "field", "plates", "detector", *KINDS, "kept"]

@@ -157,7 +157,7 @@ def _from_truth(result: FitResult) -> list[SummaryItem]:
     truth: Mapping[str, Mapping[str, float]] = result.summary.get("truth", {})
     return [
         SummaryItem(
-            f"Pulls against truth, {name}, ≥ {LEAST_OBS} measurements",
+            f"Pulls against truth, {name}, N ≥ {LEAST_OBS}",
             f"{_pull(figures, 'ra'):.2f}, {_pull(figures, 'dec'):.2f} "
             f"({_rms(figures):.2f} mas rms)",
             f"Rms of deviation over marginal sigma in α, δ of {figures['n']} sources with "

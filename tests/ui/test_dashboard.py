@@ -430,7 +430,7 @@ def test_the_address_is_what_is_shown_and_the_browser_goes_back(page, open_page,
     expect(shown(page)).to_contain_text("what if: order 4")
     page.wait_for_url("**solution=order=4+what-if&against=order=5")
     # What a hand changes little by little is one step.
-    assert page.evaluate("history.length") == steps
+    assert page.evaluate("history.length") == steps + 1
     again = open_page(page.url)
     expect(again.get_by_role("combobox", name="Detector")).to_have_text("3")
     expect(again.get_by_role("combobox", name="Field")).to_have_text("all")
@@ -438,7 +438,7 @@ def test_the_address_is_what_is_shown_and_the_browser_goes_back(page, open_page,
     again.close()
     turn_to_workspace(page, OrbitWorkspace.SKY)
     page.wait_for_url("**workspace=sky**")
-    assert page.evaluate("history.length") == steps + 1
+    assert page.evaluate("history.length") == steps + 2
     page.go_back()
     expect(page.get_by_role("button", name="Verdict", exact=True)).to_have_attribute(
         "aria-pressed", "true"

@@ -16,8 +16,8 @@ from solver.units import ARCSEC_PER_DEG
 _TITLE = "Trends of the calibration"
 _XLABEL, _YLABEL = "epoch (Julian year, TCB)", "value minus mean"
 _NONE = (
-    "What changes most from orbit to orbit in each group of the calibration, with its trend. That "
-    f"takes a run of {LEAST_ORBITS} orbits or more, which has ended."
+    f"No run of {LEAST_ORBITS} orbits or more that has ended. From then on: what changes most from "
+    "orbit to orbit in each group of the calibration, with its trend."
 )
 _HOVER = [("orbit", "@{orbit_id}"), ("value minus mean", "@{offset}{0.000} @{unit}")]
 _ANGLES = {1: "angle of the first orbit", -1: "other angle", 0: "orbits"}

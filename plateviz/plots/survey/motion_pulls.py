@@ -35,8 +35,8 @@ def plot_motion_pulls(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> Figur
     """
     if table.empty:
         text = (
-            f"Of the sources in {LEAST_ORBITS} orbits or more: histograms of fitted minus true "
-            "position, parallax and proper motion over σ. This run has none yet."
+            f"No source in {LEAST_ORBITS} orbits or more yet. From then on: histograms of fitted "
+            "minus true position, parallax and proper motion over σ."
         )
         return message(_TITLE, text, width=width, xlabel=_PULL, ylabel=_YLABEL)
     panels = [

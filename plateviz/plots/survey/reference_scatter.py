@@ -50,8 +50,8 @@ def plot_reference_scatter(table: pd.DataFrame, *, width: int = PANEL_WIDTH) -> 
     positive = table[(table["scatter_mas"] > 0) & (table["expected_mas"] > 0)]
     if positive.empty:
         text = (
-            f"Of each reference source in {LEAST_ORBITS} orbits or more: its scatter between "
-            "orbits against the predicted one. This run has none yet."
+            f"No reference source in {LEAST_ORBITS} orbits or more yet. From then on: the scatter "
+            "of each between orbits against the predicted one."
         )
         return message(_TITLE, text, width=width, xlabel=_XLABEL, ylabel=_YLABEL)
     limits = _limits(positive)

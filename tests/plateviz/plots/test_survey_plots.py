@@ -294,11 +294,11 @@ def test_smooth_errors_that_are_not_tested_say_when_they_are():
     ("draw", "table", "what"),
     [
         (plots.plot_motion_pulls, pd.DataFrame(), "parallax and proper motion over σ"),
-        (plots.plot_calibration_trends, pd.DataFrame(), "takes a run of 8 orbits or more"),
+        (plots.plot_calibration_trends, pd.DataFrame(), "what changes most from orbit to orbit"),
         (
             plots.plot_reference_scatter,
             pd.DataFrame({"scatter_mas": [], "expected_mas": []}),
-            "scatter between orbits",
+            "of each between orbits",
         ),
     ],
 )

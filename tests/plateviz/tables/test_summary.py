@@ -73,7 +73,7 @@ def test_pulls_against_the_truth_appear_only_with_a_truth(fit_result):
     assert not any("truth" in item.label for item in summary_strip(fit_result))
     figures = {"n": 12, **{f"{kind}_{axis}": 0.5 for kind in KINDS for axis in ("ra", "dec")}}
     with_truth = _with(fit_result, truth={"artificial": figures})
-    item = _item(with_truth, f"Pulls against truth, artificial, ≥ {MIN_OBS} measurements")
+    item = _item(with_truth, f"Pulls against truth, artificial, N ≥ {MIN_OBS}")
     assert item.value == "0.50, 0.50 (0.50 mas rms)"
     assert "12 sources" in item.hint
 

@@ -5,6 +5,7 @@ import pandas as pd
 from plateviz.figures.figure import FRAME_WIDTH, Axis, Figure, Ticks, framed, message
 from plateviz.plots.elements.points import steps
 from plateviz.plots.elements.style import CLASS_COLOURS
+from plateviz.plots.elements.ticks import log_ticks
 from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.orbit_counts import orbit_counts

@@ -1,11 +1,11 @@
-"""KeptSelectionsWindow: where its parts are."""
+"""KeptSelectionsDialog: where its parts are."""
 
 from plateviz.dashboard.views.controls.selection_bar import SelectionBar
-from plateviz.dashboard.views.dialogs.kept_selections import KeptSelectionsWindow
+from plateviz.dashboard.views.dialogs.kept_selections import KeptSelectionsDialog
 
 
 def test_all_parts_begin_at_the_same_place_and_none_touches_the_next(navigation):
-    window = KeptSelectionsWindow(navigation)
+    window = KeptSelectionsDialog(navigation)
     above, _, below, left = window._words.margin
     fields = [window._name.margin, window._kept.margin]
     assert [across for _, across in fields] == [left, left]

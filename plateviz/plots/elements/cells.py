@@ -62,7 +62,7 @@ class Counts:
         self._counts = np.zeros((_SHAPE[1] + 2, _SHAPE[0] + 2), dtype=np.int64)
         self._sums = np.zeros(self._counts.shape) if has_values else None
         self._with_value = np.zeros_like(self._counts) if has_values else None
-        self._names = names
+        self.names = names
         shape = (*self._counts.shape, 0 if names is None else len(names))
         self._by_name = np.zeros(shape, dtype=np.int32)
         fine = (_SHAPE[1] * _FINER + 2, _MEDIANS + 2)
@@ -97,11 +97,11 @@ class Counts:
             self._count(row, _coarser(column, _SHAPE[0] // _MEDIANS), self._fine)
             row = _coarser(row, _FINER)
         self._count(row, column, self._counts)
-        if self._names is not None and values is not None:
+        if self.names is not None and values is not None:
             # The last count has left the cells of the points.
             cell = self._cell[: len(values)]
-            cell *= len(self._names)
-            cell += np.searchsorted(self._names, values)
+            cell *= len(self.names)
+            cell += np.searchsorted(self.names, values)
             found = np.bincount(cell, minlength=self._by_name.size)
             self._by_name += found.reshape(self._by_name.shape).astype(np.int32)
         elif self._sums is not None and self._with_value is not None and values is not None:
@@ -144,9 +144,9 @@ class Counts:
 
     def most_frequent(self) -> np.ndarray:
         """Return the most frequent value in each cell, the least of several; as `image`."""
-        if self._names is None:
+        if self.names is None:
             raise ValueError("expected points with names, found others")
-        found = self._names[self._inside(self._by_name).argmax(axis=2)].astype(np.float32)
+        found = self.names[self._inside(self._by_name).argmax(axis=2)].astype(np.float32)
         found[self._inside(self._counts) == 0] = np.nan
         return found
 

@@ -17,7 +17,7 @@ from plateviz.figures.figure import (
 from plateviz.figures.glyphs import band, line, points, rectangles
 from plateviz.plots.elements.cells import Counts, cells, scaled, unscaled
 from plateviz.plots.elements.style import CLASS_COLOURS, ROW_LIMIT
-from plateviz.plots.explore.explored_names import NAMES, names_in, ramp_of_names
+from plateviz.plots.explore.explored_names import NAMES, ramp_of_names
 from plateviz.plots.explore.explored_points import (
     RowsInFrame,
     explored_points,
@@ -169,9 +169,9 @@ def _cells(
         ramp = Ramp("count", "count", (1.0, most), is_log=True, label=label)
         hover = [*at, (label, "@count{0,0}")]
         return cells(numbers, *axes, name="cells by number", ramp=ramp, hover=hover)
-    if chosen.colour in NAMES:
+    if counts.names is not None:
         label = f"most frequent {NAMES[chosen.colour]} per cell"
-        ramp = ramp_of_names(names_in(table, chosen.colour), label)
+        ramp = ramp_of_names(counts.names, label)
         hover = [*at, (label, "@{value}{0}")]
         return cells(counts.most_frequent(), *axes, name="cells by name", ramp=ramp, hover=hover)
     means, label = counts.means(), f"mean {chosen.colour} per cell"

@@ -13,22 +13,30 @@ NAMES: Mapping[str, str] = MappingProxyType({"detector_id": "detector", "field_i
 """Columns whose numbers are names, and what they name."""
 # Between the first and the last name, for them to be found without sorting all rows.
 _SPAN = 4096
+# Each is counted in every cell.
+_MOST_NAMES = 32
 _PART = 2**18
 _NO_NAME = "#7a8793"
 
 
-def names_in(table: ExplorableTable, column: str) -> np.ndarray:
-    """Return the names in a column, ascending; the numbers of all rows, drawn or not."""
+def names_in(table: ExplorableTable, column: str) -> np.ndarray | None:
+    """Return the names in a column, ascending: the numbers of all rows, drawn or not.
+
+    None if its numbers are no names, or more than can be told apart.
+    """
+    if column not in NAMES:
+        return None
     values = table.numbers(column)
     if not len(values):
-        return values
+        return None
     low = int(values.min())
     if values.max() - low >= _SPAN:
-        return np.unique(values)
+        return None
     is_there = np.zeros(int(values.max()) - low + 1, dtype=bool)
     for start in range(0, len(values), _PART):
         is_there[(values[start : start + _PART] - low).astype(np.intp)] = True
-    return np.flatnonzero(is_there).astype(float) + low
+    names = np.flatnonzero(is_there).astype(float) + low
+    return names if len(names) <= _MOST_NAMES else None
 
 
 def ramp_of_names(names: np.ndarray, label: str) -> Ramp:

@@ -74,7 +74,7 @@ def explored_points(data: RowsInFrame, chosen: ExploredColumns) -> Glyphs:
     if chosen.colour:
         values = data.column(chosen.colour)
         # Of all rows: a zoom must not change the colour of a detector.
-        names = names_in(data.table, chosen.colour) if chosen.colour in NAMES else None
+        names = names_in(data.table, chosen.colour)
         if names is not None and len(names) <= len(SERIES_COLOURS):
             return _by_name(table, chosen.colour, values, names, hover, keep)
         table["colour"] = values

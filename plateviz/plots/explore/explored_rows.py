@@ -13,7 +13,7 @@ import numpy as np
 
 from plateviz.figures.figure import Axis, Limits
 from plateviz.plots.elements.cells import Counts
-from plateviz.plots.explore.explored_names import NAMES, names_in
+from plateviz.plots.explore.explored_names import names_in
 from plateviz.tables.explore import ExplorableTable
 from plateviz.tables.polygon import Polygon
 
@@ -104,7 +104,7 @@ def extent_of(table: ExplorableTable, chosen: ExploredColumns) -> DataExtent:
 def counts_in_frame(table: ExplorableTable, chosen: ExploredColumns, x: Axis, y: Axis) -> Counts:
     """Return the rows in each cell of a frame; two threads count, of many rows half each."""
     colours = table.numbers(chosen.colour) if chosen.colour else None
-    names = names_in(table, chosen.colour) if chosen.colour in NAMES else None
+    names = names_in(table, chosen.colour)
     has_means = colours is not None and names is None
 
     def count(rows: range) -> Counts:

@@ -154,6 +154,13 @@ def test_cells_show_the_most_frequent_detector_and_no_mean_of_ids():
     assert [ramp.palette[n] for n in (0, 2, 4)] == list(SERIES_COLOURS[:3])
 
 
+def test_cells_count_no_more_names_than_can_be_told_apart():
+    rows = pd.DataFrame({"field_id": np.arange(ROW_LIMIT + 5_000) % 800, "nx": 1.0})
+    table = explorable("measurements", rows, schema.RESIDUALS)
+    (frame,) = explored_figure(table, ExploredColumns("nx", "nx", colour="field_id"))
+    assert "cells by value" in [drawn.name for drawn in frame.glyphs]
+
+
 def test_zoom_does_not_change_the_colour_of_a_detector():
     keys = {"field_id": 0, "plate_id": 1, "detector_id": [0, 1, 2]}
     rows = pd.DataFrame({**keys, "nx": [1.0, 2.0, 3.0]})

@@ -62,7 +62,7 @@ def address_of(selected: Subset) -> dict[str, str]:
     }
 
 
-def words_of(selected: Subset) -> str:
+def selection_words(selected: Subset) -> str:
     """Return a selection in words, such as "132 sources, exposures 0/3 to 0/7"."""
     n = len(selected.sources)
     texts = [f"{n:,} source{'s' * (n > 1)}"] if n else []

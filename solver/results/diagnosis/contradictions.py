@@ -39,7 +39,8 @@ def of_epoch(diagnosis: Diagnosis, shift: float = 0.0) -> list[Found]:
 def _gain_of_epoch(diagnosis: Diagnosis, shift: float) -> float:
     """Return by how much the reference stars agree better with the catalogue at the other time.
 
-    With the errors that it states, as the fit takes them: what bends the fit is not their scatter.
+    It takes the errors that the catalogue states, because the fit is bent by as much as these
+    allow; and the time found without a shift, which is the same but for the weights of the stars.
     """
     rows = diagnosis.result.sources
     rows = rows[rows["is_reference"].to_numpy(dtype=bool)]

@@ -66,3 +66,10 @@ def test_noise_does_not_make_stars_wrong():
 def test_large_error_is_named_alone(defect, subject):
     """It bends the fit, and leaves residuals that look like noise and like other patterns."""
     assert subjects(fitted(defect)) == [subject]
+
+
+def test_what_patterns_explain_is_not_taken_from_other_exposures_than_those_they_explain():
+    """Those with much jitter leave patterns, and are left out where the noise is looked at."""
+    causes = find_causes(diagnose(fitted("pointing-jitter=100mas", orbit=10)))
+    assert [one.test.subject for one in causes.found] == ["swing"]
+    assert causes.left is None

@@ -18,7 +18,7 @@ from plateviz.dashboard.saving.selected_tables import (
     selection_name,
 )
 from plateviz.dashboard.saving.table_sender import TableSender
-from plateviz.dashboard.selection.selected import words_of
+from plateviz.dashboard.selection.selected import selection_words
 from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.views.dialogs.kept_selections import KeptSelectionsDialog
 from plateviz.dashboard.views.dialogs.selection_list import SelectionList
@@ -161,11 +161,13 @@ def words(selected: Subset, in_orbit: Subset | None) -> str:
     selected : the selection
     in_orbit : the part that the orbit on the screen has measured; None if no orbit is shown
     """
-    text = f"{words_of(selected)} selected"
+    text = f"{selection_words(selected)} selected"
     if in_orbit is None or in_orbit == selected:
         return text
     return (
-        f"{text}, {words_of(in_orbit)} in this orbit" if in_orbit else f"{text}, none in this orbit"
+        f"{text}, {selection_words(in_orbit)} in this orbit"
+        if in_orbit
+        else f"{text}, none in this orbit"
     )
 
 

@@ -6,7 +6,7 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation.navigation import Navigation
-from plateviz.dashboard.selection.selected import words_of
+from plateviz.dashboard.selection.selected import selection_words
 from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.views.dialogs.dialog import dialog
 from solver.errors import InputError
@@ -61,16 +61,18 @@ class KeptSelectionsDialog(pn.viewable.Viewer):
     def _show(self, *_: object) -> None:
         selected, kept = self._selection.selected, self._selection.kept
         name = self._selection.name_of_selected
-        options = {f"{one} ({words_of(items)})": one for one, items in kept.items()}
+        options = {f"{one} ({selection_words(items)})": one for one, items in kept.items()}
         chosen = name or (self._kept.value if self._kept.value in kept else next(iter(kept), None))
         self._kept.param.update(options=options, value=chosen)
         self._again.visible, self._new.visible = bool(kept), bool(selected)
         if not selected:
             self._say("Nothing is selected.")
         elif name is None:
-            self._say(f"Selected: {words_of(selected)}.")
+            self._say(f"Selected: {selection_words(selected)}.")
         else:
-            self._say(f"Kept under the name that is chosen below: {words_of(selected)}.", "success")
+            self._say(
+                f"Kept under the name that is chosen below: {selection_words(selected)}.", "success"
+            )
 
     def _say(self, text: str, severity: str = "info") -> None:
         # It is taken for Markdown: no text of a person's may be in it.

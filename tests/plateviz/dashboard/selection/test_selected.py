@@ -9,7 +9,7 @@ from plateviz.dashboard.selection.selected import (
     checked_name,
     keys_of,
     parsed,
-    words_of,
+    selection_words,
 )
 from plateviz.dashboard.selection.selection import Selection
 from solver.data.subset import NOTHING, Subset
@@ -41,7 +41,7 @@ def of(sources=(), exposures=(), detectors=()):
     ],
 )
 def test_selection_in_words(selected, text):
-    assert words_of(selected) == text
+    assert selection_words(selected) == text
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,12 @@ from solver.data.result import FitResult
 from solver.results.diagnosis.rows import onto_focal_plane
 from solver.units import MPIX_PER_PIX, RAD_PER_MAS, UM_PER_MM
 
+# Columns of the residuals from which vectors are made.
+_OF_VECTORS = [
+    *("source_id", "detector_id", "focal_x", "focal_y", "nx", "ny"),
+    *("residual_x", "residual_y"),
+]
+
 
 def residual_map(
     result: FitResult,
@@ -38,42 +44,44 @@ def residual_map(
     on the detector in `residual_x_mpix`, `residual_y_mpix`, `residual_x_mas`,
     `residual_y_mas`
     """
-    keep = is_shown(result, exposures, detector_id)
     # Several times as fast as a mask, for the few rows of an exposure.
-    rows = result.residuals.iloc[np.flatnonzero(keep)]
+    kept = np.flatnonzero(is_shown(result, exposures, detector_id))
+    exposure = result.exposure_index[kept]
+    rows = {name: result.residuals[name].to_numpy()[kept] for name in _OF_VECTORS}
     calibration = result.values_on("det")
-    detector = instrument.index_of(rows["detector_id"].to_numpy())
-    fitted = calibration.loc[detector]
-    focal_lengths = result.values_on("exp")["focal_length"].to_numpy()
-    focal_um = focal_lengths[result.exposure_index[keep]]
-    d_x_um = (rows["residual_x"] * fitted["pitch_x"].to_numpy()).to_numpy()
-    d_y_um = (rows["residual_y"] * fitted["pitch_y"].to_numpy()).to_numpy()
-    mas_per_um = 1.0 / focal_um / RAD_PER_MAS
+    detector = instrument.index_of(rows["detector_id"])
+    pitch_x, pitch_y = (
+        calibration[name].loc[detector].to_numpy() for name in ("pitch_x", "pitch_y")
+    )
+    # Arrays, because each operation with a column takes as long as with thousands of numbers.
+    residual_x, residual_y = rows["residual_x"], rows["residual_y"]
+    d_x_um, d_y_um = residual_x * pitch_x, residual_y * pitch_y
+    mas_per_um = 1.0 / result.values_on("exp")["focal_length"].to_numpy()[exposure] / RAD_PER_MAS
     if detector_id is None:
         turn = np.radians(calibration["detector_rotation"].to_numpy())
         u, v = onto_focal_plane(np.stack([d_x_um, d_y_um], axis=-1), turn, detector).T / UM_PER_MM
         x, y = rows["focal_x"] / UM_PER_MM, rows["focal_y"] / UM_PER_MM
         mas_per_unit = mas_per_um * UM_PER_MM
     else:
-        x, y, u, v = (rows[name] for name in ("nx", "ny", "residual_x", "residual_y"))
-        mas_per_unit = mas_per_um * fitted["pitch_x"].to_numpy()
+        x, y, u, v = rows["nx"], rows["ny"], residual_x, residual_y
+        mas_per_unit = mas_per_um * pitch_x
     return pd.DataFrame(
         {
             "source_id": rows["source_id"],
-            "id": id_strings(rows["source_id"]),
-            "exposure": exposure_labels(rows),
+            "id": id_strings(pd.Series(rows["source_id"])),
+            "exposure": exposure_labels(result.exposures).take(exposure).array,
             "detector_id": rows["detector_id"],
             "x": x,
             "y": y,
             "u": u,
             "v": v,
             "mas_per_unit": mas_per_unit,
-            "residual_x_mpix": rows["residual_x"] * MPIX_PER_PIX,
-            "residual_y_mpix": rows["residual_y"] * MPIX_PER_PIX,
+            "residual_x_mpix": residual_x * MPIX_PER_PIX,
+            "residual_y_mpix": residual_y * MPIX_PER_PIX,
             "residual_x_mas": d_x_um * mas_per_um,
             "residual_y_mas": d_y_um * mas_per_um,
         }
-    ).reset_index(drop=True)
+    )
 
 
 def residual_scatter(

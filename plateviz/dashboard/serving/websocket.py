@@ -60,11 +60,14 @@ class CheckedWebsocket(WSHandler):
             self.finish(f"{TOO_MANY_OPENED}\n")
 
     def open(self, *arguments: str, **named: str) -> None:
-        """Count the page."""
+        """Count the page, and let its messages out at once."""
         limits = self._limits
         if limits is not None:
             limits.pages.enter(self._client or "")
             self._is_counted = True
+        # A message is several small packets. The network would keep back each one until the browser
+        # has acknowledged the one before, for which it may take 40 ms.
+        self.set_nodelay(True)
         super().open(*arguments, **named)
 
     def on_close(self) -> None:

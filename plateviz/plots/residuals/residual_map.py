@@ -150,8 +150,10 @@ def _plot(chosen: Chosen) -> Figure:
         for one in (chosen.result, chosen.beside)
         if one is not None
     )
-    scales = [_scale(one, shown) for one in (table, *others) if not one.empty]
-    return plot_residual_map(table, shown, arrow_scale=min(scales, default=None))
+    # Beside another solution, both have the scale of the one with the larger residuals.
+    beside = [one for one in (table, *others) if not one.empty] if others else []
+    scale = min((_scale(one, shown) for one in beside), default=None)
+    return plot_residual_map(table, shown, arrow_scale=scale)
 
 
 def _scale(table: pd.DataFrame, detector: Detector | Instrument) -> float:

@@ -5,6 +5,7 @@ import gc
 import json
 import logging
 import re
+import socket
 import warnings
 import weakref
 from concurrent.futures import ThreadPoolExecutor
@@ -395,6 +396,25 @@ def test_messages_that_are_wrong_end_their_connection_only(store, caplog, text):
 
     with_server(store, scenario)
     assert "failed to parse" not in caplog.text
+
+
+def test_small_messages_are_not_kept_back(store, monkeypatch):
+    websockets = []
+    opens = CheckedWebsocket.open
+
+    def remember(websocket, *arguments, **named):
+        opens(websocket, *arguments, **named)
+        websockets.append(websocket)
+
+    monkeypatch.setattr(CheckedWebsocket, "open", remember)
+
+    async def scenario(address, server):
+        async with opened(address):
+            (websocket,) = websockets
+            connection = websocket.ws_connection.stream.socket
+            assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+
+    with_server(store, scenario)
 
 
 def test_message_before_the_session_ends_its_connection_only(store, monkeypatch, caplog):

@@ -143,6 +143,24 @@ const tellOfZoom = plot => {
   }
 }
 
+// Copy a column of which all rows are drawn as a whole, and not row by row.
+const copyWhole = rows => {
+  const select = rows.select
+  rows.select = function (column) {
+    const isWhole = this.count === column.length
+    return isWhole ? column.slice() : select.call(this, column)
+  }
+}
+
+// Leave a sheet of styles as it is that would be written with the same text: each picture of a figure
+// writes where its parts are, and the browser would look for their styles and lay out anew.
+const writeChanges = sheet => {
+  const update = sheet._update
+  sheet._update = function (text) {
+    if (this.css !== text) update.call(this, text)
+  }
+}
+
 export function render() {
   const view = Bokeh.Models.get("Scatter").prototype.default_view.prototype
   // The page has one BokehJS, also where several dashboards are parts of it.
@@ -160,4 +178,6 @@ export function render() {
   Object.defineProperty(plot, "base_font_size", { get: () => 13 })
   layOutOnce(plot)
   tellOfZoom(plot)
+  writeChanges(Bokeh.require("core/dom").InlineStyleSheet.prototype)
+  copyWhole(Bokeh.require("core/util/bitset").BitSet.prototype)
 }

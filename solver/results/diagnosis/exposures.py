@@ -33,6 +33,12 @@ class ExposureChi2(NamedTuple):
     swing: np.ndarray
     scale: np.ndarray
 
+    def with_others_of(self, other: "ExposureChi2", kept: np.ndarray) -> "ExposureChi2":
+        """Return these of the exposures `kept`, given by their indices, and all else of `other`."""
+        is_kept = np.isin(np.arange(len(self.scale)), kept)
+        pairs = zip(self, other, strict=True)
+        return ExposureChi2(*(np.where(is_kept, *pair) for pair in pairs))
+
 
 def exposure_chi2(rows: Rows) -> ExposureChi2:
     """Return the chi2 of patterns of each exposure, with pointing, roll and scale fitted.

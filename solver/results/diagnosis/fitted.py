@@ -143,6 +143,12 @@ def _of_one_exposure(
     return in_x, in_y, precision
 
 
+def source_variances(result: FitResult, camera: Camera) -> np.ndarray:
+    """Return the variance of the prior of each source, along one axis, um^2, shape (sources,)."""
+    sigmas = result.sources[["prior_sigma_ra", "prior_sigma_dec"]].to_numpy()
+    return camera.um_per_mas**2 * np.square(sigmas).mean(axis=1)
+
+
 def with_sources(
     result: FitResult, camera: Camera, rows: Rows, columns: Columns, exposures: OfExposures
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -154,8 +160,7 @@ def with_sources(
     """
     source, known = pd.factorize(rows.source)
     n, count = columns.scalar.shape[1], len(known)
-    names = ["prior_sigma_ra", "prior_sigma_dec"]
-    prior = camera.um_per_mas**2 * np.square(result.sources[names].to_numpy()[known]).mean(axis=1)
+    prior = source_variances(result, camera)[known]
     precision = np.bincount(source, rows.weight, count) + 1.0 / prior
     factor = np.sqrt(rows.weight / precision[source])
     roll = camera.roll[rows.exposure]

@@ -10,6 +10,7 @@ from scipy.special import chdtri
 from solver.data.result import FitResult
 from solver.results.diagnosis.epoch import EpochOffset, epoch_offset
 from solver.results.diagnosis.exposures import WAVES, ExposureChi2, exposure_chi2
+from solver.results.diagnosis.fitted import source_variances
 from solver.results.diagnosis.modelled import is_adjusted
 from solver.results.diagnosis.patterns import Family, Patterns
 from solver.results.diagnosis.priors import PriorRms, prior_rms
@@ -29,6 +30,7 @@ from solver.results.diagnosis.scatter import scatter_tests
 from solver.results.diagnosis.star_tests import epoch_tests, other_star_tests, reference_tests
 from solver.results.diagnosis.swapped import Swapped, swapped
 from solver.results.diagnosis.test import Test, discovered
+from solver.results.diagnosis.without_exposures import without_exposures
 from solver.runtime.threads import one_blas_thread
 
 # If all is well, the probability that any test is a discovery: a solution to be used with care,
@@ -49,11 +51,12 @@ class Diagnosis(NamedTuple):
     ----------
     tests : the table
     result : the solution
-    camera, rows, patterns, projection : see there; the rows of exposures that swing are zero
+    camera, patterns, projection : see there
+    rows : as if the exposures that swing were left out; their own residuals are zero
     magnitude : of each source, NaN where unknown, and for reference stars, whose chi2 depends on
         the errors of the catalogue
     scale : chi2 per degree of freedom without outliers and exposures that swing, at least 1
-    exposures : chi2 of patterns of each exposure
+    exposures : chi2 of patterns of each exposure; of those that do not swing, from `rows`
     swinging : indices of the exposures whose pointing changed while they were read
     references, others : chi2 of each reference star, and of each other star
     epoch : how much later the stars are measured than the times of the exposures say
@@ -101,10 +104,11 @@ def diagnose(result: FitResult) -> Diagnosis:
         magnitude_of_others = np.where(
             result.sources["is_reference"].to_numpy(bool), np.nan, magnitude
         )
+        if len(swinging):
+            rows = without_exposures(rows, camera, source_variances(result, camera), swinging)
+            exposures = exposures.with_others_of(exposure_chi2(rows), swinging)
         scatter = scatter_tests(rows, magnitude_of_others, without=swinging)
         scale = max(scatter[0].value, 1.0)
-        still = np.isin(rows.exposure, swinging, invert=True)
-        rows = rows._replace(residual=rows.residual * still[:, None])
         pairs = swapped(result)
         references, others = (
             catalogue_chi2(result.sources[chosen]) for chosen in (is_reference, ~is_reference)
@@ -227,10 +231,12 @@ def _swings(found: ExposureChi2, field: np.ndarray) -> tuple[Test, np.ndarray]:
 
 
 def _induced(swing: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Return the largest chi2 of a swing that the other exposures of the field may bring about.
+    """Return the largest chi2 of a swing that the other exposures may bring about.
 
-    The positions of the sources, each a mean over the exposures, carry it.
+    The positions of the sources, each a mean over the exposures of its field, carry it, and what
+    all exposures share.
     """
     root, count = np.sqrt(swing), np.bincount(field)
-    others = np.bincount(field, root)[field] - root
-    return np.square(others / count[field])
+    of_field = (np.bincount(field, root)[field] - root) / count[field]
+    of_all = (root.sum() - root) / max(len(root), 1)
+    return np.square(np.maximum(of_field, of_all))

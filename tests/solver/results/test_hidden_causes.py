@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from solver.data.settings import FitSettings
 from solver.fit import fit_orbit
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.priors import prior_rms
+from solver.results.diagnosis.rows import Rows, camera_rows
 from solver.results.diagnosis.table import diagnose
+from solver.results.diagnosis.without_exposures import without_exposures
 from tests.solver.results.test_diagnosis import fitted, orbit_of
 
 
@@ -72,4 +75,56 @@ def test_what_patterns_explain_is_not_taken_from_other_exposures_than_those_they
     """Those with much jitter leave patterns, and are left out where the noise is looked at."""
     causes = find_causes(diagnose(fitted("pointing-jitter=100mas", orbit=10)))
     assert [one.test.subject for one in causes.found] == ["swing"]
-    assert causes.left is None
+
+
+@pytest.mark.parametrize("amplitude", ["60mas", "500mas"])
+def test_jitter_names_its_exposures_and_nothing_that_the_positions_carry_into_others(amplitude):
+    diagnosis = diagnose(fitted(f"pointing-jitter={amplitude}", orbit=2))
+    causes = find_causes(diagnosis)
+    assert [one.test.subject for one in causes.found] == ["swing"]
+    # Those with the largest residuals.
+    rows = camera_rows(diagnosis.result)[1]
+    chi2 = np.bincount(rows.exposure, rows.chi2) / np.bincount(rows.exposure)
+    assert sorted(causes.found[0].items) == sorted(np.argsort(chi2)[-3:])
+
+
+def test_residuals_without_an_exposure_are_those_of_the_others_alone():
+    """Of one source at a time: its position is the mean of what is left, and its prior."""
+    rng = np.random.default_rng(7)
+    n, sources = 40, 5
+    exposure = np.repeat(np.arange(8), sources)
+    roll, variance = rng.uniform(0.0, 6.0, 8), rng.uniform(1.0, 3.0, sources)
+    measured, weight = rng.normal(size=(n, 2)), rng.uniform(0.5, 2.0, n)
+    source = np.tile(np.arange(sources), 8)
+    camera = camera_rows(fitted("pointing-jitter=60mas", orbit=2))[0]._replace(roll=roll)
+    is_far = np.zeros(n, dtype=bool)
+    is_far[17] = True
+
+    def rows_of(kept):
+        """Fit the positions to some rows, with a prior about zero."""
+        residual, left = np.empty((n, 2)), np.empty(n)
+        for one in range(sources):
+            mine = source == one
+            used = mine & kept
+            precision = weight[used].sum() + 1.0 / variance[one]
+            onto_sky = [_turned(angle) for angle in roll[exposure]]
+            pull = sum(weight[i] * onto_sky[i] @ measured[i] for i in np.flatnonzero(used))
+            for i in np.flatnonzero(mine):
+                residual[i] = measured[i] - onto_sky[i].T @ pull / precision
+                left[i] = 1.0 - weight[i] / precision
+        chi2 = weight * np.square(residual).sum(axis=1)
+        residual, places = residual * ~is_far[:, None], 3 * [np.zeros((n, 2))]
+        first, zeros = np.arange(0, n + 1, sources), np.zeros(n, dtype=int)
+        fitted_to = exposure, zeros, source, first, *places, residual, weight, left
+        return Rows(*fitted_to, chi2, is_far)
+
+    is_out = np.isin(exposure, [2, 5])
+    found = without_exposures(rows_of(exposure >= 0), camera, variance, np.array([2, 5]))
+    expected, used = rows_of(~is_out), ~(is_out | is_far)
+    for name in ("residual", "left", "chi2"):
+        assert_allclose(getattr(found, name)[used], getattr(expected, name)[used], rtol=1e-12)
+    assert not found.residual[is_out].any()
+
+
+def _turned(angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

@@ -58,3 +58,24 @@ def require_marks_where_they_are(page):
     assert abs(together - alone) < 0.02 * alone
     # Each copy is within an eighth of a pixel of its mark.
     assert differing < 0.1 * alone
+
+
+def require_only_changes(page):
+    """Fail if a style is written again as it was, or if a column is copied wrongly."""
+    is_kept, css, whole, part = page.evaluate(
+        """() => {
+          const sheet = new (Bokeh.require("core/dom").InlineStyleSheet)("a { left: 0 }")
+          const text = sheet.el.firstChild
+          sheet.replace("a { left: 0 }")
+          const isKept = sheet.el.firstChild === text
+          sheet.replace("a { left: 1px }")
+          const { BitSet } = Bokeh.require("core/util/bitset"), column = Float64Array.of(4, 5, 6)
+          const whole = BitSet.all_set(3).select(column)
+          column[0] = 7
+          const part = BitSet.from_indices(3, [1]).select(column)
+          return [isKept, sheet.css, [...whole], [...part]]
+        }"""
+    )
+    assert is_kept
+    assert css == "a { left: 1px }"
+    assert (whole, part) == ([4, 5, 6], [5])

@@ -32,7 +32,7 @@ from tests.ui.conftest import (
     turn_to_workspace,
     until,
 )
-from tests.ui.painted import LAYOUTS_OF_TEN, require_marks_where_they_are
+from tests.ui.painted import LAYOUTS_OF_TEN, require_marks_where_they_are, require_only_changes
 
 expect.set_options(timeout=60_000)
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -133,6 +133,7 @@ def test_every_figure_is_drawn_when_near_and_within_the_screen(walked):
     # A part that asks without end whether it can be laid out would take a core.
     assert rests(walked)
     require_marks_where_they_are(walked)
+    require_only_changes(walked)
 
 
 def test_the_page_waits_for_no_typeface(walked):

@@ -9,7 +9,7 @@ import panel_material_ui as pmui
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.rows_to_explore import OrbitRows
 from plateviz.dashboard.session.latest_answer import PENDING, Pending
-from plateviz.dashboard.session.orbit_figures import chosen_of, figures_of
+from plateviz.dashboard.session.orbit_figures import chosen_of, figure_of, figures_of
 from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.cards.explore import ExploreView
 from plateviz.dashboard.views.cards.figure import FigureView, Part, card
@@ -164,7 +164,7 @@ class OrbitPage(pn.viewable.Viewer):
         chosen = chosen_of(self._session)
         if chosen is None:
             return None
-        figure = figure_of_both(of_both, chosen) if of_both else diagnostic.plot(chosen)
+        figure = figure_of_both(of_both, chosen) if of_both else figure_of(diagnostic, chosen)
         return self._session.units.figure(figure)
 
     def _show_workspace(self, *_: object) -> None:

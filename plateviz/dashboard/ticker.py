@@ -14,6 +14,7 @@ from plateviz.dashboard.navigation.lost_run import look_for_run
 from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.serving.model_search import one_search
 from plateviz.dashboard.session.expected_what_ifs import ExpectedWhatIfs
+from plateviz.dashboard.session.shown_address import SHOWN
 from plateviz.dashboard.views.pages.pages import Pages
 from plateviz.solving.job import Job
 from solver.data.subset import KINDS
@@ -62,7 +63,8 @@ class Ticker:
         """Begin once the page has loaded; drawing before would delay it."""
         session = navigation.session
         session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
-        session.selection.param.watch(self.wake, ["field", "plates", "detector", *KINDS])
+        session.shown_part.param.watch(self.wake, [*SHOWN])
+        session.selection.param.watch(self.wake, [*KINDS])
         session.units.param.watch(self.wake, "unit")
         names = ["view", *WORKSPACES.values(), "run_name", "written", "found"]
         navigation.param.watch(self.wake, names)

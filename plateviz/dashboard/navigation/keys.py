@@ -56,26 +56,26 @@ def _blink(navigation: Navigation) -> None:
 
 def _step_orbit(navigation: Navigation, step: int) -> None:
     session = navigation.session
-    orbits = session.selection.param["orbit"].objects
-    place = orbits.index(session.selection.orbit) + step
+    orbits = session.shown_part.param["orbit"].objects
+    place = orbits.index(session.shown_part.orbit) + step
     if 0 <= place < len(orbits):
         navigation.choose_orbit(orbits[place])
 
 
 def _step_exposures(navigation: Navigation, step: int) -> None:
     """Move the range of exposures, as long as it is, within those of the orbit."""
-    selection = navigation.session.selection
-    first, last = (plate + step for plate in selection.plates)
-    lowest, highest = selection.param["plates"].bounds
+    part = navigation.session.shown_part
+    first, last = (plate + step for plate in part.plates)
+    lowest, highest = part.param["plates"].bounds
     if lowest <= first and last <= highest:
-        selection.plates = (first, last)
+        part.plates = (first, last)
 
 
 def _step_detector(navigation: Navigation, step: int) -> None:
-    selection = navigation.session.selection
-    detectors = list(selection.param["detector"].objects)
-    place = detectors.index(selection.detector) + step
-    selection.detector = detectors[place % len(detectors)]
+    part = navigation.session.shown_part
+    detectors = list(part.param["detector"].objects)
+    place = detectors.index(part.detector) + step
+    part.detector = detectors[place % len(detectors)]
 
 
 KEYS: Mapping[str, Key] = MappingProxyType(

@@ -11,10 +11,10 @@ from plateviz.dashboard.navigation.growth import Growth, how_to_make_a_run
 from plateviz.dashboard.navigation.known_runs import KnownRuns
 from plateviz.dashboard.navigation.next_orbit import NextOrbit
 from plateviz.dashboard.navigation.view import WORKSPACES, View
-from plateviz.dashboard.selection.shown_address import SHOWN
 from plateviz.dashboard.session.run_comparison import OF_RUNS
 from plateviz.dashboard.session.selection_actions import look_for_kept
 from plateviz.dashboard.session.session import Session
+from plateviz.dashboard.session.shown_address import SHOWN
 from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.dashboard.session.solution_address import find_solution, solution_query
 from plateviz.dashboard.session.units import NAMES, OWN
@@ -111,7 +111,7 @@ class Navigation(param.Parameterized):
             self.growth = self._growth[1].look(written)
             if written != self.written:
                 self.written = written
-                self.session.selection.offer_orbits(self.session.store.orbits)
+                self.session.shown_part.offer_orbits(self.session.store.orbits)
                 self._look()
         return bool(self.growth)
 
@@ -140,20 +140,20 @@ class Navigation(param.Parameterized):
         if "selection" in address:
             # Somebody else may have kept it.
             look_for_kept(session)
-        problems += session.selection.restore(address)
+        problems += session.shown_part.restore(address) + session.selection.restore(address)
         try:
-            orbit = session.selection.orbit_of(address)
+            orbit = session.shown_part.orbit_of(address)
         except InputError as error:
             problems.append(str(error))
-            orbit = session.selection.orbit
-        default = View.ORBIT if {*address} & {*session.selection.param} else self.view
+            orbit = session.shown_part.orbit
+        default = View.ORBIT if {*address} & {"orbit", *SHOWN, *KINDS} else self.view
         view = View(chosen("view", address, [v.value for v in View], default.value, problems))
         session.note(problems)
         self._named = {name: address[name] for name in _NAMED if name in address}
         if view is View.ORBIT or session.shown is not None:
             self._open(orbit)
         else:
-            session.selection.orbit = orbit
+            session.shown_part.orbit = orbit
         self.view = view
         self._begin_workspace(address)
 
@@ -165,7 +165,7 @@ class Navigation(param.Parameterized):
         is_whole : whether settings that are too long for an address are written, too
         """
         query = {"view": self.view.value, "workspace": self.workspace.value}
-        query |= self.session.selection.address()
+        query |= self.session.shown_part.address() | self.session.selection.address()
         if self.run_name is not None:
             query["run"] = self.run_name
         if self.found is not None:
@@ -194,7 +194,7 @@ class Navigation(param.Parameterized):
         """Show a view; the Orbit view requests its orbit when it is first shown."""
         session, self.view = self.session, view
         if view is View.ORBIT and session.shown is None and session.job is None:
-            self._open(session.selection.orbit)
+            self._open(session.shown_part.orbit)
 
     def turn_to_workspace(self, workspace: Workspace) -> None:
         """Show a workspace of the view on the screen."""
@@ -212,10 +212,10 @@ class Navigation(param.Parameterized):
     def expect_orbit(self) -> None:
         """Let the orbit of the run be read ahead that is likely to be asked for next."""
         # Of a what-if, the one that it changes.
-        selection, shown = self.session.selection, self.session.fitted
+        part, shown = self.session.shown_part, self.session.fitted
         run = self.known_runs.get(shown.run) if shown is not None else None
         if run is not None:
-            run.expect(self._next_orbit.after(selection.orbit, selection.param["orbit"].objects))
+            run.expect(self._next_orbit.after(part.orbit, part.param["orbit"].objects))
 
     def find_source(self, text: str) -> None:
         """Search the run for a source by its id as text."""
@@ -246,9 +246,9 @@ class Navigation(param.Parameterized):
     def _open(self, orbit: int | None) -> None:
         """Show the solution that the address names."""
         session, shown = self.session, self.session.shown
-        is_there = shown is not None and shown.orbit == session.selection.orbit == orbit
+        is_there = shown is not None and shown.orbit == session.shown_part.orbit == orbit
         if is_there and self._solution_query() == self._named:
-            session.limit_selection()
+            session.limit_shown_part()
             return
         try:
             solution = self._find("solution", orbit) or self._solution(None, orbit)
@@ -257,7 +257,7 @@ class Navigation(param.Parameterized):
                 # It is a change of that solution, to which the controls lead back.
                 other = self._solution(None, orbit)
         except InputError as error:
-            session.selection.orbit = orbit
+            session.shown_part.orbit = orbit
             session.refuse(str(error))
             return
         self._of_address = solution

@@ -90,7 +90,7 @@ class OrbitRows:
 
     def subject(self) -> str:
         """Return the orbit on the screen."""
-        return self._session.selection.subject()
+        return self._session.shown_part.subject()
 
 
 class RunRows:

@@ -65,7 +65,7 @@ class SolutionList:
 
     def entries(self) -> list[Entry]:
         """Return the solutions of the session, the kept ones, and those of the orbit in runs."""
-        store, orbit = self._session.store, self._session.selection.orbit
+        store, orbit = self._session.store, self._session.shown_part.orbit
         what_if = self._what_if()
         made = [
             Entry(one, one.orbit, one.name, one.settings.describe(), _how(one.is_what_if))
@@ -80,7 +80,7 @@ class SolutionList:
 
     def other_orbits(self) -> list[Entry]:
         """Return the other orbits of the run on the screen, whether it has them or not."""
-        run, orbit = self._navigation.run, self._session.selection.orbit
+        run, orbit = self._navigation.run, self._session.shown_part.orbit
         if run is None:
             return []
         settings = _described(run)

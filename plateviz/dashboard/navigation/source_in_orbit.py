@@ -5,7 +5,7 @@ from typing import Any
 import pandas as pd
 
 from plateviz.dashboard.navigation.navigation import Navigation
-from plateviz.dashboard.selection.selection import Selection
+from plateviz.dashboard.session.shown_part import ShownPart
 from plateviz.dashboard.session.solution import Solution
 from plateviz.plots.workspace import OrbitWorkspace
 from solver.data.subset import Subset
@@ -23,7 +23,7 @@ def open_source_in_orbit(navigation: Navigation, source_id: int, orbit: int) -> 
 
     def show(solution: Solution) -> None:
         if solution.orbit == orbit:
-            session.note(_show_measurements(session.selection, solution, source_id))
+            session.note(_show_measurements(session.shown_part, solution, source_id))
 
     if session.job is None:
         if session.shown is not None:
@@ -39,7 +39,7 @@ def open_source_in_orbit(navigation: Navigation, source_id: int, orbit: int) -> 
     watcher = session.param.watch(follow, "shown")
 
 
-def _show_measurements(selection: Selection, solution: Solution, source_id: int) -> list[str]:
+def _show_measurements(part: ShownPart, solution: Solution, source_id: int) -> list[str]:
     """Show the first exposure and detector that measured a source, unless some are shown.
 
     Returns
@@ -50,20 +50,20 @@ def _show_measurements(selection: Selection, solution: Solution, source_id: int)
     rows = rows[rows["source_id"] == source_id]
     if rows.empty:
         return [f"this solution of orbit {solution.orbit} has no measurement of {source_id}"]
-    if not _is_any_shown(selection, solution, rows):
+    if not _is_any_shown(part, solution, rows):
         field, plate, detector = (
             int(value)
             for value in rows.sort_values(["field_id", "plate_id"], kind="stable")[
                 ["field_id", "plate_id", "detector_id"]
             ].iloc[0]
         )
-        selection.param.update(field=str(field), plates=(plate, plate), detector=str(detector))
+        part.param.update(field=str(field), plates=(plate, plate), detector=str(detector))
     return []
 
 
-def _is_any_shown(selection: Selection, solution: Solution, rows: pd.DataFrame) -> bool:
-    shown = set(selection.exposures_of(solution.result))
+def _is_any_shown(part: ShownPart, solution: Solution, rows: pd.DataFrame) -> bool:
+    shown = set(part.exposures_of(solution.result))
     is_shown = [pair in shown for pair in zip(rows["field_id"], rows["plate_id"], strict=True)]
-    detector = selection.detector_id
+    detector = part.detector_id
     is_there = True if detector is None else rows["detector_id"] == detector
     return bool((pd.Series(is_shown, index=rows.index) & is_there).any())

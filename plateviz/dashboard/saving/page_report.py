@@ -75,7 +75,7 @@ def _of_solution(navigation: Navigation) -> Later:
     if other is not None:
         facts["Report"]["Compared with solution"] = other.label
     make = partial(_solution, shown, other, session.store, facts, _on_screen(navigation))
-    stem = session.selection.subject() + ("-what-if" if shown.is_replaceable else "")
+    stem = session.shown_part.subject() + ("-what-if" if shown.is_replaceable else "")
     return _later(stem, make, session.store.reports)
 
 

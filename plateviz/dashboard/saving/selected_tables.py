@@ -36,7 +36,7 @@ def is_of_orbit(navigation: Navigation) -> bool:
 def selection_name(navigation: Navigation) -> str:
     """Return how the selection is named in files."""
     session = navigation.session
-    of = session.selection.subject() if is_of_orbit(navigation) else f"run-{navigation.run_name}"
+    of = session.shown_part.subject() if is_of_orbit(navigation) else f"run-{navigation.run_name}"
     return f"{of}-selection"
 
 

@@ -57,8 +57,8 @@ def chosen_of(session: Session) -> Chosen | None:
     return Chosen(
         result=shown.result,
         instrument=instrument_of(shown.result, otherwise=session.store.instrument),
-        exposures=tuple(session.selection.exposures_of(shown.result)),
-        detector=session.selection.detector_id,
+        exposures=tuple(session.shown_part.exposures_of(shown.result)),
+        detector=session.shown_part.detector_id,
         other=session.other.result if session.other else None,
         simulation=session.store.simulation,
     )

@@ -12,6 +12,7 @@ from plateviz.dashboard.session.held_job import HeldJob
 from plateviz.dashboard.session.journal import Journal
 from plateviz.dashboard.session.judging import Judging
 from plateviz.dashboard.session.on_screen import SolutionsOnScreen
+from plateviz.dashboard.session.shown_part import ShownPart
 from plateviz.dashboard.session.solution import Request, Solution, what_if_settings
 from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.session.units import Units
@@ -33,12 +34,12 @@ class Session(SolutionsOnScreen):
         """Begin with the first orbit, the paper's settings and the `large` selections so far."""
         super().__init__()
         self.store = store
-        self.selection = Selection(large)
+        self.shown_part, self.selection = ShownPart(), Selection(large)
         self.choices = FitChoices()
         self.units = Units(store.instrument)
         self.journal = Journal(store.made)
         self.judging = Judging(self, store.judge)
-        self.selection.offer_orbits(store.orbits)
+        self.shown_part.offer_orbits(store.orbits)
         self._detectors = store.instrument.detector_ids
         self._held = HeldJob(store, self.journal)
         self._requested = Request(store.orbits[0], FitSettings())
@@ -75,7 +76,7 @@ class Session(SolutionsOnScreen):
     def show_result(self, solution: Solution) -> None:
         """Show a solution that is there, such as that of a run, without a request."""
         self._cancel_job()
-        self.selection.orbit = solution.orbit
+        self.shown_part.orbit = solution.orbit
         if self.shown is not None and self.shown.equals(solution):
             self.param.update(stage=Stage.READY, message="")
             return
@@ -95,7 +96,7 @@ class Session(SolutionsOnScreen):
         self._cancel_job()
         self._is_opening = is_opening
         orbit = solutions[-1].orbit
-        self.selection.orbit = orbit
+        self.shown_part.orbit = orbit
         if self.shown is None or self.shown.orbit != orbit:
             self.solutions = []
             if self.shown is not None:
@@ -127,7 +128,7 @@ class Session(SolutionsOnScreen):
         request, status = Request(*awaited.made[:3]), awaited.job.status
         is_asked_for = self.job is not None and self._requested == request
         is_shown = self.shown is not None and self.shown[:2] == request[:2]
-        if request.orbit != self.selection.orbit or is_asked_for or is_shown:
+        if request.orbit != self.shown_part.orbit or is_asked_for or is_shown:
             return
         if status is JobStatus.FAILED:
             self.refuse(awaited.job.message)
@@ -144,14 +145,14 @@ class Session(SolutionsOnScreen):
         except InputError as error:
             self.refuse(str(error))
             return
-        asked = Request(self.selection.orbit, settings)
+        asked = Request(self.shown_part.orbit, settings)
         if self.job is None or self._requested != asked:
             self._cancel_job()
             self._request(asked)
 
     def awaits(self, settings: FitSettings) -> bool:
         """Return whether a solution of the orbit with these settings is being computed."""
-        if self.job is None or self._requested.orbit != self.selection.orbit:
+        if self.job is None or self._requested.orbit != self.shown_part.orbit:
             return False
         # A what-if does not compare the orders.
         asked, wanted = (
@@ -183,7 +184,7 @@ class Session(SolutionsOnScreen):
         elif known is not None:
             self._return_to(known)
         else:
-            self._request(Request(self.selection.orbit, settings, is_what_if=True))
+            self._request(Request(self.shown_part.orbit, settings, is_what_if=True))
 
     def list_what_if(self) -> None:
         """Add the what-if on the screen to the list, so that the next one does not replace it."""
@@ -252,7 +253,7 @@ class Session(SolutionsOnScreen):
         if shown.orbit != other.orbit:
             self._cancel_job()
             self.param.update(solutions=[] if other.is_replaceable else [other])
-            self.selection.orbit = other.orbit
+            self.shown_part.orbit = other.orbit
         self.param.update(shown=other, other=shown)
         self.choices.load(other.settings)
 
@@ -279,7 +280,7 @@ class Session(SolutionsOnScreen):
             self._put_on_screen(Solution(orbit, settings, result, is_what_if, is_what_if))
 
     def _put_on_screen(self, solution: Solution) -> None:
-        problems = self.selection.limit_to(solution.result, self._detectors)
+        problems = self.shown_part.limit_to(solution.result, self._detectors)
         before = self.fitted if self.fitted and self.fitted.orbit == solution.orbit else None
         self._fitted = before or solution
         kept = [s for s in self.solutions if s.settings != solution.settings]
@@ -293,7 +294,7 @@ class Session(SolutionsOnScreen):
         self.journal.add(solution)
         self.note(problems)
 
-    def limit_selection(self) -> None:
-        """Limit the selection to the solution on the screen, after an address changed it."""
+    def limit_shown_part(self) -> None:
+        """Limit what is shown to the solution on the screen, after an address changed it."""
         if self.shown is not None:
-            self.note(self.selection.limit_to(self.shown.result, self._detectors))
+            self.note(self.shown_part.limit_to(self.shown.result, self._detectors))

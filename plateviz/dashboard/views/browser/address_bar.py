@@ -6,6 +6,7 @@ import panel as pn
 import param
 
 from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation, View
+from plateviz.dashboard.session.shown_address import SHOWN
 from solver.data.subset import KINDS
 
 # Parts of an address whose change is a step of the browser's history; others replace the last one.
@@ -79,8 +80,8 @@ class AddressBar(pn.custom.JSComponent):
         session.param.watch(self._write, ["shown", "other", "stage", "figure_of_both"])
         session.run_comparison.param.watch(self._write, ["other", "figure"])
         session.units.param.watch(self._write, "unit")
-        names = ["orbit", "field", "plates", "detector", *KINDS, "kept"]
-        session.selection.param.watch(self._write, names)
+        session.shown_part.param.watch(self._write, ["orbit", *SHOWN])
+        session.selection.param.watch(self._write, [*KINDS, "kept"])
         self._is_following = False
         self._write()
 

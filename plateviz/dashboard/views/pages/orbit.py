@@ -10,6 +10,7 @@ from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.rows_to_explore import OrbitRows
 from plateviz.dashboard.session.latest_answer import PENDING, Pending
 from plateviz.dashboard.session.orbit_figures import chosen_of, figure_of, figures_of
+from plateviz.dashboard.session.shown_address import SHOWN
 from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.cards.explore import ExploreView
 from plateviz.dashboard.views.cards.figure import FigureView, Part, card
@@ -18,7 +19,7 @@ from plateviz.dashboard.views.cards.point_actions import session_actions
 from plateviz.dashboard.views.cards.state_text import empty_text
 from plateviz.dashboard.views.cards.workspace import workspace
 from plateviz.dashboard.views.controls.refit import RefitView
-from plateviz.dashboard.views.controls.selection import SelectionView
+from plateviz.dashboard.views.controls.shown_part import ShownPartView
 from plateviz.dashboard.views.controls.unit_selector import unit_selector
 from plateviz.dashboard.views.elements.markup import heading
 from plateviz.dashboard.views.elements.stack import Stack
@@ -63,7 +64,7 @@ class OrbitPage(pn.viewable.Viewer):
         session.param.watch(self._mark_stale, ["stage"])
         session.units.param.watch(self._change, "unit")
         session.selection.param.watch(self._show_selected, [*KINDS])
-        session.selection.param.watch(self._change_shown, ["field", "plates", "detector"])
+        session.shown_part.param.watch(self._change_shown, [*SHOWN])
         navigation.param.watch(self._show_workspace, "orbit_workspace")
         self._show_workspace()
 
@@ -93,8 +94,8 @@ class OrbitPage(pn.viewable.Viewer):
         return True
 
     def _shown_controls(self) -> list[Part]:
-        selection, units = SelectionView(self._navigation), unit_selector(self._session)
-        return [heading("Shown"), selection, units]
+        part, units = ShownPartView(self._navigation), unit_selector(self._session)
+        return [heading("Shown"), part, units]
 
     def _refit_controls(self) -> list[Part]:
         return [heading("Refit"), RefitView(self._navigation)]
@@ -147,7 +148,7 @@ class OrbitPage(pn.viewable.Viewer):
             partial(self._plot, diagnostic),
             waiting=partial(empty_text, self._session),
             actions=session_actions(self._session),
-            saved=Saved(self._session.selection.subject),
+            saved=Saved(self._session.shown_part.subject),
             theme=self._session.theme,
         )
 

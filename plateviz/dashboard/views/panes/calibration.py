@@ -77,7 +77,7 @@ class CalibrationView(pn.viewable.Viewer):
         self._save.theme = session.theme
 
     def _subject(self) -> str:
-        return f"{self._session.selection.subject()}-calibration"
+        return f"{self._session.shown_part.subject()}-calibration"
 
     def _files(self) -> dict[str, Table]:
         shown = self._session.shown

@@ -104,7 +104,7 @@ class CompareView(pn.viewable.Viewer):
         self._fill()
 
     def _subject(self) -> str:
-        return f"{self._session.selection.subject()}-changes"
+        return f"{self._session.shown_part.subject()}-changes"
 
     def _files(self) -> dict[str, Table]:
         return {"changes": Table.from_pandas(self._changes)}

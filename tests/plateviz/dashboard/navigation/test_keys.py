@@ -4,7 +4,7 @@ import pytest
 
 from plateviz.dashboard.navigation.keys import DIGITS, KEYS, press
 from plateviz.dashboard.navigation.navigation import View
-from plateviz.dashboard.selection.selection import ALL
+from plateviz.dashboard.session.shown_part import ALL
 from solver.data.settings import FitSettings
 from tests.plateviz.dashboard.navigation.test_navigation import requested
 
@@ -49,27 +49,27 @@ def test_brackets_step_through_the_orbits_and_stop_at_the_ends(orbit):
 
 
 def test_comma_and_full_stop_move_the_range_of_exposures_within_the_orbit(orbit):
-    selection = orbit.session.selection
-    lowest, highest = selection.param["plates"].bounds
-    selection.plates = (lowest, lowest + 1)
+    part = orbit.session.shown_part
+    lowest, highest = part.param["plates"].bounds
+    part.plates = (lowest, lowest + 1)
     press(orbit, ",")
-    assert selection.plates == (lowest, lowest + 1)
+    assert part.plates == (lowest, lowest + 1)
     press(orbit, ".")
-    assert selection.plates == (lowest + 1, lowest + 2)
-    selection.plates = (highest, highest)
+    assert part.plates == (lowest + 1, lowest + 2)
+    part.plates = (highest, highest)
     press(orbit, ".")
-    assert selection.plates == (highest, highest)
+    assert part.plates == (highest, highest)
 
 
 def test_d_goes_round_the_detectors(orbit):
-    selection = orbit.session.selection
-    detectors = selection.param["detector"].objects
-    selection.detector = ALL
+    part = orbit.session.shown_part
+    detectors = part.param["detector"].objects
+    part.detector = ALL
     for _ in detectors:
         press(orbit, "d")
-    assert selection.detector == ALL
+    assert part.detector == ALL
     press(orbit, "D")
-    assert selection.detector == detectors[-1]
+    assert part.detector == detectors[-1]
 
 
 def test_b_exchanges_the_two_solutions_and_back(orbit):
@@ -105,7 +105,7 @@ def test_f_fits_and_k_keeps(orbit):
 def test_key_of_an_orbit_does_nothing_to_it_elsewhere(orbit, key):
     orbit.turn_to(View.SURVEY)
     session = orbit.session
-    before = session.selection.address(), session.shown, session.other, requested(orbit)
+    before = session.shown_part.address(), session.shown, session.other, requested(orbit)
     press(orbit, key)
-    after = session.selection.address(), session.shown, session.other, requested(orbit)
+    after = session.shown_part.address(), session.shown, session.other, requested(orbit)
     assert after == before

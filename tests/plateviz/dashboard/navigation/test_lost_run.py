@@ -128,6 +128,6 @@ def test_orbit_whose_solution_is_damaged_is_the_one_that_a_fit_solves(fit_result
     navigation.begin({"view": "orbit", "orbit": "1"})
     session = navigation.session
     assert "orbit=0001/residuals.parquet: damaged" in session.message
-    assert session.selection.orbit == 1
+    assert session.shown_part.orbit == 1
     session.refit()
     assert session.store.requested[-1][0] == 1

@@ -11,7 +11,7 @@ from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.solution import Request
 from plateviz.dashboard.session.stage import Stage
 from plateviz.dashboard.views.browser.address_bar import AddressBar
-from plateviz.dashboard.views.controls.selection import SelectionView
+from plateviz.dashboard.views.controls.shown_part import ShownPartView
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.solving.origin import OrbitFiles, SurveyFolder
 from plateviz.solving.solution_store import SolutionStore
@@ -104,7 +104,7 @@ def test_opening_an_orbit_cancels_the_fit_of_another(navigation):
     job = navigation.session.job
     navigation.open_orbit(0)
     assert navigation.session.store.cancelled == [job]
-    assert (navigation.session.job, navigation.session.selection.orbit) == (None, 0)
+    assert (navigation.session.job, navigation.session.shown_part.orbit) == (None, 0)
 
 
 def test_run_that_cannot_be_read_is_reported(navigation, run):
@@ -171,7 +171,7 @@ def test_address_restores_the_view_the_run_and_the_source(fit_result, survey):
     second.begin(first.address())
     assert (second.view, second.run_name) == (View.SOURCE, "b")
     assert second.found.source_id == first.found.source_id
-    assert second.session.selection.orbit == 0
+    assert second.session.shown_part.orbit == 0
 
 
 def test_address_with_a_selection_only_opens_the_orbit_view(navigation):
@@ -260,19 +260,19 @@ def test_orbit_that_is_added_to_the_survey_is_offered(fit_result, survey):
     run.is_gathered, run.n_fitted, run.also_written = True, 2, {"grows": True}
     store = SurveyStore(fit_result, [run])
     navigation = Navigation(Session(store))
-    selection = navigation.session.selection
-    control = SelectionView(navigation).__panel__()[0]
+    part = navigation.session.shown_part
+    control = ShownPartView(navigation).__panel__()[0]
     assert navigation.look_again()
     assert list(control.options) == [0, 1]
     store.orbits = (0, 1, 2)
     run.also_written["n_orbits"] = 3
     assert navigation.look_again()
-    assert list(selection.param["orbit"].objects) == list(control.options) == [0, 1, 2]
+    assert list(part.param["orbit"].objects) == list(control.options) == [0, 1, 2]
     control.value = 2
-    assert selection.orbit == 2
+    assert part.orbit == 2
     navigation.turn_to(View.ORBIT)
     press(navigation, "[")
-    assert (selection.orbit, control.value) == (1, 1)
+    assert (part.orbit, control.value) == (1, 1)
 
 
 def test_tables_that_are_written_again_are_read_again(fit_result, survey):
@@ -407,10 +407,10 @@ def test_solution_that_is_not_there_is_told_and_the_default_is_shown(navigation,
 
 def test_going_back_restores_what_was_on_the_screen(navigation):
     navigation.open_orbit(0)
-    navigation.session.selection.detector = "2"
+    navigation.session.shown_part.detector = "2"
     navigation.turn_to_workspace(OrbitWorkspace.SKY)
     before, shown = navigation.address(), navigation.session.shown
-    navigation.session.selection.detector = "3"
+    navigation.session.shown_part.detector = "3"
     navigation.choose_orbit(1)
     end_job(navigation)
     navigation.turn_to(View.SURVEY)

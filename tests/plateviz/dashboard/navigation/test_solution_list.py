@@ -204,9 +204,9 @@ def test_solutions_of_different_orbits_are_exchanged_with_their_orbits(page, fit
     shown = session.shown
     session.compare_with(shown._replace(orbit=1, run="default"))
     session.exchange()
-    assert (session.shown.orbit, session.selection.orbit, session.other) == (1, 1, shown)
+    assert (session.shown.orbit, session.shown_part.orbit, session.other) == (1, 1, shown)
     session.exchange()
-    assert (session.shown, session.selection.orbit) == (shown, 0)
+    assert (session.shown, session.shown_part.orbit) == (shown, 0)
 
 
 def test_journal_is_bounded(monkeypatch):

@@ -26,8 +26,8 @@ def place(row):
 
 
 def shown(navigation):
-    selection = navigation.session.selection
-    return selection.field, selection.plates, selection.detector
+    part = navigation.session.shown_part
+    return part.field, part.plates, part.detector
 
 
 def test_orbit_opens_where_the_source_was_measured_first(navigation, star):
@@ -36,7 +36,8 @@ def test_orbit_opens_where_the_source_was_measured_first(navigation, star):
     navigation.open_orbit(0)
     navigation.turn_to_workspace(OrbitWorkspace.SKY)
     detectors = set(navigation.session._detectors) - {int(row["detector_id"])}
-    selection.param.update(detector=str(detectors.pop()), exposures=frozenset({(0, 1)}))
+    navigation.session.shown_part.detector = str(detectors.pop())
+    selection.exposures = frozenset({(0, 1)})
     navigation.turn_to(View.SOURCE)
     open_source_in_orbit(navigation, source, 0)
     assert (navigation.view, navigation.workspace) == (View.ORBIT, OrbitWorkspace.RESIDUALS)
@@ -46,10 +47,10 @@ def test_orbit_opens_where_the_source_was_measured_first(navigation, star):
 
 def test_place_that_shows_the_source_stays(navigation, star):
     source, _ = star
-    selection = navigation.session.selection
+    part = navigation.session.shown_part
     navigation.open_orbit(0)
-    low, high = selection.param["plates"].bounds
-    selection.param.update(field="all", plates=(low, high), detector="all")
+    low, high = part.param["plates"].bounds
+    part.param.update(field="all", plates=(low, high), detector="all")
     before = shown(navigation)
     open_source_in_orbit(navigation, source, 0)
     assert shown(navigation) == before
@@ -63,10 +64,10 @@ def test_place_follows_the_fit_of_an_orbit_that_the_run_lacks(navigation, star):
     assert navigation.session.shown.orbit == 1
     assert shown(navigation) == place(row)
     # Once only.
-    navigation.session.selection.detector = "all"
+    navigation.session.shown_part.detector = "all"
     navigation.session.refit()
     end_job(navigation)
-    assert navigation.session.selection.detector == "all"
+    assert navigation.session.shown_part.detector == "all"
 
 
 def test_source_without_a_measurement_is_said(navigation):

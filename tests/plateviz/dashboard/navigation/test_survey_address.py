@@ -21,8 +21,8 @@ def test_reload_of_the_survey_leaves_what_the_orbit_begins_with(navigation, n_re
     for _ in range(n_reloads):
         page = reloaded(page)
     page.turn_to(View.ORBIT)
-    shown = page.session.selection
-    assert (shown.field, shown.plates, shown.detector) == ("0", (0, 0), "0")
+    part = page.session.shown_part
+    assert (part.field, part.plates, part.detector) == ("0", (0, 0), "0")
     assert page.session.notice == ""
 
 
@@ -33,8 +33,8 @@ def test_what_is_asked_for_stays_in_the_address_until_the_orbit_is_there(navigat
     assert wanted.items() <= page.address().items()
     assert "detector" not in page.address()
     page.turn_to(View.ORBIT)
-    shown = page.session.selection
-    assert (shown.field, shown.plates, shown.detector) == ("2", (2, 2), "0")
+    part = page.session.shown_part
+    assert (part.field, part.plates, part.detector) == ("2", (2, 2), "0")
 
 
 def test_addresses_with_a_kept_selection_leave_nothing_behind(navigation):

@@ -73,7 +73,7 @@ def require_same(found, expected):
 def test_python_draws_the_figures_of_the_workspace(solved, workspace):
     session = solved.session
     session.theme = "dark"
-    session.selection.param.update(field="1", plates=(0, 1), detector="2")
+    session.shown_part.param.update(field="1", plates=(0, 1), detector="2")
     solved.turn_to_workspace(workspace)
     figures = drawn_by(page_code(solved))
     chosen = chosen_of(session)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from plateviz.dashboard.selection.selection import ALL, Selection
 from plateviz.dashboard.session.fit_choices import ANSWERED_AT_ONCE, CONTROLS, FitChoices
 from plateviz.dashboard.session.prior_widths import default_widths
 from plateviz.dashboard.session.session import Session
@@ -383,29 +382,6 @@ def test_another_orbit_removes_the_solutions(session):
     assert session.store.requested[-1][:2] == (1, FitSettings())
     finish(session)
     assert session.other is None
-
-
-def test_selection_has_the_exposures_and_detectors_of_the_solution(fit_result):
-    selection = Selection()
-    selection.limit_to(fit_result, [0, 1, 2, 3])
-    assert selection.field == "0"
-    assert selection.exposures_of(fit_result) == [(0, 0)]
-    selection.field = ALL
-    selection.plates = (0, 1)
-    assert len(selection.exposures_of(fit_result)) == 8
-    assert selection.detector_id == 0
-    selection.detector = ALL
-    assert selection.detector_id is None
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("plates", (0, 99)), ("detector", "17"), ("field", "9")]
-)
-def test_selection_out_of_range_is_refused(fit_result, name, value):
-    selection = Selection()
-    selection.limit_to(fit_result, [0, 1, 2, 3])
-    with pytest.raises(ValueError, match=name):
-        setattr(selection, name, value)
 
 
 @pytest.mark.parametrize("order", [-1, 10, 3.5])

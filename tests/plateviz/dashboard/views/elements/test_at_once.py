@@ -4,7 +4,7 @@ import pytest
 
 from plateviz.dashboard.session.fit_choices import FitChoices
 from plateviz.dashboard.views.controls.fit_controls import controls, width_input
-from plateviz.dashboard.views.controls.selection import SelectionView
+from plateviz.dashboard.views.controls.shown_part import ShownPartView
 from solver.data.parameters import BY_NAME
 from solver.data.setting_kinds import Whole
 
@@ -26,7 +26,7 @@ class Document:
     [
         lambda navigation: controls(FitChoices(), Whole)["order"],
         lambda navigation: width_input(FitChoices(), BY_NAME["sources"]),
-        lambda navigation: SelectionView(navigation).__panel__()[2],
+        lambda navigation: ShownPartView(navigation).__panel__()[2],
     ],
     ids=["order", "prior", "exposures"],
 )

@@ -1,4 +1,4 @@
-"""SelectionView: controls for the orbit, exposures and detector on the screen."""
+"""ShownPartView: controls for the orbit, exposures and detector on the screen."""
 
 from typing import Any
 
@@ -9,19 +9,18 @@ from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.views.elements.at_once import taken_at_once
 
 
-class SelectionView(pn.viewable.Viewer):
-    """Controls of the session's selection."""
+class ShownPartView(pn.viewable.Viewer):
+    """Controls of what a session shows of which orbit."""
 
     def __init__(self, navigation: Navigation, **params: object) -> None:
         """Follow the session of `navigation`."""
         super().__init__(**params)
-        session = navigation.session
-        selection = session.selection
+        part = navigation.session.shown_part
         wide = {"sizing_mode": "stretch_width", "size": "small", "description": ""}
-        field = pmui.Select.from_param(selection.param.field, label="Field", **wide)
-        detector = pmui.Select.from_param(selection.param.detector, label="Detector", **wide)
+        field = pmui.Select.from_param(part.param.field, label="Field", **wide)
+        detector = pmui.Select.from_param(part.param.detector, label="Detector", **wide)
         plates = pmui.IntRangeSlider.from_param(
-            selection.param.plates,
+            part.param.plates,
             label="Exposures of the field",
             description="",
             sizing_mode="stretch_width",
@@ -37,24 +36,24 @@ class SelectionView(pn.viewable.Viewer):
 
 def _orbit_control(navigation: Navigation, **style: Any) -> pmui.Select:  # noqa: ANN401
     """Return the control of the orbit, which is seen if there are several."""
-    selection = navigation.session.selection
+    part = navigation.session.shown_part
 
     def offered() -> dict[str, Any]:
-        orbits = list(selection.param["orbit"].objects)
+        orbits = list(part.param["orbit"].objects)
         return {"options": orbits, "visible": len(orbits) > 1}
 
-    orbit = pmui.Select(label="Orbit", value=selection.orbit, **offered(), **style)
+    orbit = pmui.Select(label="Orbit", value=part.orbit, **offered(), **style)
 
     def choose(event: object) -> None:
-        if event.new != selection.orbit:  # type: ignore[attr-defined]
+        if event.new != part.orbit:  # type: ignore[attr-defined]
             # What follows from it is sent as one message.
             with pn.io.hold():
                 navigation.choose_orbit(event.new)  # type: ignore[attr-defined]
                 # An orbit that cannot be read is not selected.
-                orbit.value = selection.orbit
+                orbit.value = part.orbit
 
     orbit.param.watch(choose, "value")
-    selection.param.watch(lambda _: orbit.param.update(value=selection.orbit), "orbit")
+    part.param.watch(lambda _: orbit.param.update(value=part.orbit), "orbit")
     # Orbits may be added to the survey while it is shown.
-    selection.param.watch(lambda _: orbit.param.update(**offered()), "orbit", what="objects")
+    part.param.watch(lambda _: orbit.param.update(**offered()), "orbit", what="objects")
     return orbit

@@ -91,7 +91,7 @@ def test_without_another_solution_it_says_so(chosen):
 def test_table_has_the_settings_that_differ_and_the_figures_of_merit(fit_result, doubled):
     table = solution_changes(fit_result, doubled).set_index("what")
     assert table.loc["Distortion order", ["a", "b"]].tolist() == ["order 5", "order 3"]
-    assert table.loc["Stellar aberration", ["a", "b"]].tolist() == ["default", "no aberration"]
+    assert table.loc["Stellar aberration", ["a", "b"]].tolist() == ["yes", "no aberration"]
     assert table.loc["Prior widths", "b"] == "distortion_x 0.5 um"
     assert "Leave out" not in table.index
     chi2 = f"{fit_result.summary['chi2_per_dof']:.4f}"

@@ -124,7 +124,8 @@ class BinShares:
                 modes.append((mode[0] * on, mode[1] * on))
         shares, order = result.values_on("coef", "prior_share"), result.settings.order
         products = np.polynomial.legendre.legvander2d(x, y, [order, order])
-        held = shares[["distortion_x", "distortion_y"]].to_numpy()
+        # A fit of order 0 or 1 has no such terms.
+        held = shares.reindex(columns=["distortion_x", "distortion_y"]).to_numpy()
         for (i, j), (held_x, held_y) in zip(terms(order), held, strict=True):
             term = products[:, i * (order + 1) + j]
             modes += [(term, none)] * bool(held_x < _HELD) + [(none, term)] * bool(held_y < _HELD)

@@ -44,7 +44,8 @@ def distortion(result: FitResult, instrument: Instrument, *, grid: int = 17) -> 
     half = max(np.abs(d.corners_um()).max() for d in instrument.detectors)
     x, y = (a.ravel() for a in np.meshgrid(*[np.linspace(-half, half, grid)] * 2))
     scaled = x / instrument.distortion_scale_um, y / instrument.distortion_scale_um
-    fitted = result.values_on("coef")
+    # A fit of order 0 or 1 has no such terms.
+    fitted = result.values_on("coef").reindex(columns=["distortion_x", "distortion_y"])
     dx = displacement_um(fitted["distortion_x"].to_numpy(), *scaled)
     dy = displacement_um(fitted["distortion_y"].to_numpy(), *scaled)
     focal_um = float(result.values_on("exp")["focal_length"].mean())

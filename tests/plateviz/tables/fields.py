@@ -33,6 +33,16 @@ def without_absorption(result: FitResult) -> FitResult:
     )
 
 
+def without_distortion(result: FitResult, order: int) -> FitResult:
+    """Return the result as that of a fit of order 0 or 1, which has no terms of the distortion."""
+    is_term = result.calibration["group"].isin(["distortion_x", "distortion_y"])
+    return replace(
+        result,
+        calibration=result.calibration[~is_term].reset_index(drop=True),
+        settings=replace(result.settings, order=order),
+    )
+
+
 def with_fitted_sources(result: FitResult) -> FitResult:
     """Return the result as if only the positions of the sources had been fitted, without priors."""
     counts = result.residuals.groupby("source_id")["nx"].transform("size")

@@ -16,6 +16,7 @@ from tests.plateviz.tables.fields import (
     with_field,
     with_fitted_sources,
     without_absorption,
+    without_distortion,
 )
 
 PULLS = ["pull_x", "pull_y", "pull_chi2"]
@@ -191,6 +192,14 @@ def test_without_magnitudes_there_are_no_bins_of_magnitude(known, instrument):
         "place along x",
         "place along y",
     ]
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_fit_without_distortion_terms_has_the_bins_of_any_other(known, instrument, order):
+    table = tables.binned_residuals(known, instrument)
+    found = tables.binned_residuals(without_distortion(known, order), instrument)
+    # In `known` the priors hold all terms, so that they absorb nothing.
+    assert np.allclose(found[PULLS], table[PULLS])
 
 
 def test_bins_of_few_measurements_have_no_row(known, instrument):

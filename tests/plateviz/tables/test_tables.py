@@ -12,6 +12,7 @@ from plateviz.tables.calibration import displacement_um
 from plateviz.tables.labels import element_labels
 from solver.data import schema
 from solver.model.directions import offsets_mas
+from tests.plateviz.tables.fields import without_distortion
 
 BEYOND_DOUBLE = 2**53
 
@@ -224,6 +225,12 @@ def test_distortion_is_zero_at_the_optical_centre(fit_result, instrument):
     assert len(centre) == 1
     assert np.hypot(centre["dx_um"], centre["dy_um"]).iloc[0] < 1e-12
     assert np.hypot(table["dx_um"], table["dy_um"]).max() > 1.0
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_orbit_without_distortion_terms_has_a_distortion_of_zero(fit_result, instrument, order):
+    table = tables.distortion(without_distortion(fit_result, order), instrument)
+    assert (table[["dx_um", "dy_um", "dx_mas", "dy_mas"]] == 0.0).all(axis=None)
 
 
 def test_distortion_of_an_incomplete_order_is_refused():

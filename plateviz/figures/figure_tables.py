@@ -1,6 +1,7 @@
 """The numbers of a figure as tables, to be kept in files."""
 
 import re
+import unicodedata
 from collections.abc import Mapping
 
 import numpy as np
@@ -10,6 +11,7 @@ from plateviz.figures.figure import HANDLES, Figure, Frame, Glyphs
 
 _ALONG_X = ("x", "x0", "x1", "xs", "left", "right")
 _ALONG_Y = ("y", "y0", "y1", "y2", "ys", "bottom", "top")
+_GREEK = re.compile("[α-ωΑ-Ω]")
 _UNIT = re.compile("_(mas|uas|mpix)$")
 # Names at their places, which other marks have as well.
 _WITHOUT_NUMBERS = ("texts",)
@@ -23,7 +25,8 @@ def figure_tables(figure: Figure) -> dict[str, Table]:
     Name -> table. Coordinates are described by the label of their axis, with its unit. Of several
     frames, a name begins with the number of its frame, from 1. An image has a row per cell that
     has a value, at the cell's centre; outlines have a row per point, numbered by `path`. A unit at
-    the end of a column's name is that of its values.
+    the end of a column's name is that of its values. Names of tables are in ASCII, since those of
+    FITS have to be: `1σ expected` is `1sigma_expected`.
     """
     found: dict[str, Table] = {}
     for number, frame in enumerate(figure, 1):
@@ -31,18 +34,21 @@ def figure_tables(figure: Figure) -> dict[str, Table]:
         for glyphs in frame.glyphs:
             is_seen = glyphs.kind not in _WITHOUT_NUMBERS and glyphs.name != HANDLES
             if len(glyphs) and is_seen:
-                name = prefix + re.sub(r"\W+", "_", glyphs.name)
+                name = prefix + _in_ascii(glyphs.name)
                 found[name] = _table(frame, glyphs)
     return found
 
 
 def _table(frame: Frame, glyphs: Glyphs) -> Table:
     columns = _cells(glyphs) if glyphs.kind == "image" else _rows(glyphs)
-    labels = dict.fromkeys(_ALONG_X, frame.x.label) | dict.fromkeys(_ALONG_Y, frame.y.label)
+    # A label that is broken into lines for a narrow card is one line in a file.
+    x, y = (" ".join(axis.label.split("\n")) for axis in (frame.x, frame.y))
+    labels = dict.fromkeys(_ALONG_X, x) | dict.fromkeys(_ALONG_Y, y)
     described = {glyphs.at[at]: labels[at] for at in glyphs.at if at in labels}
     if glyphs.kind == "image":
-        described = {"x": frame.x.label, "y": frame.y.label}
-    table = Table(meta={"title": frame.title} if frame.title else {})
+        described = {"x": x, "y": y}
+    title = " ".join(frame.title.split("\n"))
+    table = Table(meta={"title": title} if title else {})
     for name, values in columns.items():
         plain = values.astype(str) if values.dtype == object else values
         in_file = _in_unit(name, glyphs.units.get(name))
@@ -50,6 +56,11 @@ def _table(frame: Frame, glyphs: Glyphs) -> Table:
         if in_file not in table.colnames:
             table[in_file] = Column(plain, description=described.get(name))
     return table
+
+
+def _in_ascii(name: str) -> str:
+    spelt = _GREEK.sub(lambda letter: unicodedata.name(letter[0]).split()[-1].lower(), name)
+    return re.sub(r"\W+", "_", spelt, flags=re.ASCII)
 
 
 def _in_unit(name: str, unit: str | None) -> str:

@@ -1,9 +1,12 @@
 """The numbers of a figure as tables."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from plateviz.figures.figure import Figure, side_by_side
 from plateviz.figures.figure_tables import figure_tables
+from plateviz.figures.glyphs import line
 
 
 def test_every_kind_of_mark_but_names_has_a_table(every_kind):
@@ -37,3 +40,14 @@ def test_frames_are_numbered_where_there_are_several(framed_glyphs, marks):
         "frame1_sources": 3,
         "frame2_sources": 1,
     }
+
+
+def test_names_and_labels_are_such_as_every_format_can_have(framed_glyphs, marks):
+    law = line([0.0, 1.0], [0.0, 1.0], name="1σ expected", color="text")
+    frame = framed_glyphs([marks(), law])[0]
+    x = replace(frame.x, label="fitted minus\nprior (mas)")
+    frame = replace(frame, title="Two\nlines", x=x)
+    tables = figure_tables(Figure((frame,)))
+    assert set(tables) == {"sources", "1sigma_expected"}
+    assert tables["sources"].meta == {"title": "Two lines"}
+    assert tables["sources"]["x"].description == "fitted minus prior (mas)"

@@ -11,9 +11,13 @@ from bokeh.document import Document
 from bokeh.models import BoxZoomTool, ColorBar, Text, Title
 
 from plateviz import plots
+from plateviz.dashboard.saving.downloads import as_file
 from plateviz.figures.bokeh_figure import BokehFigure
-from plateviz.figures.figure import MESSAGE
+from plateviz.figures.figure import MESSAGE, Figure
+from plateviz.figures.figure_tables import figure_tables
+from plateviz.figures.resized import resized
 from plateviz.figures.theme import THEMES
+from solver.io.formats import read_tables
 from tests.plateviz.plots.drawn import renderers_of, texts_of
 
 _LABELLED_UNIT = re.compile(
@@ -72,6 +76,16 @@ def test_glyphs_of_a_frame_have_different_names(figures, name):
     for frame in figures(name):
         assert len(set(frame.names)) == len(frame.names)
         assert all(frame.names)
+
+
+@with_every_plot
+def test_data_of_every_figure_can_be_saved_as_fits(figures, name, tmp_path):
+    # In a narrow card, the labels of axes have several lines.
+    tables = figure_tables(resized(Figure(tuple(figures(name))), 400, 300))
+    made = as_file(tables, name, ".fits")
+    (tmp_path / made.name).write_bytes(made.content)
+    read = read_tables(tmp_path / made.name)
+    assert [table.upper() for table in read] == [table.upper() for table in tables]
 
 
 @with_every_survey_plot

@@ -174,14 +174,15 @@ class RefitView(pn.viewable.Viewer):
         shown, listed = self._session.shown, list(self._session.solutions)
         self._reproduce.visible = shown is not None
         self._add.visible = shown is not None and shown.is_replaceable
-        if shown is not None and shown.is_replaceable:
+        # A what-if, or after a blink the solution of another run. Of a value that is not among
+        # the options, the browser makes the first of them, as if a person had chosen it.
+        if shown is not None and not any(one is shown for one in listed):
             listed.append(shown)
         solutions: dict[str, Solution] = {}
         for solution in listed:
             # Different sources may be left out, of which the label has the number only.
             same = sum(other.label == solution.label for other in solutions.values())
             solutions[solution.label + (f" ({same + 1})" if same else "")] = solution
-        # A value that is not among the options would be sent to the browser unchanged.
         chosen = next((s for s in solutions.values() if s is shown), None)
         self._solutions.param.update(options=solutions, value=chosen, visible=len(solutions) > 1)
 

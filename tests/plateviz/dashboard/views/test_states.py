@@ -176,6 +176,21 @@ def test_two_solutions_that_are_exchanged_are_no_step_of_the_history(fresh):
     assert not bar.is_blink
 
 
+def test_solution_of_another_run_is_among_those_to_choose_while_it_is_shown(fresh):
+    session = fresh.session
+    finish(session)
+    choice = RefitView(fresh)._solutions
+    shown = session.shown
+    other = shown._replace(settings=shown.settings.with_(order=3), run="second")
+    session.compare_with(other)
+    assert (choice.value, list(choice.options.values())) == (shown, [shown])
+    session.exchange()
+    # The browser would choose the first of the options, and the page would show that.
+    assert (choice.value, list(choice.options.values())) == (other, [shown, other])
+    session.exchange()
+    assert choice.value == shown
+
+
 def test_only_what_shows_eigenmodes_waits_for_them(fresh, tmp_path):
     session, asked = fresh.session, []
     finish(session)

@@ -12,7 +12,7 @@ class Keyboard(pn.custom.JSComponent):
     """A button that lists the keys of the page, and does what they mean when they are pressed.
 
     A key that is typed into a control, pressed in a window, or with Control, Alt or Meta, is left
-    to it.
+    to it. Sliders, switches and radio buttons take no key that has a meaning here.
     """
 
     theme = param.Selector(default="light", objects=["light", "dark"])
@@ -22,11 +22,11 @@ class Keyboard(pn.custom.JSComponent):
 
     _esm = """
     const TEXT = new Set(["INPUT", "TEXTAREA", "SELECT"])
-    const ROLES = new Set(["combobox", "listbox", "option", "menuitem", "textbox", "slider",
-                           "dialog"])
+    const TYPELESS = new Set(["checkbox", "radio", "range"])
+    const ROLES = new Set(["combobox", "listbox", "option", "menuitem", "textbox", "dialog"])
     export function render({ model, el }) {
       const isControl = event => event.composedPath().some(one =>
-        TEXT.has(one.tagName) && one.type !== "checkbox" || one.isContentEditable
+        TEXT.has(one.tagName) && !TYPELESS.has(one.type) || one.isContentEditable
         || ROLES.has(one.getAttribute?.("role")))
       const sheet = document.createElement("dialog")
       sheet.setAttribute("aria-label", "Keys")

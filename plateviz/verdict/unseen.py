@@ -28,6 +28,13 @@ def unseen_sentences(result: FitResult, epoch: EpochOffset, are_noticed: bool = 
         "turn or stretch the field are taken for pointing, and move all positions by as much as "
         "they are large."
     ]
+    quadratic = quadratic_mas(result)
+    if np.isfinite(quadratic):
+        sentences.append(
+            "Those that are quadratic in the field are taken for distortion: they could be as "
+            f"large as all of the fitted quadratic distortion, {rounded(quadratic)} mas rms. Only "
+            "orbits at other position angles tell them apart."
+        )
     if epoch.sigma > 0.0 and not abs(epoch.days) > _NOTICED * epoch.sigma:
         sentences.append(
             "A time that is wrong in all exposures alike, by less than "
@@ -36,15 +43,9 @@ def unseen_sentences(result: FitResult, epoch: EpochOffset, are_noticed: bool = 
         )
     elif not epoch.sigma > 0.0:
         sentences.append(
-            "Nor is a time tested that is wrong in all exposures alike: the solution has no "
-            "proper motions of reference stars."
-        )
-    quadratic = quadratic_mas(result)
-    if np.isfinite(quadratic):
-        sentences.append(
-            "Those that are quadratic in the field are taken for distortion: they could be as "
-            f"large as all of the fitted quadratic distortion, {rounded(quadratic)} mas rms. Only "
-            "orbits at other position angles tell them apart."
+            "A time that is wrong in all exposures alike is not tested: that takes the proper "
+            "motions of at least ten reference stars, and measurements that determine where they "
+            "are."
         )
     factor = reference_factor(result)
     if np.isfinite(factor) and not are_noticed:

@@ -49,6 +49,12 @@ def test_good_solution_says_so_everywhere(run, orbit, tmp_path):
     assert read_result(tmp_path / "r.fits").summary["verdict"] == verdict
 
 
+def test_good_solution_is_printed_with_what_no_test_can_see(run, orbit, tmp_path):
+    code, out, _ = run("fit", *orbit, "-o", tmp_path / "r.fits")
+    assert code == 0
+    assert "- No test of one orbit shows smooth errors of the reference catalogue." in out
+
+
 @pytest.mark.parametrize("obstime", [0.0, 1e6, np.nan], ids=str)
 def test_time_that_no_mission_has_is_refused(run, orbit, tmp_path, obstime):
     def change(table):

@@ -35,6 +35,21 @@ def test_quadratic_terms_are_the_limit_of_quadratic_errors(fit_result):
     )
 
 
+def test_sentences_on_smooth_errors_stand_together(fit_result):
+    result = with_summary(fit_result, distortion_scale_um=21_000.0)
+    smooth, quadratic, time, *_ = unseen_sentences(result, EpochOffset(0.0, 5.0))
+    assert "smooth errors" in smooth
+    assert quadratic.startswith("Those that are quadratic")
+    assert time.startswith("A time that is wrong")
+
+
+def test_time_that_is_not_tested_is_not_put_down_to_the_catalogue(fit_result):
+    unknown = EpochOffset(float("nan"), float("nan"))
+    (time,) = (one for one in unseen_sentences(fit_result, unknown) if "A time" in one)
+    assert "is not tested" in time
+    assert "ten reference stars" in time
+
+
 def test_result_of_an_older_version_has_no_limit(fit_result):
     summary = {k: v for k, v in fit_result.summary.items() if k != "distortion_scale_um"}
     assert np.isnan(quadratic_mas(replace(fit_result, summary=summary)))

@@ -76,9 +76,10 @@ def discoveries_in_words(
     if not found:
         return f"None of {total} {tests} finds anything that chance does not explain; {chance}."
     named = ", ".join(dict.fromkeys(one.name for one in found[:_MOST_NAMED]))
+    find = "finds" if len(found) == 1 else "find"
     return (
-        f"{len(found)} of {total} {tests} find what chance does not explain, among them: {named}; "
-        f"{chance}."
+        f"{len(found)} of {total} {tests} {find} what chance does not explain, "
+        f"among them: {named}; {chance}."
     )
 
 

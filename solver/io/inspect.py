@@ -21,7 +21,7 @@ from solver.io.parquet import count_rows
 from solver.io.read_orbit import names_of
 from solver.io.result import is_result, to_result
 from solver.io.survey import measurement_path, survey_orbits
-from solver.io.survey_header import read_header, section
+from solver.io.survey_header import UNFINISHED, found_unfinished, read_header, section
 from solver.io.survey_manifest import survey_changes
 from solver.io.survey_problems import survey_problems
 from solver.io.table_check import examine, matched_names
@@ -100,6 +100,12 @@ def _inspect(path: Path) -> _Finding:
 
 def _inspect_folder(finding: _Finding) -> None:
     files = [p for p in sorted(finding.path.iterdir()) if has_reader(p) and p.is_file()]
+    if (finding.path / UNFINISHED).is_file():
+        finding.kind = "unfinished survey"
+        finding.problems.append(
+            f"{finding.path}: expected a survey, found {found_unfinished(finding.path)}"
+        )
+        return
     if (finding.path / "survey.toml").is_file():
         for path in files:
             if path.name in _SURVEY_TABLES:

@@ -10,6 +10,8 @@ from solver.io.survey_manifest import require_unchanged_files
 
 FORMAT = 1
 HEADER = "survey.toml"
+# Of a survey whose simulation was interrupted.
+UNFINISHED = "unfinished.toml"
 
 
 def read_header(directory: Path, name: str = HEADER, of: str = "survey") -> dict[str, object]:
@@ -31,7 +33,10 @@ def read_header(directory: Path, name: str = HEADER, of: str = "survey") -> dict
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
-        raise InputError(f"{directory}: expected a {of} with a file {name}, found none") from error
+        found = found_unfinished(Path(directory)) if name == HEADER else "none"
+        raise InputError(
+            f"{directory}: expected a {of} with a file {name}, found {found}"
+        ) from error
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: expected the header of a {of}, found: {error}") from error
     content = parse_toml(text, path, f"the header of a {of}")
@@ -40,6 +45,13 @@ def read_header(directory: Path, name: str = HEADER, of: str = "survey") -> dict
             f"{path}: expected format = {FORMAT}, found {content.get('format', 'no format')!r}"
         )
     return content
+
+
+def found_unfinished(directory: Path) -> str:
+    """Return what to say of a directory without a survey's header: why it has none, or "none"."""
+    if not (directory / UNFINISHED).is_file():
+        return "none"
+    return "an unfinished one: the command `plateviz simulate` that started it completes it"
 
 
 def section(header: Mapping[str, object], name: str) -> Mapping[str, object]:

@@ -25,7 +25,7 @@ from solver.io.survey import (
     write_manifest,
     write_survey_table,
 )
-from solver.io.survey_header import HEADER, read_header, section, write_header
+from solver.io.survey_header import HEADER, UNFINISHED, read_header, section, write_header
 from solver.runtime.device import require_device
 from solver.runtime.versions import versions_of
 from solver.simulate.catalogue import (
@@ -37,8 +37,6 @@ from solver.simulate.defects.stages import defective_catalogue, none_affected, r
 from solver.simulate.measure import measure_orbit
 from solver.simulate.schedule import environment, orbit_attitude
 from solver.simulate.settings import SurveySettings
-
-UNFINISHED = "unfinished.toml"
 
 _PACKAGES = ("plateviz", "jax", "numpy", "pyerfa")
 

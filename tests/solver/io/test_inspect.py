@@ -9,6 +9,7 @@ import pytest
 from astropy.time import Time
 
 from solver.data.instrument import MINI_MOCK, write_instrument
+from solver.errors import InputError
 from solver.io.inspect import inspect_files
 from solver.io.result import write_result
 from solver.io.survey import measurement_path, read_survey_orbit
@@ -247,3 +248,14 @@ def test_orbits_that_are_misnamed_unreadable_or_copies_are_named(small_survey, t
     assert any("orbit=-005.parquet is not read, since its name is" in one for one in problems)
     assert any("orbit=0001.parquet: expected a table" in one for one in problems)
     assert any("found the same times and pointings in (0, 5)" in one for one in problems)
+
+
+def test_unfinished_survey_is_not_taken_for_whole_tables(small_survey, tmp_path):
+    survey = tmp_path / "survey"
+    shutil.copytree(small_survey, survey)
+    (survey / "survey.toml").rename(survey / "unfinished.toml")
+    (report,) = inspect_files([survey])
+    assert report["kind"] == "unfinished survey"
+    assert any("`plateviz simulate`" in one for one in report["problems"])
+    with pytest.raises(InputError, match="found an unfinished one"):
+        read_survey_orbit(survey, 0)

@@ -186,7 +186,7 @@ class Navigation(param.Parameterized):
         session, coming = self.session, self.session.coming
         if session.shown is None or (session.is_opening and coming is self._of_address):
             return self._named
-        shown = coming if session.is_opening and coming is not None else session.shown
+        shown = session.awaited_of(session.shown_part.orbit, session.is_opening) or session.shown
         large = session.selection.large
         return solution_query(shown, session.other, self.run_name, large, is_whole)
 

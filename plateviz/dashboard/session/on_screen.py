@@ -38,6 +38,17 @@ class SolutionsOnScreen(RequestState):
         """The solution on the screen, or the one before the what-ifs on the screen."""
         return self._fitted if self.shown is not None and self.shown.is_replaceable else self.shown
 
+    def awaited_of(self, orbit: int | None, is_opening: bool) -> Solution | Request | None:
+        """Return the solution of an orbit that is on its way to the screen; None if none is.
+
+        Parameters
+        ----------
+        is_opening : whether one is on its way to where another one of the same orbit is
+        """
+        is_there = self.shown is not None and self.shown.orbit == orbit
+        is_awaited = self.coming is not None and self.coming.orbit == orbit
+        return self.coming if is_awaited and (is_opening or not is_there) else None
+
     def restore_both(self, address: Mapping[str, str]) -> list[str]:
         """Draw of both solutions what an address requests; return what is invalid, in words."""
         problems: list[str] = []

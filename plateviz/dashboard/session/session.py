@@ -95,14 +95,14 @@ class Session(SolutionsOnScreen):
     def _begin(self, solutions: list[Solution | Request], is_opening: bool = False) -> None:
         self._cancel_job()
         self._is_opening = is_opening
-        orbit = solutions[-1].orbit
+        self._later, self.coming = solutions, solutions[-1]
+        orbit = self.coming.orbit
         self.shown_part.orbit = orbit
         if self.shown is None or self.shown.orbit != orbit:
             self.solutions = []
             if self.shown is not None:
                 self.store.leave(self.shown.orbit)
         self.chosen = self.other = None
-        self._later, self.coming = solutions, solutions[-1]
         self._show_next()
 
     def _show_next(self) -> None:

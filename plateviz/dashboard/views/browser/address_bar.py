@@ -26,11 +26,12 @@ class AddressBar(pn.custom.JSComponent):
     query = param.String(doc="of the address, without the question mark")
     steps = param.List(item_type=str, doc="parts whose change is a step of the history")
     pause = param.Integer(doc="ms between two solutions that are steps")
+    answered = param.Integer(doc="number of the last step back or forward that has been followed")
     is_blink = param.Boolean(doc="whether two runs or solutions were exchanged, which is no step")
 
     _esm = """
     export function render({ model }) {
-      let isFirst = true, timer = null, last = 0
+      let isFirst = true, timer = null, last = 0, asked = model.answered
       const places = search => {
         const parts = new URLSearchParams(search)
         return JSON.stringify(model.steps.map(name => parts.get(name)))
@@ -45,7 +46,8 @@ class AddressBar(pn.custom.JSComponent):
       }
       const write = () => {
         const search = `?${model.query}`
-        if (!model.query || search === location.search) return
+        // What was on the screen before the last step is no answer to it.
+        if (model.answered < asked || !model.query || search === location.search) return
         const isStep = isStepTo(search) && !isFirst && !model.is_blink
         isFirst = false
         const url = location.pathname + search + location.hash
@@ -56,9 +58,11 @@ class AddressBar(pn.custom.JSComponent):
       const follow = () => {
         clearTimeout(timer)
         last = Date.now()
-        model.send_msg(location.search.slice(1))
+        asked += 1
+        model.send_msg({ number: asked, query: location.search.slice(1) })
       }
       model.on("query", later)
+      model.on("answered", later)
       later()
       addEventListener("popstate", follow)
       model.on("remove", () => { clearTimeout(timer); removeEventListener("popstate", follow) })
@@ -106,7 +110,9 @@ class AddressBar(pn.custom.JSComponent):
 
     def _handle_msg(self, data: object) -> None:
         """Show what the browser has gone back or forward to."""
-        query = str(data)[:_MOST_CHARACTERS]
+        if not isinstance(data, dict) or not isinstance(data.get("number"), int):
+            return
+        query = str(data.get("query"))[:_MOST_CHARACTERS]
         try:
             parts = parse_qs(query, keep_blank_values=True, max_num_fields=_MOST_PARTS)
         except ValueError:
@@ -117,4 +123,5 @@ class AddressBar(pn.custom.JSComponent):
             self._navigation.begin({name: values[0] for name, values in parts.items()})
         finally:
             self._is_following = False
-        self._write()
+            self._write()
+            self.answered = data["number"]

@@ -8,9 +8,7 @@ import pytest
 from plateviz.dashboard.navigation.keys import press
 from plateviz.dashboard.navigation.navigation import Navigation, View
 from plateviz.dashboard.session.session import Session
-from plateviz.dashboard.session.solution import Request
 from plateviz.dashboard.session.stage import Stage
-from plateviz.dashboard.views.browser.address_bar import AddressBar
 from plateviz.dashboard.views.controls.shown_part import ShownPartView
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace
 from plateviz.solving.origin import OrbitFiles, SurveyFolder
@@ -422,21 +420,6 @@ def test_going_back_restores_what_was_on_the_screen(navigation):
     end_job(navigation)
     assert navigation.address() == after
     assert navigation.session.notice == ""
-
-
-def test_address_names_what_is_being_computed_and_not_what_the_page_began_with(navigation):
-    navigation.begin({"view": "orbit", "orbit": "0", "solution": "order=3 what-if"})
-    assert navigation.address()["solution"] == "order=3 what-if"
-    end_job(navigation)
-    bar = AddressBar(navigation)
-    later = Request(1, FitSettings(order=4), is_what_if=True)
-    navigation.session.open_listed(later)
-    assert navigation.session.is_opening
-    assert navigation.address()["solution"] == "order=4 what-if"
-    assert "orbit=1" in bar.query
-    assert "solution=order=4+what-if" in bar.query
-    end_job(navigation)
-    assert navigation.address()["solution"] == "order=4 what-if"
 
 
 def test_going_back_within_an_orbit_leaves_its_solution_and_a_fit(navigation):

@@ -152,7 +152,8 @@ def test_figure_of_both_solutions_follows_the_address(fresh):
     both = figure(page, "both-solutions")
     bar = AddressBar(fresh)
     assert "both=residual-map" in bar.query
-    bar._handle_msg(bar.query.replace("both=residual-map", "both=exposure-tracks"))
+    query = bar.query.replace("both=residual-map", "both=exposure-tracks")
+    bar._handle_msg({"number": 1, "query": query})
     assert page._compare._figure.value == page._compare.figure.name == "exposure-tracks"
     assert both.is_due
     page._compare._figure.value = "residual-map"

@@ -103,13 +103,16 @@ class Exploration(param.Parameterized):
     def restore(self, address: Mapping[str, str]) -> list[str]:
         """Draw what a page's address requests, once its table is there.
 
+        Columns without a table are those of the table that is drawn.
+
         Returns
         -------
         Why the address names no table, in words; `offer` returns what else of it is invalid.
         """
         problems: list[str] = []
-        if "rows" in address:
-            address = {**address, "rows": _RENAMED.get(address["rows"], address["rows"])}
+        if any(part in address for part in PARTS):
+            rows = address.get("rows", self.table)
+            address = {**address, "rows": _RENAMED.get(rows, rows)}
             table = chosen("rows", address, self.param["table"].objects, None, problems)
             if table is not None:
                 self.table, self._requested = table, dict(address)

@@ -55,6 +55,13 @@ def test_address_is_read_back(exploration, between):
     assert other.address() == exploration.address()
 
 
+def test_columns_without_a_table_are_those_of_the_one_that_is_drawn(exploration):
+    assert exploration.restore({"x": "dec", "y": "nope"}) == []
+    (told,) = exploration.offer(COLUMNS)
+    assert told == "y: expected a column of the sources, found 'nope'"
+    assert (exploration.table, exploration.x) == ("sources", "dec")
+
+
 def test_table_has_its_former_name_in_older_addresses(exploration):
     assert exploration.restore({"rows": "residuals", "x": "dec"}) == []
     assert exploration.table == "measurements"

@@ -91,7 +91,10 @@ export function render({ model, el }) {
     enlarge.title = "Open large"
   }
   explain.onclick = () => show(words.hidden)
-  enlarge.onclick = () => isLarge() ? close() : fill()
+  enlarge.onclick = () => {
+    isLarge() ? close() : fill()
+    place()
+  }
   const escape = event => {
     if (event.key !== "Escape") return
     if (!words.hidden) {
@@ -109,7 +112,12 @@ export function render({ model, el }) {
   const stale = made("p", "Being computed", "stale")
   stale.title = "The last solution; another is being computed"
   stale.setAttribute("role", "status")
-  const follow = () => { stale.hidden = !model.is_stale }
+  // In the lower corner, where figures have the fewest words.
+  const place = () => stale.style.setProperty("--bottom", `${card.clientHeight - 29}px`)
+  const follow = () => {
+    place()
+    stale.hidden = !model.is_stale
+  }
   follow()
   model.on("is_stale", follow)
   corner.append(words, stale, explain, enlarge)

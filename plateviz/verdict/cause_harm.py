@@ -25,6 +25,9 @@ from solver.results.diagnosis.table import BAD_RATE
 _LARGE_ERROR = 0.1
 # Outliers of so many of the sources are not few.
 _LARGE_PARTS = {"outliers": 0.02, "swapped": 0.02}
+# The positions follow a pattern with all else that is fitted: in 102 sparse orbits with seven kinds
+# of defects, they were off by 0.3 to 1.8 times its size.
+_AT_MOST = 2.0
 # Groups of sources of similar magnitudes.
 _MAGNITUDE_GROUPS = 8
 
@@ -43,8 +46,9 @@ def harm(case: Case) -> tuple[str, bool]:
         error = case.diagnosis.camera.on_sky(size)
         typical = typical_sigma(case.result)
         spoils = (
-            f"It spoils the positions, by up to {rounded(error)} mas rms where their "
-            f"uncertainty is {rounded(typical)} mas, and the calibration."
+            f"It spoils the positions, by about {rounded(error)} and at most "
+            f"{rounded(_AT_MOST * error)} mas rms where their uncertainty is {rounded(typical)} "
+            "mas, and the calibration."
         )
         return spoils, error > LARGE_SHARE * typical
     if subject in of_parts:
@@ -153,14 +157,15 @@ def _magnitude_group(case: Case) -> np.ndarray:
 
 
 def _largest_shift_of_one(case: Case) -> float:
-    """Return how far a measurement that is far off moves its source at most, mas along one axis.
+    """Return how far the measurements that are far off move their source at most, mas on one axis.
 
     The residual is what is left of the error; the rest is what the fit has followed.
     """
     rows = case.diagnosis.rows
     residual = np.sqrt(rows.chi2[rows.is_far] / rows.weight[rows.is_far])
     left = np.maximum(rows.left[rows.is_far], 1e-3)
-    return case.diagnosis.camera.on_sky(float((residual * (1.0 - left) / left).max(initial=0.0)))
+    shift = np.bincount(rows.source[rows.is_far], residual * (1.0 - left) / left)
+    return case.diagnosis.camera.on_sky(float(shift.max(initial=0.0)))
 
 
 def _shift_by_swings(case: Case) -> float:

@@ -9,6 +9,7 @@ from plateviz.tables.labels import id_strings
 from plateviz.tables.rounded import rounded
 from plateviz.verdict.cause_case import Case, Said
 from plateviz.verdict.prior_words import narrowed_priors, usual_priors
+from solver.units import DAYS_PER_JULIAN_YEAR
 
 _MOST_NAMED = 8
 # So many options a person would still give.
@@ -16,6 +17,10 @@ _MOST_LEFT_OUT = 20
 # Few catalogues state errors that are so many times too small, and none so many: something else is
 # wrong with them.
 DOUBTFUL_FACTOR, WRONG_FACTOR = 5.0, 30.0
+# The same of the noise of the measurements.
+_DOUBTFUL_NOISE = 3.0
+# A catalogue and the times of exposures differ by decades.
+_MOST_DAYS = 100.0 * DAYS_PER_JULIAN_YEAR
 _OTHER_ERRORS = "Wrong proper motions, smooth errors or wrong units do this"
 
 
@@ -23,11 +28,17 @@ def said_of_noise(case: Case) -> Said:
     """Return what is said of noise that is the same in all measurements."""
     factor = float(np.sqrt(case.found.test.statistic))
     is_larger = factor > 1.0
+    action = f"let the fit estimate the noise, or multiply sx and sy by {factor:.3f}"
+    if not 1.0 / _DOUBTFUL_NOISE < factor < _DOUBTFUL_NOISE:
+        action = (
+            "check the units of sx and sy, and of the measured positions; if they are right, "
+            "let the fit estimate the noise"
+        )
     return Said(
         "noise",
         f"the noise is {'larger' if is_larger else 'smaller'} than stated",
         f"It is {factor:.3f} times the stated uncertainties, in all exposures and sources alike.",
-        f"let the fit estimate the noise, or multiply sx and sy by {factor:.3f}",
+        action,
         ("--noise-scale",),
     )
 
@@ -156,6 +167,15 @@ def said_of_epoch(case: Case) -> Said:
     how, instead = ("early", "late") if days > 0.0 else ("late", "early")
     than = "later" if days > 0.0 else "earlier"
     offset = f"{rounded(abs(days), 3)} ± {rounded(sigma)} days"
+    if abs(days) > _MOST_DAYS:
+        return Said(
+            "wrong-epoch",
+            "the stars have not moved as their proper motions say",
+            "They are off the catalogue along their own proper motions, by so much that the times "
+            f"would be {offset} too {how}: the motions seem to have another unit.",
+            "check the unit of the proper motions, then the times of the exposures and the epoch "
+            "of the catalogue",
+        )
     return Said(
         "wrong-epoch",
         f"the stars are measured {rounded(abs(days), 3)} days {than} than the exposures say",

@@ -48,6 +48,8 @@ _OF_OUTLIERS = 0.5
 _MOST_LINEAR = 0.5
 # Those that explain more leave residuals that look like noise: larger in some groups, with tails.
 _MOST_BESIDE_NOISE = 0.1
+# Chi2 per degree of freedom below which groups scatter by their priors, not by their noise.
+_OVERSTATED = 0.1
 _OF_GROUPS = ("exposures", "sources", "detectors", "magnitudes")
 SCATTER = ("noise", *_OF_GROUPS)
 
@@ -241,8 +243,13 @@ def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
         ]
     if not of_size:
         return tails
-    best = max(of_size, key=lambda one: one.gain)
+    best = max(of_size, key=lambda one: (_is_overstated(one), one.gain))
     # The noise as a whole changes, too.
     chance = min(best.test.log_chance, noise.log_chance)
     best = best._replace(test=best.test._replace(log_chance=chance, sigma=sigmas(chance)))
     return [best, *tails]
+
+
+def _is_overstated(one: Found) -> bool:
+    """Return whether a cause is a noise so much smaller than stated that priors decide the rest."""
+    return one.test.subject == "noise" and one.test.statistic < _OVERSTATED

@@ -10,9 +10,16 @@ import pytest
 from plateviz.verdict import star_cause_harm
 from plateviz.verdict.cause_case import Case
 from plateviz.verdict.cause_harm import harm
+from plateviz.verdict.verdict import orbit_verdict
+from solver.fit import fit_orbit
 from solver.results.diagnosis.causes import find_causes
 from solver.results.diagnosis.found import Found
 from solver.results.diagnosis.table import Diagnosis, diagnose
+from solver.simulate.settings import SurveySettings
+from solver.units import MAS_PER_DEG
+from tests.campaigns.defects import defective_orbit
+
+SPARSE = SurveySettings(orbits=4, seed=11).scaled(12_000)
 
 
 def with_noise(result, factor):
@@ -67,6 +74,43 @@ def test_an_outlier_moves_its_source_by_what_the_fit_has_followed(fit_result):
         moved.append(number_after(spoils, "by at most "))
     assert moved[0] > 0.0
     assert moved[1] == pytest.approx(2.0 * moved[0], rel=0.1)
+
+
+def test_outliers_of_one_source_move_it_together(fit_result):
+    residuals = fit_result.residuals.copy()
+    residuals["sy"] = residuals["sx"]
+    star = residuals["source_id"].value_counts().index[0]
+    rows = residuals.index[residuals["source_id"] == star][:3]
+    moved = []
+    for n in (1, 3):
+        residuals.loc[rows[:n], "residual_x"] = 60.0 * residuals.loc[rows[:n], "sx"]
+        spoils, _ = harm_of(replace(fit_result, residuals=residuals), "outliers")
+        moved.append(number_after(spoils, "by at most "))
+    assert moved[1] > 1.5 * moved[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "defect", ["distortion-drift=0.3um", "detector-shift=0.4um", "outliers=3%"], ids=str
+)
+def test_positions_are_off_by_no_more_than_the_most_that_is_said(defect):
+    found, without = (
+        fit_orbit(defective_orbit(replace(SPARSE, defects=defects), 0)[0])
+        for defects in ((defect,), ())
+    )
+    rows = found.sources.merge(without.sources, on="source_id", suffixes=("", "_without"))
+    are_some = defect.startswith("outliers")
+    chosen = np.full(len(rows), True) if are_some else ~rows["is_reference"] & (rows["n_obs"] >= 10)
+    offset = MAS_PER_DEG * np.stack(
+        [
+            (rows["ra"] - rows["ra_without"]) * np.cos(np.deg2rad(rows["dec"])),
+            rows["dec"] - rows["dec_without"],
+        ]
+    )
+    offset = np.abs(offset[:, chosen])
+    error = offset.max() if are_some else np.sqrt(np.mean(offset**2))
+    most = number_after(orbit_verdict(found).causes[0].spoils, "at most ")
+    assert 0.3 * most < error < most
 
 
 def test_wrong_reference_star_shifts_the_frame_by_its_share(fit_result, monkeypatch):

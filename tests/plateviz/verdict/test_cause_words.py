@@ -30,6 +30,32 @@ def test_step_is_at_the_field_that_comes_first_in_time(step, field):
     assert said.options == ("--field-distortion 2",)
 
 
+@pytest.mark.parametrize(
+    ("factor", "asks_for_units"), [(0.05, True), (0.8, False), (1.3, False), (10.0, True)]
+)
+def test_noise_that_no_instrument_has_is_a_question_of_units(factor, asks_for_units):
+    test = Test("noise", "noise", (), factor**2, 1.0, 0.01, -400.0, 30.0)
+    said = said_of(SimpleNamespace(found=SimpleNamespace(test=test)))
+    assert said.action.startswith("check the units of sx and sy") == asks_for_units
+    assert f"multiply sx and sy by {factor:.3f}" in said.action or asks_for_units
+    assert said.options == ("--noise-scale",)
+
+
+@pytest.mark.parametrize(
+    ("days", "begin"),
+    [
+        (60.0, "the stars are measured 60 days later than"),
+        (-60.0, "the stars are measured 60 days earlier than"),
+        (4.7e6, "the stars have not moved as their proper motions say"),
+        (-4.7e6, "the stars have not moved as their proper motions say"),
+    ],
+)
+def test_time_that_no_catalogue_is_off_by_is_a_question_of_units(days, begin):
+    said = said_of_stars("epoch", days)
+    assert said.title.startswith(begin)
+    assert ("unit of the proper motions" in said.action) == (abs(days) > 1e5)
+
+
 @pytest.mark.parametrize("robust", [False, True])
 @pytest.mark.parametrize(("kurtosis", "title"), [(0.3, "more large errors"), (-0.3, "fewer large")])
 def test_noise_that_is_not_normal_has_more_or_fewer_large_errors(kurtosis, title, robust):

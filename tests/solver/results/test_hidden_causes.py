@@ -31,6 +31,14 @@ def test_tails_do_not_hide_noise_of_another_size(noise):
     assert find_causes(diagnosis).found[0].test.subject == "noise"
 
 
+def test_uncertainties_in_another_unit_are_named_and_not_the_sources():
+    """The priors, which decide then, leave some sources much more than others."""
+    data = orbit_of()
+    errors = {name: 472.0 * data.measurements[name] for name in ("sx", "sy")}
+    result = fit_orbit(replace(data, measurements=data.measurements.assign(**errors)))
+    assert subjects(result)[0] == "noise"
+
+
 @pytest.mark.parametrize("width", [0.1, 1e-3])
 def test_prior_is_named_however_narrow_it_is(width):
     """The narrower it is, the closer to its centre it holds the values."""

@@ -6,8 +6,23 @@ _MAX_LISTED = 5
 # An orbit about the Earth takes hours; one about L2 may be cut into days.
 _LONGEST_ORBIT_D = 2.0
 _EXPOSURE = ["orbit_id", "field_id", "plate_id"]
+_PIXELS = ["nx", "ny"]
 # No two exposures of a telescope have all of these in common.
 _ATTITUDE = ["obstime", "ra_est", "dec_est", "pa_est"]
+
+
+def place_problems(measurements: pd.DataFrame, where: str) -> list[str]:
+    """Return a message for each orbit whose measurements have one and the same position."""
+    if not {"orbit_id", *_PIXELS} <= set(measurements):
+        return []
+    by_orbit = measurements.groupby("orbit_id")[_PIXELS]
+    least, most, count = by_orbit.min(), by_orbit.max(), by_orbit.size()
+    same = least[(least == most).all(axis=1) & (count > 1)]
+    return [
+        f"{where}, columns nx and ny: expected measurements at different places of a detector, "
+        f"found all {count[orbit]:,} of orbit {orbit} at ({x:g}, {y:g}) pix"
+        for orbit, x, y in same.itertuples(name=None)
+    ]
 
 
 def exposure_problems(

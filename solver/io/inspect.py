@@ -14,7 +14,12 @@ from astropy.time import Time
 from solver.data.instrument import read_instrument
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
 from solver.errors import InputError
-from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
+from solver.io.consistency import (
+    catalogue_problems,
+    exposure_problems,
+    place_problems,
+    truth_problems,
+)
 from solver.io.fits import read_fits
 from solver.io.formats import has_reader, is_fits, place, read_tables
 from solver.io.parquet import count_rows
@@ -178,6 +183,8 @@ def _inspect_tables(
             where = place(path, name)
             frame, problems = examine(table, kind, where)
             finding.problems += problems
+            if kind is MEASUREMENT:
+                finding.problems += place_problems(frame, where)
             finding.frames.append((kind, where, frame))
     finding.kind = _overall([kind.name for kind, _, _ in finding.frames])
     if not any(kinds.values()):

@@ -13,7 +13,12 @@ from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
-from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
+from solver.io.consistency import (
+    catalogue_problems,
+    exposure_problems,
+    place_problems,
+    truth_problems,
+)
 from solver.io.formats import has_reader, holds_one_table, place, read_tables
 from solver.io.table_check import conform, refuse
 
@@ -66,7 +71,8 @@ def read_orbit(
     truths = None if true is None else conform(true.table, TRUTH, true.where)
 
     measurements = _select(measurements, _choose(measurements, orbit, measured.where))
-    found = exposure_problems(measurements, exposures, measured.where, environment.where)
+    found = place_problems(measurements, measured.where)
+    found += exposure_problems(measurements, exposures, measured.where, environment.where)
     found += catalogue_problems(measurements, stars, measured.where, catalogue.where)
     if truths is not None and true is not None:
         found += truth_problems(measurements, truths, measured.where, true.where)

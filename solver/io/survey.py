@@ -29,7 +29,12 @@ from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH, Table
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
-from solver.io.consistency import catalogue_problems, exposure_problems, truth_problems
+from solver.io.consistency import (
+    catalogue_problems,
+    exposure_problems,
+    place_problems,
+    truth_problems,
+)
 from solver.io.manifest import (
     manifest_of,
 )
@@ -102,7 +107,8 @@ def read_survey_orbit(directory: Path, orbit_id: int) -> OrbitData:
     catalogue = _table_of_sources(paths[1], provenance[REFERENCE], CATALOGUE)
     _check_orbit(measurements, orbit_id, paths[0])
     where, where_catalogue, where_exposures = map(str, paths[:3])
-    found = exposure_problems(measurements, exposures, where, where_exposures)
+    found = place_problems(measurements, where)
+    found += exposure_problems(measurements, exposures, where, where_exposures)
     found += catalogue_problems(measurements, catalogue, where, where_catalogue)
     truth = None
     if (path := directory / TRUTH_FILE) in paths:

@@ -10,7 +10,12 @@ from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT
 from solver.errors import InputError
 from solver.io.atomic import sha256_of, write_atomically
-from solver.io.consistency import catalogue_problems, exposure_problems, repeated_orbit_problems
+from solver.io.consistency import (
+    catalogue_problems,
+    exposure_problems,
+    place_problems,
+    repeated_orbit_problems,
+)
 from solver.io.disk import writing
 from solver.io.lock import locked
 from solver.io.manifest import manifest_text
@@ -110,7 +115,8 @@ def _check(directory: Path, orbit: OrbitData) -> None:
     where = f"orbit {orbit.orbit_id}"
     if orbit.orbit_id < 0:
         raise InputError(f"{where}: expected an orbit_id of 0 or more")
-    found = exposure_problems(orbit.measurements, orbit.exposures, where, f"{where}, exposures")
+    found = place_problems(orbit.measurements, where)
+    found += exposure_problems(orbit.measurements, orbit.exposures, where, f"{where}, exposures")
     catalogue = read_survey_table(reference, CATALOGUE)
     found += catalogue_problems(orbit.measurements, catalogue, where, str(reference))
     refuse(found)

@@ -250,6 +250,14 @@ def test_orbits_that_are_misnamed_unreadable_or_copies_are_named(small_survey, t
     assert any("found the same times and pointings in (0, 5)" in one for one in problems)
 
 
+def test_measurements_at_one_place_are_a_problem(tmp_path):
+    table = measurement()
+    table["nx"], table["ny"] = 3.5, -2.0
+    obs, _ = _inspect(*write_orbit(tmp_path, table))
+    (problem,) = obs["problems"]
+    assert problem.endswith("found all 24 of orbit 1 at (3.5, -2) pix")
+
+
 def test_unfinished_survey_is_not_taken_for_whole_tables(small_survey, tmp_path):
     survey = tmp_path / "survey"
     shutil.copytree(small_survey, survey)

@@ -236,6 +236,11 @@ def _float_ids(table):
     return table
 
 
+def _at_one_place(table):
+    table["nx"], table["ny"] = 0.0, 0.0
+    return table
+
+
 def _twice(table):
     return vstack([table, table[3:4]])
 
@@ -261,6 +266,11 @@ MISTAKES = {
     "source not in the catalogue": (
         {"listed": catalogue()[1:]},
         rf"MEASUREMENT, column source_id: .*REF\.fits.*found 1 of 6 that are not: {FIRST_ID}",
+    ),
+    "all measurements at one place": (
+        {"measured": _at_one_place(measurement())},
+        r"MEASUREMENT, columns nx and ny: expected .* different places of a detector, "
+        r"found all 24 of orbit 1 at \(0, 0\) pix$",
     ),
     "duplicate id in the catalogue": (
         {"listed": _twice(catalogue())},

@@ -20,6 +20,7 @@ from solver.io.consistency import (
     truth_problems,
 )
 from solver.io.formats import has_reader, holds_one_table, place, read_tables
+from solver.io.survey_header import HEADER, UNFINISHED, found_unfinished
 from solver.io.table_check import conform, refuse
 
 _MAX_LISTED_ORBITS = 10
@@ -166,15 +167,23 @@ def _file_in(folder: Path, wanted: schema.Table, preferred_suffix: str = "") -> 
             )
         if candidates:
             return (same or candidates)[0]
+    _refuse_unfinished(folder)
     raise InputError(
         f"{folder}: expected a file called {wanted.name} (.fits, .ecsv, .csv, .parquet or .xml), "
         f"found {', '.join(p.name for p in files) or 'no table file'}{_if_of_survey(folder)}"
     )
 
 
+def _refuse_unfinished(folder: Path) -> None:
+    """Refuse the directory of a survey that is not whole yet, and its folder of measurements."""
+    for survey in (folder, folder.parent):
+        if (survey / UNFINISHED).is_file():
+            raise InputError(f"{survey}: expected a survey, found {found_unfinished(survey)}")
+
+
 def _if_of_survey(folder: Path) -> str:
     """Return what to do with a survey directory, or its folder of measurements; else nothing."""
-    survey = next((p for p in (folder, folder.parent) if (p / "survey.toml").is_file()), None)
+    survey = next((p for p in (folder, folder.parent) if (p / HEADER).is_file()), None)
     if survey is None:
         return ""
     return (

@@ -361,6 +361,16 @@ def test_survey_is_no_orbit_and_says_how_to_fit_one_of_it(tmp_path):
             read_orbit(given, ref)
 
 
+def test_unfinished_survey_is_not_asked_for_the_tables_of_an_observation(tmp_path):
+    (tmp_path / "measurements").mkdir()
+    (tmp_path / "unfinished.toml").touch()
+    ref = write_table(catalogue(), tmp_path / "reference.csv")
+    obs = write_table(measurement(), tmp_path / "measurements" / "m.csv")
+    for given in (tmp_path, obs):
+        with pytest.raises(InputError, match=r"found an unfinished one: .*`plateviz simulate`"):
+            read_orbit(given, ref)
+
+
 def test_missing_environment_file(tmp_path):
     obs = write_table(measurement(), tmp_path / "m.csv")
     ref = write_table(catalogue(), tmp_path / "r.csv")

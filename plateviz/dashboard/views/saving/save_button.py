@@ -1,6 +1,7 @@
 """SaveButton: a menu of what a figure or a table can be saved as."""
 
 import json
+import logging
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -12,7 +13,19 @@ from bokeh.document import Document
 
 from plateviz.dashboard.saving.downloads import Download, Later
 from plateviz.dashboard.views.elements.bar_style import BAR_STYLE
-from solver.errors import InputError
+from solver.errors import FitError, InputError
+
+_LOG = logging.getLogger(__name__)
+# A file that cannot be made must not leave a person without a word.
+_FAULTS = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
 
 
 class Picture(NamedTuple):
@@ -196,15 +209,26 @@ class SaveButton(pn.custom.JSComponent):
             return
         try:
             made = make()
-        except InputError as error:
-            self._send_msg({"text": f"It could not be {self.done}: {error}."})
-            return
-        if isinstance(made, Later):
-            self._begin(made)
-        elif isinstance(made, Picture):
-            self._send_msg({"name": made.name, "item": json.dumps(made.item)})
-        else:
-            self._send_msg({"name": made.name, "content": made.content})
+            if isinstance(made, Later):
+                self._begin(made)
+                return
+            message = (
+                {"name": made.name, "item": json.dumps(made.item)}
+                if isinstance(made, Picture)
+                else made._asdict()
+            )
+        except _FAULTS as error:
+            message = self._reason(error)
+        self._send_msg(message)
+
+    def _reason(self, error: Exception) -> dict[str, object]:
+        """Return the message that says why there is no file; log what nobody has expected."""
+        could_not = f"It could not be {self.done}"
+        if isinstance(error, InputError | FitError):
+            return {"text": f"{could_not}: {error}."}
+        _LOG.error("%s: a file cannot be made", self.title, exc_info=error)
+        why = f"{type(error).__name__}: {error}"
+        return {"text": f"{could_not}: {why}. The server's log has the details."}
 
     def _begin(self, later: Later) -> None:
         """Make a file on a thread, unless one is being made."""
@@ -230,8 +254,8 @@ class SaveButton(pn.custom.JSComponent):
             before = "the one" if place == 1 else f"the {place}"
             send({"text": f"Waiting for {before} of other pages before it \u2026", "more": True})
 
-        could_not = f"It could not be {self.done}"
-        message: dict[str, object] = {"text": f"{could_not}; the server's log says why."}
+        text = f"It could not be {self.done}; the server's log says why."
+        message: dict[str, object] = {"text": text}
         try:
             with later.turn(wait):
                 if document is not None and document.session_context is None:
@@ -239,8 +263,8 @@ class SaveButton(pn.custom.JSComponent):
                     return
                 made = later.make(progress)
             message = made._asdict()
-        except InputError as error:
-            message = {"text": f"{could_not}: {error}."}
+        except _FAULTS as error:
+            message = self._reason(error)
         finally:
             self._is_making = False
             send(message)

@@ -121,6 +121,27 @@ def test_file_that_cannot_be_made_is_told(sent, monkeypatch):
     until(lambda: sent == [{"text": "It could not be saved: orbits are missing."}])
 
 
+@pytest.mark.parametrize(
+    "error",
+    [KeyError("Δα"), OSError("no space"), ValueError("not ASCII"), RuntimeError("lost")],
+    ids=lambda error: type(error).__name__,
+)
+@pytest.mark.parametrize("is_later", [False, True], ids=["at once", "later"])
+def test_error_that_nobody_expects_is_logged_and_told(sent, monkeypatch, caplog, error, is_later):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(type(pn.state), "curdoc", Page())
+    choices = {"FITS": (lambda: Later(fail)) if is_later else fail}
+    SaveButton("A figure", choices)._handle_msg("FITS")
+    until(lambda: sent)
+    (message,) = sent
+    assert message["text"].startswith(f"It could not be saved: {type(error).__name__}: {error}. ")
+    (record,) = caplog.records
+    assert record.getMessage() == "A figure: a file cannot be made"
+    assert record.exc_info[1] is error
+
+
 def until(holds):
     deadline = time.monotonic() + 10.0
     while not holds():

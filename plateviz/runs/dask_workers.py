@@ -1,9 +1,13 @@
 """The Dask workers of a survey: how they are started, and the task that fits one orbit."""
 
 import logging
+import signal
+import sys
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import NamedTuple
 
@@ -112,24 +116,65 @@ def dask_client(workers: int, scheduler: str | None) -> Iterator[Client]:
         with client:
             yield client
         return
-    with (
-        worker_scratch() as scratch,
-        dask.config.set({**_LESS_MONITORING, "temporary-directory": str(scratch.path)}),
-        LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            # No dashboard; its server still needs a port, so any free one is taken.
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            # No memory limit per worker.
-            memory_limit=0,
-            # No warnings about workers that are slow to end.
-            silence_logs=logging.ERROR,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        yield client
+    with ExitStack() as stack:
+        scratch = stack.enter_context(worker_scratch())
+        temporary = {"temporary-directory": str(scratch.path)}
+        stack.enter_context(dask.config.set({**_LESS_MONITORING, **temporary}))
+        with _interrupted_later():
+            cluster = stack.enter_context(_local_cluster(workers))
+        yield stack.enter_context(Client(cluster))
+
+
+def _local_cluster(workers: int) -> LocalCluster:
+    return LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        processes=True,
+        # No dashboard; its server still needs a port, so any free one is taken.
+        dashboard_address="127.0.0.1:0",
+        scheduler_kwargs={"dashboard": False},
+        # No memory limit per worker.
+        memory_limit=0,
+        # No warnings about workers that are slow to end.
+        silence_logs=logging.ERROR,
+    )
+
+
+@contextmanager
+def _interrupted_later() -> Iterator[None]:
+    """Let Ctrl-C in the block act at its end, and not at all on processes that it starts.
+
+    Distributed cannot end a cluster whose workers are starting, and a terminal sends Ctrl-C to
+    them, too.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        # Ctrl-C acts on the main thread only.
+        yield
+        return
+    interrupts: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
+    try:
+        with _blocked_for_new_processes():
+            yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if interrupts:
+            signal.raise_signal(signal.SIGINT)
+
+
+@contextmanager
+def _blocked_for_new_processes() -> Iterator[None]:
+    """Let processes that are started in the block inherit that Ctrl-C does nothing."""
+    if sys.platform == "win32":
+        yield
+        return
+    # Where it is started later, it takes the signal up again before the first worker starts.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def fit_on_workers(client: Client, run: Run, orbits: list[int]) -> Iterator[Outcome]:

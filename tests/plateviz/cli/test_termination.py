@@ -1,4 +1,4 @@
-"""SIGTERM to a command: exit code 143, no traceback, no scratch folder, no process that goes on."""
+"""SIGTERM or Ctrl-C to a command: exit code, no traceback, no scratch folder, no process left."""
 
 import os
 import signal
@@ -28,6 +28,31 @@ pytestmark = [
     ids=["simulate", "survey", "serve"],
 )
 def test_sigterm_ends_a_command_cleanly(survey_folder, tmp_path, arguments, begun, to):
+    assert survey_folder.parent == tmp_path
+    process = started(tmp_path, arguments, begun)
+    os.kill(process.pid if to == "process" else -process.pid, signal.SIGTERM)
+    assert process.wait(60) == 143
+    require_nothing_left(tmp_path)
+
+
+@pytest.mark.parametrize(("command", "code"), [("survey", 130), ("watch", 0)])
+@pytest.mark.parametrize("seconds", [0.0, 0.7], ids=["scheduler", "workers"])
+def test_interrupt_while_workers_start_ends_a_command_quietly(
+    survey_folder, tmp_path, command, code, seconds
+):
+    assert survey_folder.parent == tmp_path
+    begun = "tmp/plateviz-workers-*.part/dask-scratch-space/*"
+    process = started(tmp_path, (command, "survey", "--workers", "2"), begun)
+    time.sleep(seconds)
+    # As a terminal does.
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.wait(60) == code
+    assert "ERROR" not in (tmp_path / "printed").read_text()
+    require_nothing_left(tmp_path)
+
+
+def started(tmp_path, arguments, begun):
+    """Start a command in a folder, and return it once a file says that it has begun."""
     (tmp_path / "tmp").mkdir()
     with (tmp_path / "printed").open("wb") as printed:
         process = subprocess.Popen(
@@ -38,14 +63,16 @@ def test_sigterm_ends_a_command_cleanly(survey_folder, tmp_path, arguments, begu
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-    assert survey_folder.parent == tmp_path
     end = time.monotonic() + 120.0
     while not list(tmp_path.glob(begun)):
         assert process.poll() is None
         assert time.monotonic() < end
         time.sleep(0.005)
-    os.kill(process.pid if to == "process" else -process.pid, signal.SIGTERM)
-    assert process.wait(60) == 143
+    return process
+
+
+def require_nothing_left(tmp_path):
+    end = time.monotonic() + 60.0
     text = (tmp_path / "printed").read_text()
     assert "Traceback" not in text
     assert not [path for path in tmp_path.rglob("*") if is_scratch(path.name)]

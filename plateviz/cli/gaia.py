@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from plateviz.cli import options
+from solver.data.plural import plural
 
 
 def gaia(
@@ -77,6 +78,6 @@ def gaia(
     else:
         fetched = "from the cache" if stars.from_cache else "fetched"
         typer.echo(
-            f"{output}: {len(stars.table)} stars of {meta['SERVICE']}, {fetched}, "
-            f"as of {meta['DATE']}"
+            f"{output}: {len(stars.table)} {plural(len(stars.table), 'star')} "
+            f"of {meta['SERVICE']}, {fetched}, as of {meta['DATE']}"
         )

@@ -11,6 +11,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from solver.data.plural import plural
 from solver.data.settings import COUNTED
 from solver.units import MPIX_PER_PIX
 
@@ -40,8 +41,8 @@ def print_fit(summary: Mapping[str, Any], output: Path) -> None:
         ("orbit", f"{summary['orbit']}, mean epoch MJD {summary['epoch_mjd']:.5f} (TCB)"),
         (
             "data",
-            f"{summary['n_measurements']} measurements of {summary['n_sources']} sources "
-            f"({summary['n_reference']} reference) on {summary['n_exposures']} exposures",
+            f"{_counted(summary, 'measurement')} of {_counted(summary, 'source')} "
+            f"({summary['n_reference']} reference) on {_counted(summary, 'exposure')}",
         ),
         *_outlier_row(summary),
         ("engine", _engine(summary)),
@@ -127,12 +128,17 @@ def print_agreement(rows: Iterable["Comparison"]) -> None:
         typer.echo(f"{row.engine}: {row.what}: {row.found:.3g} (limit {row.limit:.3g}), {verdict}")
 
 
+def _counted(summary: Mapping[str, Any], noun: str) -> str:
+    number = summary[f"n_{noun}s"]
+    return f"{number} {plural(number, noun)}"
+
+
 def print_inspection(reports: list[dict[str, Any]]) -> None:
     """Print the reports of `inspect_files` as text."""
     for report in reports:
         typer.echo(f"{report['file']}: {report['kind']}")
         for table in report["tables"]:
-            typer.echo(f"  {table['name']}: {table['rows']} rows")
+            typer.echo(f"  {table['name']}: {table['rows']} {plural(table['rows'], 'row')}")
             for column in table["columns"]:
                 typer.echo(f"    {_column(column)}")
         for line in _survey_lines(report):
@@ -218,7 +224,8 @@ def _truth_rows(truth: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]
     return [
         (
             f"{name} against truth",
-            f"{numbers['n']} sources: mean {_pair(numbers, 'mean_{}', 'mas')} "
+            f"{numbers['n']} {plural(numbers['n'], 'source')}: "
+            f"mean {_pair(numbers, 'mean_{}', 'mas')} "
             f"(of which {_pair(numbers, 'induced_{}', '')}from the reference sources), "
             f"rms {_pair(numbers, 'rms_{}', 'mas')}, rms pull {_pair(numbers, 'pull_rms_{}', '')}",
         )

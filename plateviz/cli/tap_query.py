@@ -16,6 +16,7 @@ from typing import Any
 from astropy.io import votable
 from astropy.table import Table
 
+from solver.data.plural import plural
 from solver.errors import InputError
 from solver.io.failures import reading
 from solver.io.scratch import ScratchFolder, temporary_folder
@@ -98,7 +99,8 @@ def _check_whole(document: votable.tree.VOTableFile, rows: int, name: str) -> No
         for info in resource.infos:
             if info.name == "QUERY_STATUS" and info.value.upper() != "OK":
                 raise InputError(
-                    f"{name}: expected a whole answer, found {info.value} after {rows} rows"
+                    f"{name}: expected a whole answer, found {info.value} after {rows} "
+                    f"{plural(rows, 'row')}"
                     f"{': ' + _short(info.content) if info.content else ''}; "
                     f"choose a smaller field"
                 )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from plateviz.notebook.card import CARD_STYLE
 from plateviz.notebook.lazy_collection import LazyCollection
 from plateviz.notebook.progress import notebook_shell
+from solver.data.plural import plural
 from solver.errors import InputError
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ class Overview(Displayed):
 
     def __repr__(self) -> str:
         """Return the card as one line of text."""
-        return f"{self._text}; {len(self._figures)} figures"
+        return f"{self._text}; {len(self._figures)} {plural(len(self._figures), 'figure')}"
 
 
 class HasFigures(ABC):

@@ -16,6 +16,7 @@ from plateviz.runs.kept_solutions import (
 )
 from plateviz.solving.job import Job
 from plateviz.solving.origin import OrbitFiles
+from plateviz.tables.counts import orbits_text
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
 from solver.io.result import read_result
@@ -134,7 +135,7 @@ def simulate(
         "settings": settings.to_dict(),
         "catalogue": None if table is None else str(table),
     }
-    run_job(Job(request), f"simulating {orbits} orbits")
+    run_job(Job(request), f"simulating {orbits_text(orbits)}")
     return OpenSurvey(target)
 
 

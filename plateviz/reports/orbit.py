@@ -22,6 +22,7 @@ from plateviz.verdict.solution_changes import solution_changes
 from plateviz.verdict.verdict import Verdict, orbit_verdict
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
+from solver.data.plural import plural
 from solver.data.result import FitResult
 from solver.io.result_instrument import require_comparable
 from solver.simulate.settings import SurveySettings
@@ -97,11 +98,12 @@ def failed_orbit_report(data: OrbitData, message: str, facts: Facts) -> Report:
     message : reason of the failure
     """
     rows = data.measurements
+    n_rows, n_sources, n_exposures = len(rows), rows["source_id"].nunique(), len(data.exposures)
     counts = rows.groupby(["field_id", "plate_id", "detector_id"]).size().rename("n_obs")
     tables = {"Measurements by exposure and detector": counts.reset_index()}
     contents = [
-        f"The orbit has {len(rows):,} measurements of {rows['source_id'].nunique():,} sources on "
-        f"{len(data.exposures):,} exposures."
+        f"The orbit has {n_rows:,} {plural(n_rows, 'measurement')} of {n_sources:,} "
+        f"{plural(n_sources, 'source')} on {n_exposures:,} {plural(n_exposures, 'exposure')}."
     ]
     headline = "This orbit has no solution."
     return Report(

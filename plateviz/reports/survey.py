@@ -20,6 +20,7 @@ from plateviz.tables import (
     source_orbits,
     source_strip,
 )
+from plateviz.tables.counts import orbits_text
 from plateviz.tables.headings import CHANGES, MOTION, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in_words
 from plateviz.tables.run_health import MISSING
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
@@ -50,7 +51,7 @@ def survey_report(
     """
     tables, changes = _whole(run), {}
     orbits, motions = tables.orbits, tables.motions
-    subtitle = f"Run {run.name} of {len(orbits):,} orbits"
+    subtitle = f"Run {run.name} of {orbits_text(len(orbits))}"
     if other is not None:
         require_same_catalogue(other, run)
         subtitle += f", compared with run {other.name}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from plateviz.runs.column_cache import Arrays, ColumnCache
 from solver.data.columns import Column, Table
+from solver.data.plural import plural
 from solver.errors import InputError
 from solver.io.parquet import count_rows, read_columns
 from solver.runtime.threads import count_cores
@@ -131,9 +132,10 @@ class FileRows:
         return {name: table[name].to_numpy() for name in needs}
 
     def _require(self, path: Path, n_rows: int, place: slice) -> None:
-        if n_rows != place.stop - place.start:
+        wanted = place.stop - place.start
+        if n_rows != wanted:
             raise InputError(
-                f"{path}: expected {place.stop - place.start:,} rows as before, found {n_rows:,}"
+                f"{path}: expected {wanted:,} {plural(wanted, 'row')} as before, found {n_rows:,}"
             )
 
     def _for_each_file(self, read: Callable[[Path, slice], None]) -> None:

@@ -1,9 +1,11 @@
 """Numbers of orbits, and durations, as text."""
 
+from solver.data.plural import plural
+
 
 def orbits_text(number: int) -> str:
     """Return a number of orbits: "1 orbit", "83 orbits"."""
-    return f"{number:,} orbit{'' if number == 1 else 's'}"
+    return f"{number:,} {plural(number, 'orbit')}"
 
 
 def orbits_are(number: int) -> str:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from plateviz.tables.counts import orbits_text
 from plateviz.tables.rounded import with_minus_signs
 
 _MOTION = ("parallax", "pmra", "pmdec")
@@ -32,7 +33,7 @@ class NotableSource(NamedTuple):
         parallax = with_minus_signs(f"{self.parallax:+.2f}")
         return (
             f"{self.proper_motion:.2f} mas/yr and {parallax} mas parallax off its catalogue, in "
-            f"{self.n_orbits:,} orbits"
+            f"{orbits_text(self.n_orbits)}"
         )
 
 

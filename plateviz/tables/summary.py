@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 from scipy.special import chdtrc
 
 from plateviz.tables.rounded import with_minus_signs
+from solver.data.plural import plural
 from solver.data.result import FitResult
 
 State = Literal["good", "warn", "bad", "neutral"]
@@ -141,8 +142,8 @@ def _normalised_deviation(result: FitResult, coordinate: str, symbol: str) -> Su
     dof = float(result.summary.get(f"normalised_deviation_dof_{coordinate}", count))
     scatter = expected / math.sqrt(2.0 * dof) if dof > 0.0 else float("nan")
     basis = (
-        f"{count} reference sources with common errors, which scatter like {dof:.1f} "
-        "independent ones"
+        f"{count} reference {plural(count, 'source')} with common errors, "
+        f"which scatter like {dof:.1f} independent ones"
     )
     return SummaryItem(
         f"Reference sources, {symbol}",
@@ -160,10 +161,11 @@ def _from_truth(result: FitResult) -> list[SummaryItem]:
             f"Pulls against truth, {name}, N ≥ {LEAST_OBS}",
             f"{_pull(figures, 'ra'):.2f}, {_pull(figures, 'dec'):.2f} "
             f"({_rms(figures):.2f} mas rms)",
-            f"Rms of deviation over marginal sigma in α, δ of {figures['n']} sources with "
-            f"{LEAST_OBS} or more measurements and a simulated truth; expected 1. The figure of "
-            "the deviations has all sources. It is not judged, because the "
-            "sources of one orbit share the calibration's error; about their mean it is "
+            f"Rms of deviation over marginal sigma in α, δ of {figures['n']} "
+            f"{plural(figures['n'], 'source')} with {LEAST_OBS} or more measurements and a "
+            "simulated truth; expected 1. The figure of the deviations has all sources. It is not "
+            "judged, because the sources of one orbit share the calibration's error; about their "
+            "mean it is "
             f"{figures['pull_sd_ra']:.2f}, {figures['pull_sd_dec']:.2f}. Mean deviation "
             f"{_pair(figures, 'mean')} mas, of which {_pair(figures, 'induced')} mas come from "
             "the reference sources' errors.",

@@ -10,6 +10,7 @@ from astropy.units import Quantity, Unit, UnrecognizedUnit
 from astropy.utils.masked import Masked
 
 from solver.data.columns import Column
+from solver.data.plural import plural
 
 # Units in which float32 is too coarse: 110 mas at 266 deg, minutes in MJD.
 _UNITS_IN_FLOAT64 = ("deg", "d")
@@ -76,7 +77,7 @@ def _refused(where: str, expected: str, found: str) -> Converted:
 
 def _rows(bad: np.ndarray, what: str) -> str:
     first, count = int(np.argmax(bad)) + 1, int(bad.sum())
-    return f"{count} of {bad.size} rows {what}, the first is row {first}"
+    return f"{count} of {bad.size} {plural(bad.size, 'row')} {what}, the first is row {first}"
 
 
 def _split(raw: RawColumn | Quantity) -> tuple[np.ndarray, np.ndarray]:

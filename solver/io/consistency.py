@@ -2,6 +2,8 @@
 
 import pandas as pd
 
+from solver.data.plural import plural
+
 _MAX_LISTED = 5
 # An orbit about the Earth takes hours; one about L2 may be cut into days.
 _LONGEST_ORBIT_D = 2.0
@@ -110,8 +112,8 @@ def truth_problems(
     if measured.isin(truth["source_id"]).any():
         return []
     return [
-        f"{where_truth}, column source_id: expected some of the {measured.size} sources "
-        f"measured in {where}, found none of them"
+        f"{where_truth}, column source_id: expected some of the {measured.size} "
+        f"{plural(measured.size, 'source')} measured in {where}, found none of them"
     ]
 
 

@@ -9,6 +9,7 @@ import pandas as pd
 from astropy.table import Table as RawTable
 
 from solver.data.columns import Column, Table
+from solver.data.plural import plural
 from solver.errors import InputError
 from solver.io.column_check import convert
 
@@ -125,9 +126,11 @@ def _repeated(frame: pd.DataFrame, schema: Table, where: str) -> list[str]:
     repeated = frame.duplicated(key)
     if not repeated.any():
         return []
+    count = int(repeated.sum())
     example = frame.loc[repeated.idxmax(), key]
     key_text = ", ".join(f"{name} {value}" for name, value in example.items())
     return [
-        f"{where}: expected each {', '.join(key)} once, found {int(repeated.sum())} rows that "
-        f"repeat another, for example {key_text} in row {int(repeated.idxmax()) + 1}"
+        f"{where}: expected each {', '.join(key)} once, found {count} "
+        f"{plural(count, 'row')} that {'repeats' if count == 1 else 'repeat'} another, for example "
+        f"{key_text} in row {int(repeated.idxmax()) + 1}"
     ]

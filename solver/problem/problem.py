@@ -16,6 +16,7 @@ from solver.data.distortion_terms import terms
 from solver.data.instrument import Instrument
 from solver.data.orbit import OrbitData
 from solver.data.parameters import BY_NAME, FRAME_GROUPS, SOURCES
+from solver.data.plural import plural
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import InputError
 from solver.model.astrometry import propagate, sky_position
@@ -212,7 +213,8 @@ def _check_freedom(n_obs: int, n_src: int, layout: VectorLayout, order: int) -> 
     hint = f"the highest order they allow is {max(possible)}" if possible else "no order fits"
     raise InputError(
         f"distortion order {order}: expected more than {2 * n_src + layout.size} coordinates "
-        f"measured for as many parameters, found {2 * n_obs} ({n_obs} measurements); {hint}"
+        f"measured for as many parameters, found {2 * n_obs} "
+        f"({n_obs} {plural(n_obs, 'measurement')}); {hint}"
     )
 
 

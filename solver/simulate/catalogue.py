@@ -9,6 +9,7 @@ from astropy.table import Table as RawTable
 from jaxtyping import Float
 
 from solver.data.columns import numpy_dtype
+from solver.data.plural import plural
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.errors import InputError
 from solver.model.correlation import ASTROMETRY, CORRELATIONS, correlation_matrices, square_roots
@@ -92,8 +93,8 @@ def truth_from_gaia(
     if not stars["is_reference"].any():
         raise InputError(
             f"{name}: expected stars that satisfy the cuts for reference stars in the field, "
-            f"found none among {len(table)} rows, {len(stars)} of them in the field with a "
-            f"parallax over {settings.parallax_over_error:g} times its error"
+            f"found none among {len(table)} {plural(len(table), 'row')}, {len(stars)} of them "
+            f"in the field with a parallax over {settings.parallax_over_error:g} times its error"
         )
     _check_correlations(stars[stars["is_reference"]], name)
     artificial = _artificial(settings, settings.rng(Stream.TRUTH)).assign(

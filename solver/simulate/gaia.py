@@ -7,6 +7,7 @@ import pandas as pd
 from astropy.table import Table as RawTable
 
 from solver.data.columns import Column, Table
+from solver.data.plural import plural
 from solver.data.schema import CATALOGUE
 from solver.errors import InputError
 from solver.io.column_check import missing_rows
@@ -57,7 +58,7 @@ def gaia_stars(table: RawTable | pd.DataFrame, where: str) -> pd.DataFrame:
     if len(raw) and is_incomplete.all():
         raise InputError(
             f"{where}: expected a row with a value in each of {', '.join(used)}, "
-            f"found none among {len(raw)} rows"
+            f"found none among {len(raw)} {plural(len(raw), 'row')}"
         )
     if is_incomplete.any():
         where = f"{where}, its {int((~is_incomplete).sum())} complete rows"

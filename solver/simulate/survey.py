@@ -7,6 +7,7 @@ import pandas as pd
 
 from solver.data.defect_schema import AFFECTED
 from solver.data.instrument import MINI_MOCK, Instrument, write_instrument
+from solver.data.plural import plural
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
 from solver.errors import InputError
 from solver.io.atomic import flush, sha256_of
@@ -214,7 +215,8 @@ def _truth(settings: SurveySettings, catalogue: Path | None) -> pd.DataFrame:
 def _check_seen(measurements: pd.DataFrame, truth: pd.DataFrame, orbit_id: int) -> None:
     references = truth["source_id"][truth["is_reference"]]
     if not measurements["source_id"].isin(references).any():
+        count = measurements["source_id"].nunique()
         raise InputError(
             f"orbit {orbit_id}: expected at least one reference star on the detectors, found "
-            f"none among {measurements['source_id'].nunique()} sources; more stars are needed"
+            f"none among {count} {plural(count, 'source')}; more stars are needed"
         )

@@ -7,7 +7,7 @@ from shlex import quote
 
 from plateviz.runs.queries import Written
 from plateviz.solving.origin import Origin, SurveyFolder
-from plateviz.tables.counts import duration_text
+from plateviz.tables.counts import duration_text, orbits_are
 
 # After so many seconds without another orbit, nobody seems to fit the rest.
 _PATIENCE = 120.0
@@ -47,7 +47,7 @@ class Growth:
             return ""
         if is_over and written.is_gathered:
             return _OPEN if written.grows else ""
-        counts = f"{done:,} of {written.n_orbits:,} orbits are done"
+        counts = f"{done:,} of {orbits_are(written.n_orbits)} done"
         if is_over:
             words = f"{counts}; the tables over all of them are missing yet."
         else:

@@ -3,6 +3,7 @@
 from astropy.table import Table
 
 from plateviz.dashboard.saving.samp import local_hub, send_table
+from solver.data.plural import plural
 from solver.io.disk import writing
 from solver.io.scratch import ScratchFolder, temporary_folder
 from solver.io.write_tables import write_tables
@@ -36,7 +37,7 @@ class TableSender:
         takers = send_table(path, name, hub)
         if self._is_closed:
             self.close()
-        counted = "1 source" if len(table) == 1 else f"{len(table):,} sources"
+        counted = f"{len(table):,} {plural(len(table), 'source')}"
         return f"{counted} sent to {', '.join(takers)}."
 
     def close(self) -> None:

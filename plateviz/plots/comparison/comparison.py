@@ -19,6 +19,7 @@ from plateviz.plots.elements.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.comparison import comparison, difference_histogram
 from plateviz.tables.residuals import binned_vectors
+from solver.data.plural import plural
 from solver.units import MAS_PER_ARCMIN
 
 _MAP = "Difference of positions, B minus A"
@@ -113,7 +114,7 @@ def plot_comparison_histogram(table: pd.DataFrame, *, width: int = FRAME_WIDTH) 
             for number, (coordinate, rows) in enumerate(histogram.groupby("coordinate", sort=False))
         ],
         title=_HISTOGRAM,
-        subtitle=f"{len(table):,} sources\nmedian σ of B over σ of A: "
+        subtitle=f"{len(table):,} {plural(len(table), 'source')}\nmedian σ of B over σ of A: "
         f"{ratios.iloc[0]:.3f} (α), {ratios.iloc[1]:.3f} (δ)",
         x=Axis(_HISTOGRAM_X, (-limit, limit)),
         y=Axis(_HISTOGRAM_Y, (0.0, 1.1 * float(histogram["count"].max()))),
@@ -133,13 +134,14 @@ def _vectors(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _thinned(vectors: pd.DataFrame, half: float) -> tuple[pd.DataFrame, str]:
+    sources = f"{len(vectors):,} {plural(len(vectors), 'source')}"
     if len(vectors) <= ARROW_LIMIT:
-        return vectors, f"{len(vectors):,} sources, one arrow each"
+        return vectors, f"{sources}, one arrow each"
     means = binned_vectors(
         vectors, x_range=(-half, half), y_range=(-half, half), bins=_BINS, least_share=_LEAST_SHARE
     )
     return means, (
-        f"{len(vectors):,} sources: mean difference in {len(means):,} bins of a "
+        f"{sources}: mean difference in {len(means):,} {plural(len(means), 'bin')} of a "
         f"{_BINS} × {_BINS} grid"
     )
 

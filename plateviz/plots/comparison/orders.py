@@ -21,6 +21,7 @@ from plateviz.plots.diagnostic import Chosen, Diagnostic
 from plateviz.plots.elements.style import PANEL_WIDTH, SERIES_COLOURS
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.orders import order_comparison, preferred_order
+from solver.data.plural import plural
 from solver.data.settings import MAX_ORDER
 
 _TITLE = "Orders of the distortion"
@@ -104,7 +105,7 @@ def _held_out(table: pd.DataFrame, width: int) -> Figure:
     if rows.empty:
         text = "No reserved sources"
         return message(_HELD_OUT, text, width=width, xlabel=_XLABEL, ylabel=_HELD_OUT_Y)
-    spread = float(rows["held_out_sd"].max())
+    spread, reserved = float(rows["held_out_sd"].max()), int(rows["n_reserved"].iloc[0])
     scale = _BAND_SIGMAS * spread
     rows = rows.assign(height=np.arcsinh((rows["held_out_chi2_per_dof"] - 1.0) / scale))
     edge = float(np.arcsinh(1.0))
@@ -120,7 +121,7 @@ def _held_out(table: pd.DataFrame, width: int) -> Figure:
             *_series(rows, "reserved sources", "mark", "triangle", _HELD_OUT_HOVER),
         ],
         title=_HELD_OUT,
-        subtitle=f"{rows['n_reserved'].iloc[0]:,} sources, with the calibration fitted to the "
+        subtitle=f"{reserved:,} {plural(reserved, 'source')}, with the calibration fitted to the "
         f"others\nexpected: 1 ± {spread:.3f} for a sufficient order",
         x=_x_axis(table),
         y=Axis(

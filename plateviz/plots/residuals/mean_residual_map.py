@@ -22,6 +22,7 @@ from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.mean_residuals import MapStatistics, map_statistics, mean_residuals
 from plateviz.tables.rounded import rounded
 from solver.data.instrument import Instrument
+from solver.data.plural import plural
 from solver.units import UM_PER_MM
 
 _TITLE = "Mean residual over the focal plane"
@@ -92,7 +93,8 @@ def _panel(
 def _subtitle(table: pd.DataFrame, axis: str, statistics: MapStatistics) -> str:
     if axis == "x":
         return (
-            f"{statistics.n:,} measurements in {statistics.bins:,} bins; by chance ± "
+            f"{statistics.n:,} {plural(statistics.n, 'measurement')} in "
+            f"{statistics.bins:,} {plural(statistics.bins, 'bin')}; by chance ± "
             f"{rounded(statistics.sigma_mpix)} mpix = {angle_text(statistics.sigma_mas)} in a "
             f"typical bin; colours to ± {_COLOUR_SIGMAS:g}σ"
         )

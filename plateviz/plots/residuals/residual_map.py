@@ -20,6 +20,7 @@ from plateviz.plots.elements.units import angle_text
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.residuals import binned_vectors, residual_map
 from solver.data.instrument import Detector, Instrument
+from solver.data.plural import plural
 from solver.units import UM_PER_MM
 
 _BINS_ON_DETECTOR, _BINS_ON_FOCAL_PLANE = 16, 24
@@ -105,15 +106,16 @@ def _thinned(
     table: pd.DataFrame, detector: Detector | Instrument, field: Field
 ) -> tuple[pd.DataFrame, str]:
     """Return the vectors or their means in bins, and a text that describes them."""
+    measurements = f"{len(table):,} {plural(len(table), 'measurement')}"
     if len(table) <= ARROW_LIMIT:
-        return table, f"{len(table):,} measurements, one arrow each"
+        return table, f"{measurements}, one arrow each"
     bins = _BINS_ON_FOCAL_PLANE if isinstance(detector, Instrument) else _BINS_ON_DETECTOR
     x, y = field.x[1] / _MARGIN, field.y[1] / _MARGIN
     means = binned_vectors(
         table, x_range=(-x, x), y_range=(-y, y), bins=bins, least_share=_LEAST_SHARE
     )
     return means, (
-        f"{len(table):,} measurements: mean residual in {len(means):,} bins of a "
+        f"{measurements}: mean residual in {len(means):,} {plural(len(means), 'bin')} of a "
         f"{bins} × {bins} grid, {means['n'].mean():.0f} in each on average"
     )
 

@@ -21,6 +21,7 @@ from plateviz.plots.elements.focal_plane import of_detectors
 from plateviz.plots.elements.points import class_points
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.footprint import footprint_fields, footprint_sources
+from solver.data.plural import plural
 
 _TITLE = "Footprint of the orbit"
 _XLABEL, _YLABEL = "Δα cos δ (arcmin, East to the left)", "Δδ (arcmin)"
@@ -73,7 +74,7 @@ def _largest(*columns: pd.Series) -> float:
 def _subtitle(sources: pd.DataFrame, fields: pd.DataFrame) -> str:
     counts = sources["source_class"].value_counts()
     parts = [f"{count:,} {name}" for name, count in counts.items()]
-    return f"{', '.join(parts)} sources; fields {_listed(fields)}"
+    return f"{', '.join(parts)} {plural(len(sources), 'source')}; fields {_listed(fields)}"
 
 
 def _listed(fields: pd.DataFrame) -> str:

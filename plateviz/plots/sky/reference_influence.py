@@ -10,6 +10,7 @@ from plateviz.plots.elements.style import CLASS_COLOURS
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.reference_influence import reference_influence
 from plateviz.tables.sources import REFERENCE
+from solver.data.plural import plural
 
 _TITLE = "Reference sources against the fit without them"
 _XLABEL, _YLABEL = "pull of the catalogue position (σ)", "shift by the catalogue position (σ)"
@@ -85,8 +86,9 @@ def _subtitle(table: pd.DataFrame, rows: pd.DataFrame) -> str:
     unknown = len(table) - len(rows)
     left_out = f"; {unknown:,} not measured well enough" if unknown else ""
     return (
-        f"{len(rows):,} reference sources{left_out}; rms pull {ra:.2f} (α), {dec:.2f} (δ), "
-        f"expected 1\n{int(rows['is_beyond'].sum()):,} beyond {rows['level'].iloc[0]:.2f} σ, "
+        f"{len(rows):,} reference {plural(len(rows), 'source')}{left_out}; "
+        f"rms pull {ra:.2f} (α), {dec:.2f} (δ), expected 1\n"
+        f"{int(rows['is_beyond'].sum()):,} beyond {rows['level'].iloc[0]:.2f} σ, "
         "which the largest exceeds by chance in 1 %"
     )
 

@@ -22,6 +22,7 @@ from plateviz.plots.elements.style import CLASS_COLOURS, PANEL_WIDTH, ROW_LIMIT
 from plateviz.plots.elements.ticks import log_ticks
 from plateviz.plots.workspace import OrbitWorkspace
 from plateviz.tables.sources import CLASSES, KINDS, uncertainty, uncertainty_by_count
+from solver.data.plural import plural
 
 Coordinate = Literal["ra", "dec", "both"]
 
@@ -72,11 +73,12 @@ def _panel(
     drawn_rows = uncertainty_by_count(rows) if reduced else rows
     marks = _medians(drawn_rows) if reduced else [_points(drawn_rows)]
     single = float(rows["sigma_single_mas"].iloc[0])
+    n_sources = rows["source_id"].nunique()
     what = "median and 16–84 % range at each N" if reduced else "one point per source"
     return framed(
         [_law(single, limits[0]), *marks],
         title=f"Uncertainty of {_NAMES[coordinate]}",
-        subtitle=f"{rows['source_id'].nunique():,} sources, {what}",
+        subtitle=f"{n_sources:,} {plural(n_sources, 'source')}, {what}",
         x=Axis(_XLABEL, limits[0], is_log=True, ticks=log_ticks(limits[0], whole=True)),
         y=Axis("σ (mas)", limits[1], is_log=True, ticks=log_ticks(limits[1])),
         width=width,

@@ -13,6 +13,7 @@ from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.tables.counts import orbits_text
 from plateviz.tables.sources import ARTIFICIAL, REFERENCE
 from plateviz.tables.survey_tables import SurveyTables
+from solver.data.plural import plural
 
 _TITLE = "Positional error of the artificial sources"
 _XLABEL = "number of orbits N"
@@ -139,11 +140,12 @@ def _limits(rows: pd.DataFrame) -> tuple[Limits, Limits]:
 
 def _subtitle(rows: pd.DataFrame) -> str:
     first, last = rows.iloc[0], rows.iloc[-1]
+    most = int(rows["n_sources"].max())
     noise, floor = angle_text(float(first["noise_mas"])), angle_text(float(last["floor_mas"]))
     orbits = orbits_text(int(first["n_orbits"]))
     return (
-        f"{int(rows['n_sources'].max()):,} sources; noise of {orbits} {noise}; "
-        f"floor at {int(last['n_orbits'])} orbits {floor}"
+        f"{most:,} {plural(most, 'source')}; noise of {orbits} {noise}; "
+        f"floor at {orbits_text(int(last['n_orbits']))} {floor}"
     )
 
 

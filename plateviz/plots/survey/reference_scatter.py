@@ -23,6 +23,7 @@ from plateviz.tables.histogram import pull_bins
 from plateviz.tables.reference_scatter import LEAST_ORBITS, reference_scatter, scatter_cells
 from plateviz.tables.rounded import with_minus_signs
 from plateviz.tables.survey_tables import SurveyTables
+from solver.data.plural import plural
 
 _TITLE = "Scatter of the reference sources"
 _NAMES = {"ra": "α cos δ", "dec": "δ"}
@@ -71,7 +72,7 @@ def _scatter(rows: pd.DataFrame, axis: str, limits: Limits, width: int) -> Figur
     return framed(
         [sources, _identity(limits)],
         title=f"Scatter between orbits, {_NAMES[axis]}",
-        subtitle=f"{len(rows):,} reference sources{counted}\n"
+        subtitle=f"{len(rows):,} reference {plural(len(rows), 'source')}{counted}\n"
         f"median of measured / predicted: {ratio:.3f}",
         x=Axis(_XLABEL, limits, is_log=True, ticks=log_ticks(limits)),
         y=Axis(_YLABEL, limits, is_log=True, ticks=log_ticks(limits)),

@@ -278,7 +278,7 @@ MISTAKES = {
     ),
     "duplicate measurement": (
         {"measured": _twice(measurement())},
-        r"MEASUREMENT: expected each orbit_id, .*source_id once, found 1 rows",
+        r"MEASUREMENT: expected each orbit_id, .*source_id once, found 1 row that repeats another",
     ),
     "exposure without a row": (
         {"exposed": environment()[:3]},

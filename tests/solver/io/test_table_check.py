@@ -269,7 +269,9 @@ def test_empty_table():
 def test_duplicate_key_names_one():
     table = catalogue()
     table["source_id"][5] = table["source_id"][2]
-    message = f"each source_id once, found 1 rows .* source_id {FIRST_ID + 2} in row 6"
+    message = (
+        f"each source_id once, found 1 row that repeats another.* source_id {FIRST_ID + 2} in row 6"
+    )
     with pytest.raises(InputError, match=message):
         conform(table, CATALOGUE, WHERE)
 

@@ -25,6 +25,7 @@ from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.plots.workspace import SurveyWorkspace
 from plateviz.runs.load_tables import require_same_catalogue
 from plateviz.solving.run_reader import ReadRun
+from plateviz.tables.counts import orbits_text
 from plateviz.tables.headings import CHANGES, in_words
 from plateviz.tables.run_health import COMPLETE
 from plateviz.tables.survey_tables import SurveyTables
@@ -232,6 +233,6 @@ def _growth(read: ReadRun) -> str:
     orbits = read.tables.orbits
     fitted = int((orbits["status"] == COMPLETE).sum())
     return (
-        f"Run {read.run.name} has {fitted:,} of {len(orbits):,} orbits so far; its motions are "
+        f"Run {read.run.name} has {fitted:,} of {orbits_text(len(orbits))} so far; its motions are "
         "fitted after the last one."
     )

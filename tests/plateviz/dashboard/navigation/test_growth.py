@@ -42,6 +42,10 @@ def test_rate_and_rest_are_those_of_what_was_added(growth, clock):
     assert growth.look(written(25)) == words
 
 
+def test_single_orbit_takes_the_singular(growth):
+    assert growth.look(Written(1, 0, 0, False, False)).startswith("0 of 1 orbit is done. ")
+
+
 def test_failed_orbits_are_done(growth, clock):
     growth.look(written(10))
     clock.now = 60.0

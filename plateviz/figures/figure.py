@@ -92,6 +92,7 @@ class Glyphs:
     label : of the legend; "@name" for the texts of a column, empty for none
     reach : of the frame's limits between which an image is shown; None for all
     units : column -> unit of its values, in place of the one at the end of its name
+    arrow_rows : rows that draw one arrow; 0 where the glyphs are no arrows
     """
 
     kind: Kind
@@ -103,6 +104,7 @@ class Glyphs:
     label: str = ""
     reach: Limits | None = None
     units: Mapping[str, str] = field(default_factory=dict)
+    arrow_rows: int = 0
 
     def __len__(self) -> int:
         """Return the number of rows."""

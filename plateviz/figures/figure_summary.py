@@ -7,6 +7,7 @@ import numpy as np
 
 from plateviz.figures.figure import Figure, Frame, Glyphs
 from plateviz.figures.figure_tables import figure_tables
+from solver.data.plural import plural
 
 # Rows of a text table; files have all.
 MOST_ROWS = 200
@@ -68,7 +69,10 @@ def _counted(frame: Frame) -> Iterator[str]:
     for glyphs in frame.glyphs:
         if glyphs.kind in _MARKS and len(glyphs):
             n, mark = len(glyphs), _MARKS[glyphs.kind]
-            yield f"{n:,} {mark}{'s' if n > 1 else ''} ({_name(glyphs)})"
+            if glyphs.arrow_rows:
+                n, mark = n // glyphs.arrow_rows, "arrow"
+            marks, name = plural(n, mark), _name(glyphs)
+            yield f"{n:,} {marks}" if name == f"{mark}s" else f"{n:,} {marks} ({name})"
 
 
 def _name(glyphs: Glyphs) -> str:

@@ -1,6 +1,7 @@
 """Vectors drawn to a stated scale: shafts, heads, and a key arrow."""
 
 import math
+from dataclasses import replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -16,6 +17,8 @@ _LARGEST_HEAD = 0.018
 _HEAD_ANGLE = math.radians(26.0)
 _KEY_STRIP = 0.11
 _STEPS = (1.0, 2.0, 5.0, 10.0)
+# Of an arrow: the shaft and both strokes of the head.
+_ROWS = 3
 # Columns by which an arrow is selected.
 _KEYS = ("id", "exposure", "detector_id")
 
@@ -110,7 +113,8 @@ def arrows(
     tails = points(
         table, "x", "y", name="tails", color=colour, size=3.5, alpha=0.6, hover=hover, keep=[*kept]
     )
-    return [segments(*strokes, name="arrows", color=colour, keep=of_strokes), tails]
+    shafts = segments(*strokes, name="arrows", color=colour, keep=of_strokes)
+    return [replace(shafts, arrow_rows=_ROWS), tails]
 
 
 def key(length: float, text: str, *, scale: float, field: Field) -> list[Glyphs]:
@@ -130,7 +134,7 @@ def key(length: float, text: str, *, scale: float, field: Field) -> list[Glyphs]
     tail_x, at_y, tip_x = (np.array([value]) for value in (x, y, tip))
     strokes = _strokes(tail_x, at_y, tip_x, at_y, field)
     return [
-        segments(*strokes, name="key", color="text", width=2.0),
+        replace(segments(*strokes, name="key", color="text", width=2.0), arrow_rows=_ROWS),
         texts([tip + direction * 0.015 * field.width], [y], [text], name="key text", align="left"),
     ]
 

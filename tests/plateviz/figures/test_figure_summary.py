@@ -1,10 +1,12 @@
 """A figure in words and as tables of texts."""
 
 import numpy as np
+import pandas as pd
 
 from plateviz.figures.figure import Axis, framed, message, side_by_side
 from plateviz.figures.figure_summary import MOST_ROWS, figure_summary, text_tables
 from plateviz.figures.glyphs import horizontal, line, points
+from plateviz.plots.elements.arrows import Field, arrows, key
 
 
 def figure_of(n, title="Errors", name="sources"):
@@ -27,6 +29,16 @@ def test_summary_has_a_sentence_with_the_numbers_of_each_frame():
         "Errors. mean 0.12 mas; rms 0.3 mas. offset (mas) against time (yr): 1 point (sources). "
         "More. mean 0.12 mas; rms 0.3 mas. offset (mas) against time (yr): 1,200 points (sources)."
     )
+
+
+def test_summary_counts_arrows_and_not_their_strokes():
+    vectors = pd.DataFrame(dict.fromkeys("xyuv", np.arange(184.0)))
+    area = Field((-9.0, 9.0), (-9.0, 9.0))
+    drawn = arrows(vectors, scale=1.0, field=area, colour="mark", hover=())
+    axes = Axis("x (mm)", area.x), Axis("y (mm)", area.y)
+    length = key(1.0, "1 mm", scale=1.0, field=area)
+    figure = framed([*drawn, *length], title="Residuals", x=axes[0], y=axes[1], width=200)
+    assert figure_summary(figure).endswith("184 arrows, 184 points (tails), 1 arrow (key).")
 
 
 def test_summary_says_why_nothing_is_drawn():

@@ -1,5 +1,6 @@
 """CodeDialog: a dialog with the code that makes what is on the screen."""
 
+import re
 from html import escape
 
 import panel as pn
@@ -10,6 +11,7 @@ from plateviz.dashboard.views.dialogs.dialog import dialog, dialog_button
 from plateviz.dashboard.views.elements.markup import markup_pane, paragraph, themed
 from solver.errors import InputError
 
+_OPTION = re.compile(r"(?<!\S)--?[a-z][\w-]*")
 _TO_COPY = "A click selects the whole text."
 
 
@@ -47,10 +49,15 @@ class CodeDialog(pn.viewable.Viewer):
             return
         parts = {"Command line": code.command, "Python": code.python}
         blocks = "".join(
-            f"<h3>{title}</h3><pre>{escape(one)}</pre>" for title, one in parts.items()
+            f"<h3>{title}</h3><pre>{_unbroken(one)}</pre>" for title, one in parts.items()
         )
-        markup = f"<div class='code'><p>{escape(code.about)} {_TO_COPY}</p>{blocks}</div>"
+        markup = f"<div class='code'><p>{_unbroken(code.about)} {_TO_COPY}</p>{blocks}</div>"
         self._text.object = themed(markup, self._session.theme)
+
+
+def _unbroken(text: str) -> str:
+    """Return plain text as markup whose options, such as `--orbits`, stay in one line."""
+    return _OPTION.sub(r"<span class='option'>\g<0></span>", escape(text))
 
 
 def code_button(navigation: Navigation) -> list[pn.viewable.Viewable]:

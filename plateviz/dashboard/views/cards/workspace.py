@@ -9,6 +9,9 @@ from plateviz.dashboard.views.cards.figure_grid import FigureGrid
 
 # Screen pixels above a workspace: the page's bar, the switches, the verdict.
 _ABOVE = 154
+# Property of a page's style: the height of what stands above its workspaces beside that.
+_MORE_ABOVE = "--more-above"
+_LINE = 32
 
 
 def workspace(grid: FigureGrid, *above: Part, below: Sequence[Part] = ()) -> pmui.FlexBox:
@@ -30,11 +33,16 @@ def workspace(grid: FigureGrid, *above: Part, below: Sequence[Part] = ()) -> pmu
             "gridTemplateColumns": "minmax(0, 1fr)",
             "gridTemplateRows": " ".join(rows),
             "gap": "8px",
-            "minHeight": f"calc(100vh - {_ABOVE}px)",
+            "minHeight": f"calc(100vh - {_ABOVE}px - var({_MORE_ABOVE}, 0px))",
         },
         sizing_mode="stretch_width",
         margin=0,
     )
+
+
+def below_lines(number: int) -> dict[str, str]:
+    """Return the style of a page with lines of text between its verdict and its workspaces."""
+    return {_MORE_ABOVE: f"{number * _LINE}px"}
 
 
 def _rows(*parts: Part) -> pmui.FlexBox:

@@ -18,7 +18,7 @@ from plateviz.dashboard.views.cards.explore import ExploreView
 from plateviz.dashboard.views.cards.figure import FigureView, card
 from plateviz.dashboard.views.cards.figure_grid import FigureGrid
 from plateviz.dashboard.views.cards.point_actions import PointActions
-from plateviz.dashboard.views.cards.workspace import workspace
+from plateviz.dashboard.views.cards.workspace import below_lines, workspace
 from plateviz.dashboard.views.controls.run_selector import run_selector
 from plateviz.dashboard.views.controls.unit_selector import unit_selector
 from plateviz.dashboard.views.dialogs.code_dialog import code_button
@@ -279,6 +279,7 @@ class SurveyPage(pn.viewable.Viewer):
         if self._shown is not None:
             verdict = self._session.units.text(judged(self._shown.verdict, is_open=is_open))
         head = f"<div class='head'>{verdict}{title}</div>"
+        self._below.styles = below_lines(bool(self._failure) + bool(self._navigation.growth))
         if self._failure:
             head += paragraph(self._failure, "outdated", self._session.theme)
         if self._navigation.growth:

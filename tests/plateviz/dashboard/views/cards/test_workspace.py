@@ -5,7 +5,7 @@ import pytest
 
 from plateviz.dashboard.views.cards.figure import FigureView
 from plateviz.dashboard.views.cards.figure_grid import FigureGrid
-from plateviz.dashboard.views.cards.workspace import workspace
+from plateviz.dashboard.views.cards.workspace import below_lines, workspace
 from plateviz.plots.gallery import diagnostics
 
 
@@ -22,6 +22,14 @@ def test_parts_of_a_workspace_stand_above_and_below_its_cards(view):
     assert foot is last
     assert middle is grid.__panel__() or grid.__panel__() in list(middle)
     assert box.sx["gridTemplateRows"] == "auto minmax(0, 1fr) auto"
+
+
+def test_workspace_is_lower_below_other_lines_of_its_page(view):
+    height = workspace(FigureGrid([view], lambda *_: None)).sx["minHeight"]
+    (name,) = below_lines(1)
+    assert f"- var({name}, 0px)" in height
+    assert below_lines(0) == {name: "0px"}
+    assert below_lines(1) != below_lines(0)
 
 
 def test_hidden_parts_leave_the_cards_the_row_that_fills_the_window(view):

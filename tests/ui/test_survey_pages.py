@@ -9,6 +9,7 @@ from playwright.sync_api import expect
 
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.workspace import SourceWorkspace, SurveyWorkspace
+from solver.io.survey import read_survey_orbit
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
 from tests.ui.accessibility import require_accessible
@@ -235,6 +236,17 @@ def test_back_and_forward_lead_through_the_solutions_of_an_orbit(served, open_pa
     assert "order=4" not in page.url
     page.go_forward()
     expect(head).to_contain_text("what if: order 4")
+
+
+def test_titles_of_selected_sources_are_not_cut(served, open_page, simulated):
+    rows = read_survey_orbit(simulated, 0).measurements
+    page = open_page(f"{served}?view=orbit&orbit=0&sources={rows['source_id'].iloc[0]}")
+    page.get_by_role("button", name="List", exact=True).click()
+    title = ".tabulator-col-group > .tabulator-col-content .tabulator-col-title"
+    titles = page.get_by_role("dialog").locator(title)
+    expect(titles).to_have_text(["minus prior, mas", "marginal σ, mas"])
+    cut = "all => all.filter(one => one.scrollWidth > one.clientWidth).map(one => one.textContent)"
+    assert titles.evaluate_all(cut) == []
 
 
 def test_a_source_is_looked_for_and_carried_by_the_address(page, open_page, tmp_path):

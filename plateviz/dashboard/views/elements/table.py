@@ -23,6 +23,9 @@ _COLOURS: Mapping[str, Mapping[State, str]] = MappingProxyType(
 # Tabulator makes its tables visible even in a hidden view; this prevents it.
 TABLE_STYLE = """
 :host .tabulator { font-size: 13px; visibility: inherit !important; }
+/* A title above several narrow columns keeps its unit. */
+:host .pnx-tabulator.tabulator .tabulator-header .tabulator-col.tabulator-col-group
+> .tabulator-col-content .tabulator-col-title { white-space: normal; font-size: 11.5px; }
 /* The theme has a blue on which the colours of numbers cannot be read. */
 :host .pnx-tabulator.tabulator .tabulator-tableholder .tabulator-row.tabulator-selectable:hover {
   background-color: color-mix(in srgb, currentColor 12%, transparent); color: inherit; }

@@ -10,6 +10,7 @@ from plateviz.figures.figure import MARGIN, Axis, Figure, Frame, Ramp
 from plateviz.figures.fitting_texts import with_fitting_texts
 from plateviz.figures.text_width import has_room_for_words, text_width, wrapped
 from plateviz.figures.theme import LABEL_SIZE, SMALL_SIZE, TITLE_SIZE
+from plateviz.figures.tick_count import longest_label
 from plateviz.figures.words import words_of_row
 
 # Screen pixels around a frame: label of the left axis, its shortest tick labels, margin on the
@@ -249,7 +250,9 @@ def _rise(axis: Axis) -> int:
 
 
 def _longest_tick(axis: Axis) -> float:
-    return max((text_width(label, SMALL_SIZE) for _, label in axis.ticks or ()), default=0.0)
+    if axis.ticks is None:
+        return text_width(longest_label(axis), SMALL_SIZE)
+    return max((text_width(label, SMALL_SIZE) for _, label in axis.ticks), default=0.0)
 
 
 def _legend_columns(frame: Frame) -> int:

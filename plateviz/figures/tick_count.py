@@ -20,7 +20,7 @@ def columns_of_ticks(axis: Axis, width: int) -> int:
     ----------
     width : of the frame, screen pixels
     """
-    label = _label(axis)
+    label = longest_label(axis)
     return _limited(width / (text_width(label, SMALL_SIZE) + _GAP))
 
 
@@ -29,8 +29,8 @@ def rows_of_ticks(height: int) -> int:
     return _limited(height / _ROW)
 
 
-def _label(axis: Axis) -> str:
-    """Return a label as long as the longest one of the axis."""
+def longest_label(axis: Axis) -> str:
+    """Return a label as long as the longest one of an axis with automatic ticks."""
     step = axis.length / _TYPICAL
     decimals = max(0, -math.floor(math.log10(step))) if step > 0 else 0
     sign = "−" if min(axis.limits) < 0 else ""

@@ -92,6 +92,12 @@ def test_long_tick_labels_take_width():
     assert sizes(resized(labelled, 800, 400))[0][0] < sizes(resized(frame(), 800, 400))[0][0]
 
 
+@pytest.mark.parametrize("limits", [(-5000.0, 5000.0), (0.0, 25_000.0), (0.0, 0.0005)], ids=str)
+def test_long_numbers_at_automatic_ticks_take_width(limits):
+    wide = sizes(resized(frame(), 800, 400))[0][0]
+    assert sizes(resized(frame(y=limits), 800, 400))[0][0] < wide
+
+
 def test_colour_bar_takes_width():
     ramp = Ramp("n", "count", (0.0, 5.0), label="number")
     barred = frame(glyphs=[points(TABLE, "x", "y", name="barred", color=ramp)])

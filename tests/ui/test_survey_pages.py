@@ -241,6 +241,7 @@ def test_back_and_forward_lead_through_the_solutions_of_an_orbit(served, open_pa
 def test_titles_of_selected_sources_are_not_cut(served, open_page, simulated):
     rows = read_survey_orbit(simulated, 0).measurements
     page = open_page(f"{served}?view=orbit&orbit=0&sources={rows['source_id'].iloc[0]}")
+    expect(heading(page, "Solution of orbit 0")).to_be_visible()
     page.get_by_role("button", name="List", exact=True).click()
     title = ".tabulator-col-group > .tabulator-col-content .tabulator-col-title"
     titles = page.get_by_role("dialog").locator(title)

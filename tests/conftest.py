@@ -72,8 +72,11 @@ class _ByFile(LoadFileScheduling):
 def _share_compilations(config):
     """Let every process of the tests use what another one has compiled.
 
-    The key of an entry holds the program, the compiler's options and its version.
+    The key of an entry holds the program, the compiler's options and its version. Without pytest's
+    cache, as with `-p no:cacheprovider`, each process compiles for itself.
     """
+    if not config.pluginmanager.has_plugin("cacheprovider"):
+        return
     folder = config.cache.mkdir("compiled")
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")

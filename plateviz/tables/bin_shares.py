@@ -1,6 +1,8 @@
 """What a fit leaves of the sums of weighted residuals in bins."""
 
+from collections.abc import Iterator
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +15,27 @@ from solver.units import UM_PER_MM
 _ENOUGH = 4_000
 # Calibration parameters that the prior holds by more than this share absorb next to nothing.
 _HELD = 0.5
+# Eigenvalues below this share of the largest count as zero in a pseudo-inverse.
 _RCOND = 1e-9
+
+# Displacements of some measurements along x and y of the focal plane, each of shape (m,).
+_Move = tuple[np.ndarray, np.ndarray]
+
+
+class _Calibration(NamedTuple):
+    """What detectors and distortion can displace, at some of the measurements.
+
+    Attributes
+    ----------
+    rows : these measurements, shape (m,)
+    moves : weighted displacements by each free parameter along x and along y of the detectors,
+        two arrays of shape (m, parameters)
+    inverse : of the normal equations of the parameters, shape (parameters, parameters)
+    """
+
+    rows: np.ndarray
+    moves: list[np.ndarray]
+    inverse: np.ndarray
 
 
 class BinShares:
@@ -97,44 +119,63 @@ class BinShares:
 
     def _by_calibration(self, cells: np.ndarray, size: int) -> np.ndarray:
         """Return what detectors and distortion absorb of the weights, if free."""
-        rows, modes, inverse = self._modes
+        rows, moves, inverse = self._calibration
         inside = (cells[rows] == np.arange(size)[:, None]).astype(float)
         factor = len(cells) / max(len(rows), 1)
-        sums = [inside @ of_axis for of_axis in modes]
+        sums = [inside @ of_axis for of_axis in moves]
         return factor * np.stack([np.einsum("bi,ij,bj->b", m, inverse, m) for m in sums], axis=-1)
 
     @cached_property
-    def _modes(self) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-        """Some measurements, their weighted modes along x and y, inverse of normal equations."""
-        found, result = self._found, self._result
-        rows = np.arange(0, len(found), max(1, len(found) // _ENOUGH))
-        at = found.at[rows]
-        scale = float(result.summary.get("distortion_scale_um", 0.0)) / UM_PER_MM
+    def _calibration(self) -> _Calibration:
+        rows = np.arange(0, len(self._found), max(1, len(self._found) // _ENOUGH))
+        # Along x and y of the focal plane, shape (2, m, parameters).
+        design = np.array(list(self._moves(rows))).transpose(1, 2, 0)
+        weight, c, s = (
+            v[rows, None] for v in (self._weight, np.cos(self._turn), np.sin(self._turn))
+        )
+        normal = np.einsum("ank,anl->kl", weight * design, design, optimize=True)
+        # Parameters of one scale, so that `_RCOND` means the same for each.
+        scales = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        inverse = np.linalg.pinv(normal * np.outer(scales, scales), rcond=_RCOND, hermitian=True)
+        along = [c * design[0] - s * design[1], s * design[0] + c * design[1]]
+        return _Calibration(
+            rows, [weight * one for one in along], inverse * np.outer(scales, scales)
+        )
+
+    def _moves(self, rows: np.ndarray) -> Iterator[_Move]:
+        """Yield the displacements of some measurements by each parameter that is free."""
+        at = self._found.at[rows]
+        scale = float(self._result.summary.get("distortion_scale_um", 0.0)) / UM_PER_MM
         x, y = (at / (scale or max(float(np.abs(at).max(initial=0.0)), 1.0))).T
         one, none = np.ones(len(x)), np.zeros(len(x))
-        modes = [(one, none), (none, one), (-y, x), (x, y)]
-        shares = result.values_on("det", "prior_share")
-        for name, mode in (
+        # Those of all detectors together.
+        yield from ((one, none), (none, one), (-y, x), (x, y))
+        yield from self._detector_moves(rows, x, y)
+        yield from self._distortion_moves(x, y)
+
+    def _detector_moves(self, rows: np.ndarray, x: np.ndarray, y: np.ndarray) -> Iterator[_Move]:
+        """Yield the shifts and the turn of each detector, unless the prior holds them."""
+        shares = self._result.values_on("det", "prior_share")
+        one, none = np.ones(len(x)), np.zeros(len(x))
+        for name, (along_x, along_y) in (
             ("detector_x", (one, none)),
             ("detector_y", (none, one)),
             ("detector_rotation", (-y, x)),
         ):
             for number in np.flatnonzero(shares[name].to_numpy() < _HELD):
-                on = found.detector[rows] == number
-                modes.append((mode[0] * on, mode[1] * on))
-        shares, order = result.values_on("coef", "prior_share"), result.settings.order
+                on = self._found.detector[rows] == number
+                yield along_x * on, along_y * on
+
+    def _distortion_moves(self, x: np.ndarray, y: np.ndarray) -> Iterator[_Move]:
+        """Yield the terms of the distortion, along x and along y, unless the prior holds them."""
+        shares, order = self._result.values_on("coef", "prior_share"), self._result.settings.order
         products = np.polynomial.legendre.legvander2d(x, y, [order, order])
+        none = np.zeros(len(x))
         # A fit of order 0 or 1 has no such terms.
         held = shares.reindex(columns=["distortion_x", "distortion_y"]).to_numpy()
         for (i, j), (held_x, held_y) in zip(terms(order), held, strict=True):
             term = products[:, i * (order + 1) + j]
-            modes += [(term, none)] * bool(held_x < _HELD) + [(none, term)] * bool(held_y < _HELD)
-        design = np.array(modes).transpose(1, 2, 0)
-        weight, c, s = (
-            v[rows, None] for v in (self._weight, np.cos(self._turn), np.sin(self._turn))
-        )
-        normal = np.einsum("ank,anl->kl", weight * design, design, optimize=True)
-        scales = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        inverse = np.linalg.pinv(normal * np.outer(scales, scales), rcond=_RCOND, hermitian=True)
-        along = [c * design[0] - s * design[1], s * design[0] + c * design[1]]
-        return rows, [weight * one for one in along], inverse * np.outer(scales, scales)
+            if held_x < _HELD:
+                yield term, none
+            if held_y < _HELD:
+                yield none, term

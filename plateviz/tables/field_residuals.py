@@ -51,39 +51,80 @@ def field_residuals(
         wanted = int(np.sqrt(len(found) / (len(ids) * _PER_BIN * len(instrument.detectors))))
         bins = min(max(wanted, _FEWEST_BINS), _MOST_BINS)
     grid, cells = square_bins(found, instrument, bins)
-    sums, kept, n = _sums(found, number * len(grid) + cells, (len(ids), len(grid)))
-    grid["x"] = grid[["left", "right"]].mean(axis=1)
-    grid["y"] = grid[["bottom", "top"]].mean(axis=1)
-    others = kept.sum(axis=0) - kept
-    least = np.minimum(kept, others).min(axis=-1)
-    typical = float(np.median(kept[kept > 0.0])) if (kept > 0.0).any() else 0.0
-    is_known = (least > 0.0) & (least >= _LEAST_SHARE * typical)
+    places = pd.DataFrame(
+        {
+            "detector_id": grid["detector_id"],
+            "x": grid[["left", "right"]].mean(axis=1),
+            "y": grid[["bottom", "top"]].mean(axis=1),
+        }
+    )
+    sums = _sums(found, number * len(grid) + cells, (len(ids), len(grid)))
+    is_known = sums.are_known()
     share = 1.0 - _OF_FIELD / np.maximum(2.0 * is_known.sum(axis=1), 1.0)
     tables = []
-    for one in np.flatnonzero(share > 0.0):
+    for one in map(int, np.flatnonzero(share > 0.0)):
         use = is_known[one]
-        mine, theirs = (share[one] * of[one, use] for of in (kept, others))
-        rest = sums.sum(axis=0)[use] - sums[one, use]
-        table = grid.loc[use, ["detector_id", "x", "y"]].assign(n=n[one, use])
+        table = places[use].assign(n=sums.n[one, use])
         table.insert(0, "field_id", ids[one])
-        difference = sums[one, use] / mine - rest / theirs
-        sigma = np.sqrt(1.0 / mine + 1.0 / theirs)
-        for along, values, sigmas in zip("xy", difference.T, sigma.T, strict=True):
-            table[f"difference_{along}_mpix"] = values
-            table[f"sigma_{along}_mpix"] = sigmas
-            table[f"pull_{along}"] = values / sigmas
-            table[f"difference_{along}_mas"] = values * found.mas_per_mpix
-            table[f"sigma_{along}_mas"] = sigmas * found.mas_per_mpix
-        tables.append(table)
+        difference, sigma = sums.difference(one, use, share[one])
+        tables.append(table.assign(**_columns(difference, sigma, found.mas_per_mpix)))
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 
-def _sums(
-    found: FocalResiduals, cells: np.ndarray, shape: tuple[int, int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return sums of weighted residuals, the weights kept of them, and counts, by field and bin.
+class _Sums(NamedTuple):
+    """Sums over the measurements of each field in each bin.
 
-    Cells of which the positions of the sources leave little are empty.
+    Attributes
+    ----------
+    weighted : of the weighted residuals, mpix^-1, shape (fields, bins, 2)
+    kept : of the weights, less what the positions of the sources absorb, mpix^-2, the same shape
+    n : number of measurements, shape (fields, bins)
+    """
+
+    weighted: np.ndarray
+    kept: np.ndarray
+    n: np.ndarray
+
+    @property
+    def _kept_of_others(self) -> np.ndarray:
+        """What `kept` is of all other fields together."""
+        return self.kept.sum(axis=0) - self.kept
+
+    def are_known(self) -> np.ndarray:
+        """Return in which bins a field can be compared with the others, shape (fields, bins)."""
+        least = np.minimum(self.kept, self._kept_of_others).min(axis=-1)
+        is_filled = self.kept > 0.0
+        typical = float(np.median(self.kept[is_filled])) if is_filled.any() else 0.0
+        return (least > 0.0) & (least >= _LEAST_SHARE * typical)
+
+    def difference(
+        self, field: int, bins: np.ndarray, share: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the mean of a field less that of the others in some bins, and its sigma.
+
+        Parameters
+        ----------
+        field : index of the field
+        bins : whether to use each bin, shape (bins,)
+        share : what the pointing, roll and focal length of the field leave of the difference
+
+        Returns
+        -------
+        Two arrays of shape (used bins, 2), mpix
+        """
+        mine, theirs = (share * of[field, bins] for of in (self.kept, self._kept_of_others))
+        rest = self.weighted.sum(axis=0)[bins] - self.weighted[field, bins]
+        difference = self.weighted[field, bins] / mine - rest / theirs
+        return difference, np.sqrt(1.0 / mine + 1.0 / theirs)
+
+
+def _sums(found: FocalResiduals, cells: np.ndarray, shape: tuple[int, int]) -> _Sums:
+    """Return the sums by field and bin; cells of which the sources leave little are empty.
+
+    Parameters
+    ----------
+    cells : of each measurement: that of its field and bin in an array of `shape`, flattened
+    shape : number of fields and of bins
     """
     size = shape[0] * shape[1]
 
@@ -92,9 +133,28 @@ def _sums(
 
     kept = found.kept_by_sources(cells, size)
     is_kept = kept > _LEAST_KEPT * summed(found.weight)
-    sums = np.where(is_kept, summed(found.weight * found.vector), 0.0)
-    n = np.bincount(cells, minlength=size).reshape(shape)
-    return sums.reshape(*shape, 2), np.where(is_kept, kept, 0.0).reshape(*shape, 2), n
+    weighted = np.where(is_kept, summed(found.weight * found.vector), 0.0)
+    return _Sums(
+        weighted.reshape(*shape, 2),
+        np.where(is_kept, kept, 0.0).reshape(*shape, 2),
+        np.bincount(cells, minlength=size).reshape(shape),
+    )
+
+
+def _columns(
+    difference: np.ndarray, sigma: np.ndarray, mas_per_mpix: float
+) -> dict[str, np.ndarray]:
+    """Return the columns of differences and their sigmas, both of shape (rows, 2), in mpix."""
+    columns = {}
+    for along, values, sigmas in zip("xy", difference.T, sigma.T, strict=True):
+        columns |= {
+            f"difference_{along}_mpix": values,
+            f"sigma_{along}_mpix": sigmas,
+            f"pull_{along}": values / sigmas,
+            f"difference_{along}_mas": values * mas_per_mpix,
+            f"sigma_{along}_mas": sigmas * mas_per_mpix,
+        }
+    return columns
 
 
 class FieldStatistics(NamedTuple):

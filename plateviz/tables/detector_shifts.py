@@ -17,6 +17,9 @@ from solver.data.result import FitResult
 _LEAST_SHARE = 0.02
 _BAND_SIGMAS = 2.0
 
+# Displacements of the measurements along x and y of the focal plane, each of shape (n,).
+_Move = tuple[np.ndarray, np.ndarray]
+
 
 def detector_shifts(
     result: FitResult, instrument: Instrument, *, together: Sequence[int] = (1, 6)
@@ -147,23 +150,38 @@ def _absorbed(found: FocalResiduals, n_exposures: int) -> np.ndarray:
     """
     n_detectors = int(found.detector.max(initial=0)) + 1
     cells, size = found.exposure * n_detectors + found.detector, n_exposures * n_detectors
-    (x, y), (free_x, free_y) = found.at.T, found.free_weight.T
-    one, zero = np.ones(len(x)), np.zeros(len(x))
-    moves = [(one, zero), (zero, one), (-y, x), (x, y)]
+    moves = _exposure_moves(found)
+    # Of the shift of each detector along x and along y with each move, shape (2, moves, cells).
     of_cells = np.array(
         [
-            [np.bincount(cells, free_x * move_x, minlength=size) for move_x, _ in moves],
-            [np.bincount(cells, free_y * move_y, minlength=size) for _, move_y in moves],
+            [np.bincount(cells, free * move[axis], minlength=size) for move in moves]
+            for axis, free in enumerate(found.free_weight.T)
         ]
     )
+    normal = _normal_equations(found, moves, n_exposures)
+    inverse = np.repeat(np.linalg.pinv(normal, hermitian=True), n_detectors, axis=0)
+    taken = np.einsum("ais,sij,ajs->as", of_cells, inverse, of_cells)
+    weights = np.stack([of_cells[0, 0], of_cells[1, 1]])
+    share = np.divide(taken, weights, out=np.ones_like(taken), where=weights > 0.0)
+    return share[:, cells].T
+
+
+def _exposure_moves(found: FocalResiduals) -> list[_Move]:
+    """Return how each parameter of an exposure moves its measurements, one unit each."""
+    x, y = found.at.T
+    one, zero = np.ones(len(x)), np.zeros(len(x))
+    return [(one, zero), (zero, one), (-y, x), (x, y)]
+
+
+def _normal_equations(
+    found: FocalResiduals, moves: Sequence[_Move], n_exposures: int
+) -> np.ndarray:
+    """Return the normal equations of each exposure, shape (exposures, moves, moves)."""
+    free_x, free_y = found.free_weight.T
     normal = np.empty((n_exposures, len(moves), len(moves)))
     for i, (x_i, y_i) in enumerate(moves):
         for j, (x_j, y_j) in enumerate(moves[: i + 1]):
             products = free_x * x_i * x_j + free_y * y_i * y_j
             sums = np.bincount(found.exposure, products, minlength=n_exposures)
             normal[:, i, j] = normal[:, j, i] = sums
-    inverse = np.repeat(np.linalg.pinv(normal, hermitian=True), n_detectors, axis=0)
-    taken = np.einsum("ais,sij,ajs->as", of_cells, inverse, of_cells)
-    weights = np.stack([of_cells[0, 0], of_cells[1, 1]])
-    share = np.divide(taken, weights, out=np.ones_like(taken), where=weights > 0.0)
-    return share[:, cells].T
+    return normal

@@ -11,7 +11,7 @@ from plateviz.tables.run_health import COMPLETE, FAILED, orbit_states, run_strip
 from plateviz.verdict.causes import Cause
 from plateviz.verdict.run_causes import run_causes
 from plateviz.verdict.tests_in_words import TestInWords, discoveries_in_words
-from plateviz.verdict.verdict import Verdict, worst
+from plateviz.verdict.verdict import State, Verdict, worst
 from solver.results.diagnosis.table import BAD_RATE, CARE_RATE
 from solver.results.diagnosis.test import Test
 
@@ -37,41 +37,70 @@ def run_verdict(orbits: pd.DataFrame, motions: pd.DataFrame, tables: RunTests) -
     tables : of the tests, no rows until then
     """
     diagnosis = diagnose_run(motions, tables)
-    found, certain = diagnosis.found(CARE_RATE), diagnosis.found(BAD_RATE)
+    found = diagnosis.found(CARE_RATE)
     causes = run_causes(diagnosis, tables, motions) if found else []
-    by_tests = "warn" if found else "good"
-    if certain and any(cause.is_large for cause in causes):
-        by_tests = "bad"
-    if len(diagnosis.states) == 1:
-        # Nothing is compared with other orbits: the run is as good as its only orbit.
-        by_tests = worst([by_tests, diagnosis.states.iloc[0]])
-    of_orbits = orbit_states(orbits).drop(columns=["status", "verdict"])
-    is_off = (of_orbits == "bad").any(axis=1) & (orbits["status"] == COMPLETE)
-    far = orbits[is_off]
-    # Some numbers of many orbits are far off by chance; the tests know how many, but not of orbits
-    # that came without a verdict.
-    is_untested = ~far["orbit_id"].isin(diagnosis.states.index)
-    by_numbers = "bad" if is_untested.any() else "good"
+    far = _far_off(orbits)
     strip = (item.state for item in run_strip(orbits, motions))
+    by_tests, by_numbers = _state_by_tests(diagnosis, causes), _state_by_numbers(diagnosis, far)
     state = worst([by_tests, by_numbers, *strip])  # type: ignore[list-item]
-    headline = _HEADLINES[state]
-    if causes:
-        headline = f"{headline[:-1]}: {causes[0].title}."
-    elif len(diagnosis.states) == 1 and (title := str(tables.orbit_causes["title"].iloc[0])):
-        headline = f"{headline[:-1]}: {title}."
+    titles = _titles(diagnosis, causes, tables)
+    headline = f"{_HEADLINES[state][:-1]}: {titles[0]}." if titles else _HEADLINES[state]
     reasons = [*(cause.sentence() for cause in causes), *_tested(diagnosis, found, tables)]
     reasons += [*_fitted(orbits), *_motions(motions)]
     reasons += _smooth_errors(tables.zonal, found, causes)
     faults = [f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes]
-    notable = _failed(orbits)
-    if len(far):
-        notable.append(f"Numbers far from their expected values: {_named(far['orbit_id'])}.")
-    if len(careful := diagnosis.states[diagnosis.states == "warn"]):
-        notable.append(f"Solutions to be used with care: {_named(pd.Series(careful.index))}.")
-    if len(distrusted := diagnosis.states[diagnosis.states == "bad"]):
-        notable.append(f"Solutions not to be trusted: {_named(pd.Series(distrusted.index))}.")
+    notable = [*_failed(orbits), *_notable(diagnosis, far)]
     tests = _in_words(diagnosis, found)
     return Verdict(state, headline, reasons, notable, faults, causes, tests)
+
+
+def _state_by_tests(diagnosis: RunDiagnosis, causes: Sequence[Cause]) -> State:
+    """Return the state by the tests of the run, and by that of its only orbit if it has one."""
+    state: State = "warn" if diagnosis.found(CARE_RATE) else "good"
+    if diagnosis.found(BAD_RATE) and any(cause.is_large for cause in causes):
+        state = "bad"
+    if len(diagnosis.states) == 1:
+        # Nothing is compared with other orbits: the run is as good as its only orbit.
+        return worst([state, diagnosis.states.iloc[0]])
+    return state
+
+
+def _far_off(orbits: pd.DataFrame) -> pd.Series:
+    """Return the ids of the fitted orbits with a number far from its expected value."""
+    states = orbit_states(orbits).drop(columns=["status", "verdict"])
+    is_far = (states == "bad").any(axis=1) & (orbits["status"] == COMPLETE)
+    return orbits.loc[is_far, "orbit_id"]
+
+
+def _state_by_numbers(diagnosis: RunDiagnosis, far: pd.Series) -> State:
+    """Return the state by the orbits with numbers `far` off that came without a verdict.
+
+    Some numbers of many orbits are far off by chance; the tests of the others know how many.
+    """
+    return "good" if far.isin(diagnosis.states.index).all() else "bad"
+
+
+def _titles(diagnosis: RunDiagnosis, causes: Sequence[Cause], tables: RunTests) -> list[str]:
+    """Return the title of the first cause, or of that of the only orbit; none if there is none."""
+    if causes:
+        return [causes[0].title]
+    title = str(tables.orbit_causes["title"].iloc[0]) if len(diagnosis.states) == 1 else ""
+    return [title] if title else []
+
+
+def _notable(diagnosis: RunDiagnosis, far: pd.Series) -> list[str]:
+    """Return sentences that list the orbits to look at: those `far` off or not simply good."""
+    careful = diagnosis.states.index[diagnosis.states == "warn"]
+    distrusted = diagnosis.states.index[diagnosis.states == "bad"]
+    return [
+        f"{words}: {_named(pd.Series(orbits))}."
+        for words, orbits in (
+            ("Numbers far from their expected values", far),
+            ("Solutions to be used with care", careful),
+            ("Solutions not to be trusted", distrusted),
+        )
+        if len(orbits)
+    ]
 
 
 def _tested(diagnosis: RunDiagnosis, found: Sequence[Test], tables: RunTests) -> list[str]:

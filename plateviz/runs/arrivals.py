@@ -129,20 +129,12 @@ class Arrivals:
         self._record(one for one in fitted if self._fitted_exposures.of(one) is None)
         files = {one: measurement_path(self._survey, one) for one in orbits if one not in fitted}
         self._before, self._states = self._states, {p: _state_of(p) for p in files.values()}
-        ready, remarks = [], self._misnamed()
-        for orbit in orbits:
-            if orbit in fitted:
-                found = self._changed(orbit)
-            else:
-                found = self._unfit(orbit) or self._copied(orbit, fitted)
-            if found is not None:
-                remarks.append(found)
-            elif orbit not in fitted and self._tried.get(orbit) != self._signature(orbit):
-                ready.append(orbit)
-        waiting = {one.orbit for one in remarks if one.kind == "waiting"}
-        return Look(
-            ready, remarks, all(self._has_settled(files[one]) for one in files if one in waiting)
-        )
+        found = {one: self._remark_on(one, fitted) for one in orbits}
+        remarks = [*self._misnamed(), *(remark for remark in found.values() if remark is not None)]
+        ready = [one for one in files if found[one] is None and not self._was_tried(one)]
+        waiting = {remark.orbit for remark in remarks if remark.kind == "waiting"}
+        is_settled = all(self._has_settled(path) for one, path in files.items() if one in waiting)
+        return Look(ready, remarks, is_settled)
 
     def try_orbits(self, orbits: Iterable[int]) -> None:
         """Record that orbits are fitted as they are; one is ready again once it has changed."""
@@ -156,7 +148,7 @@ class Arrivals:
             self._read()
         except InputError:
             return False
-        return self._tried.get(orbit) == self._signature(orbit)
+        return self._was_tried(orbit)
 
     def _read(self) -> list[int]:
         """Read what all orbits share, and return their ids; InputError if that is not whole."""
@@ -171,6 +163,16 @@ class Arrivals:
             self._copies = {one: group for group in repeated_orbits(table) for one in group}
             self._exposures_read = state
         return survey_orbits(self._survey)
+
+    def _remark_on(self, orbit: int, fitted: set[int]) -> Remark | None:
+        """Return what there is to say of an orbit: why it is not ready, or what has changed."""
+        if orbit in fitted:
+            return self._changed(orbit)
+        return self._unfit(orbit) or self._copied(orbit, fitted)
+
+    def _was_tried(self, orbit: int) -> bool:
+        """Return whether an orbit was tried with its files as they are at this look."""
+        return self._tried.get(orbit) == self._signature(orbit)
 
     def _unfit(self, orbit: int) -> Remark | None:
         """Return why an orbit that is not fitted cannot be fitted yet; None if it can."""

@@ -14,6 +14,7 @@ from plateviz.dashboard.navigation.lost_run import look_for_run
 from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.serving.model_search import one_search
 from plateviz.dashboard.session.expected_what_ifs import ExpectedWhatIfs
+from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.shown_address import SHOWN
 from plateviz.dashboard.views.pages.pages import Pages
 from plateviz.solving.job import Job
@@ -158,25 +159,38 @@ class Ticker:
             session.judging.look()
             self._pages.draw_due()
         job = session.job
+        self._watch(job)
+        if self._pages.is_pending or session.judging.is_any_pending:
+            self._tick_later(session)
+        elif self._pages.is_due or self._pages.complete(_is_brief(job)):
+            self.wake()
+        elif job is None:
+            self._come_to_rest(self._navigation)
+
+    def _watch(self, job: Job | None) -> None:
+        """Follow a job that is new."""
         if job is not None and job is not self._watched:
             self._watched = job
             job.watch(self._call)
             self._start_looking()
-        is_pending = self._pages.is_pending or session.judging.is_any_pending
-        if is_pending and self._document is not None:
-            # Another thread is at work, and would wait for a page that asks without a pause.
-            self._is_to_tick = True
-            self._later = self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
-            session.store.background.listen(self._call)
-        elif is_pending or self._pages.is_due or self._pages.complete(_is_brief(job)):
+
+    def _tick_later(self, session: Session) -> None:
+        """Tick again in a while: another thread is at work, and would wait for a page that asks."""
+        if self._document is None:
             self.wake()
-        elif job is None:
-            if self._progress.running:
-                self._progress.stop()
-            self._navigation.expect_orbit()
-            if self._expected is not None and self._rest is not None:
-                self._expected.ask()
-                self._rest.begin()
+            return
+        self._is_to_tick = True
+        self._later = self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
+        session.store.background.listen(self._call)
+
+    def _come_to_rest(self, navigation: Navigation) -> None:
+        """Stop looking, and prepare what a person is likely to do next."""
+        if self._progress.running:
+            self._progress.stop()
+        navigation.expect_orbit()
+        if self._expected is not None and self._rest is not None:
+            self._expected.ask()
+            self._rest.begin()
 
 
 def _is_brief(job: Job | None) -> bool:

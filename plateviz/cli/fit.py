@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from solver.data.orbit import OrbitData
     from solver.data.result import FitResult
     from solver.fit import OrbitFitter
+    from solver.results.agreement import Comparison
 
 
 class FitRequest(NamedTuple):
@@ -33,12 +34,33 @@ class FitRequest(NamedTuple):
     overwrite: bool
     accept: bool
 
+    def checkpoint_of(self, engine: str) -> Path | None:
+        """Return the file from which a fit by an engine resumes; None for all but svi."""
+        return self.checkpoint if engine == "svi" else None
+
+
+class _Fitted(NamedTuple):
+    """The fit by one engine.
+
+    Attributes
+    ----------
+    result : as it is written
+    summary : of the result, with the times, the output and the comparison of orders
+    output : file of the result
+    """
+
+    result: "FitResult"
+    summary: dict[str, Any]
+    output: Path
+
 
 def run_fit(request: FitRequest, as_json: bool) -> None:
     """Fit, write and print.
 
     Raises
     ------
+    InputError
+        If an input or an output is not as expected.
     FitError
         If a fit has not converged or the engines disagree.
     DistrustError
@@ -46,6 +68,30 @@ def run_fit(request: FitRequest, as_json: bool) -> None:
     """
     start = time.perf_counter()
     keep_memory()
+    outputs = _checked_outputs(request)
+    fits = {}
+    with reporting("reading the orbit") as reporter:
+        focal_plane, data = request.files.read_instrument(), request.files.read(request.orbit)
+        read = time.perf_counter() - start
+        reporter.say("loading the solver")
+        keep_compilations()
+        from solver.fit import OrbitFitter
+
+        fitter = OrbitFitter(data, focal_plane)
+        for engine, output in outputs.items():
+            result = with_verdict(_fit(fitter, data, request, engine, reporter))
+            reporter.say("writing the result")
+            seconds = {"read": read, **dict(result.summary["seconds"])}
+            seconds["write"] = _write(result, output, request, engine)
+            summary = {**result.summary, "seconds": seconds, "output": str(output)}
+            fits[engine] = _Fitted(result, summary | _orders(result), output)
+    _report(fits, as_json)
+    if not request.accept:
+        _require_trust(fits)
+
+
+def _checked_outputs(request: FitRequest) -> dict[str, Path]:
+    """Return engine -> result file; `InputError` if one of the outputs cannot be written."""
     outputs = {engine: _output(request, engine) for engine in request.engines}
     inputs = request.files.inputs()
     for output in outputs.values():
@@ -53,35 +99,11 @@ def run_fit(request: FitRequest, as_json: bool) -> None:
     if request.checkpoint is not None:
         # One that exists is resumed from.
         check_output(request.checkpoint, (), [*inputs, *outputs.values()], overwrite=True)
-    if request.checkpoint is not None and "svi" not in request.engines:
-        raise InputError(
-            f"--checkpoint: expected the engine svi, found {', '.join(request.engines)}"
-        )
-    summaries, results = {}, {}
-    with reporting("reading the orbit") as reporter:
-        focal_plane, data = request.files.read_instrument(), request.files.read(request.orbit)
-        read = time.perf_counter() - start
-        reporter.say("loading the solver")
-        keep_compilations()
-        from solver.fit import OrbitFitter
-        from solver.io.result import write_result
-
-        fitter = OrbitFitter(data, focal_plane)
-        for engine, output in outputs.items():
-            result = with_verdict(_fit(fitter, data, request, engine, reporter))
-            reporter.say("writing the result")
-            fitted = time.perf_counter()
-            write_result(result, output, request.overwrite)
-            if engine == "svi" and request.checkpoint is not None:
-                request.checkpoint.unlink(missing_ok=True)
-            seconds = {"read": read, **dict(result.summary["seconds"])}
-            seconds["write"] = time.perf_counter() - fitted
-            summaries[engine] = {**result.summary, "seconds": seconds, "output": str(output)}
-            summaries[engine] |= _orders(result)
-            results[engine] = result
-    _report(summaries, results, outputs, as_json)
-    if not request.accept:
-        _require_trust(summaries)
+        if "svi" not in request.engines:
+            raise InputError(
+                f"--checkpoint: expected the engine svi, found {', '.join(request.engines)}"
+            )
+    return outputs
 
 
 def _output(request: FitRequest, engine: str) -> Path:
@@ -102,15 +124,27 @@ def _fit(
     # The comparison of orders does not depend on the engine.
     compared = request.settings.compare_orders and engine == request.engines[0]
     settings = request.settings.with_(engine=engine, compare_orders=compared)
-    resumption = None
-    if engine == "svi" and request.checkpoint is not None:
+    resumption, checkpoint = None, request.checkpoint_of(engine)
+    if checkpoint is not None:
         from solver.engines.checkpoint import resume_from
 
         instrument = request.files.read_instrument()
-        resumption = resume_from(request.checkpoint, data, instrument, settings)
+        resumption = resume_from(checkpoint, data, instrument, settings)
     return fitter.fit(
         settings, lambda it: reporter.say(f"{engine}: {COUNTED[engine]} {it.iteration}"), resumption
     )
+
+
+def _write(result: "FitResult", output: Path, request: FitRequest, engine: str) -> float:
+    """Write a result, which makes the checkpoint needless; return the time it took, s."""
+    from solver.io.result import write_result
+
+    begin = time.perf_counter()
+    write_result(result, output, request.overwrite)
+    checkpoint = request.checkpoint_of(engine)
+    if checkpoint is not None:
+        checkpoint.unlink(missing_ok=True)
+    return time.perf_counter() - begin
 
 
 def _orders(result: "FitResult") -> dict[str, Any]:
@@ -125,43 +159,60 @@ def _orders(result: "FitResult") -> dict[str, Any]:
     return {"orders": plain.to_dict("records"), "preferred_order": order_verdict(table)}
 
 
-def _require_trust(summaries: Mapping[str, dict[str, Any]]) -> None:
-    for engine, summary in summaries.items():
-        if summary["verdict"]["state"] == "bad":
-            raise DistrustError(
-                f"orbit {summary['orbit']}, {engine}: the fit converged, but its solution should "
-                "not be trusted as it is; it is written, and --accept ends with exit code 0"
-            )
-
-
-def _report(
-    summaries: Mapping[str, dict[str, Any]],
-    results: Mapping[str, "FitResult"],
-    outputs: Mapping[str, Path],
-    as_json: bool,
-) -> None:
-    first = next(iter(summaries.values()))
-    rows = []
-    if len(results) > 1:
-        from solver.results.agreement import compare
-
-        rows = compare(results)
+def _report(fits: Mapping[str, _Fitted], as_json: bool) -> None:
+    """Print the fits; `FitError` if one has not converged, or if they disagree."""
+    rows = _agreement(fits)
     if as_json:
-        agreement = [{**row._asdict(), "agrees": row.agrees} for row in rows]
-        more = {"engines": summaries, "agreement": agreement} if rows else {}
-        print_json({**first, **more})
+        _print_json(fits, rows)
     else:
-        for engine, summary in summaries.items():
-            print_fit(summary, outputs[engine])
-            if "orders" in summary:
-                print_orders(summary["orders"], summary["preferred_order"])
-        print_agreement(rows)
-    for summary in summaries.values():
+        _print_text(fits, rows)
+    _require_convergence(fits)
+    _require_agreement(rows)
+
+
+def _agreement(fits: Mapping[str, _Fitted]) -> "list[Comparison]":
+    """Return how the engines compare with the first one; no rows for a single engine."""
+    if len(fits) == 1:
+        return []
+    from solver.results.agreement import compare
+
+    return compare({engine: fit.result for engine, fit in fits.items()})
+
+
+def _print_json(fits: Mapping[str, _Fitted], rows: "list[Comparison]") -> None:
+    summaries = {engine: fit.summary for engine, fit in fits.items()}
+    agreement = [{**row._asdict(), "agrees": row.agrees} for row in rows]
+    more = {"engines": summaries, "agreement": agreement} if rows else {}
+    print_json({**next(iter(summaries.values())), **more})
+
+
+def _print_text(fits: Mapping[str, _Fitted], rows: "list[Comparison]") -> None:
+    for fit in fits.values():
+        print_fit(fit.summary, fit.output)
+        if "orders" in fit.summary:
+            print_orders(fit.summary["orders"], fit.summary["preferred_order"])
+    print_agreement(rows)
+
+
+def _require_convergence(fits: Mapping[str, _Fitted]) -> None:
+    for summary in (fit.summary for fit in fits.values()):
         if not summary["converged"]:
             raise FitError(
                 f"orbit {summary['orbit']} has not converged with {summary['engine']}: "
                 f"{summary['reason']}"
             )
+
+
+def _require_agreement(rows: "list[Comparison]") -> None:
     disagreements = [f"{row.engine}, {row.what}: {row.found:.3g}" for row in rows if not row.agrees]
     if disagreements:
         raise FitError(f"the engines {', '.join(ENGINES)} do not agree: {'; '.join(disagreements)}")
+
+
+def _require_trust(fits: Mapping[str, _Fitted]) -> None:
+    for engine, fit in fits.items():
+        if fit.summary["verdict"]["state"] == "bad":
+            raise DistrustError(
+                f"orbit {fit.summary['orbit']}, {engine}: the fit converged, but its solution "
+                "should not be trusted as it is; it is written, and --accept ends with exit code 0"
+            )

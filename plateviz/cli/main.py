@@ -226,11 +226,12 @@ def survey(
 ) -> None:
     """Fit every orbit of a survey; an interrupted run resumes."""
     from plateviz.cli.output import telling_if_interrupted
-    from plateviz.cli.survey import parse_orbits, run_survey
+    from plateviz.cli.survey import SurveyRequest, parse_orbits, run_survey
 
     chosen, numbers = options.fit_settings(settings), parse_orbits(orbits)
+    request = SurveyRequest(directory, run, chosen, numbers, workers, scheduler, repair, accept)
     with telling_if_interrupted("the same command continues with the orbits that are missing"):
-        run_survey(directory, run, chosen, numbers, workers, scheduler, repair, accept, as_json)
+        run_survey(request, as_json)
 
 
 app.command()(watch)

@@ -2,15 +2,19 @@
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
 from plateviz.cli.output import print_json
 from plateviz.cli.survey_progress import fit_and_report, require_all, require_trust
 from plateviz.tables.counts import orbits_text
-from plateviz.verdict.verdict import as_plain
+from plateviz.verdict.verdict import Verdict, as_plain
 from solver.data.settings import FitSettings
 from solver.errors import InputError
+
+if TYPE_CHECKING:
+    from plateviz.runs.fit_survey import SurveyOutcome
 
 # More than any survey has.
 _MOST_ORBITS = 1_000_000
@@ -41,61 +45,78 @@ def parse_orbits(text: str | None) -> list[int] | None:
     return orbits
 
 
-def run_survey(
-    survey: Path,
-    name: str,
-    settings: FitSettings,
-    orbits: list[int] | None,
-    workers: int | None,
-    scheduler: str | None,
-    repair: bool,
-    accept: bool,
-    as_json: bool,
-) -> None:
+class SurveyRequest(NamedTuple):
+    """Arguments of `plateviz survey`, named as those of `fit_survey`."""
+
+    survey: Path
+    name: str
+    settings: FitSettings
+    orbits: list[int] | None
+    workers: int | None
+    scheduler: str | None
+    repair: bool
+    accept: bool
+
+
+def run_survey(request: SurveyRequest, as_json: bool) -> None:
     """Fit the missing orbits and print the outcome.
 
     Raises
     ------
+    InputError
+        If the request or the survey is not as expected.
     FitError
         If orbits failed.
     DistrustError
         If the run, or solutions of its orbits, should not be trusted, unless the request accepts
         that.
     """
-    if workers is not None and scheduler is not None:
+    if request.workers is not None and request.scheduler is not None:
         raise InputError(
             "--workers: expected none with --scheduler, which has its own workers, found both"
         )
-    report = fit_and_report(survey, name, settings, orbits, workers, scheduler, repair)
+    outcome = fit_and_report(
+        request.survey,
+        request.name,
+        request.settings,
+        request.orbits,
+        request.workers,
+        request.scheduler,
+        request.repair,
+    )
     # Imported here, because it takes a while, and a mistake in the request should be told at once.
     from plateviz.runs.queries import SurveyRun
     from plateviz.runs.run_tables import read_run_verdict
 
-    verdict = read_run_verdict(SurveyRun(report.run))
+    verdict = read_run_verdict(SurveyRun(outcome.run))
     if as_json:
-        print_json(
-            {
-                "output": str(report.run.directory),
-                "complete": report.run.is_complete,
-                "fitted": report.fitted,
-                "kept": report.kept,
-                "failed": {str(orbit): reason for orbit, reason in report.failed.items()},
-                "distrusted": {str(orbit): why for orbit, why in report.distrusted.items()},
-                "seconds": report.seconds,
-                "verdict": as_plain(verdict),
-            }
-        )
+        print_json(_as_json(outcome, verdict))
     else:
-        counts = f"{orbits_text(len(report.fitted))} fitted"
-        counts += f", {len(report.kept)} fitted before" if report.kept else ""
-        state = "complete" if report.run.is_complete else "not complete yet"
-        typer.echo(
-            f"{report.run.directory}: {counts}, in {report.seconds:.1f} s; the run is {state}"
-        )
-        typer.echo(verdict.headline)
-        if verdict.state != "good":
-            for sentence in [*verdict.reasons, *verdict.notable]:
-                typer.echo(f"  {sentence}")
-    require_all(report)
-    if not accept:
-        require_trust(report, verdict)
+        _print_text(outcome, verdict)
+    require_all(outcome)
+    if not request.accept:
+        require_trust(outcome, verdict)
+
+
+def _as_json(outcome: "SurveyOutcome", verdict: Verdict) -> dict[str, object]:
+    return {
+        "output": str(outcome.run.directory),
+        "complete": outcome.run.is_complete,
+        "fitted": outcome.fitted,
+        "kept": outcome.kept,
+        "failed": {str(orbit): reason for orbit, reason in outcome.failed.items()},
+        "distrusted": {str(orbit): why for orbit, why in outcome.distrusted.items()},
+        "seconds": outcome.seconds,
+        "verdict": as_plain(verdict),
+    }
+
+
+def _print_text(outcome: "SurveyOutcome", verdict: Verdict) -> None:
+    counts = f"{orbits_text(len(outcome.fitted))} fitted"
+    counts += f", {len(outcome.kept)} fitted before" if outcome.kept else ""
+    state = "complete" if outcome.run.is_complete else "not complete yet"
+    typer.echo(f"{outcome.run.directory}: {counts}, in {outcome.seconds:.1f} s; the run is {state}")
+    typer.echo(verdict.headline)
+    if verdict.state != "good":
+        for sentence in [*verdict.reasons, *verdict.notable]:
+            typer.echo(f"  {sentence}")

@@ -51,28 +51,28 @@ def _progress_text(progress: "Progress", elapsed: float) -> str:
     return f"{text}, {duration_text(left)} left"
 
 
-def require_all(report: "SurveyOutcome") -> None:
+def require_all(outcome: "SurveyOutcome") -> None:
     """Raise `FitError` with the reasons if orbits failed."""
-    if report.failed:
-        raise FitError(_failure_message(report.failed))
+    if outcome.failed:
+        raise FitError(_failure_message(outcome.failed))
 
 
-def require_trust(report: "SurveyOutcome", verdict: Verdict) -> None:
+def require_trust(outcome: "SurveyOutcome", verdict: Verdict) -> None:
     """Raise `DistrustError` if the run, or the solutions of some orbits, should not be trusted."""
-    orbits = list(map(str, report.distrusted))
+    orbits = list(map(str, outcome.distrusted))
     if orbits:
         listed = ", ".join(orbits[:_MAX_LISTED])
         listed += f" and {len(orbits) - _MAX_LISTED} more" if len(orbits) > _MAX_LISTED else ""
         raise DistrustError(
             f"the solutions of {orbits_text(len(orbits))} should not be trusted as they are: "
-            f"{listed}; they are written. `plateviz report {quote(str(report.run.survey))} "
-            f"--run {report.run.name} --orbit {orbits[0]} -o report.html` says why, and --accept "
+            f"{listed}; they are written. `plateviz report {quote(str(outcome.run.survey))} "
+            f"--run {outcome.run.name} --orbit {orbits[0]} -o report.html` says why, and --accept "
             "ends with exit code 0"
         )
     if verdict.state == "bad":
         raise DistrustError(
-            f"{verdict.headline} It is written. `plateviz report {quote(str(report.run.survey))} "
-            f"--run {report.run.name} -o report.html` says why, and --accept ends with exit code 0"
+            f"{verdict.headline} It is written. `plateviz report {quote(str(outcome.run.survey))} "
+            f"--run {outcome.run.name} -o report.html` says why, and --accept ends with exit code 0"
         )
 
 

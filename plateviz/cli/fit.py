@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from solver.data.orbit import OrbitData
     from solver.data.result import FitResult
     from solver.fit import OrbitFitter
-    from solver.results.agreement import Comparison
+    from solver.results.agreement import Agreement
 
 
 class FitRequest(NamedTuple):
@@ -170,23 +170,23 @@ def _report(fits: Mapping[str, _Fitted], as_json: bool) -> None:
     _require_agreement(rows)
 
 
-def _agreement(fits: Mapping[str, _Fitted]) -> "list[Comparison]":
+def _agreement(fits: Mapping[str, _Fitted]) -> "list[Agreement]":
     """Return how the engines compare with the first one; no rows for a single engine."""
     if len(fits) == 1:
         return []
-    from solver.results.agreement import compare
+    from solver.results.agreement import compare_engines
 
-    return compare({engine: fit.result for engine, fit in fits.items()})
+    return compare_engines({engine: fit.result for engine, fit in fits.items()})
 
 
-def _print_json(fits: Mapping[str, _Fitted], rows: "list[Comparison]") -> None:
+def _print_json(fits: Mapping[str, _Fitted], rows: "list[Agreement]") -> None:
     summaries = {engine: fit.summary for engine, fit in fits.items()}
     agreement = [{**row._asdict(), "agrees": row.agrees} for row in rows]
     more = {"engines": summaries, "agreement": agreement} if rows else {}
     print_json({**next(iter(summaries.values())), **more})
 
 
-def _print_text(fits: Mapping[str, _Fitted], rows: "list[Comparison]") -> None:
+def _print_text(fits: Mapping[str, _Fitted], rows: "list[Agreement]") -> None:
     for fit in fits.values():
         print_fit(fit.summary, fit.output)
         if "orders" in fit.summary:
@@ -203,7 +203,7 @@ def _require_convergence(fits: Mapping[str, _Fitted]) -> None:
             )
 
 
-def _require_agreement(rows: "list[Comparison]") -> None:
+def _require_agreement(rows: "list[Agreement]") -> None:
     disagreements = [f"{row.engine}, {row.what}: {row.found:.3g}" for row in rows if not row.agrees]
     if disagreements:
         raise FitError(f"the engines {', '.join(ENGINES)} do not agree: {'; '.join(disagreements)}")

@@ -16,7 +16,7 @@ from solver.data.settings import COUNTED
 from solver.units import MPIX_PER_PIX
 
 if TYPE_CHECKING:
-    from solver.results.agreement import Comparison
+    from solver.results.agreement import Agreement
 
 
 @contextmanager
@@ -121,7 +121,7 @@ def _number(value: float | None, form: str) -> str:
     return "-" if value is None else f"{prefix} {value:{form}}" if prefix else f"{value:{form}}"
 
 
-def print_agreement(rows: Iterable["Comparison"]) -> None:
+def print_agreement(rows: Iterable["Agreement"]) -> None:
     """Print the comparison of the engines, one line per number."""
     for row in rows:
         verdict = "agrees" if row.agrees else "DOES NOT AGREE"

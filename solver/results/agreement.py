@@ -15,7 +15,7 @@ _CHANCE = 1e-3
 _AXES = ("ra", "dec")
 
 
-class Comparison(NamedTuple):
+class Agreement(NamedTuple):
     """One number that compares an engine with gauss-newton, and its limit."""
 
     engine: str
@@ -29,7 +29,7 @@ class Comparison(NamedTuple):
         return bool(self.found <= self.limit)
 
 
-def compare(results: Mapping[str, FitResult]) -> list[Comparison]:
+def compare_engines(results: Mapping[str, FitResult]) -> list[Agreement]:
     """Compare the results of the other engines with that of gauss-newton.
 
     Parameters
@@ -37,46 +37,35 @@ def compare(results: Mapping[str, FitResult]) -> list[Comparison]:
     results : results by engine, of the same orbit and otherwise the same settings
     """
     exact = results["gauss-newton"]
-    rows = []
-    if "svi" in results:
-        found = results["svi"]
-        rows += [
-            Comparison(
-                "svi",
-                "largest shift of a source, marginal sigmas",
-                float(np.abs(_shifts(found, exact)).max()),
-                _MEANS,
-            ),
-            Comparison(
-                "svi",
-                "largest relative change of a conditional sigma",
-                float(np.abs(_ratios(found, exact, "conditional") - 1.0).max()),
-                _SIGMAS,
-            ),
-        ]
-    if "nuts" in results:
-        found = results["nuts"]
-        n_means, n_sigmas = (
-            float(found.summary[f"smallest_effective_samples{kind}"]) for kind in ("", "_of_sigmas")
-        )
-        shifts = _shifts(found, exact) * np.sqrt(n_means)
-        ratios = (_ratios(found, exact, "marginal") - 1.0) * np.sqrt(2.0 * n_sigmas)
-        limit = float(norm.isf(0.5 * _CHANCE / shifts.size))
-        rows += [
-            Comparison(
-                "nuts",
-                "largest shift of a source, Monte-Carlo errors",
-                float(np.abs(shifts).max()),
-                limit,
-            ),
-            Comparison(
-                "nuts",
-                "largest change of a marginal sigma, Monte-Carlo errors",
-                float(np.abs(ratios).max()),
-                limit,
-            ),
-        ]
-    return rows
+    rules = {"svi": _of_svi, "nuts": _of_nuts}
+    return [
+        row
+        for engine, rule in rules.items()
+        if engine in results
+        for row in rule(results[engine], exact)
+    ]
+
+
+def _of_svi(found: FitResult, exact: FitResult) -> list[Agreement]:
+    shift = float(np.abs(_shifts(found, exact)).max())
+    change = float(np.abs(_ratios(found, exact, "conditional") - 1.0).max())
+    return [
+        Agreement("svi", "largest shift of a source, marginal sigmas", shift, _MEANS),
+        Agreement("svi", "largest relative change of a conditional sigma", change, _SIGMAS),
+    ]
+
+
+def _of_nuts(found: FitResult, exact: FitResult) -> list[Agreement]:
+    n_means, n_sigmas = (
+        float(found.summary[f"smallest_effective_samples{kind}"]) for kind in ("", "_of_sigmas")
+    )
+    shifts = _shifts(found, exact) * np.sqrt(n_means)
+    changes = (_ratios(found, exact, "marginal") - 1.0) * np.sqrt(2.0 * n_sigmas)
+    limit = float(norm.isf(0.5 * _CHANCE / shifts.size))
+    return [
+        Agreement("nuts", f"largest {what}, Monte-Carlo errors", float(np.abs(of_all).max()), limit)
+        for what, of_all in (("shift of a source", shifts), ("change of a marginal sigma", changes))
+    ]
 
 
 def _shifts(found: FitResult, exact: FitResult) -> np.ndarray:
@@ -91,5 +80,6 @@ def _shifts(found: FitResult, exact: FitResult) -> np.ndarray:
 
 
 def _ratios(found: FitResult, exact: FitResult, kind: str) -> np.ndarray:
+    """Return the ratios of the sigmas of all coordinates; `kind` is conditional or marginal."""
     names = [f"sigma_{axis}_{kind}" for axis in _AXES]
     return np.concatenate([found.sources[name] / exact.sources[name] for name in names])

@@ -13,7 +13,7 @@ from solver.data.settings import FitSettings
 from solver.engines.nuts import Chains, _mixing
 from solver.errors import CancelledError
 from solver.fit import fit_orbit
-from solver.results.agreement import compare
+from solver.results.agreement import compare_engines
 from tests.solver.small_orbit import make_orbit
 
 ENGINES = {
@@ -36,7 +36,7 @@ def results(optimised):
 @pytest.mark.full
 @pytest.mark.slow
 def test_engines_agree(results):
-    rows = compare(results)
+    rows = compare_engines(results)
     assert {row.engine for row in rows} == {"svi", "nuts"}
     for row in rows:
         assert row.agrees, row
@@ -60,7 +60,7 @@ def test_wrong_results_do_not_agree(results):
         offset_ra=exact.sources["offset_ra"] + exact.sources["sigma_ra_marginal"],
     )
     wrong = {name: replace(result, sources=sources) for name, result in results.items()}
-    assert not any(row.agrees for row in compare({**wrong, "gauss-newton": exact}))
+    assert not any(row.agrees for row in compare_engines({**wrong, "gauss-newton": exact}))
 
 
 @pytest.mark.full

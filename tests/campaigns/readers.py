@@ -16,8 +16,6 @@ from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.runs.load_tables import survey_tables
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
 from plateviz.runs.run import Run
-from plateviz.solving.job import Job
-from plateviz.solving.made_solutions import MadeSolutions
 from plateviz.solving.origin import SurveyFolder
 from solver.data.columns import Table, numpy_dtype
 from solver.data.instrument import read_instrument
@@ -31,6 +29,7 @@ from solver.io.survey import REFERENCE, TRUTH_FILE, read_survey_orbit, read_surv
 from tests.campaigns import mutators, seed_files
 from tests.campaigns.mutators import Mutator
 from tests.campaigns.seed_files import ORBITS, RUN
+from tests.plateviz.dashboard.fake_store import FakeStore
 from tests.solver.io_samples import FIRST_ID
 
 # Names of exceptions, and other internals of Python.
@@ -192,39 +191,20 @@ def _survey_instrument(folder: Path) -> Values:
     return {"instrument": SurveyFolder(str(folder)).read_instrument()}
 
 
-class _Judge:
-    """Has judged every solution; of a page's solutions the campaign reads no verdict."""
-
-    def has_judged(self, _: object) -> bool:
-        return True
-
-
-class _Store:
-    """The store of a dashboard over a run, without a solver."""
+class MutatedStore(FakeStore):
+    """A store over a survey whose files are mutated, without a solver."""
 
     title = "mutated"
 
     def __init__(self, folder: Path) -> None:
+        super().__init__(result=None)
         self.origin = SurveyFolder(str(folder))
         self.orbits = self.origin.orbits()
         self.instrument = self.origin.read_instrument()
-        self.made, self.kept = MadeSolutions(), KeptSolutions(self.origin.solutions)
-        self.judge = _Judge()
+        self.kept = KeptSolutions(self.origin.solutions)
 
     def runs(self) -> list[SurveyRun]:
         return survey_runs(Path(self.origin.directory))
-
-    def request(self, *request: object) -> Job:
-        return Job({"do": "fit"})
-
-    def prepare(self, *request: object) -> None:
-        pass
-
-    def leave(self, orbit: object) -> None:
-        pass
-
-    def cancel(self, job: Job) -> None:
-        job.cancel()
 
 
 def _run(folder: Path) -> SurveyRun:
@@ -259,7 +239,7 @@ def _changes(folder: Path) -> Values:
 
 def _page(folder: Path) -> Values:
     """Open the page of a source; why it is not shown is a message of the page."""
-    page = Navigation(Session(_Store(folder)))  # type: ignore[arg-type]
+    page = Navigation(Session(MutatedStore(folder)))  # type: ignore[arg-type]
     page.begin({"source": str(FIRST_ID)})
     if page.found is None:
         check_words(page.message, str(folder))
@@ -287,7 +267,7 @@ _RUN_READERS: dict[str, Callable[[Path], Values]] = {
 
 def _open_address(folder: Path) -> Values:
     """Open a page by its address, and again by the address that it then shows."""
-    store = _Store(folder)
+    store = MutatedStore(folder)
     # As the server decodes it.
     query = parse_qs_bytes((folder / "address").read_bytes(), keep_blank_values=True)
     requested = {name: values[0].decode("utf-8", "replace") for name, values in query.items()}
@@ -315,7 +295,7 @@ def _is_same_id(text: str, found: str | None) -> bool:
     return is_id and found is not None and int(text) == int(found)
 
 
-def _shown(store: _Store, address: Mapping[str, str]) -> dict[str, str]:
+def _shown(store: MutatedStore, address: Mapping[str, str]) -> dict[str, str]:
     """Return the address of a page that was opened by one, with its orbit on the screen."""
     navigation = Navigation(Session(store))  # type: ignore[arg-type]
     navigation.begin(address)

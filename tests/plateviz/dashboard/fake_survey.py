@@ -6,7 +6,7 @@ from pathlib import Path
 from plateviz.runs.queries import Written
 from plateviz.solving.origin import SurveyFolder
 from solver.data.settings import FitSettings
-from tests.plateviz.dashboard.session.test_session import FakeStore
+from tests.plateviz.dashboard.fake_store import FakeStore
 
 SOURCE_COUNTS = ("source_id", "is_reference", "is_artificial", "n_orbits", "n_obs")
 

@@ -13,8 +13,8 @@ from plateviz.solving.judge import Judge
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_pool import Solver
 from tests.plateviz.cli.test_demo import DeadSolver, NoSolver
+from tests.plateviz.dashboard.fake_store import FakeStore
 from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
-from tests.plateviz.dashboard.session.test_session import FakeStore
 from tests.plateviz.dashboard.session.test_taken_up_fit import SharedStore
 from tests.plateviz.dashboard.views.panes.test_compare_runs import ComparedRun
 from tests.plateviz.dashboard.views.test_states import LostRun

@@ -10,7 +10,8 @@ from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.controls.fit_controls import width_input
 from solver.data.parameters import BY_NAME
 from solver.data.settings import FitSettings
-from tests.plateviz.dashboard.session.test_session import FakeStore, finish, of_run
+from tests.plateviz.dashboard.fake_store import FakeStore
+from tests.plateviz.dashboard.session.test_session import finish, of_run
 
 
 @pytest.fixture

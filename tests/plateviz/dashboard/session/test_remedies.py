@@ -11,7 +11,8 @@ from plateviz.verdict.causes import Cause
 from plateviz.verdict.verdict import Verdict
 from solver.data.settings import FitSettings
 from solver.data.subset import Subset
-from tests.plateviz.dashboard.session.test_session import FakeStore, finish
+from tests.plateviz.dashboard.fake_store import FakeStore
+from tests.plateviz.dashboard.session.test_session import finish
 
 DRIFT = FitSettings(drift=2)
 

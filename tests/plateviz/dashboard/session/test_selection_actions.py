@@ -12,8 +12,9 @@ from plateviz.runs.kept_selections import KeptSelections
 from solver.data.settings import FitSettings
 from solver.data.subset import NOTHING, Subset
 from solver.errors import InputError
+from tests.plateviz.dashboard.fake_store import FakeStore
 from tests.plateviz.dashboard.fake_survey import SurveyStore
-from tests.plateviz.dashboard.session.test_session import FakeStore, finish
+from tests.plateviz.dashboard.session.test_session import finish
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.shown_part import ALL, ShownPart
 from solver.data.instrument import MINI_MOCK
 from solver.errors import InputError
-from tests.plateviz.dashboard.session.test_session import FakeStore
+from tests.plateviz.dashboard.fake_store import FakeStore
 
 
 def test_address_restores_what_is_shown(fit_result):

@@ -8,7 +8,7 @@ from plateviz.dashboard.views.cards.figure import FigureView
 from plateviz.dashboard.views.cards.point_actions import session_actions
 from plateviz.plots.gallery import diagnostics
 from solver.data.subset import Subset
-from tests.plateviz.dashboard.session.test_session import FakeStore
+from tests.plateviz.dashboard.fake_store import FakeStore
 from tests.plateviz.dashboard.views.cards.test_figure import come_near, figure_of, plot
 
 EMPTY = {"type": "rect", "x0": 5.0, "x1": 6.0, "y0": 0.0, "y1": 2.0}

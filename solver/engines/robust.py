@@ -20,7 +20,7 @@ from solver.data.settings import FitSettings
 from solver.engines.gauss_newton import Iteration, Mode, find_mode
 from solver.linear.covariances import marginal_covariance
 from solver.linear.leverage import of_slots
-from solver.linear.normal_equations import chunks
+from solver.linear.linearised_chunks import linearised_chunks
 from solver.problem.problem import Problem, of_rows
 
 # Degrees of freedom of Student's t: few, so that outliers have little weight.
@@ -148,8 +148,8 @@ def _weighted(problem: Problem, weight: Float[np.ndarray, " obs"]) -> Problem:
 
 
 def whitened_residuals(problem: Problem, mode: Mode) -> Float[np.ndarray, "obs 2"]:
-    """Return the residuals over their uncertainties, in working order."""
-    residuals = [of_slots(c.residual) for c in chunks(problem, mode.theta, mode.sources)]
+    """Return measured minus predicted over sigma at a mode, in working order."""
+    residuals = [of_slots(c.residual) for c in linearised_chunks(problem, mode.theta, mode.sources)]
     return np.concatenate(residuals)[problem.measurements.tiles.place]
 
 
@@ -159,7 +159,7 @@ def _outliers(problem: Problem, mode: Mode, found: Bool[np.ndarray, " obs"]) -> 
     outlier_problem = of_rows(problem, found)
     place = outlier_problem.measurements.tiles.place
     whitened, jacobian = [], []
-    for chunk in chunks(outlier_problem, mode.theta, mode.sources):
+    for chunk in linearised_chunks(outlier_problem, mode.theta, mode.sources):
         whitened.append(of_slots(chunk.residual))
         jacobian.append(np.stack([of_slots(pair) for pair in chunk.source], axis=-1))
     residual, by_source = np.concatenate(whitened)[place], np.concatenate(jacobian)[place]

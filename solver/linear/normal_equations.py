@@ -7,18 +7,16 @@ eliminate (`solver.linear.source_elimination`). Priors are added there, so that 
 stay valid when the priors change.
 """
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from solver.linear.chi2 import Gradient
 from solver.linear.derivative_products import TiledDerivatives, one_by_one, tiled_derivatives
-from solver.linear.linearise import Linearised, linearise, turning
+from solver.linear.linearised_chunks import linearised_chunks
 from solver.linear.tile_sums import TileSums
 from solver.linear.walk_sums import add_cross_walk, add_walks
 from solver.model.forward import Index
@@ -26,7 +24,6 @@ from solver.problem.parameter_vector import VectorLayout
 from solver.problem.problem import Problem
 from solver.problem.source_blocks import SourceBlocks
 from solver.problem.tiles import Gathering
-from solver.runtime.interruption import give_way
 from solver.runtime.threads import one_blas_thread
 
 
@@ -70,35 +67,6 @@ class NormalEquations:
     by_detector: DetectorSums | None
 
 
-def chunks(
-    problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
-) -> Iterator[Linearised]:
-    """Linearise the measurements a chunk of tiles at a time.
-
-    JAX computes the next chunk while the caller works on this one.
-    """
-    launched = _launched(problem, theta, sources)
-    current = next(launched)
-    for ahead in launched:
-        give_way()
-        yield jax.tree.map(np.asarray, current)
-        current = ahead
-    give_way()
-    yield jax.tree.map(np.asarray, current)
-
-
-def _launched(
-    problem: Problem, theta: Float[np.ndarray, " calib"], sources: Float[np.ndarray, "src 2"]
-) -> Iterator[Linearised]:
-    """Yield each chunk while JAX still computes it."""
-    # Transferred once, not with every chunk.
-    offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
-    turn, n_padded = turning(offsets, geometry), problem.geometry.sizes["coef"]
-    for i in range(len(problem.measurements.tiles.measured)):
-        chunk = linearise(turn, offsets, geometry, *problem.measurements.tiles.chunk(i))
-        yield chunk.with_terms(problem.layout.n_coef, n_padded)
-
-
 def accumulate(
     problem: Problem,
     theta: Float[np.ndarray, " calib"],
@@ -122,7 +90,7 @@ def accumulate(
     sums = TileSums.empty(index.source.shape, touched.shape[-1], n_coef, layout.n_walk)
     with one_blas_thread(), ThreadPoolExecutor(max_workers=1) as helper:
         pending = helper.submit(lambda: None)
-        for i, chunk in enumerate(chunks(problem, theta, sources)):
+        for i, chunk in enumerate(linearised_chunks(problem, theta, sources)):
             chunk_index, rows = Index(*(column[i] for column in index)), tiled_derivatives(chunk)
             sums.keep_slots(chunk, rows, i)
             # One chunk at a time, because chunks are large.
@@ -145,13 +113,30 @@ def accumulate(
         hessian, by_theta, chi2 = _assemble(index, touched, layout, sums, term_blocks)
         _cross_coefficients(places, sums, second_half, cross_by_detector)
         pending.result()
-    np.sum(cross_by_detector, axis=0, out=cross[layout.coefficients()])
     by_detector = DetectorSums(chi2, by_theta, by_source, hessian, source, cross_by_detector)
-    gradient = Gradient(float(chi2.sum()), by_theta.sum(axis=0), by_source.sum(axis=0).T.copy())
-    source_hessian = source.sum(axis=0).transpose(2, 0, 1).copy()
-    at, theta_hessian = (theta, sources), hessian.sum(axis=0)
+    np.sum(cross_by_detector, axis=0, out=cross[layout.coefficients()])
+    return _summed((theta, sources), by_detector, problem.source_blocks, cross)
+
+
+def _summed(
+    at: tuple[Float[np.ndarray, " calib"], Float[np.ndarray, "src 2"]],
+    by_detector: DetectorSums,
+    source_blocks: SourceBlocks,
+    cross: Float[np.ndarray, "calib 2 src"],
+) -> NormalEquations:
+    """Return the normal equations of all detectors together; `cross` is W."""
     return NormalEquations(
-        at, gradient, theta_hessian, source_hessian, problem.source_blocks, cross, by_detector
+        at=at,
+        gradient=Gradient(
+            float(by_detector.chi2.sum()),
+            by_detector.by_theta.sum(axis=0),
+            by_detector.by_source.sum(axis=0).T.copy(),
+        ),
+        theta=by_detector.theta.sum(axis=0),
+        source=by_detector.source.sum(axis=0).transpose(2, 0, 1).copy(),
+        source_blocks=source_blocks,
+        cross=cross,
+        by_detector=by_detector,
     )
 
 

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from solver.linear.derivative_products import in_tiles, one_by_one, side_by_side, tiled_derivatives
-from solver.linear.normal_equations import chunks
+from solver.linear.linearised_chunks import linearised_chunks
 from solver.problem.parameter_vector import PER_DETECTOR, PER_EXPOSURE
 
 
 @pytest.fixture
 def chunk(problem, expansion_point):
-    return next(chunks(problem, *expansion_point))
+    return next(linearised_chunks(problem, *expansion_point))
 
 
 def test_rows_equal_the_fields_of_a_chunk(chunk):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from solver.linear.chi2 import gradient
-from solver.linear.normal_equations import accumulate, chunks
+from solver.linear.linearised_chunks import linearised_chunks
+from solver.linear.normal_equations import accumulate
 from solver.problem.problem import of_rows
 
 
@@ -108,7 +109,7 @@ def test_given_blocks_between_terms_are_used_unchanged(problem, equations, expan
 
 
 def test_chunks_follow_the_tiles(problem, expansion_point):
-    found = list(chunks(problem, *expansion_point))
+    found = list(linearised_chunks(problem, *expansion_point))
     assert len(found) == len(problem.measurements.tiles.measured) > 1
     for chunk, weight in zip(found, problem.measurements.tiles.weight, strict=True):
         assert chunk.residual[0].shape == weight[0].shape

@@ -6,7 +6,7 @@ import pytest
 from solver.data.parameters import BY_NAME
 from solver.data.settings import MAX_ORDER, FitSettings
 from solver.errors import InputError
-from solver.linear.normal_equations import chunks
+from solver.linear.linearised_chunks import linearised_chunks
 from solver.problem.padding import padded_sources
 from solver.problem.problem import build_problem, thinned
 from tests.solver.small_orbit import Design, epoch_places, make_orbit
@@ -143,7 +143,7 @@ def test_thinned_problem_has_the_measurements_of_the_kept_sources(problem, expan
     )
     # The model is that of the full problem: the same measurements have the same residuals.
     whole, found = (
-        np.concatenate([np.ravel(c.residual[0]) for c in chunks(p, theta, s)])[
+        np.concatenate([np.ravel(c.residual[0]) for c in linearised_chunks(p, theta, s)])[
             p.measurements.tiles.place
         ]
         for p, s in ((problem, sources), (subset, sources[keep]))

@@ -27,7 +27,7 @@ from solver.problem.adjustments import Adjustments
 from solver.problem.problem import Problem, orders_held, rebuilt
 from solver.problem.problem_cache import ProblemCache
 from solver.results.catalogue_response import sky_statistics
-from solver.results.orbit_result import PartialResult, partial_result
+from solver.results.orbit_result import Beginnings, PartialResult, partial_result
 from solver.results.orders import compare_orders, with_orders
 from solver.results.source_history import history_table
 from solver.runtime.device import require_device
@@ -119,11 +119,9 @@ class OrbitFitter:
         start, beside = time.perf_counter(), beside or progress
         adjustments = find_adjustments(self._cache, self._instrument, settings, beside)
         data, problem = self._cache.get(settings, adjustments)
-        prepared = time.perf_counter()
+        began = Beginnings(start, time.perf_counter())
         estimate = run_engine(problem, settings, progress, resumption or self._resumption(settings))
-        found = partial_result(
-            data, self._instrument, settings, problem, estimate, (start, prepared)
-        )
+        found = partial_result(data, self._instrument, settings, problem, estimate, began)
         result = found.whole()
         self._stopped = None
         fitted = time.perf_counter()
@@ -196,14 +194,12 @@ class OrbitFitter:
             return None
         start = time.perf_counter()
         data, problem = self._cache.get(settings, last.adjustments)
-        prepared = time.perf_counter()
+        began = Beginnings(start, time.perf_counter())
         mode = self._starts and self._starts.solution(problem, settings)
         if mode is None:
             return None
         estimate = Estimate(mode)
-        found = partial_result(
-            data, self._instrument, settings, problem, estimate, (start, prepared)
-        )
+        found = partial_result(data, self._instrument, settings, problem, estimate, began)
         same_but_order = settings == last.settings.with_(order=settings.order)
         orders = last.orders if same_but_order else None
         result = with_adjustments(found.result, last.adjustments)

@@ -53,6 +53,13 @@ class PartialResult(NamedTuple):
         return replace(self.result, **tables, summary={**self.result.summary, "seconds": seconds})
 
 
+class Beginnings(NamedTuple):
+    """When the work on a result and when its engine began, by `time.perf_counter`, s."""
+
+    work: float
+    engine: float
+
+
 @one_blas_thread()
 def partial_result(
     data: OrbitData,
@@ -60,7 +67,7 @@ def partial_result(
     settings: FitSettings,
     problem: Problem,
     estimate: Estimate,
-    times: tuple[float, float],
+    began: Beginnings,
 ) -> PartialResult:
     """Return the result of an estimate, but for its eigenmodes.
 
@@ -68,7 +75,7 @@ def partial_result(
     ----------
     data, problem : of the orbit under `settings`
     instrument : nominal focal plane
-    times : when the work on it and when the engine began, s
+    began : for the times in the summary
 
     Raises
     ------
@@ -78,7 +85,6 @@ def partial_result(
     mode = estimate.mode
     if mode.reduced is None:
         raise FitError(f"orbit {data.orbit_id}: {mode.status.value}. {likely_cause(problem, mode)}")
-    start, prepared = times
     solved = time.perf_counter()
     solution = solved_problem(problem, estimate, mode.reduced)
     with ThreadPoolExecutor(1) as helper:
@@ -97,8 +103,8 @@ def partial_result(
             "losses": loss_table(estimate.losses),
         }
     seconds = {
-        "prepare": prepared - start,
-        "fit": solved - prepared,
+        "prepare": began.engine - began.work,
+        "fit": solved - began.engine,
         "diagnose": time.perf_counter() - solved,
     }
     of_catalogue = {"n_reference_excluded": _n_reference_excluded(data, settings)}

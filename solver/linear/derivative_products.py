@@ -29,7 +29,7 @@ def tiled_derivatives(chunk: Linearised) -> TiledDerivatives:
 
 
 def side_by_side(pairs: list[Pair]) -> Float[np.ndarray, "tile row 2 slot"]:
-    """Return derivatives as one array, contiguous for each tile."""
+    """Return derivatives of x and y, a row each pair, as one array, contiguous for each tile."""
     flat = np.stack([values for pair in pairs for values in pair], axis=1)
     return flat.reshape(len(flat), len(pairs), 2, -1)
 
@@ -37,13 +37,13 @@ def side_by_side(pairs: list[Pair]) -> Float[np.ndarray, "tile row 2 slot"]:
 def one_by_one(
     first: Float[np.ndarray, "tile i 2 slot"], second: Float[np.ndarray, "tile j 2 slot"]
 ) -> Float[np.ndarray, "i j tile slot"]:
-    """Return the products of all pairs of rows, with the tiles on an inner axis."""
+    """Return the sums over x and y of the products of all pairs of rows, tiles on an inner axis."""
     return np.einsum("tics,tjcs->ijts", first, second)
 
 
 def in_tiles(
     first: Float[np.ndarray, "tile i 2 slot"], second: Float[np.ndarray, "tile j 2 slot"]
 ) -> Float[np.ndarray, "tile i_j slot"]:
-    """Return the products of all pairs of rows, contiguous for each tile."""
+    """Return the same as `one_by_one`, contiguous for each tile."""
     products = np.einsum("tics,tjcs->tijs", first, second)
     return products.reshape(len(first), -1, products.shape[-1])

@@ -71,7 +71,13 @@ def residuals(
     sources: Float[np.ndarray, "src 2"],
     covariance: Covariances,
 ) -> Residuals:
-    """Return the residuals and their leverage at a point."""
+    """Return the residuals at a point, and their leverage.
+
+    Parameters
+    ----------
+    theta, sources : the point, as offsets from the origins
+    covariance : marginal, of the problem linearised at its own `at`
+    """
     tiles, geometry = problem.measurements.tiles, jax.device_put(problem.geometry)
     # Along prior-dominated directions large variances cancel, but only with the Jacobians
     # from which the covariances were computed.
@@ -241,5 +247,5 @@ def _with_zeros(
 
 
 def of_slots(pair: Pair) -> Float[np.ndarray, "slots 2"]:
-    """Return x and y of every slot of a chunk."""
+    """Return x and y of every slot of a chunk, tile after tile."""
     return np.stack([values.ravel() for values in pair], axis=-1)

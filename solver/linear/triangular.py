@@ -14,7 +14,7 @@ _PARTS = 4
 def lower_solve(
     factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "*k 2 src"]
 ) -> Float[np.ndarray, "*k 2 src"]:
-    """Solve L x = right for 2 x 2 lower triangles."""
+    """Solve L x = right for the 2 x 2 lower triangle L of each source, k right sides at once."""
     solved, (first, below, second) = np.empty(right.shape), _triangle(factor)
     np.divide(right[..., 0, :], first, out=solved[..., 0, :])
     np.multiply(solved[..., 0, :], -below, out=solved[..., 1, :])
@@ -26,7 +26,7 @@ def lower_solve(
 def upper_solve(
     factor: Float[np.ndarray, "src 2 2"], right: Float[np.ndarray, "*k 2 src"]
 ) -> Float[np.ndarray, "*k 2 src"]:
-    """Solve L' x = right for 2 x 2 lower triangles L."""
+    """Solve L' x = right for the 2 x 2 lower triangle L of each source, as `lower_solve`."""
     solved, (first, below, second) = np.empty(right.shape), _triangle(factor)
     np.divide(right[..., 1, :], second, out=solved[..., 1, :])
     np.multiply(solved[..., 1, :], -below, out=solved[..., 0, :])

@@ -1,4 +1,7 @@
-"""Defects of the detectors: motion during the orbit, charge transfer, pixel phase."""
+"""Defects of the detectors: motion during the orbit, charge transfer, pixel phase.
+
+Each function returns a displacement in pixels; see `DefectStage.DETECTOR`.
+"""
 
 from typing import NamedTuple
 
@@ -14,7 +17,7 @@ _MOTION = (0.25, 0.75)
 
 
 class Motion(NamedTuple):
-    """A detector that moves: its index, the index of the first exposure after, a direction."""
+    """A detector that moves: its index, that of the first exposure after, a direction in rad."""
 
     detector: int
     exposure: int

@@ -1,4 +1,7 @@
-"""Defects on the focal plane: distortion that changes or is of higher order, axes, jitter."""
+"""Defects on the focal plane: distortion that changes or is of higher order, axes, jitter.
+
+Each function returns a displacement in um; see `DefectStage.FOCAL_PLANE`.
+"""
 
 import numpy as np
 from jaxtyping import Float, Int

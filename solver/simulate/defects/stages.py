@@ -80,7 +80,7 @@ def focal_displacement(
 def displaced_pixels(
     rows: TrueRows, settings: SurveySettings, orbit_id: int
 ) -> Float[np.ndarray, "obs 2"]:
-    """Return the positions on the detectors, each defect after those before it in the table."""
+    """Return the positions on the detectors with all defects in the table's order, pixels."""
     for defect, applied in applied_defects(settings, DefectStage.DETECTOR, orbit_id):
         rows = replace(rows, pixel=rows.pixel + defect.apply(applied, rows))
     return rows.pixel
@@ -89,7 +89,7 @@ def displaced_pixels(
 def noise_ratio(
     rows: TrueRows, settings: SurveySettings, orbit_id: int
 ) -> Float[np.ndarray, " obs"]:
-    """Return the noise over the stated uncertainty."""
+    """Return the noise over the stated uncertainty, a factor that applies to both axes."""
     ratio = np.ones(len(rows.exposure))
     for defect, applied in applied_defects(settings, DefectStage.NOISE, orbit_id):
         ratio = ratio * defect.apply(applied, rows)

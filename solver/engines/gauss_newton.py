@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
 from solver.engines.attitude_start import attitude_start
+from solver.engines.jacobian_reuse import JacobianReuse
 from solver.linear.chi2 import Gradient, gradient
 from solver.linear.normal_equations import NormalEquations, accumulate
 from solver.linear.source_elimination import ReducedSystem, eliminate_sources
@@ -24,19 +25,6 @@ from solver.problem.problem import Problem, thinned
 from solver.runtime.threads import one_blas_thread
 
 _MIN_STEP_FRACTION = 1e-6
-# The Jacobians are reused while steps are at most this many sigmas long, and at most this
-# fraction of the step before. Larger values fail: only the priors constrain common changes of
-# pointings and detectors, and along these directions small changes of the Jacobians are
-# amplified by the uncertainty.
-_REUSE_BELOW = 1.0
-_REUSE_RATIO = 0.1
-# Tolerance of a last step with reused Jacobians, as a fraction of that with exact ones. For the
-# same reason a small remainder elsewhere becomes a step along these directions that exact ones do
-# not confirm.
-_REUSED_TOLERANCE = 0.1
-# Walking terms let pointings move against them, so that steps shrink more slowly, with exact
-# Jacobians as well. Jacobians less than this many sigmas away are then as good as exact ones.
-_CLOSE_WITH_WALKS = 0.01
 # Fits of more sources than this start from a fit of about this many of them, to a tolerance
 # of this many sigmas, which replaces a step of the full fit at a fraction of its cost.
 _ROUGH_SOURCES = 1000
@@ -84,6 +72,22 @@ class _Point(NamedTuple):
     sources: Float[np.ndarray, "src 2"]
     gradient: Gradient
     objective: float
+
+
+class _Trace:
+    """The rows of the trace, each reported when it is added."""
+
+    def __init__(self, progress: Callable[[Iteration], None], begin: float) -> None:
+        """Begin without rows; `begin` is when the fit began, by `time.perf_counter`."""
+        self.rows: list[Iteration] = []
+        self._progress, self._begin = progress, begin
+
+    def add(self, point: _Point, largest: float, parameter: str, damping: float) -> None:
+        """Add the row of a point, and of the step that led there."""
+        seconds = time.perf_counter() - self._begin
+        numbers = point.objective, point.gradient.chi2, largest, parameter, damping, seconds
+        self.rows.append(Iteration(len(self.rows), *numbers))
+        self._progress(self.rows[-1])
 
 
 @one_blas_thread()
@@ -151,48 +155,39 @@ def _iterate(
     progress: Callable[[Iteration], None],
     begin: float,
 ) -> Mode:
-    trace: list[Iteration] = []
-
-    def report(point: _Point, largest: float, parameter: str, damping: float) -> None:
-        elapsed = time.perf_counter() - begin
-        chi2 = point.gradient.chi2
-        trace.append(
-            Iteration(len(trace), point.objective, chi2, largest, parameter, damping, elapsed)
-        )
-        progress(trace[-1])
+    """Iterate from the point of `equations`; `begin` is when the fit began."""
+    trace = _Trace(progress, begin)
 
     def end(point: _Point, reduced: ReducedSystem | None, status: FitStatus) -> Mode:
-        return Mode(point.theta, point.sources, reduced, status, trace, equations)
+        return Mode(point.theta, point.sources, reduced, status, trace.rows, equations)
 
     point = _point(problem, *equations.at, equations.gradient)
-    report(point, float("nan"), "", 0.0)
+    trace.add(point, float("nan"), "", 0.0)
     if not np.isfinite(point.objective):
         return end(point, None, FitStatus.NOT_FINITE)
-    reduced, limit, is_close = eliminate_sources(equations, problem.priors), np.inf, False
+    reduced, reuse = eliminate_sources(equations, problem.priors), JacobianReuse()
     while True:
         if reduced is None:
             return end(point, None, FitStatus.SINGULAR)
         step = reduced.solve(*downhill(problem, *point[:3]))
         largest, parameter = largest_step(problem, step, reduced)
-        is_doubtful = _REUSED_TOLERANCE < largest / settings.tolerance < 1.0 and limit < np.inf
-        if largest > limit or (is_doubtful and not is_close):
+        if reuse.needs_exact(largest, settings.tolerance):
             # Freed first, because they are large and reusing memory is faster than allocating it.
             del equations, reduced
             equations = accumulate(problem, point.theta, point.sources)
-            reduced, limit = eliminate_sources(equations, problem.priors), np.inf
+            reduced, reuse = eliminate_sources(equations, problem.priors), JacobianReuse()
             continue
         if largest < settings.tolerance:
             point = point._replace(theta=point.theta + step[0], sources=point.sources + step[1])
-            report(point, largest, parameter, 0.0)
+            trace.add(point, largest, parameter, 0.0)
             return end(point, reduced, FitStatus.CONVERGED)
-        if len(trace) > settings.max_iterations:
+        if len(trace.rows) > settings.max_iterations:
             return end(point, reduced, FitStatus.MAX_ITERATIONS)
         moved, damping = _descend(problem, point, step)
         if moved is None:
             return end(point, reduced, FitStatus.STUCK)
-        is_close = largest < _CLOSE_WITH_WALKS and problem.layout.n_walk > 0
-        point, limit = moved, largest if is_close else min(_REUSE_BELOW, _REUSE_RATIO * largest)
-        report(point, largest, parameter, damping)
+        point, reuse = moved, JacobianReuse.after(largest, problem.layout.n_walk > 0)
+        trace.add(point, largest, parameter, damping)
 
 
 def _point(

@@ -85,7 +85,7 @@ def test_detectors_that_are_exchanged_are_told_whatever_their_turns_may_be(probl
 def test_detectors_whose_places_are_not_known_are_left_to_the_fit(problem_of):
     widths = {"detector_rotation": 648_000.0, "detector_x": 1e5, "detector_y": 1e5}
     settings = FitSettings(prior_widths=widths)
-    find_mode(problem_of(exchanged, settings), settings)
+    assert len(find_mode(problem_of(exchanged, settings), settings).trace) > 1
 
 
 def test_wrong_identifications_are_not_taken_for_turned_detectors(problem_of):

@@ -82,14 +82,17 @@ class PointActions:
                 self._heard.add(frame.plot.id)
                 self._hear(frame)
             for glyphs in frame.glyphs():
-                if glyphs.source.id in self._followed:
-                    continue
-                if selected_column(glyphs) in self._selects:
-                    self._followed.add(glyphs.source.id)
-                    self._select_from(frame, glyphs)
-                elif column := next((c for c in self._links if c in glyphs.source.data), None):
-                    self._followed.add(glyphs.source.id)
-                    self._open_on_tap(frame, glyphs, column)
+                if glyphs.source.id not in self._followed:
+                    self._follow_glyphs(frame, glyphs)
+
+    def _follow_glyphs(self, frame: BokehFrame, glyphs: BokehGlyphs) -> None:
+        """Let glyphs select, or open links, or neither."""
+        if selected_column(glyphs) in self._selects:
+            self._followed.add(glyphs.source.id)
+            self._select_from(frame, glyphs)
+        elif column := next((c for c in self._links if c in glyphs.source.data), None):
+            self._followed.add(glyphs.source.id)
+            self._open_on_tap(frame, glyphs, column)
 
     def _hear(self, frame: BokehFrame) -> None:
         """Answer to the areas that a person draws."""
@@ -122,30 +125,33 @@ class PointActions:
             self._is_showing = False
 
     def _select_from(self, frame: BokehFrame, glyphs: BokehGlyphs) -> None:
-        def take(name: str, old: list[int], new: list[int]) -> None:
-            # The tables of a frame answer one after the other; the last one completes the answer.
-            among = next((one for one in self._selectable if glyphs in one), None)
-            column = selected_column(glyphs)
-            if self._is_showing or among is None or column not in self._selects:
-                return
-            same = [one for one in among if selected_column(one) == column]
-            if glyphs.kind == "points" and time.monotonic() < self._outline_until:
-                self._show_rows(glyphs)
-                return
-            chosen = frozenset(text for one in same for text in self._chosen(one))
-            if chosen == self._selected.get(column, frozenset()):
-                # Nothing else will show the other rows of what is chosen again.
-                self.show(self._selected)
-            items = (_item(column, text) for text in chosen)
-            self._selects[column](frozenset(item for item in items if item is not None))
-            if glyphs.renderer.name == HANDLES and new:
-                self._outline_until = time.monotonic() + _ONE_TAP_SECONDS
-
-        glyphs.source.selected.on_change("indices", take)
+        glyphs.source.selected.on_change(
+            "indices", lambda _name, _old, rows: self._take_rows(glyphs, rows)
+        )
         if glyphs.kind == "points":
             self._tools_of(frame).select_among(glyphs.renderer)
         elif glyphs.renderer.name == HANDLES:
             self._tools_of(frame).tap_among(glyphs.renderer)
+
+    def _take_rows(self, glyphs: BokehGlyphs, rows: list[int]) -> None:
+        """Select what a person has chosen in a frame, once some glyphs of it have other `rows`."""
+        # The tables of a frame answer one after the other; the last one completes the answer.
+        among = next((one for one in self._selectable if glyphs in one), None)
+        column = selected_column(glyphs)
+        if self._is_showing or among is None or column not in self._selects:
+            return
+        same = [one for one in among if selected_column(one) == column]
+        if glyphs.kind == "points" and time.monotonic() < self._outline_until:
+            self._show_rows(glyphs)
+            return
+        chosen = frozenset(text for one in same for text in self._chosen(one))
+        if chosen == self._selected.get(column, frozenset()):
+            # Nothing else will show the other rows of what is chosen again.
+            self.show(self._selected)
+        items = (_item(column, text) for text in chosen)
+        self._selects[column](frozenset(item for item in items if item is not None))
+        if glyphs.renderer.name == HANDLES and rows:
+            self._outline_until = time.monotonic() + _ONE_TAP_SECONDS
 
     def _chosen(self, glyphs: BokehGlyphs) -> Iterable[str]:
         """Return the ids that a person has chosen among points; other glyphs only follow them."""

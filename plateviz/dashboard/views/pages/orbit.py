@@ -154,19 +154,28 @@ class OrbitPage(pn.viewable.Viewer):
 
     def _plot(self, diagnostic: Diagnostic) -> Figure | Pending | None:
         of_both = self._compare.figure if diagnostic is BOTH and self._compare else None
-        judging, needing = self._session.judging, of_both or diagnostic
-        if needing.needs_verdict and (judging.is_any_pending if of_both else judging.is_pending):
-            return PENDING
-        drawn = [self._session.shown, self._session.other if of_both else None]
-        if needing.needs_eigenmodes and any(
-            [one is not None and are_eigenmodes_to_come(one.result) for one in drawn]
-        ):
+        if self._is_to_come(diagnostic if of_both is None else of_both, of_both is not None):
             return PENDING
         chosen = chosen_of(self._session)
         if chosen is None:
             return None
         figure = figure_of_both(of_both, chosen) if of_both else figure_of(diagnostic, chosen)
         return self._session.units.figure(figure)
+
+    def _is_to_come(self, diagnostic: Diagnostic, is_of_both: bool) -> bool:
+        """Whether a part that a figure needs of its solution, or of both, is still being made."""
+        session = self._session
+        judging, drawn = session.judging, [session.shown]
+        if is_of_both:
+            drawn.append(session.other)
+        if diagnostic.needs_verdict:
+            is_pending = judging.is_any_pending if is_of_both else judging.is_pending
+            if is_pending:
+                return True
+        if not diagnostic.needs_eigenmodes:
+            return False
+        # A list, no generator: each solution that lacks its eigenmodes asks for them here.
+        return any([one is not None and are_eigenmodes_to_come(one.result) for one in drawn])
 
     def _show_workspace(self, *_: object) -> None:
         self._stack.show(self._navigation.orbit_workspace)

@@ -116,6 +116,14 @@ class SourcePage(pn.viewable.Viewer):
             sizing_mode="stretch_width",
             margin=0,
         )
+        self._watch()
+        self._show_workspace()
+        self._list_sources()
+        self._show()
+
+    def _watch(self) -> None:
+        """Follow what a person enters, the navigation and the session."""
+        navigation = self._navigation
         self._entry.param.watch(lambda event: navigation.find_source(event.new), "value")
         navigation.param.watch(self._list_sources, ["run_name", "written"])
         navigation.param.watch(self._show, ["run_name", "written", "found", "message"])
@@ -123,9 +131,6 @@ class SourcePage(pn.viewable.Viewer):
         self._session.param.watch(self._show, "theme")
         self._session.units.param.watch(self._show, "unit")
         navigation.param.watch(self._allow_entry, "run_name")
-        self._show_workspace()
-        self._list_sources()
-        self._show()
 
     def __panel__(self) -> pn.viewable.Viewable:
         """Return the page without its sidebar."""

@@ -138,6 +138,12 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
         **_login(endpoint.password),
     )
     keep_no_first_page(server.io_loop)
+    _protect(server, store, endpoint)
+    return server
+
+
+def _protect(server: Any, store: SolutionStore, endpoint: Endpoint) -> None:  # noqa: ANN401 of Bokeh
+    """Limit what clients can ask of a server, and tell browsers what its pages may do."""
     application = server._tornado  # noqa: SLF001 it has no public name
     pages = PageLimit(endpoint.pages, endpoint.pages_per_address)
     limits = application.settings[LIMITS] = Limits(pages, is_proxied=bool(endpoint.proxies))
@@ -145,7 +151,6 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
     refuse_floods(application, limits)
     refuse_paths(application)
     application.add_transform(NotebookHeaders if endpoint.in_notebook else SecurityHeaders)
-    return server
 
 
 def _login(password: str | None) -> dict[str, Any]:

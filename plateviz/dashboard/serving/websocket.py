@@ -4,6 +4,7 @@ import contextlib
 import time
 from typing import Any
 
+import panel as pn
 from bokeh.io import doc as bokeh_io_doc
 from bokeh.protocol.exceptions import ProtocolError
 from bokeh.protocol.message import Message
@@ -18,6 +19,8 @@ LIMITS = "plateviz_limits"
 
 # The documents in which the process is at the moment. It has no public name.
 _PATCHED_DOCUMENTS: Any = bokeh_io_doc._PATCHED_CURDOCS  # noqa: SLF001
+# The documents that Panel takes for connected, of which it drops no change. It has no public name.
+_CONNECTED: Any = pn.state._connected  # noqa: SLF001
 # Opening a websocket with something that is no token of this server raises one of these.
 _NO_TOKEN = (ValueError, TypeError, KeyError, AttributeError, AssertionError, RecursionError)
 # A part that is no JSON, or not what it should be, raises one of these, which Bokeh logs.
@@ -114,6 +117,10 @@ class CheckedWebsocket(WSHandler):
                 self.close(_AGAINST_THE_RULES, "too many messages that were wrong")
                 return
         await super()._schedule(work)
+        if isinstance(work, Message) and work.msgtype == "PULL-DOC-REPLY" and self.connection:
+            # Panel knows that a page is connected once it is drawn. What a person does before, as
+            # soon as a button is there, would be answered with changes that it drops.
+            _CONNECTED[self.connection.session.document] = True
 
     async def _async_open(self, token: str) -> None:
         # The session is made here, and its links have to start from the page.

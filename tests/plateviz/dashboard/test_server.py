@@ -100,6 +100,14 @@ async def send(connection, message):
         await connection.write_message(part)
 
 
+def event_message(event):
+    """Return the message of a page in which something happens, as JSON."""
+    sent = {"kind": "MessageSent", "msg_type": "bokeh_event", "msg_data": event}
+    message = Protocol().create("SERVER-INFO-REQ")
+    message.header["msgtype"], message.content = "PATCH-DOC", {"events": [sent]}
+    return message
+
+
 async def ended(connection):
     """Wait for the end of a connection; return its status code."""
     while await asyncio.wait_for(connection.read_message(), 20) is not None:
@@ -268,11 +276,7 @@ def test_pages_that_are_closed_leave_nothing(store, monkeypatch):
             await connection.read_message()
         (session,) = server.get_sessions()
         documents.append(weakref.ref(session.document))
-        ready = {"kind": "MessageSent", "msg_type": "bokeh_event"}
-        ready["msg_data"] = Serializer().encode(DocumentReady())
-        message = Protocol().create("SERVER-INFO-REQ")
-        message.header["msgtype"], message.content = "PATCH-DOC", {"events": [ready]}
-        await send(connection, message)
+        await send(connection, event_message(Serializer().encode(DocumentReady())))
         # What the page does in its first moments; its answers come in between.
         await asyncio.sleep(0.3)
         connection.close()
@@ -464,3 +468,28 @@ def test_messages_that_cannot_be_carried_out_end_the_connection_in_the_end(store
 
     with_server(store, scenario)
     assert caplog.text.count("none") < 200
+
+
+@pytest.mark.newest
+def test_button_of_a_page_that_is_being_drawn_is_answered(store, fit_result):
+    source = fit_result.sources["source_id"].iloc[0]
+
+    async def scenario(address, server):
+        async with opened(address, f"?view=orbit&orbit=0&sources={source}") as connection:
+            await send(connection, Protocol().create("PULL-DOC-REQ"))
+            (session,) = server.get_sessions()
+            button = next(
+                one
+                for one in esm_models(session.document)
+                if getattr(one.data, "label", None) == "List"
+            )
+            # Only the browser says that the page is drawn, which it has not done yet.
+            values = {"type": "map", "entries": [["model", button.ref], ["node", "click"]]}
+            click = {"type": "event", "name": "dom_event", "values": values}
+            await send(connection, event_message(click))
+            while '"attr":"open","new":true' not in str(
+                await asyncio.wait_for(connection.read_message(), 20)
+            ):
+                pass
+
+    with_server(store, scenario)

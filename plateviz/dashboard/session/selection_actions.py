@@ -8,9 +8,13 @@ from plateviz.dashboard.session.solution import Solution
 from plateviz.dashboard.session.without_what_if import what_to_do
 from plateviz.runs.kept_selections import TakenError
 from solver.data.settings import FitSettings
-from solver.data.subset import NOTHING, Subset
+from solver.data.subset import KINDS, NOTHING, Subset
 from solver.errors import InputError
 
+_NOT_MEASURED = (
+    "The orbit on the screen has measured nothing of the selection. Open an orbit that has, or "
+    "select something else."
+)
 # Selections that a session keeps.
 _MOST_KEPT = 50
 
@@ -24,6 +28,7 @@ class SelectionActions:
         self._known: tuple[Solution | None, Subset] = (None, NOTHING)
         session.param.watch(self._forget_advice, "shown")
         session.choices.param.watch(self._forget_advice, "exclusions")
+        session.selection.param.watch(self._forget_refusal, [*KINDS])
 
     @property
     def in_orbit(self) -> Subset:
@@ -47,10 +52,7 @@ class SelectionActions:
     def leave_out(self) -> None:
         """Exclude the selection from the next fit, which shows a what-if, or say what to do."""
         if not self.in_orbit:
-            self._session.refuse(
-                "The orbit on the screen has measured nothing of the selection. Open an orbit that "
-                "has, or select something else."
-            )
+            self._session.advice = _NOT_MEASURED
             return
         self._exclude(self._left_out | self.in_orbit)
 
@@ -144,6 +146,10 @@ class SelectionActions:
     def _forget_advice(self, *_: object) -> None:
         shown = self._session.shown
         if shown is not None and shown.settings.exclusions == self._left_out:
+            self._session.advice = ""
+
+    def _forget_refusal(self, *_: object) -> None:
+        if self._session.advice == _NOT_MEASURED:
             self._session.advice = ""
 
 

@@ -91,7 +91,10 @@ class SelectionActions:
             raise
         except InputError as error:
             why = str(error)
-        self._selection.kept = {**kept, name: selected}
+        # First, since the first name of a selection is that of the address.
+        self._selection.kept = {name: selected} | {
+            one: items for one, items in kept.items() if one != name
+        }
         return why
 
     def take_up(self, name: str) -> None:

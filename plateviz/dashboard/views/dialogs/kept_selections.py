@@ -6,9 +6,10 @@ import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.navigation.navigation import Navigation
-from plateviz.dashboard.selection.selected import selection_words
+from plateviz.dashboard.selection.selected import checked_name, selection_words
 from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.views.dialogs.dialog import dialog
+from solver.data.subset import Subset
 from solver.errors import InputError
 
 
@@ -20,6 +21,8 @@ class KeptSelectionsDialog(pn.viewable.Viewer):
         super().__init__(**params)
         self._session, self._selection = navigation.session, navigation.session.selection
         self._actions = SelectionActions(navigation.session)
+        # The name that somebody is asked whether to replace what is kept under it, and that.
+        self._asked: tuple[str, Subset | None] | None = None
         # The words begin where the title does; a label on the border of a field has room above.
         wide = {"sizing_mode": "stretch_width", "size": "small", "margin": (10, 8)}
         self._name = pmui.TextInput(label="Name", placeholder="such as: lower left corner", **wide)
@@ -46,19 +49,37 @@ class KeptSelectionsDialog(pn.viewable.Viewer):
     def open(self) -> None:
         """Open the dialog."""
         look_for_kept(self._session)
+        self._asked = None
         self._name.value = self._selection.name_of_selected or ""
         self._show()
         self._dialog.open = True
 
     def _keep_it(self) -> None:
         try:
-            why = self._actions.keep(self._name.value_input or self._name.value)
+            name = checked_name(self._name.value_input or self._name.value)
+            if self._asks_to_replace(name):
+                return
+            why = self._actions.keep(name)
             if why:
                 self._say(f"It is kept in this session only: {escape(why)}.", "warning")
         except InputError as error:
             self._say(f"It was not kept: {error}.", "error")
 
+    def _asks_to_replace(self, name: str) -> bool:
+        """Ask once before what is kept under a name is lost, which may be another person's."""
+        selected, there = self._selection.selected, self._selection.kept.get(name)
+        before, self._asked = self._asked, (name, there)
+        if not selected or there is None or there == selected or before == self._asked:
+            return False
+        self._say(
+            f"This name has another selection: {selection_words(there)}. Press Keep again to "
+            "replace it.",
+            "warning",
+        )
+        return True
+
     def _show(self, *_: object) -> None:
+        self._asked = None
         selected, kept = self._selection.selected, self._selection.kept
         name = self._selection.name_of_selected
         options = {f"{one} ({selection_words(items)})": one for one, items in kept.items()}

@@ -176,7 +176,7 @@ def test_selection_that_cannot_be_written_is_kept_in_the_session(live, actions, 
     assert "selections.json" in actions.keep("one")
     look_for_kept(live)
     assert "selections.json" in live.notice
-    assert list(live.selection.kept) == ["all", "one"]
+    assert list(live.selection.kept) == ["one", "all"]
 
 
 def test_nothing_and_too_much_is_not_kept(live, actions):

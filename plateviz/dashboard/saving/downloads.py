@@ -109,8 +109,14 @@ def rows_of(table: ExplorableTable, rows: np.ndarray, names: Iterable[str] | Non
             found["source_class"] = _plain(sources.classes[codes])
     for name in table.columns if names is None else names:
         column = table.columns[name]
-        found[name] = _described(table.read(name)[rows], column)
+        found[name] = _described(_whole(table.read(name)[rows], column), column)
     return found
+
+
+def _whole(values: np.ndarray, column: columns.Column) -> np.ndarray:
+    """Return what is whole by its definition, such as an id, as such: a run reads it as float32."""
+    is_whole = column.dtype == "int64" and values.dtype.kind == "f" and np.isfinite(values).all()
+    return values.astype(np.int64) if is_whole else values
 
 
 def described(frame: pd.DataFrame, definition: columns.Table) -> Table:

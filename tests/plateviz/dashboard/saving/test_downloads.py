@@ -75,3 +75,13 @@ def test_columns_of_the_definition_have_units_and_meanings():
     assert made.colnames == ["source_id"]
     assert made["source_id"][0] == 2**62 + 1
     assert made["source_id"].description == MOTIONS["source_id"].meaning
+
+
+def test_ids_that_a_run_reads_as_float32_are_saved_as_whole_numbers(fit_result):
+    table = EXPLORABLE["measurements"](fit_result)
+    numbers = {name: table.read(name).astype(np.float32) for name in table.columns}
+    of_run = table._replace(read=lambda name: numbers.get(name, table.read(name)))
+    saved = rows_of(of_run, np.arange(5), ["detector_id", "residual_x"])
+    assert saved["detector_id"].dtype == np.int64
+    assert saved["detector_id"].tolist() == table.read("detector_id")[:5].tolist()
+    assert saved["residual_x"].dtype == np.float32

@@ -107,13 +107,14 @@ class PointActions:
     def show(self, selected: SelectedIds) -> None:
         """Show what is selected: rows of a selected source, exposure or detector stand out."""
         self._selected = selected
-        every = [one for frame in self._selectable for one in frame]
-        for glyphs in every:
-            self._show_rows(glyphs)
-        stand_out = [glyphs for glyphs in every if glyphs.source.selected.indices]
-        for glyphs in every:
-            is_of_kind = any(selected.get(column) for column in glyphs.keys)
-            glyphs.fade(bool(stand_out) and is_of_kind and glyphs not in stand_out)
+        for frame in self._selectable:
+            for glyphs in frame:
+                self._show_rows(glyphs)
+            # Of two solutions beside each other, the one without what is selected stays readable.
+            stand_out = [glyphs for glyphs in frame if glyphs.source.selected.indices]
+            for glyphs in frame:
+                is_of_kind = any(selected.get(column) for column in glyphs.keys)
+                glyphs.fade(bool(stand_out) and is_of_kind and glyphs not in stand_out)
 
     def _show_rows(self, glyphs: BokehGlyphs) -> None:
         self._is_showing = True

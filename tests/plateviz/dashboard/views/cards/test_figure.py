@@ -247,6 +247,25 @@ def test_points_beside_selected_ones_of_another_table_are_faded():
     assert faded() == [False, False]
 
 
+def test_frame_without_what_is_selected_in_another_one_is_not_faded():
+    axes = {"x": Axis("x (mm)", (0.0, 9.0)), "y": Axis("y (mm)", (0.0, 2.0))}
+    rows = pd.DataFrame({"x": [0.0, 1.0], "y": 1.0, "id": ["7", "8"]})
+    frames = []
+    for there in (rows, rows[1:]):
+        table = points(there, "x", "y", name="one", color="mark", hover=[("source", "@{id}")])
+        frames += framed([table], title="(A)", width=200, height=100, **axes).frames
+    view = FigureView(
+        diagnostics()[0], lambda: Figure(tuple(frames)), actions=PointActions(select=print)
+    )
+    come_near(view)
+    view.draw()
+    view.show_selected({"id": frozenset({"7"})})
+    view.draw()
+    shown = [glyphs for frame in view._actions._selectable for glyphs in frame]
+    assert [glyphs.source.selected.indices for glyphs in shown] == [[0], []]
+    assert [glyphs.renderer.muted for glyphs in shown] == [False, False]
+
+
 EXPOSURES = ["field 0, exposure 3", "field 0, exposure 4", "field 0, exposure 3"]
 
 

@@ -11,6 +11,7 @@ from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
 from plateviz.verdict.causes import Cause, causes_in_words, wrong_catalogue
 from plateviz.verdict.estimated_noise import noise_sentences
+from plateviz.verdict.left_out_together import moved_detectors
 from plateviz.verdict.notable_in_orbit import notable_sentences
 from plateviz.verdict.tests_in_words import TestInWords, discoveries_in_words, tests_in_words
 from plateviz.verdict.unseen import references_left_out, unseen_sentences
@@ -115,12 +116,16 @@ def _judge(result: FitResult) -> Verdict:
     state: State = "warn" if found else "good"
     is_large = any(cause.is_large for cause in causes if not cause.instead_of)
     is_epoch = any(cause.name == "wrong-epoch" for cause in causes)
-    catalogue = [] if is_epoch else wrong_catalogue(result)
-    if not converged or (certain and is_large) or any(cause.is_large for cause in catalogue):
+    # What no residual of the solution shows.
+    hidden = [] if is_epoch else wrong_catalogue(result)
+    hidden += moved_detectors(result) if converged else []
+    named = {cause.title for cause in causes}
+    hidden = [cause for cause in hidden if cause.title not in named]
+    if not converged or (certain and is_large) or any(cause.is_large for cause in hidden):
         state = "bad"
-    causes = [*catalogue, *causes]
+    causes = [*hidden, *causes]
     left_out = references_left_out(result)
-    state = worst([state, "warn" if left_out or catalogue else "good"])
+    state = worst([state, "warn" if left_out or hidden else "good"])
     titles = [*_first(causes), *left_out[:1]]
     headline = f"{_HEADLINES[state][:-1]}: {titles[0]}." if titles else _HEADLINES[state]
     items = summary_strip(result)

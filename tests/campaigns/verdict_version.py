@@ -12,6 +12,7 @@ _PARTS = (
     "plateviz/verdict/causes.py",
     "plateviz/verdict/*cause_harm.py",
     "plateviz/verdict/*cause_words.py",
+    "plateviz/verdict/left_out_together.py",
     "plateviz/verdict/verdict.py",
     "solver/engines/moves.py",
     "solver/engines/noise.py",

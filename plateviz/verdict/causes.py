@@ -20,6 +20,9 @@ from solver.results.diagnosis.table import Diagnosis
 
 # Share of chi2 from which the measurements that are far off explain why a fit does not converge.
 _WILD_SHARE = 0.5
+# Share of their chi2 in reference stars, and of the reference stars that have any of them, from
+# which the catalogue is wrong and not the measurements.
+_OF_CATALOGUE, _MANY_REFERENCES = 0.95, 0.5
 
 
 class Cause(NamedTuple):
@@ -109,10 +112,17 @@ def _stuck(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> Caus
     far, total = int(rows.is_far.sum()), rows.n
     explains = rows.chi2[rows.is_far].sum() > _WILD_SHARE * rows.chi2.sum()
     is_wild = explains and not result.settings.robust
+    narrow = narrowed_priors(result.settings)
     words = (
         f"{far:,} of {total:,} residuals are more than six times as large as is usual in their "
         f"exposures; χ² per degree of freedom without them is {rounded(noise.statistic, 3)}."
     )
+    if explains and not narrow and _are_references_far(result, diagnosis):
+        said = said_of_wrong_catalogue(
+            f"{words} Nearly all of these are of reference stars, and most of those have some."
+        )
+        sigma = float(noise.sigma)
+        return Cause(said.name, said.title, said.words, sigma, spoils, said.action, (), True)
     if is_wild:
         title = "measurements that are far off keep the fit from converging"
         words += (
@@ -125,7 +135,6 @@ def _stuck(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> Caus
         title = "the fit came to no solution"
         action = "check the start values, and allow more iterations"
         options = ()
-        narrow = narrowed_priors(result.settings)
         if narrow:
             words += f" Priors that are narrower than usual: {', '.join(narrow)}."
             action, options = "give priors their usual widths", usual_priors(narrow)
@@ -134,6 +143,17 @@ def _stuck(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> Caus
             action, options = looks_like[0].action, looks_like[0].options
     name = "wild-measurements" if is_wild else "not-converged"
     return Cause(name, title, words, float(noise.sigma), spoils, action, options, True)
+
+
+def _are_references_far(result: FitResult, diagnosis: Diagnosis) -> bool:
+    """Return whether the measurements that are far off are those of most reference stars."""
+    rows, is_reference = diagnosis.rows, result.sources["is_reference"].to_numpy(dtype=bool)
+    is_one = rows.is_far & is_reference[rows.source]
+    count = len(np.unique(rows.source[is_one]))
+    return bool(
+        rows.chi2[is_one].sum() > _OF_CATALOGUE * rows.chi2[rows.is_far].sum()
+        and count > _MANY_REFERENCES * is_reference.sum()
+    )
 
 
 def _in_words(case: Case) -> Cause:

@@ -19,9 +19,12 @@ _MOST_LEFT_OUT = 20
 DOUBTFUL_FACTOR, WRONG_FACTOR = 5.0, 30.0
 # The same of the noise of the measurements.
 _DOUBTFUL_NOISE = 3.0
+# Excess kurtosis of the residuals within six sigma from which they are a mixture of small errors
+# and many large ones.
+_MANY_OUTLIERS = 1.0
 # A catalogue and the times of exposures differ by decades.
 _MOST_DAYS = 100.0 * DAYS_PER_JULIAN_YEAR
-_OTHER_ERRORS = "Wrong proper motions, smooth errors or wrong units do this"
+_OTHER_ERRORS = "Wrong proper motions, a wrong epoch, smooth errors or wrong units do this"
 
 
 def said_of_noise(case: Case) -> Said:
@@ -33,6 +36,17 @@ def said_of_noise(case: Case) -> Said:
         action = (
             "check the units of sx and sy, and of the measured positions; if they are right, "
             "let the fit estimate the noise"
+        )
+    tails = next((one for one in case.diagnosis.tests if one.subject == "kurtosis"), None)
+    if factor > _DOUBTFUL_NOISE and tails is not None and tails.statistic > _MANY_OUTLIERS:
+        return Said(
+            "noise",
+            "the noise is larger than stated, or many measurements are outliers",
+            f"The residuals are {factor:.3f} times the stated uncertainties, in all exposures and "
+            f"sources alike, with tails: their excess kurtosis is {tails.statistic:+.3f}, that of "
+            "normal noise 0. Where so many are far off, outliers cannot be told from noise.",
+            f"{action} of what is left without outliers",
+            ("--robust", "--noise-scale"),
         )
     return Said(
         "noise",
@@ -70,6 +84,7 @@ def said_of_kurtosis(case: Case) -> Said:
         f"The excess kurtosis of the residuals within six sigma is {test.statistic:+.3f}, that of "
         f"normal ones 0 ± {rounded(test.scatter)}, in all exposures and sources alike."
     )
+    options: tuple[str, ...] = ()
     if not has_more:
         action = "check whether large errors were removed from the measurements, or others rounded"
     else:
@@ -80,11 +95,16 @@ def said_of_kurtosis(case: Case) -> Said:
                 "are still there, and make such tails."
             )
             action = f"nothing, if outliers of every size are expected; otherwise {action}"
+        elif test.statistic > _MANY_OUTLIERS:
+            words += " Many outliers make such tails."
+            action = f"let the fit find and leave out outliers; if tails remain, {action}"
+            options = ("--robust",)
     return Said(
         "tails",
         f"the noise has {'more' if has_more else 'fewer'} large errors than a normal distribution",
         words,
         action,
+        options,
     )
 
 
@@ -156,7 +176,7 @@ def said_of_wrong_catalogue(evidence: str) -> Said:
         "wrong-catalogue",
         "the reference stars are much further from the catalogue than it states",
         f"{evidence} {_OTHER_ERRORS}.",
-        "check the proper motions and the units of the catalogue",
+        "check the proper motions, the epoch and the units of the catalogue",
     )
 
 

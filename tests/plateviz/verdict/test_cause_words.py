@@ -34,11 +34,29 @@ def test_step_is_at_the_field_that_comes_first_in_time(step, field):
     ("factor", "asks_for_units"), [(0.05, True), (0.8, False), (1.3, False), (10.0, True)]
 )
 def test_noise_that_no_instrument_has_is_a_question_of_units(factor, asks_for_units):
-    test = Test("noise", "noise", (), factor**2, 1.0, 0.01, -400.0, 30.0)
-    said = said_of(SimpleNamespace(found=SimpleNamespace(test=test)))
+    said = said_of_noise(factor, 0.1)
     assert said.action.startswith("check the units of sx and sy") == asks_for_units
     assert f"multiply sx and sy by {factor:.3f}" in said.action or asks_for_units
     assert said.options == ("--noise-scale",)
+
+
+@pytest.mark.parametrize(
+    ("factor", "kurtosis", "are_many"),
+    [(5.4, 5.2, True), (5.4, 0.1, False), (1.3, 5.2, False), (0.1, 5.2, False)],
+)
+def test_many_outliers_cannot_be_told_from_noise(factor, kurtosis, are_many):
+    said = said_of_noise(factor, kurtosis)
+    assert ("or many measurements are outliers" in said.title) == are_many
+    assert ("--robust" in said.options) == are_many
+    assert said.options[-1] == "--noise-scale"
+
+
+def said_of_noise(factor, kurtosis):
+    """Return what is said of noise of this size, whose residuals have tails."""
+    test = Test("noise", "noise", (), factor**2, 1.0, 0.01, -400.0, 30.0)
+    tails = Test("kurtosis", "kurtosis", (), kurtosis, 0.0, 0.01, -400.0, 30.0)
+    diagnosis = SimpleNamespace(tests=(test, tails))
+    return said_of(SimpleNamespace(found=SimpleNamespace(test=test), diagnosis=diagnosis))
 
 
 @pytest.mark.parametrize(
@@ -66,6 +84,15 @@ def test_noise_that_is_not_normal_has_more_or_fewer_large_errors(kurtosis, title
     assert f"is {kurtosis:+.3f}" in said.words
     # Small outliers, which a robust fit keeps, make large errors and no small ones.
     assert ("outliers" in said.words) == (robust and kurtosis > 0.0)
+    assert not said.options
+
+
+@pytest.mark.parametrize(("robust", "options"), [(False, ("--robust",)), (True, ())])
+def test_large_tails_are_left_out_where_they_are_not(robust, options):
+    test = Test("kurtosis", "kurtosis", (), 5.2, 0.0, 0.02, -400.0, 30.0)
+    result = SimpleNamespace(settings=FitSettings(robust=robust))
+    said = said_of(SimpleNamespace(found=SimpleNamespace(test=test), result=result))
+    assert said.options == options
 
 
 def said_of_stars(subject, size, items=(), statistic=9.0, **settings):

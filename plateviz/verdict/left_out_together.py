@@ -20,6 +20,8 @@ from solver.units import RAD_PER_MAS
 # Chance at which the measurements left out in one field on one detector are by accident both more
 # than their share, and displaced alike. One solution has some dozens of these groups.
 _LOG_CHANCE = float(np.log(1e-6))
+# Where more of a group is left out than this share, no position rests on what is left.
+_ALL = 0.9
 _OPTION = "--detector-motion"
 _GROUP = ["field_id", "detector_id"]
 _EXPOSURE = ["field_id", "plate_id"]
@@ -58,6 +60,7 @@ def _groups(result: FitResult) -> list[_Group]:
     of_exposure = pd.Index(share.index.droplevel("detector_id"))
     expected = share * lost.reindex(of_exposure, fill_value=0).to_numpy()
     expected = expected.groupby(level=_GROUP).sum()
+    total = taken.groupby(level=_GROUP).sum()
     found = []
     for (field, detector), rows in out.groupby(_GROUP):
         usual = float(expected.loc[(field, detector)])
@@ -66,7 +69,8 @@ def _groups(result: FitResult) -> list[_Group]:
         together = float(np.hypot(np.sum(x / size), np.sum(y / size)))
         # Directions by chance add up to a square of their number (Rayleigh).
         chance = max(log_chance_poisson(len(rows), usual), -(together**2) / len(rows))
-        if chance < _LOG_CHANCE:
+        is_all = len(rows) > _ALL * total.loc[(field, detector)]
+        if chance < _LOG_CHANCE and not is_all:
             shift = float(np.hypot(np.median(x), np.median(y)))
             found.append(_Group(int(field), int(detector), len(rows), usual, shift, chance))
     return sorted(found, key=lambda one: one.log_chance)

@@ -69,3 +69,13 @@ def test_fit_that_lets_the_detectors_move_has_another_remedy(moved):
     settings = moved.settings.with_(detector_motion=True)
     (cause,) = moved_detectors(replace(moved, settings=settings))
     assert cause.options == ("--exclude detector=3",)
+
+
+def test_detector_that_is_left_out_altogether_in_a_field_spoils_nothing(moved):
+    rows = moved.residuals
+    is_one = (rows["field_id"] == 2) & (rows["detector_id"] == 1)
+    lost = rows[is_one].assign(residual_x=40.0, residual_y=3.0)[list(moved.outliers.columns[:9])]
+    assert not moved_detectors(replace(moved, residuals=rows[~is_one], outliers=lost))
+    half = is_one & (np.arange(len(rows)) % 2 == 0)
+    kept, some = rows[~half], lost[half[is_one]]
+    assert moved_detectors(replace(moved, residuals=kept, outliers=some))

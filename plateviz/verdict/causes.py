@@ -21,7 +21,7 @@ from solver.results.diagnosis.table import Diagnosis
 # Share of chi2 from which the measurements that are far off explain why a fit does not converge.
 _WILD_SHARE = 0.5
 # Share of their chi2 in reference stars, and of the reference stars that have any of them, from
-# which the catalogue is wrong and not the measurements.
+# which the catalogue may be wrong and not the measurements.
 _OF_CATALOGUE, _MANY_REFERENCES = 0.95, 0.5
 
 
@@ -113,16 +113,10 @@ def _stuck(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> Caus
     explains = rows.chi2[rows.is_far].sum() > _WILD_SHARE * rows.chi2.sum()
     is_wild = explains and not result.settings.robust
     narrow = narrowed_priors(result.settings)
-    words = (
+    words = counted = (
         f"{far:,} of {total:,} residuals are more than six times as large as is usual in their "
         f"exposures; χ² per degree of freedom without them is {rounded(noise.statistic, 3)}."
     )
-    if explains and not narrow and _are_references_far(result, diagnosis):
-        said = said_of_wrong_catalogue(
-            f"{words} Nearly all of these are of reference stars, and most of those have some."
-        )
-        sigma = float(noise.sigma)
-        return Cause(said.name, said.title, said.words, sigma, spoils, said.action, (), True)
     if is_wild:
         title = "measurements that are far off keep the fit from converging"
         words += (
@@ -131,6 +125,17 @@ def _stuck(result: FitResult, diagnosis: Diagnosis, causes: FoundCauses) -> Caus
         )
         action = "let the fit find, list and leave out the measurements that are far off"
         options = ("--robust",)
+        if not narrow and _are_references_far(result, diagnosis):
+            title = "the reference stars contradict the measurements, and the fit does not converge"
+            words = (
+                f"{counted} Nearly all of these are of reference stars, and most of those have "
+                "some. A wrong epoch, proper motions or units of the catalogue do this, as do many "
+                "measurements that are wrong together."
+            )
+            action = (
+                "check the proper motions, the epoch and the units of the catalogue; if they are "
+                f"right, {action}"
+            )
     else:
         title = "the fit came to no solution"
         action = "check the start values, and allow more iterations"

@@ -138,7 +138,9 @@ def test_fit_that_does_not_converge_says_what_helps(fit_result):
     assert [cause.name for cause in orbit_verdict(robust).causes] == ["not-converged"]
 
 
-def test_catalogue_is_blamed_where_the_measurements_of_reference_stars_are_far_off(fit_result):
+def test_catalogue_is_to_be_checked_where_the_measurements_of_reference_stars_are_far_off(
+    fit_result,
+):
     sources = fit_result.sources
     references = sources.loc[sources["is_reference"], "source_id"]
     is_one = fit_result.residuals["source_id"].isin(references).to_numpy()
@@ -146,12 +148,12 @@ def test_catalogue_is_blamed_where_the_measurements_of_reference_stars_are_far_o
     rows = is_one & (np.arange(len(is_one)) % 3 == 0)
     stuck = stuck_with(fit_result, rows, 1000.0)
     [cause] = orbit_verdict(stuck).causes
-    assert (cause.name, cause.options) == ("wrong-catalogue", ())
-    assert "epoch" in cause.action
+    assert cause.title.startswith("the reference stars contradict the measurements")
+    assert cause.action.startswith("check the proper motions, the epoch and the units")
     # Of few reference stars, the measurements are wrong.
     few = rows & fit_result.residuals["source_id"].isin(references[::4]).to_numpy()
     [cause] = orbit_verdict(stuck_with(fit_result, few, 1000.0)).causes
-    assert cause.name == "wild-measurements"
+    assert cause.title.startswith("measurements that are far off")
 
 
 def test_outliers_are_not_blamed_where_all_measurements_are_far_off(fit_result):

@@ -9,6 +9,7 @@ from scipy.special import chdtrc
 
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
+from plateviz.verdict.catalogue_offset import displaced_references, offset_sentences
 from plateviz.verdict.causes import Cause, causes_in_words, wrong_catalogue
 from plateviz.verdict.estimated_noise import noise_sentences
 from plateviz.verdict.left_out_together import moved_detectors
@@ -118,7 +119,7 @@ def _judge(result: FitResult) -> Verdict:
     is_epoch = any(cause.name == "wrong-epoch" for cause in causes)
     # What no residual of the solution shows.
     hidden = [] if is_epoch else wrong_catalogue(result)
-    hidden += moved_detectors(result) if converged else []
+    hidden += [*moved_detectors(result), *displaced_references(result)] if converged else []
     named = {cause.title for cause in causes}
     hidden = [cause for cause in hidden if cause.title not in named]
     if not converged or (certain and is_large) or any(cause.is_large for cause in hidden):
@@ -140,6 +141,7 @@ def _judge(result: FitResult) -> Verdict:
         faults.append(discoveries_in_words(diagnosis.tests, found))
     tests = tests_in_words(diagnosis)
     notable = [*noise_sentences(result), *notable_sentences(result)]
+    notable += offset_sentences(result) if converged else []
     return Verdict(state, headline, reasons, notable, faults, causes, tests)
 
 

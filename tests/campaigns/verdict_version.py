@@ -9,6 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # with a cause adjusts before its solution.
 _PARTS = (
     "solver/results/diagnosis/*.py",
+    "plateviz/verdict/catalogue_offset.py",
     "plateviz/verdict/causes.py",
     "plateviz/verdict/*cause_harm.py",
     "plateviz/verdict/*cause_words.py",

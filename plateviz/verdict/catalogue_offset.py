@@ -1,0 +1,118 @@
+"""The other stars of a catalogue against its reference stars, which may be displaced together.
+
+The reference stars place the solution on the sky. If they are displaced together, so are all
+positions, and no residual shows it. The catalogue positions of the other stars do, in the mean of
+many, though each of them is uncertain.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from plateviz.tables.rounded import rounded
+from plateviz.verdict.causes import Cause
+from solver.data.result import FitResult
+from solver.results.diagnosis.rate import sigmas
+
+_AXES = ("ra", "dec")
+# Fewer stars tell too little.
+_LEAST = 20
+# Chance of a larger offset from which it is none by accident.
+_LOG_CHANCE = float(np.log(1e-6))
+# Share of the stated error of a single star from which the catalogue contradicts itself. Less may
+# be that of another catalogue, from which the other stars were taken.
+_MUCH = 0.5
+# Of normal values: sigma over the median distance from the median; sigma of the median of n of
+# them, times the root of n.
+_SIGMA_OF_DISTANCE, _SIGMA_OF_MEDIAN = 1.4826, 1.2533
+
+
+class _Offset(NamedTuple):
+    """Median distance of the other stars from the catalogue; pairs are of α cos δ and δ, mas.
+
+    Attributes
+    ----------
+    count : number of these stars
+    median, expected : the distance, and what it is by chance
+    stated : error of a single star along an axis, mas
+    """
+
+    count: int
+    median: tuple[float, float]
+    expected: tuple[float, float]
+    stated: float
+
+    @property
+    def size(self) -> float:
+        """The distance on the sky, mas."""
+        return float(np.hypot(*self.median))
+
+    @property
+    def log_chance(self) -> float:
+        """The logarithm of the chance of a larger one."""
+        ratios = np.divide(self.median, self.expected)
+        return -0.5 * float(np.sum(ratios**2))
+
+    def words(self) -> str:
+        """Return it as a sentence."""
+        by_axis = " and ".join(
+            f"{rounded(value, 3)} ± {rounded(error)} mas in {name}"
+            for value, error, name in zip(self.median, self.expected, ("α cos δ", "δ"), strict=True)
+        )
+        return (
+            f"In the median, the {self.count:,} other stars are {by_axis} from where the catalogue "
+            "has them."
+        )
+
+    def harm(self) -> str:
+        """Return what it spoils."""
+        return (
+            "If the reference stars are displaced, so are all positions, by "
+            f"{rounded(self.size, 3)} mas, and no residual shows it; if the others are, nothing is "
+            "spoiled."
+        )
+
+
+def displaced_references(result: FitResult) -> list[Cause]:
+    """Return as a cause that the reference stars and the others are further apart than stated."""
+    found = _offset(result)
+    if found is None or found.size < _MUCH * found.stated:
+        return []
+    return [
+        Cause(
+            "catalogue-offset",
+            "the reference stars and the other stars of the catalogue are apart",
+            found.words(),
+            sigmas(found.log_chance),
+            found.harm(),
+            "compare the reference stars with another catalogue, and check the frame and the epoch "
+            "of both parts of this one",
+            (),
+            is_large=True,
+        )
+    ]
+
+
+def offset_sentences(result: FitResult) -> list[str]:
+    """Return sentences on an offset that is certain, but less than a star's stated error."""
+    found = _offset(result)
+    if found is None or found.size >= _MUCH * found.stated:
+        return []
+    return [f"{found.words()} {found.harm()}"]
+
+
+def _offset(result: FitResult) -> _Offset | None:
+    """Return the offset if it is none by accident; single stars that are far off make none."""
+    sources = result.sources
+    others = sources[~sources["is_reference"].to_numpy(dtype=bool)]
+    if len(others) < _LEAST or len(others) == len(sources):
+        return None
+    distances = others[[f"offset_{axis}" for axis in _AXES]].to_numpy(dtype=float)
+    median = np.median(distances, axis=0)
+    spread = _SIGMA_OF_DISTANCE * np.median(np.abs(distances - median), axis=0)
+    # The reference stars let all others have an error in common.
+    shared = [float(result.summary[f"mean_error_{axis}"]) for axis in _AXES]
+    expected = np.hypot(_SIGMA_OF_MEDIAN * spread / np.sqrt(len(others)), shared)
+    stated = np.median(others[[f"prior_sigma_{axis}" for axis in _AXES]].to_numpy(dtype=float))
+    found = _Offset(len(others), tuple(median), tuple(expected), float(stated))
+    return found if found.log_chance < _LOG_CHANCE else None

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -101,8 +100,7 @@ class PointActions:
         if (area := self._area) is not None:
             frame.plot.on_event(PanStart, lambda _: area.begin())
         if self._select_area is not None or area is not None:
-            take_area = partial(self._take_area, frame)
-            frame.plot.on_event(SelectionGeometry, lambda event, take=take_area: take(event))
+            frame.plot.on_event(SelectionGeometry, lambda event: self._take_area(frame, event))
 
     def show(self, selected: SelectedIds) -> None:
         """Show what is selected: rows of a selected source, exposure or detector stand out."""

@@ -47,7 +47,7 @@ def unseen_sentences(result: FitResult, epoch: EpochOffset, are_noticed: bool = 
             "motions of at least ten reference stars, and measurements that determine where they "
             "are."
         )
-    factor = reference_factor(result)
+    factor = unnoticed_factor(result)
     if np.isfinite(factor) and not are_noticed:
         taken = "the fit takes them" if result.settings.reference_scale else "stated"
         sentences.append(
@@ -96,8 +96,8 @@ def quadratic_mas(result: FitResult) -> float:
     return float(np.sqrt(variance)) / (focal_length * RAD_PER_MAS)
 
 
-def reference_factor(result: FitResult) -> float:
-    """Return the factor on the errors of the reference stars that a solution would just show.
+def unnoticed_factor(result: FitResult) -> float:
+    """Return the least factor on the errors of the reference stars that a solution shows.
 
     With the stated covariance P and that of the measurements M, the deviation of an estimate from
     the catalogue has the variance (f^2 P + M) / (P + M) times the expected one, whose square is the

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plateviz.verdict.unseen import quadratic_mas, reference_factor, unseen_sentences
+from plateviz.verdict.unseen import quadratic_mas, unnoticed_factor, unseen_sentences
 from plateviz.verdict.verdict import orbit_verdict
 from solver.results.diagnosis.epoch import EpochOffset
 
@@ -59,7 +59,7 @@ def test_references_that_the_data_do_not_determine_may_be_far_off(fit_result):
     def factor(expected, freedom):
         values = {f"expected_normalised_deviation_{one}": expected for one in ("ra", "dec")}
         values |= {f"normalised_deviation_dof_{one}": freedom for one in ("ra", "dec")}
-        return reference_factor(with_summary(fit_result, **values))
+        return unnoticed_factor(with_summary(fit_result, **values))
 
     # Three sigma of the scatter are 30 %.
     assert factor(1.0, 50.0) == pytest.approx(1.3)

@@ -22,8 +22,8 @@ from solver.results.diagnosis.contradictions import (
 )
 from solver.results.diagnosis.found import CLOSE, Found, limit_of
 from solver.results.diagnosis.pattern_causes import LEAST_SHARE, PATTERNS, pattern_causes
-from solver.results.diagnosis.rate import sigmas
 from solver.results.diagnosis.scatter import Scatter, scatter_tests
+from solver.results.diagnosis.scatter_causes import OF_GROUPS, SCATTER, of_scatter
 from solver.results.diagnosis.table import Diagnosis
 
 _OF_EXPOSURES = ("stretch", "shear", "quadratic")
@@ -48,10 +48,6 @@ _OF_OUTLIERS = 0.5
 _MOST_LINEAR = 0.5
 # Those that explain more leave residuals that look like noise: larger in some groups, with tails.
 _MOST_BESIDE_NOISE = 0.1
-# Chi2 per degree of freedom below which groups scatter by their priors, not by their noise.
-_OVERSTATED = 0.1
-_OF_GROUPS = ("exposures", "sources", "detectors", "magnitudes")
-SCATTER = ("noise", *_OF_GROUPS)
 
 
 class FoundCauses(NamedTuple):
@@ -85,7 +81,7 @@ def find_causes(diagnosis: Diagnosis) -> FoundCauses:
             rows, diagnosis.magnitude, explained + of_each, without=diagnosis.swinging
         )
         found += of_references(diagnosis)
-        found += _of_scatter(diagnosis, scatter) if share <= _MOST_BESIDE_NOISE else []
+        found += of_scatter(diagnosis, scatter) if share <= _MOST_BESIDE_NOISE else []
     # Tails spoil no positions, and make nothing but scatter.
     spoils = any(one.test.subject not in (*SCATTER, "kurtosis") for one in found)
     found.sort(key=lambda one: (spoils and one.test.subject == "kurtosis", -one.gain))
@@ -160,7 +156,7 @@ def _is_of_tails(subject: str, leads: str) -> bool:
     Whatever spoils some residuals more than others gives all of them tails, and noise with tails
     makes groups scatter; but it does not change their size as a whole.
     """
-    return subject == "kurtosis" or (leads == "kurtosis" and subject in _OF_GROUPS)
+    return subject == "kurtosis" or (leads == "kurtosis" and subject in OF_GROUPS)
 
 
 def _swinging(diagnosis: Diagnosis) -> list[Found]:
@@ -204,52 +200,3 @@ def _of_outliers(diagnosis: Diagnosis) -> list[Found]:
     if test.log_chance > limit_of(diagnosis):
         return []
     return [Found(test, gains.of_outliers(diagnosis), size=float(rows.is_far.sum()))]
-
-
-def _of_scatter(diagnosis: Diagnosis, scatter: list[Scatter]) -> list[Found]:
-    """Return the cause that changes the size of the residuals, after what patterns explain.
-
-    The tails of their distribution are a cause of their own.
-    """
-    limit, noise = limit_of(diagnosis), scatter[0]
-    tests = {one.subject: one for one in diagnosis.tests}
-    found = []
-    for one in scatter:
-        test = tests.get(one.name)
-        # What the fit adjusts itself has no significance.
-        if test is None or test.sigma == 0.0 or one.log_chance > limit:
-            continue
-        test = test._replace(
-            statistic=one.value, log_chance=one.log_chance, sigma=sigmas(one.log_chance)
-        )
-        if one.name == "noise":
-            gain = gains.of_scale(one.value, one.freedom)
-            found.append(Found(test, gain, size=float(np.sqrt(one.value) - 1.0)))
-        elif one.name == "magnitudes":
-            found.append(Found(test, gains.of_slope(noise, one)))
-        elif one.name == "kurtosis":
-            found.append(Found(test, gains.of_kurtosis(one)))
-        elif one.name in ("exposures", "detectors", "sources"):
-            found.append(Found(test, gains.of_groups(noise, one)))
-    tails = [one for one in found if one.test.subject == "kurtosis"]
-    of_size = [one for one in found if one.test.subject != "kurtosis"]
-    if tails:
-        # Noise with tails makes groups scatter: they count with what they gain beyond its size.
-        whole = gains.of_scale(noise.value, noise.freedom)
-        of_size = [
-            one
-            for one in of_size
-            if one.test.subject == "noise" or one.gain - whole > tails[0].gain
-        ]
-    if not of_size:
-        return tails
-    best = max(of_size, key=lambda one: (_is_overstated(one), one.gain))
-    # The noise as a whole changes, too.
-    chance = min(best.test.log_chance, noise.log_chance)
-    best = best._replace(test=best.test._replace(log_chance=chance, sigma=sigmas(chance)))
-    return [best, *tails]
-
-
-def _is_overstated(one: Found) -> bool:
-    """Return whether a cause is a noise so much smaller than stated that priors decide the rest."""
-    return one.test.subject == "noise" and one.test.statistic < _OVERSTATED

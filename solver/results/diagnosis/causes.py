@@ -13,35 +13,19 @@ import numpy as np
 from solver.results.diagnosis import gains
 from solver.results.diagnosis.contradictions import (
     STARS,
-    beyond_shift,
-    is_beyond_noise,
     of_epoch,
     of_others,
     of_priors,
     of_references,
 )
-from solver.results.diagnosis.found import CLOSE, Found, limit_of
-from solver.results.diagnosis.pattern_causes import LEAST_SHARE, PATTERNS, pattern_causes
+from solver.results.diagnosis.found import Found, limit_of
+from solver.results.diagnosis.named_causes import FAR_OFF, OF_EXPOSURES, named_causes
+from solver.results.diagnosis.pattern_causes import pattern_causes
 from solver.results.diagnosis.scatter import Scatter, scatter_tests
-from solver.results.diagnosis.scatter_causes import OF_GROUPS, SCATTER, of_scatter
+from solver.results.diagnosis.scatter_causes import SCATTER, of_scatter
 from solver.results.diagnosis.table import Diagnosis
 
-_OF_EXPOSURES = ("stretch", "shear", "quadratic")
-# The positions of the sources carry these into all exposures.
-_MAKES_PATTERNS = (
-    "swing",
-    "outliers",
-    "swapped",
-    *STARS,
-    "epoch",
-    "prior",
-)
-# A cause of another kind is named beside the first one from this share of its sigmas.
-_OF_ITS_OWN = 0.5
-# What these bring about explains at most so many times what the positions carry.
-_SHIFTS_STARS, _MARGIN = ("swing", "outliers"), 2.0
 _MOST_RIVALS = 2
-_FAR_OFF = ("outliers", "swapped")
 # Outliers are wrong identifications if these have this share of their chi2.
 _OF_OUTLIERS = 0.5
 # Patterns that explain more of chi2 are not linear: what they leave tells nothing about the noise.
@@ -90,73 +74,11 @@ def find_causes(diagnosis: Diagnosis) -> FoundCauses:
     swapped = wrong_identifications(diagnosis)
     if swapped and found and found[0].test.subject in (*SCATTER, *STARS):
         # They make both of these, and neither makes them.
-        found = [*swapped, *(one for one in found if one.test.subject not in _FAR_OFF)]
-    named, left_out = _of_their_own(found, diagnosis)
-    rivals = [*(rivals if named[:1] == patterns[:1] else ()), *_rivals(named, left_out)]
+        found = [*swapped, *(one for one in found if one.test.subject not in FAR_OFF)]
+    divided = named_causes(found, diagnosis)
+    named = divided.named
+    rivals = [*(rivals if named[:1] == patterns[:1] else ()), *divided.rivals()]
     return FoundCauses(tuple(named), tuple(rivals[:_MOST_RIVALS]), left)
-
-
-def _rivals(named: list[Found], left_out: list[Found]) -> list[Found]:
-    """Return the causes that are left out, but nearly as likely as the first one.
-
-    What describes the size of the residuals includes a noise that is larger as a whole.
-    """
-    return [
-        one
-        for one in left_out
-        if one.gain > named[0].gain - CLOSE and one.test.subject not in (*SCATTER, "kurtosis")
-    ]
-
-
-def _of_their_own(found: list[Found], diagnosis: Diagnosis) -> tuple[list[Found], list[Found]]:
-    """Return the causes without those that the first one may have brought about, and these.
-
-    Patterns were tested one after the other. Of two kinds of causes the weaker may be a result of
-    the stronger; the next fit finds it if it is not.
-    """
-    if not found:
-        return [], []
-    leads, *others = found
-    subject, rows = leads.test.subject, diagnosis.rows
-    # One wrong of n measurements shifts its star by 1/n; its other residuals have 1/n of the chi2.
-    carried = _MARGIN * leads.gain * len(np.unique(rows.source)) / max(rows.n, 1)
-
-    def is_named(one: Found) -> bool:
-        is_pattern = one.test.subject in PATTERNS
-        if (is_pattern and subject in PATTERNS) or one.test.subject == "epoch":
-            # No other cause moves each star along its own proper motion.
-            return True
-        if one.test.subject == "prior" and subject in SCATTER:
-            return is_beyond_noise(one, diagnosis.scale, limit_of(diagnosis))
-        if one.test.subject == "sources" and subject in _FAR_OFF:
-            return False
-        is_weak = one.test.sigma <= _OF_ITS_OWN * leads.test.sigma
-        if is_weak or _is_of_tails(one.test.subject, subject):
-            return False
-        if is_pattern and subject in _SHIFTS_STARS:
-            return one.gain > carried
-        is_made = is_pattern and subject in (*_MAKES_PATTERNS, *_OF_EXPOSURES)
-        return one.gain > LEAST_SHARE * leads.gain and not is_made
-
-    named, left_out = [leads], list[Found]()
-    sizes = [one.test.size_um for one in found if one.test.subject in PATTERNS]
-    shift = diagnosis.camera.on_sky(float(np.hypot.reduce(sizes))) if sizes else 0.0
-    for one in others:
-        is_shifted = subject in PATTERNS and one.test.subject in (*STARS, "epoch")
-        rest = beyond_shift(diagnosis, one, shift) if is_shifted else [one]
-        its_own = list(filter(is_named, rest))
-        named += its_own
-        left_out += [] if its_own else [one]
-    return named, left_out
-
-
-def _is_of_tails(subject: str, leads: str) -> bool:
-    """Return whether a cause is not to be named beside the first one because of tails.
-
-    Whatever spoils some residuals more than others gives all of them tails, and noise with tails
-    makes groups scatter; but it does not change their size as a whole.
-    """
-    return subject == "kurtosis" or (leads == "kurtosis" and subject in OF_GROUPS)
 
 
 def _swinging(diagnosis: Diagnosis) -> list[Found]:
@@ -172,7 +94,7 @@ def _of_exposures(diagnosis: Diagnosis, explained: float) -> tuple[list[Found], 
 
     It is the pattern that explains most, beyond what those of all exposures explain already.
     """
-    tests = [one for one in diagnosis.tests if one.subject in _OF_EXPOSURES]
+    tests = [one for one in diagnosis.tests if one.subject in OF_EXPOSURES]
     gained = [(*gains.of_each_exposure(diagnosis, one.subject), one) for one in tests]
     gain, of_each, best = max(gained, key=lambda one: one[0])
     if best.log_chance > limit_of(diagnosis) or best.statistic - best.expected < explained:

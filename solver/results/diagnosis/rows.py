@@ -1,13 +1,17 @@
 """The residuals of a solution on the focal plane, in the order of the exposures."""
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from solver.data.detector_spans import Move, span_numbers, with_moves
 from solver.data.result import FitResult
+from solver.results.diagnosis.sorted_table import (
+    ResidualColumns,
+    SortedTable,
+    read_columns,
+    sorted_table,
+)
 from solver.units import MINUTES_PER_DAY, RAD_PER_MAS
 
 # Sigmas beyond which a residual is an outlier: one good one in five hundred million is.
@@ -99,60 +103,52 @@ class Camera(NamedTuple):
 
 def camera_rows(result: FitResult) -> tuple[Camera, Rows]:
     """Return the residuals of a result, and its camera."""
-    table, detectors = result.residuals, result.values_on("det")
-    rotation = result.calibration["group"] == "detector_rotation"
-    labels = result.calibration.loc[rotation, "label"].str.split().str[-1]
+    detectors = result.values_on("det")
     turn = np.radians(detectors["detector_rotation"].to_numpy())
     pitch = detectors[["pitch_x", "pitch_y"]].to_numpy()
-    detector = pd.Index(labels.to_numpy(dtype=np.int64)).get_indexer(table["detector_id"])
-    exposure, n_det = result.exposure_index, len(turn)
-    key = exposure * n_det + detector
-    # Sixteen bits are sorted by their digits, ten times as fast as more.
-    order = np.argsort(key.astype(np.min_scalar_type(key.max(initial=0))), kind="stable")
-    exposure, detector = exposure.take(order), detector.take(order)
+    table = sorted_table(result, len(turn))
+    columns = read_columns(table, result.sources["source_id"].to_numpy())
+    half = _largest(columns.pixel, table.detector, len(turn))
+    scale = _distortion_scale(result, columns.focal)
+    camera = _camera(result, turn, pitch, half, scale)
+    return camera, _rows(table, columns, camera)
 
-    def column(name: str) -> np.ndarray:
-        return table[name].to_numpy().take(order)
 
-    def pair(name: str) -> np.ndarray:
-        # Each axis is contiguous.
-        found = np.empty((2, len(order)))
-        for axis, letter in zip(found, "xy", strict=True):
-            np.take(table[f"{name}{letter}"].to_numpy(dtype=float), order, out=axis, mode="clip")
-        return found.T
+def _distortion_scale(result: FitResult, focal: np.ndarray) -> float:
+    """Return the unit of the distortion's coordinates, um.
 
-    def sources() -> np.ndarray:
-        # Few ids are searched for: all of them would take ten times as long.
-        source, known = pd.factorize(column("source_id"))
-        return np.searchsorted(result.sources["source_id"].to_numpy(), known)[source]
-
-    with ThreadPoolExecutor(1) as thread:
-        later = [thread.submit(sources), *(thread.submit(pair, one) for one in ("n", "focal_"))]
-        sigma, residual = pair("s"), pair("residual_")
-        source, pixel, focal = (one.result() for one in later)
-    um, half = pitch.T.take(detector, axis=1).T, _largest(pixel, detector, n_det)
-    first = np.searchsorted(exposure, np.arange(len(result.exposures) + 1))
-    left = 1.0 - np.clip(0.5 * column("leverage"), 0.0, 1.0)
-    squares = np.square(residual / sigma)
-    is_far = _far(squares.max(axis=1), left, first)
+    Parameters
+    ----------
+    focal : positions on the focal plane, um, shape (n, 2)
+    """
     # Older results lack it; the largest coordinate is near.
     largest = np.abs(focal).max(initial=1.0)
-    scale = float(result.summary.get("distortion_scale_um", largest))
-    rows = Rows(
-        exposure,
-        detector,
-        source,
-        first,
-        focal / scale,
-        pixel,
-        pixel / half.T.take(detector, axis=1).T,
-        onto_focal_plane(residual * um * ~is_far[:, None], turn, detector),
-        1.0 / np.square(sigma * um).mean(axis=1),
-        left,
-        squares.sum(axis=1),
-        is_far,
+    return float(result.summary.get("distortion_scale_um", largest))
+
+
+def _rows(table: SortedTable, columns: ResidualColumns, camera: Camera) -> Rows:
+    """Return the residuals on the focal plane."""
+    detector = table.detector
+    um = camera.pitch.T.take(detector, axis=1).T
+    first = np.searchsorted(table.exposure, np.arange(len(camera.time) + 1))
+    left = 1.0 - np.clip(0.5 * table.column("leverage"), 0.0, 1.0)
+    squares = np.square(columns.residual / columns.sigma)
+    is_far = _far(squares.max(axis=1), left, first)
+    used = columns.residual * um * ~is_far[:, None]
+    return Rows(
+        exposure=table.exposure,
+        detector=detector,
+        source=columns.source,
+        first=first,
+        at=columns.focal / camera.scale,
+        pixel=columns.pixel,
+        local=columns.pixel / camera.half.T.take(detector, axis=1).T,
+        residual=onto_focal_plane(used, camera.turn, detector),
+        weight=1.0 / np.square(columns.sigma * um).mean(axis=1),
+        left=left,
+        chi2=squares.sum(axis=1),
+        is_far=is_far,
     )
-    return _camera(result, turn, pitch, half, scale), rows
 
 
 def _largest(pixel: np.ndarray, detector: np.ndarray, n_det: int) -> np.ndarray:
@@ -213,15 +209,15 @@ def _camera(
     roll = np.radians(fitted["position_angle"].to_numpy())
     period = result.settings.breathing_period / MINUTES_PER_DAY
     return Camera(
-        turn,
-        pitch,
-        half,
-        result.values_on("det", "prior_centre")[["detector_x", "detector_y"]].to_numpy(),
-        scale,
-        roll - roll[0],
-        (days - days.min()) / span - 0.5,
-        2.0 * np.pi * (days - 0.5 * (days.min() + days.max())) / period,
-        np.unique(start.to_numpy(), return_inverse=True)[1],
-        detector_spans(result),
-        float(fitted["focal_length"].mean()) * RAD_PER_MAS,
+        turn=turn,
+        pitch=pitch,
+        half=half,
+        centre=result.values_on("det", "prior_centre")[["detector_x", "detector_y"]].to_numpy(),
+        scale=scale,
+        roll=roll - roll[0],
+        time=(days - days.min()) / span - 0.5,
+        phase=2.0 * np.pi * (days - 0.5 * (days.min() + days.max())) / period,
+        field=np.unique(start.to_numpy(), return_inverse=True)[1],
+        span=detector_spans(result),
+        um_per_mas=float(fitted["focal_length"].mean()) * RAD_PER_MAS,
     )

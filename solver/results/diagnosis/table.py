@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.special import chdtri
 
 from solver.data.result import FitResult
 from solver.results.diagnosis.epoch import EpochOffset, epoch_offset
-from solver.results.diagnosis.exposures import WAVES, ExposureChi2, exposure_chi2
+from solver.results.diagnosis.exposure_tests import exposure_tests, swing_test
+from solver.results.diagnosis.exposures import ExposureChi2, exposure_chi2
 from solver.results.diagnosis.fitted import source_variances
 from solver.results.diagnosis.modelled import is_adjusted
 from solver.results.diagnosis.patterns import Family, Patterns
@@ -18,7 +18,6 @@ from solver.results.diagnosis.products import products
 from solver.results.diagnosis.projection import Projection, covariance_of_products
 from solver.results.diagnosis.rate import (
     log_chance,
-    of_many,
     sigmas,
 )
 from solver.results.diagnosis.references import (
@@ -26,7 +25,7 @@ from solver.results.diagnosis.references import (
     catalogue_chi2,
 )
 from solver.results.diagnosis.rows import Camera, Rows, camera_rows
-from solver.results.diagnosis.scatter import scatter_tests
+from solver.results.diagnosis.scatter import Scatter, scatter_tests
 from solver.results.diagnosis.star_tests import epoch_tests, other_star_tests, reference_tests
 from solver.results.diagnosis.swapped import Swapped, swapped
 from solver.results.diagnosis.test import Test, discovered
@@ -36,10 +35,6 @@ from solver.runtime.threads import one_blas_thread
 # If all is well, the probability that any test is a discovery: a solution to be used with care,
 # and one that is not to be trusted.
 CARE_RATE, BAD_RATE = 0.02, 0.002
-# An exposure stands out if chance makes one like it in so many orbits.
-_OF_EXPOSURES = np.log(1e-3)
-# If more of the exposures swing than this share, it is not the pointing of some.
-_MOST_SWINGING = 0.3
 # Of the size of a normal value.
 _PRIOR_SCATTER = float(np.sqrt(1.0 - 2.0 / np.pi))
 
@@ -89,67 +84,113 @@ class Diagnosis(NamedTuple):
         return pd.DataFrame(self.tests, columns=list(Test._fields))
 
 
+class _Steady(NamedTuple):
+    """A solution as if the exposures that swing were left out.
+
+    Attributes
+    ----------
+    rows, exposures, swinging : as in `Diagnosis`
+    test : of the swing
+    """
+
+    rows: Rows
+    exposures: ExposureChi2
+    swinging: np.ndarray
+    test: Test
+
+
 @one_blas_thread()
 def diagnose(result: FitResult) -> Diagnosis:
     """Return the tests of a solution."""
     camera, rows = camera_rows(result)
     magnitude = source_magnitudes(result)
+    is_reference = result.sources["is_reference"].to_numpy(bool)
     patterns = Patterns(camera, int(result.summary["order"]), magnitude)
     # The covariance takes as long as all else here.
     with ThreadPoolExecutor(1) as thread:
         covariance = thread.submit(covariance_of_products, result, camera, rows, patterns)
-        exposures = exposure_chi2(rows)
-        swings, swinging = _swings(exposures, camera.field)
-        is_reference = result.sources["is_reference"].to_numpy(bool)
-        magnitude_of_others = np.where(
-            result.sources["is_reference"].to_numpy(bool), np.nan, magnitude
-        )
-        if len(swinging):
-            rows = without_exposures(rows, camera, source_variances(result, camera), swinging)
-            exposures = exposures.with_others_of(exposure_chi2(rows), swinging)
-        scatter = scatter_tests(rows, magnitude_of_others, without=swinging)
-        scale = max(scatter[0].value, 1.0)
+        steady = _steady(result, camera, rows)
+        of_others = np.where(is_reference, np.nan, magnitude)
+        scatter = scatter_tests(steady.rows, of_others, without=steady.swinging)
         pairs = swapped(result)
         references, others = (
             catalogue_chi2(result.sources[chosen]) for chosen in (is_reference, ~is_reference)
         )
         epoch = epoch_offset(result.sources)
-        along, weight = products(patterns, rows), float(rows.weight.sum())
+        along, weight = products(patterns, steady.rows), float(steady.rows.weight.sum())
         projection = Projection(along, *covariance.result(), weight)
-    priors = prior_rms(result)
-    tests = [
-        *(Test(one.name, one.name, (), *one[1:5], sigmas(one.log_chance)) for one in scatter),
-        _of_pairs(pairs),
-        *(pattern_test(projection, family, scale) for family in patterns.families),
-        *_of_exposures(exposures, swinging),
-        swings,
-        *reference_tests(result, references),
-        *other_star_tests(others),
-        *epoch_tests(epoch),
-        *(prior_test(one) for one in sorted(priors, key=lambda one: one.log_chance)[:1]),
-    ]
-    # A test that the fit itself adjusts counts, but never alarms.
-    tests = [
-        one._replace(log_chance=0.0, sigma=0.0) if is_adjusted(result, one.subject) else one
-        for one in tests
-    ]
-    return Diagnosis(
-        tuple(tests),
-        result,
-        camera,
-        rows,
-        patterns,
-        projection,
-        magnitude_of_others,
-        scale,
-        exposures,
-        swinging,
-        references,
-        others,
-        epoch,
-        pairs,
-        priors,
+    without_tests = Diagnosis(
+        tests=(),
+        result=result,
+        camera=camera,
+        rows=steady.rows,
+        patterns=patterns,
+        projection=projection,
+        magnitude=of_others,
+        scale=max(scatter[0].value, 1.0),
+        exposures=steady.exposures,
+        swinging=steady.swinging,
+        references=references,
+        others=others,
+        epoch=epoch,
+        swapped=pairs,
+        priors=prior_rms(result),
     )
+    tests = _tests(without_tests, scatter, steady.test)
+    return without_tests._replace(tests=tuple(_without_alarm(one, result) for one in tests))
+
+
+def _steady(result: FitResult, camera: Camera, rows: Rows) -> _Steady:
+    """Return a solution without the exposures that swing, if any do.
+
+    Parameters
+    ----------
+    rows : with all exposures
+    """
+    exposures = exposure_chi2(rows)
+    test, swinging = swing_test(exposures, camera.field)
+    if not len(swinging):
+        return _Steady(rows, exposures, swinging, test)
+    rows = without_exposures(rows, camera, source_variances(result, camera), swinging)
+    exposures = exposures.with_others_of(exposure_chi2(rows), swinging)
+    return _Steady(rows, exposures, swinging, test)
+
+
+def _tests(found: Diagnosis, scatter: list[Scatter], of_swing: Test) -> list[Test]:
+    """Return all tests, in the order of the table.
+
+    Parameters
+    ----------
+    found : what they are computed from; it has no tests yet
+    scatter : tests of the size of the residuals, and of outliers
+    of_swing : test of the largest swing of an exposure
+    """
+    families = found.patterns.families
+    worst_prior = sorted(found.priors, key=lambda one: one.log_chance)[:1]
+    return [
+        *(_scatter_test(one) for one in scatter),
+        _of_pairs(found.swapped),
+        *(pattern_test(found.projection, family, found.scale) for family in families),
+        *exposure_tests(found.exposures, found.swinging),
+        of_swing,
+        *reference_tests(found.result, found.references),
+        *other_star_tests(found.others),
+        *epoch_tests(found.epoch),
+        *(prior_test(one) for one in worst_prior),
+    ]
+
+
+def _without_alarm(test: Test, result: FitResult) -> Test:
+    """Return a test that counts, but never alarms, if the fit itself adjusts what it is about."""
+    if is_adjusted(result, test.subject):
+        return test._replace(log_chance=0.0, sigma=0.0)
+    return test
+
+
+def _scatter_test(found: Scatter) -> Test:
+    """Return the test of the size of the residuals."""
+    numbers = found.value, found.expected, found.scatter, found.log_chance
+    return Test(found.name, found.name, (), *numbers, sigmas(found.log_chance))
 
 
 def source_magnitudes(result: FitResult) -> np.ndarray:
@@ -192,51 +233,8 @@ def prior_test(found: PriorRms) -> Test:
     return Test(name, "prior", (found.place,), *numbers)
 
 
-def _of_exposures(found: ExposureChi2, swinging: np.ndarray) -> list[Test]:
-    """Return the tests of patterns that all exposures may have, each its own."""
-    tests = []
-    for subject, chi2, each in (
-        ("stretch", found.stretch, 1),
-        ("shear", found.shear, 1),
-        ("quadratic", found.quadratic, 6),
-    ):
-        others = np.delete(chi2, swinging)
-        total, dof = float(others.sum()), float(each * len(others))
-        chance = log_chance(total, dof)
-        name = f"{subject} of each exposure"
-        scatter = float(np.sqrt(2.0 * dof))
-        tests.append(Test(name, subject, (), total, dof, scatter, chance, sigmas(chance)))
-    return tests
-
-
 def _of_pairs(found: Swapped) -> Test:
     """Return the test of the identifications."""
     count, scatter = float(len(found.rows) // 2), float(np.sqrt(found.expected))
     numbers = count, found.expected, scatter, found.log_chance, sigmas(found.log_chance)
     return Test("measurements in each other's place", "swapped", (), *numbers)
-
-
-def _swings(found: ExposureChi2, field: np.ndarray) -> tuple[Test, np.ndarray]:
-    """Return the test of the largest swing of an exposure, and which exposures swing."""
-    dof, n = 4.0 * WAVES, len(found.swing)
-    chances = np.array([of_many(log_chance(one, dof), n) for one in found.swing])
-    is_own = found.swing * found.scale > _induced(found.swing * found.scale, field)
-    swinging = np.flatnonzero((chances < _OF_EXPOSURES) & is_own)
-    if len(swinging) > _MOST_SWINGING * n:
-        swinging = swinging[:0]
-    largest, chance = float(found.swing.max(initial=0.0)), float(chances.min(initial=0.0))
-    typical, scatter = float(chdtri(dof, 0.5 / n)), float(np.sqrt(2.0 * dof))
-    name = "pointing while an exposure is read"
-    return Test(name, "swing", (), largest, typical, scatter, chance, sigmas(chance)), swinging
-
-
-def _induced(swing: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Return the largest chi2 of a swing that the other exposures may bring about.
-
-    The positions of the sources, each a mean over the exposures of its field, carry it, and what
-    all exposures share.
-    """
-    root, count = np.sqrt(swing), np.bincount(field)
-    of_field = (np.bincount(field, root)[field] - root) / count[field]
-    of_all = (root.sum() - root) / max(len(root), 1)
-    return np.square(np.maximum(of_field, of_all))

@@ -8,15 +8,16 @@ that go with each parameter sum to their expectation, which leverage lowers; sco
 in a few fits.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
 from solver.data.settings import FitSettings
-from solver.engines.gauss_newton import Iteration, Mode, find_mode
+from solver.engines.gauss_newton import Iteration, Mode, StartingPoint, find_mode
 from solver.engines.variance_model import VarianceModel
 from solver.errors import InputError
 from solver.linear.covariances import Covariances, covariances
@@ -35,6 +36,45 @@ _MAX_STEP = 1.0
 # one orbit may hardly say anything about it, and would then make it vanish. Where they say much,
 # the tails of the prior leave the estimate to them.
 _REFERENCE_WIDTH, _REFERENCE_DOF = 1.0, 4.0
+
+
+class _Parameters(NamedTuple):
+    """A value for each parameter of the noise model, or its uncertainty.
+
+    Attributes
+    ----------
+    of_rows : those of `VarianceModel`, shape (parameters,)
+    of_references : logarithm of the references' variance over the stated one
+    """
+
+    of_rows: Float[np.ndarray, " parameter"]
+    of_references: float
+
+
+class _Round(NamedTuple):
+    """The search for the noise model after a number of fits.
+
+    Attributes
+    ----------
+    number : of fits
+    start : where the next fit starts, the solution of the last one; None before the first
+    is_solution : whether the last fit has found its solution
+    at : values of the parameters, after the step that follows from that fit
+    sigma : their uncertainties
+    largest : step over its uncertainty, of the parameter where that is largest
+    """
+
+    number: int
+    start: StartingPoint | None
+    is_solution: bool
+    at: _Parameters
+    sigma: _Parameters
+    largest: float
+
+    @property
+    def has_converged(self) -> bool:
+        """Whether the last step was small."""
+        return bool(self.largest < _TOLERANCE)
 
 
 def estimate_noise(
@@ -61,47 +101,94 @@ def estimate_noise(
     model_of_all = _variance_model(whole or problem, settings)
     labels = pd.Index((whole or problem).measurements.label)
     model_of_all, model = model_of_all.of_rows(labels.get_indexer(problem.measurements.label))
-    by_reference = 0.0
-    by_row, sigma = model.start(), model.start()
-    mode, rounds, largest, is_solution = None, 0, np.inf, False
-    while not (is_solution and largest < _TOLERANCE) and rounds < _MAX_ROUNDS:
-        rounds += 1
-        scaled = _scaled(problem, model.sigma(by_row), np.exp(0.5 * by_reference))
-        mode = find_mode(scaled, settings, progress, start=mode)
-        if mode.reduced is None:
+    found = _search(problem, settings, model, progress)
+    if found is None:
+        return None
+    by_row, by_reference = found.at
+    factor = pd.Series(model_of_all.factor(by_row), index=labels)
+    entry = _entry(found, model, settings)
+    return Noise(factor, model.floor(by_row), float(np.exp(0.5 * by_reference)), entry)
+
+
+def _search(
+    problem: Problem,
+    settings: FitSettings,
+    model: VarianceModel,
+    progress: Callable[[Iteration], None],
+) -> _Round | None:
+    """Return the last round of scoring steps, or None without a solution."""
+    start = _Parameters(model.start(), 0.0)
+    last = _Round(0, None, False, start, start, np.inf)
+    # Wrong uncertainties may be what keeps a fit from its solution.
+    while not (last.is_solution and last.has_converged) and last.number < _MAX_ROUNDS:
+        following = _next_round(last, problem, settings, model, progress)
+        if following is None:
             return None
-        # Wrong uncertainties may be what keeps a fit from its solution.
-        is_solution = mode.status.is_solution
-        covariance = covariances(mode.reduced)
-        found = residuals(scaled, mode.theta, mode.sources, covariance)
-        step, sigma = model.step(by_row, found)
+        last = following
+    return last if last.is_solution else None
+
+
+def _next_round(
+    last: _Round,
+    problem: Problem,
+    settings: FitSettings,
+    model: VarianceModel,
+    progress: Callable[[Iteration], None],
+) -> _Round | None:
+    """Fit with the noise of the last round, and take a step; None if that fit is impossible."""
+    by_row, by_reference = last.at
+    scaled = _scaled(problem, model.sigma(by_row), np.exp(0.5 * by_reference))
+    mode = find_mode(scaled, settings, progress, start=last.start)
+    if mode.reduced is None:
+        return None
+    covariance = covariances(mode.reduced)
+    found = residuals(scaled, mode.theta, mode.sources, covariance)
+    step, sigma = model.step(by_row, found)
+    reference_step, reference_sigma = 0.0, np.inf
+    if settings.reference_scale:
         reference_step, reference_sigma = _step_of_references(
             scaled, mode, covariance, by_reference
         )
-        if not settings.reference_scale:
-            reference_step, reference_sigma = 0.0, np.inf
-        by_row, by_reference = by_row + step, by_reference + reference_step
-        largest = np.max(np.abs(step) / sigma, initial=abs(reference_step) / reference_sigma)
-    if not is_solution:
-        return None
-    # Half of the logarithm of the variance.
-    log_factor, sigmas = (
-        {name: 0.5 * float(value) for name, value in zip(model.names, values, strict=False)}
-        for values in (by_row, sigma)
+    at = _Parameters(by_row + step, by_reference + reference_step)
+    largest = np.max(np.abs(step) / sigma, initial=abs(reference_step) / reference_sigma)
+    return _Round(
+        number=last.number + 1,
+        start=StartingPoint(mode.theta, mode.sources),
+        is_solution=mode.status.is_solution,
+        at=at,
+        sigma=_Parameters(sigma, reference_sigma),
+        largest=largest,
     )
-    if settings.reference_scale:
-        log_factor["references"], sigmas["references"] = 0.5 * by_reference, 0.5 * reference_sigma
+
+
+def _entry(found: _Round, model: VarianceModel, settings: FitSettings) -> dict[str, object]:
+    """Return what the summary of a result says about the noise.
+
+    Factors are logarithms of those on the uncertainties, half of those on the variances.
+    """
+    log_factor, sigma = (
+        _by_name(values, model.names, settings) for values in (found.at, found.sigma)
+    )
     entry: dict[str, object] = {
-        "rounds": rounds,
-        "converged": bool(largest < _TOLERANCE),
+        "rounds": found.number,
+        "converged": found.has_converged,
         "log_factor": log_factor,
-        "sigma": sigmas,
+        "sigma": sigma,
     }
     if model.has_floor:
-        entry["floor_pix"] = model.floor(by_row)
-        entry["floor_sigma_pix"] = model.floor_sigma(by_row, sigma)
-    factor = pd.Series(model_of_all.factor(by_row), index=labels)
-    return Noise(factor, model.floor(by_row), float(np.exp(0.5 * by_reference)), entry)
+        entry["floor_pix"] = model.floor(found.at.of_rows)
+        entry["floor_sigma_pix"] = model.floor_sigma(found.at.of_rows, found.sigma.of_rows)
+    return entry
+
+
+def _by_name(values: _Parameters, names: Sequence[str], settings: FitSettings) -> dict[str, float]:
+    """Return half of each value by the name of its parameter, without that of the floor."""
+    # The floor is last, and has no name.
+    pairs = zip(names, values.of_rows, strict=False)
+    halves = {name: 0.5 * float(value) for name, value in pairs}
+    if settings.reference_scale:
+        halves["references"] = 0.5 * values.of_references
+    return halves
 
 
 def _variance_model(problem: Problem, settings: FitSettings) -> VarianceModel:

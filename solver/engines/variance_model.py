@@ -101,6 +101,9 @@ class VarianceModel(NamedTuple):
         # For a factor alone, the raw step is the ratio of the variances minus one.
         bounded = np.clip(raw[:count], np.expm1(-_MAX_STEP), np.expm1(_MAX_STEP))
         moved = np.append(np.log1p(bounded), np.maximum(raw[count:], -at[count:]))
+        # Powers of the magnitude make much of a small step, where stars are far from the mean.
+        furthest = float(np.abs(self.design @ moved[:count]).max(initial=0.0))
+        moved *= min(1.0, _MAX_STEP / max(furthest, _MAX_STEP))
         return moved, np.sqrt(2.0 * np.diag(np.linalg.inv(information)))
 
     def _check_distinct(self, information: Float[np.ndarray, "n n"]) -> None:

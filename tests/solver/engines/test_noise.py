@@ -8,7 +8,9 @@ import pytest
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.fit import OrbitFitter, fit_orbit
+from solver.simulate.settings import SurveySettings
 from solver.units import MAS_PER_DEG
+from tests.campaigns.defects import defective_orbit
 
 
 def understated(data, factor):
@@ -191,3 +193,17 @@ def test_a_floor_and_a_factor_of_equal_uncertainties_are_refused(small_orbit):
     equal = replace(data, measurements=data.measurements.assign(sx=0.01, sy=0.01))
     with pytest.raises(InputError, match="a floor does what a factor does"):
         fit_orbit(equal, small_orbit.instrument, settings)
+
+
+def test_search_does_not_run_away_where_a_power_of_the_magnitude_makes_much_of_a_step():
+    settings = SurveySettings(
+        orbits=5, seed=2, magnitudes=True, defects=("noise=50%", "detector-shift=0.3um")
+    )
+    data, _ = defective_orbit(settings.scaled(8000), 0)
+    # Stated uncertainties have little to do with the noise.
+    wrong = 10.0 ** np.random.default_rng(2).uniform(-0.6, 0.6, len(data.measurements))
+    asked = FitSettings(noise_by_magnitude=True, noise_floor=True, reference_scale=True)
+    result = fit_orbit(understated(data, wrong), settings=asked)
+    assert result.summary["converged"]
+    assert result.summary["noise"]["converged"]
+    assert result.summary["chi2_per_dof"] == pytest.approx(1.0, abs=0.02)

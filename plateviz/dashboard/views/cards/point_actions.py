@@ -25,8 +25,7 @@ Select = Callable[[frozenset[Any]], object]
 """Called with what a person has selected: ids of sources or detectors, or pairs of exposures."""
 
 SelectArea = Callable[[np.ndarray], object]
-"""Called with the corners, (n, 2), of an area where a person has drawn one and there are no points.
-"""
+"""Called with the corners, (n, 2), of an area that a person has drawn where there are no points."""
 
 _MOST_CORNERS = 500
 _ONE_TAP_SECONDS = 0.5

@@ -1,6 +1,7 @@
 """The summary strip as HTML, for the dashboard and reports in both themes."""
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 
@@ -8,6 +9,8 @@ from plateviz.tables import SummaryItem
 
 STYLE = (files("plateviz.reports") / "summary_strip.css").read_text(encoding="utf-8")
 """The colours of both themes, and the classes of the strip."""
+# Tiles that share a row in any window.
+_FEW = 4
 
 
 def strip(items: Iterable[SummaryItem], others: Iterable[SummaryItem] = ()) -> str:
@@ -22,7 +25,16 @@ def strip(items: Iterable[SummaryItem], others: Iterable[SummaryItem] = ()) -> s
     for item in items:
         (counts if item.is_count else tiles).append(_cell(item, of_a.get(item.label)))
     line = f"<div class='counts'>{''.join(counts)}</div>" if counts else ""
-    return f"<div class='strip'>{''.join(tiles)}</div>{line}"
+    return f"<div class='strip'>{_in_rows(tiles)}</div>{line}"
+
+
+def _in_rows(tiles: Sequence[str]) -> str:
+    """Return tiles whose style knows how many share a row in a wide and in a narrower window."""
+    n = len(tiles)
+    half = n if n <= _FEW else math.ceil(n / 2)
+    third = half if n <= 2 * _FEW else math.ceil(n / 3)
+    style = f"--row:{max(1, n)};--half:{max(1, half)};--third:{max(1, third)}"
+    return f"<div class='tiles' style='{style}'>{''.join(tiles)}</div>"
 
 
 def _cell(item: SummaryItem, other: SummaryItem | None) -> str:

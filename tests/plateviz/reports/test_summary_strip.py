@@ -1,5 +1,9 @@
 """The summary strip as HTML: tiles, the line of counts, and what a solution is compared with."""
 
+import re
+
+import pytest
+
 from plateviz.reports.summary_strip import strip
 from plateviz.tables.summary import SummaryItem
 
@@ -26,3 +30,20 @@ def test_values_that_differ_stand_beside_each_other():
     assert html.count("<span class='other'>&nbsp;</span>") == 1
     assert strip([COUNT], [COUNT]) == strip([COUNT])
     assert "<b>" not in html
+
+
+@pytest.mark.parametrize(
+    ("n_tiles", "expected"),
+    [
+        (3, [[3], [3], [3]]),
+        (7, [[7], [4, 3], [4, 3]]),
+        (8, [[8], [4, 4], [4, 4]]),
+        (9, [[9], [5, 4], [3, 3, 3]]),
+        (10, [[10], [5, 5], [4, 4, 2]]),
+    ],
+)
+def test_no_row_has_a_single_tile(n_tiles, expected):
+    html = strip([CHI2._replace(label=str(n)) for n in range(n_tiles)])
+    numbers = [int(found) for found in re.findall(r"--\w+:(\d+)", html)]
+    rows = [[min(n, n_tiles - k) for k in range(0, n_tiles, n)] for n in numbers]
+    assert rows == expected

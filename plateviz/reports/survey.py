@@ -13,6 +13,7 @@ from plateviz.runs.queries import SurveyRun
 from plateviz.runs.run_tables import RunTables
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import (
+    motion_in_words,
     motion_table,
     orbit_list,
     run_strip,
@@ -21,7 +22,7 @@ from plateviz.tables import (
     source_strip,
 )
 from plateviz.tables.counts import orbits_text
-from plateviz.tables.headings import CHANGES, MOTION, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in_words
+from plateviz.tables.headings import CHANGES, ORBITS_OF_RUN, ORBITS_OF_SOURCE, in_words
 from plateviz.tables.run_health import MISSING
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from plateviz.verdict.run_changes import ComparedRun, run_changes
@@ -120,7 +121,7 @@ def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
     if history.empty:
         raise InputError(f"{run.directory}: expected a source {source_id}, found none of that id")
     found = SourceTables(history, motion)
-    tables = {} if motion is None else {"Motion": in_words(motion_table(history, motion), MOTION)}
+    tables = {} if motion is None else {"Motion": motion_in_words(motion_table(history, motion))}
     return Report(
         title=f"Source {source_id}",
         subtitle=f"{source_class(history).capitalize()} source in run {run.name}",

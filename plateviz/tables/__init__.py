@@ -62,6 +62,7 @@ from plateviz.tables.selected_sources import selected_sources
 from plateviz.tables.sky_distribution import sky_density, sky_distribution
 from plateviz.tables.sky_track import TrackStatistics, sky_track, track_statistics
 from plateviz.tables.source_profile import (
+    motion_in_words,
     motion_table,
     source_class,
     source_list,
@@ -129,6 +130,7 @@ __all__ = [
     "mean_residuals",
     "motion_differences",
     "motion_pulls",
+    "motion_in_words",
     "motion_table",
     "orbit_counts",
     "orbit_health",

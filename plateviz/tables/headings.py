@@ -1,6 +1,7 @@
 """Titles and number formats of the columns of tables on pages and in reports."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import pandas as pd
@@ -101,27 +102,33 @@ SOURCES_OF_RUN: Mapping[str, Heading] = {
 }
 
 
-def in_words(table: pd.DataFrame, headings: Mapping[str, Heading]) -> pd.DataFrame:
+def in_words(
+    table: pd.DataFrame,
+    headings: Mapping[str, Heading],
+    decimals: Mapping[str, Sequence[int]] = MappingProxyType({}),
+) -> pd.DataFrame:
     """Return a table for display: titles as column names, numbers formatted as text.
 
     Parameters
     ----------
     headings : column -> how it is shown; other columns, and columns without any value, are
         left out
+    decimals : column -> decimals of each of its rows, if they are not those of its format
     """
-    shown = {
-        f"{heading.group}: {heading.title}" if heading.group else heading.title: table[name].map(
-            lambda value, form=heading.format: _text(value, form)
-        )
-        for name, heading in headings.items()
-    }
+    shown = {}
+    for name, heading in headings.items():
+        title = f"{heading.group}: {heading.title}" if heading.group else heading.title
+        own = [len(heading.format.partition(".")[2])] * len(table)
+        cells = zip(table[name], decimals.get(name, own), strict=True)
+        texts = [_text(value, heading.format, n) for value, n in cells]
+        shown[title] = pd.Series(texts, index=table.index, dtype=object)
     return pd.DataFrame({title: values for title, values in shown.items() if (values != "").any()})
 
 
-def _text(value: Any, form: str) -> str:  # noqa: ANN401 a cell of any type
+def _text(value: Any, form: str, decimals: int) -> str:  # noqa: ANN401 a cell of any type
     if pd.isna(value):
         return ""
     if not form:
         return str(value)
-    thousands, decimals = "," if "," in form else "", len(form.partition(".")[2])
+    thousands = "," if "," in form else ""
     return with_minus_signs(f"{float(value):{thousands}.{decimals}f}")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 
-from plateviz.tables.headings import ORBITS_OF_SOURCE, SOURCES_OF_RUN
+from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE, SOURCES_OF_RUN, in_words
 from plateviz.tables.labels import dates, id_strings
 from plateviz.tables.rounded import with_minus_signs
 from plateviz.tables.source_track import catalogue_motion
@@ -20,6 +20,8 @@ _NAMES = {
     "pmra": ("proper motion in α cos δ", "mas/yr"),
     "pmdec": ("proper motion in δ", "mas/yr"),
 }
+# Decimals of a number whose uncertainty is not known, which are the most that any has.
+_MOST_DECIMALS = 3
 _FIGURES = ("fit", "sigma_noise", "sigma_catalogue", "sigma", "true", "pull")
 
 
@@ -117,6 +119,17 @@ def motion_table(history: pd.DataFrame, motion: pd.Series) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def motion_in_words(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a `motion_table` for display, with the decimals that each uncertainty justifies.
+
+    Parameters
+    ----------
+    table : in any unit
+    """
+    decimals = [_decimals(sigma) for sigma in table["sigma"]]
+    return in_words(table, MOTION, dict.fromkeys(("value", *_FIGURES[:-1]), decimals))
+
+
 def source_orbits(history: pd.DataFrame) -> pd.DataFrame:
     """Return the orbits of one source for display, a row each.
 
@@ -153,3 +166,10 @@ def source_list(counts: pd.DataFrame) -> pd.DataFrame:
         ["n_orbits", "n_obs"], ascending=False, kind="stable", ignore_index=True
     )
     return table.assign(id=id_strings(table["source_id"]))[list(SOURCES_OF_RUN)]
+
+
+def _decimals(sigma: float) -> int:
+    """Return the decimals of an uncertainty with two significant digits."""
+    if not (math.isfinite(sigma) and sigma > 0.0):
+        return _MOST_DECIMALS
+    return min(_MOST_DECIMALS, max(0, 1 - math.floor(math.log10(sigma))))

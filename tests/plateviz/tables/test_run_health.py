@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from plateviz.tables import (
+    motion_in_words,
     motion_table,
     orbit_list,
     orbit_states,
@@ -94,6 +95,19 @@ def test_motion_table_has_fit_truth_and_uncertainties(survey):
     assert table["sigma"].to_numpy() == pytest.approx(
         np.hypot(table["sigma_noise"], table["sigma_catalogue"]), rel=1e-6
     )
+
+
+def test_motion_in_words_has_the_decimals_that_the_uncertainties_justify():
+    one = {"parameter": "parallax", "unit": "µas", "value": 314900.387, "fit": -54.515}
+    rest = {"sigma_noise": 58.2, "sigma_catalogue": 2.767, "true": math.nan, "pull": 1.171}
+    rows = [{**one, **rest, "sigma": sigma} for sigma in (58.26, 0.0583, 0.26, 4.21, math.nan)]
+    words = motion_in_words(pd.DataFrame(rows))
+    assert words["fitted"].tolist() == [
+        *("314,900", "314,900.387", "314,900.39", "314,900.4", "314,900.387")
+    ]
+    assert words.iloc[0].tolist() == [
+        *("parallax", "µas", "314,900", "−55", "58", "3", "58", "1.171")
+    ]
 
 
 def test_parallax_and_proper_motion_have_values_of_their_own(survey):

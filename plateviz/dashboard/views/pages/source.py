@@ -39,13 +39,14 @@ from plateviz.plots.survey_figure import SourceFigure
 from plateviz.plots.workspace import SourceWorkspace
 from plateviz.reports.summary_strip import strip
 from plateviz.tables import (
+    motion_in_words,
     motion_table,
     source_class,
     source_list,
     source_orbits,
     source_strip,
 )
-from plateviz.tables.headings import MOTION, ORBITS_OF_SOURCE, SOURCES_OF_RUN, in_words
+from plateviz.tables.headings import ORBITS_OF_SOURCE, SOURCES_OF_RUN
 from plateviz.tables.survey_tables import SourceTables
 from plateviz.verdict.verdict import source_verdict
 from solver.data.survey_schema import HISTORY, MOTIONS
@@ -243,7 +244,7 @@ class SourcePage(pn.viewable.Viewer):
             self._motion.object = paragraph(words, "caption", theme)
         else:
             table = self._session.units.rows(motion_table(found.history, found.motion))
-            self._motion.object = themed(numbers(in_words(table, MOTION)), theme)
+            self._motion.object = themed(numbers(motion_in_words(table)), theme)
         self._measurements.object = paragraph(_MEASUREMENTS, "caption", theme)
         self._orbits.show(source_orbits(found.history), theme)
 

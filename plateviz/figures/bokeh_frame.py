@@ -11,6 +11,7 @@ from plateviz.figures.bokeh_glyphs import BokehGlyphs
 from plateviz.figures.figure import Axis, Frame
 from plateviz.figures.theme import FONT, LABEL_SIZE, SMALL_SIZE, TITLE_SIZE, Theme
 from plateviz.figures.tick_count import columns_of_ticks, rows_of_ticks
+from plateviz.figures.tick_labels import follow_policy
 from plateviz.figures.tick_numbers import with_tick_numbers
 from plateviz.figures.words import MENU, Words
 
@@ -262,11 +263,7 @@ def _follow_axis(
         drawn.update(ticker=models.LogTicker() if axis.is_log else models.BasicTicker())
     if isinstance(drawn.ticker, models.BasicTicker):
         drawn.ticker.desired_num_ticks = ticks
-    # Ticks that suit a large frame may be too close to each other in a small one. Turned labels
-    # lie beside each other, although the rectangles around them overlap.
-    policy = models.AllLabels if axis.rotation else models.NoOverlap
-    if not isinstance(drawn.major_label_policy, policy):
-        drawn.update(major_label_policy=policy())
+    follow_policy(drawn, axis)
     drawn.update(
         axis_label=axis.label,
         major_label_overrides=dict(axis.ticks or ()),

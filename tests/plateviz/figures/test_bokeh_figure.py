@@ -10,7 +10,7 @@ from bokeh.core.property.descriptors import UnsetValueError
 from bokeh.core.property.vectorization import Field, Value
 from bokeh.document import Document
 from bokeh.model import Model
-from bokeh.models import AllLabels, HoverTool, LogScale, NoOverlap
+from bokeh.models import AllLabels, CustomLabelingPolicy, HoverTool, LogScale, NoOverlap
 from bokeh.util.warnings import BokehDeprecationWarning
 
 from plateviz.figures.bokeh_figure import BokehFigure
@@ -235,15 +235,18 @@ def test_other_kinds_of_axes_are_drawn_anew(framed_glyphs, marks):
     assert drawn.model.children[0][0] is drawn.frames[0].plot
 
 
-def test_labels_of_ticks_may_not_overlap_unless_they_are_turned():
-    figure = message("Marks", "nothing")
+def test_labels_of_ticks_may_not_overlap_unless_they_are_turned(framed_glyphs, marks):
+    figure = framed_glyphs([marks()])
     turned = replace(figure[0], x=replace(figure[0].x, rotation=30.0))
     drawn = BokehFigure(figure, "light")
     (lower,), (left,) = drawn.frames[0].plot.below[:1], drawn.frames[0].plot.left
-    assert isinstance(lower.major_label_policy, NoOverlap)
+    assert isinstance(lower.major_label_policy, CustomLabelingPolicy)
     before = lower.major_label_policy
     drawn.follow(figure, "dark")
     assert lower.major_label_policy is before
     drawn.follow(replace(figure, frames=(turned,)), "light")
     assert isinstance(lower.major_label_policy, AllLabels)
-    assert isinstance(left.major_label_policy, NoOverlap)
+    assert isinstance(left.major_label_policy, CustomLabelingPolicy)
+    named = replace(figure[0], x=replace(figure[0].x, ticks=[(1.0, "one")]))
+    drawn.follow(replace(figure, frames=(named,)), "light")
+    assert isinstance(lower.major_label_policy, NoOverlap)

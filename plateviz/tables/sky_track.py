@@ -29,7 +29,7 @@ class TrackStatistics(NamedTuple):
 def sky_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
     """Return the positions of one source at its orbits and between them, in the tangent plane.
 
-    The origin is the catalogue's position at the mean epoch. If the catalogue lies further
+    The origin is the catalogue's position at `origin_year`. If the catalogue lies further
     away than the source itself moves, it is left out (NaN), and the origin is the true position
     at that time, else the fitted one, else the mean of the estimates.
 
@@ -42,7 +42,7 @@ def sky_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFrame:
     -------
     Rows of the `kind` "orbit" with all columns of `tables.source_track`, and of the kind
     "curve" with those of `tables.source_curves`; repeated along the table `zero` (the origin:
-    "catalogue", "true", "fit" or "mean"), `mean_year` and `rms_catalogue_mas`, the rms
+    "catalogue", "true", "fit" or "mean"), `origin_year` and `rms_catalogue_mas`, the rms
     separation from the catalogue (2-D). No rows without an orbit
     """
     return sky_track_of(source_track(history, motion), source_curves(history, motion))
@@ -56,7 +56,7 @@ def sky_track_of(track: pd.DataFrame, curves: pd.DataFrame) -> pd.DataFrame:
     zero = "catalogue" if _is_near(track, distance) else _zero(track)
     summary = {
         "zero": zero,
-        "mean_year": track["mean_year"].iloc[0],
+        "origin_year": track["origin_year"].iloc[0],
         "rms_catalogue_mas": float(np.sqrt(np.mean(distance[0] ** 2 + distance[1] ** 2))),
     }
     origin = [_origin(track, curves, zero, axis) for axis in _AXES]
@@ -93,12 +93,12 @@ def _zero(track: pd.DataFrame) -> str:
 
 
 def _origin(track: pd.DataFrame, curves: pd.DataFrame, zero: str, axis: str) -> float:
-    """Return the origin in one coordinate, mas from the catalogue's position at the mean epoch."""
+    """Return the origin in one coordinate, mas from the catalogue's position at its epoch."""
     if zero == "catalogue":
         return 0.0
     if zero == "mean":
         return float(track[f"{axis}_mas"].mean())
     if curves.empty:
         return float(track[f"{zero}_{axis}_mas"].mean())
-    at = float(track["mean_year"].iloc[0])
+    at = float(track["origin_year"].iloc[0])
     return float(np.interp(at, curves["year"], curves[f"{zero}_{axis}_mas"]))

@@ -17,7 +17,7 @@ SERIES = ("catalogue", "true", "fit")
 _AXES = ("ra", "dec")
 _CURVE_POINTS = 361
 _TRACK_COLUMNS = [
-    *("id", "source_class", "orbit_id", "n_obs", "year", "mean_year"),
+    *("id", "source_class", "orbit_id", "n_obs", "year", "origin_year"),
     *(f"{name}{axis}_mas" for name in ("", "sigma_", "noise_") for axis in _AXES),
     *(f"{name}_{axis}_mas" for name in SERIES for axis in _AXES),
 ]
@@ -26,13 +26,13 @@ _TRACK_COLUMNS = [
 class _Frame(NamedTuple):
     """Origin of the offsets of a source, and the motion of its catalogue entry.
 
-    `catalogue` has the five parameters about (ra, dec) at `mean_year`; `origin` is its position
+    `catalogue` has the five parameters about (ra, dec) at `origin_year`; `origin` is its position
     at that time, mas; `is_determined` is whether the orbits determine the parameters.
     """
 
     ra: float
     dec: float
-    mean_year: float
+    origin_year: float
     catalogue: np.ndarray
     origin: np.ndarray
     is_determined: bool
@@ -52,12 +52,13 @@ def source_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFram
     (Julian), and in ra cos(dec) and dec, mas: the estimate `ra_mas`, `dec_mas`, its marginal
     `sigma_ra_mas`, `sigma_dec_mas` and `noise_ra_mas`, `noise_dec_mas` (the part that scatters
     between orbits), `catalogue_*_mas`, `true_*_mas` and `fit_*_mas` (NaN where there is none);
-    the origin is the catalogue's position at the mean epoch `mean_year`
+    the origin is the catalogue's position at `origin_year`, the epoch of the fitted motion, or
+    the mean one of the orbits where they do not reach it
     """
     rows = history.sort_values(["epoch", "orbit_id"], kind="stable").reset_index(drop=True)
     if rows.empty:
         return pd.DataFrame(columns=_TRACK_COLUMNS)
-    frame = _frame(rows)
+    frame = _frame(rows, motion)
     catalogue = _catalogue_places(rows, frame.ra, frame.dec) - frame.origin
     fit = catalogue + _fitted(frame, rows["epoch"].to_numpy(dtype=float), motion)
     table = pd.DataFrame(
@@ -67,7 +68,7 @@ def source_track(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFram
             "orbit_id": rows["orbit_id"],
             "n_obs": rows["n_obs"],
             "year": julian_year(rows["epoch"]),
-            "mean_year": frame.mean_year,
+            "origin_year": frame.origin_year,
         }
     )
     for k, axis in enumerate(_AXES):
@@ -91,12 +92,12 @@ def source_curves(history: pd.DataFrame, motion: pd.Series | None) -> pd.DataFra
     """
     rows = history.sort_values(["epoch", "orbit_id"], kind="stable").reset_index(drop=True)
     names = [f"{series}_{axis}_mas" for series in (*SERIES, "fit_sigma") for axis in _AXES]
-    frame = _frame(rows) if len(rows) else None
+    frame = _frame(rows, motion) if len(rows) else None
     if frame is None or not frame.is_determined:
         return pd.DataFrame(columns=["year", *names], dtype=float)
     mjd = np.linspace(rows["epoch"].min(), rows["epoch"].max(), _CURVE_POINTS)
-    design = motion_design(frame.ra, frame.dec, mjd, frame.mean_year)
-    at_orbits = motion_design(frame.ra, frame.dec, rows["epoch"].to_numpy(), frame.mean_year)
+    design = motion_design(frame.ra, frame.dec, mjd, frame.origin_year)
+    at_orbits = motion_design(frame.ra, frame.dec, rows["epoch"].to_numpy(), frame.origin_year)
     catalogue = design @ frame.catalogue - frame.origin
     true_offset = _solve(at_orbits, rows[["true_offset_ra", "true_offset_dec"]].to_numpy())
     series = {
@@ -123,25 +124,33 @@ def catalogue_motion(history: pd.DataFrame) -> tuple[float, float, float]:
     -------
     NaN if the orbits are too few, or too close in time, to determine the motion
     """
-    frame = _frame(history.reset_index(drop=True))
+    frame = _frame(history.reset_index(drop=True), None)
     if not frame.is_determined:
         return math.nan, math.nan, math.nan
     _, _, parallax, pmra, pmdec = frame.catalogue.tolist()
     return parallax, pmra, pmdec
 
 
-def _frame(rows: pd.DataFrame) -> _Frame:
+def _frame(rows: pd.DataFrame, motion: pd.Series | None) -> _Frame:
     """Return the origin and the catalogue's motion, fitted to its positions at the orbits."""
     dec = float(rows["dec"].iloc[0] - rows["offset_dec"].iloc[0] / MAS_PER_DEG)
     east = float(rows["offset_ra"].iloc[0] / np.cos(np.radians(rows["dec"].iloc[0])))
     ra = float(rows["ra"].iloc[0] - east / MAS_PER_DEG)
     mjd = rows["epoch"].to_numpy(dtype=float)
-    mean_year = float(julian_year(mjd.mean()))
-    design = motion_design(ra, dec, mjd, mean_year)
+    origin_year = _origin_year(mjd, motion)
+    design = motion_design(ra, dec, mjd, origin_year)
     parameters = _solve(design, _catalogue_places(rows, ra, dec))
-    at_mean = motion_design(ra, dec, mjd_of(np.array([mean_year])), mean_year)[0]
+    at_mean = motion_design(ra, dec, mjd_of(np.array([origin_year])), origin_year)[0]
     rank = int(np.linalg.matrix_rank(design.reshape(-1, N_PARAMETERS)))
-    return _Frame(ra, dec, mean_year, parameters, at_mean @ parameters, rank == N_PARAMETERS)
+    return _Frame(ra, dec, origin_year, parameters, at_mean @ parameters, rank == N_PARAMETERS)
+
+
+def _origin_year(mjd: np.ndarray, motion: pd.Series | None) -> float:
+    if motion is not None:
+        first, last = julian_year(np.array([mjd.min(), mjd.max()]))
+        if first <= motion["epoch"] <= last:
+            return float(motion["epoch"])
+    return float(julian_year(mjd.mean()))
 
 
 def _catalogue_places(rows: pd.DataFrame, ra: float, dec: float) -> np.ndarray:

@@ -155,7 +155,7 @@ def _subtitle(first: pd.Series, statistics: TrackStatistics) -> str:
     separation = f"rms from the truth {ra} (α), {dec} (δ), {both} (2-D)"
     has_truth = np.isfinite(statistics.rms_2d)
     lines = [f"{orbits_text(statistics.n)}; {separation if has_truth else 'no truth'}"]
-    at = "" if first["zero"] == "mean" else f" at J{first['mean_year']:.2f}"
+    at = "" if first["zero"] == "mean" else f" at J{first['origin_year']:.2f}"
     lines.append(f"origin: {_ZEROS[first['zero']]}{at}")
     if first["zero"] != "catalogue":
         lines.append(f"catalogue left out: {angle_text(first['rms_catalogue_mas'])} off (rms, 2-D)")

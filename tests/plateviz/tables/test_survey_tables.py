@@ -53,11 +53,11 @@ def test_curves_pass_through_the_positions_at_the_orbits(survey, kind, series):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_origin_of_the_track_is_the_catalogue_at_the_mean_epoch(survey, kind):
+def test_origin_of_the_track_is_the_catalogue_at_the_epoch_of_the_motion(survey, kind):
     history, motion = survey.source(kind)
     track = tables.source_track(history, motion)
     row = survey.catalogue[survey.catalogue["source_id"] == history["source_id"].iloc[0]]
-    ra, dec = places(row, np.array([history["epoch"].mean()]))[0, 0]
+    ra, dec = places(row, mjd_of(np.array([motion["epoch"]])))[0, 0]
     expected = offsets_mas(history["ra"], history["dec"], ra, dec)
     assert track["ra_mas"].to_numpy() == pytest.approx(np.asarray(expected[0]), abs=0.03)
     assert track["dec_mas"].to_numpy() == pytest.approx(np.asarray(expected[1]), abs=0.03)
@@ -100,6 +100,24 @@ def test_origin_of_a_reference_sources_sky_track_is_the_catalogue(survey):
     table = tables.sky_track(*survey.source("reference"))
     assert set(table["zero"]) == {"catalogue"}
     assert table["catalogue_ra_mas"].notna().all()
+
+
+def test_origin_of_a_sky_track_is_at_the_epoch_of_the_fitted_motion(survey):
+    history, motion = survey.source("reference")
+    whole = tables.sky_track(history, motion)
+    first, last = whole["year"].min(), whole["year"].max()
+    within = motion.copy()
+    within["epoch"] = 0.3 * first + 0.7 * last
+    origin = tables.sky_track(history, within)
+    assert set(origin["origin_year"]) == {within["epoch"]}
+    # The same place on the sky, from another origin.
+    shift = whole["ra_mas"] - origin["ra_mas"]
+    assert np.ptp(shift[whole["kind"] == "orbit"]) < UAS
+    beyond = motion.copy()
+    beyond["epoch"] = last + 1.0
+    mean = whole.loc[whole["kind"] == "orbit", "year"].mean()
+    found = tables.sky_track(history, beyond)["origin_year"].iloc[0]
+    assert found == pytest.approx(mean, abs=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["artificial", "other"])

@@ -137,6 +137,15 @@ def test_the_table_of_orbits_fits_a_small_screen_and_is_readable_below_the_mouse
         )
     ]
     assert begins[0] == pytest.approx(begins[1], abs=1.0)
+    # Its mark of the order stands beside the heading, and none where there is no column.
+    title, mark = (
+        column.locator(part).evaluate("""e => { const r = document.createRange();
+          r.selectNodeContents(e); const box = (e.textContent ? r : e).getBoundingClientRect();
+          return [box.left, box.right]; }""")
+        for part in (".tabulator-col-title", ".tabulator-arrow")
+    )
+    assert mark[0] - title[1] > 2.0
+    expect(page.locator(".tabulator-col.empty .tabulator-arrow:visible")).to_have_count(0)
     # A grey through which the colours of the numbers are seen.
     behind = row.evaluate("e => getComputedStyle(e).backgroundColor")
     assert float(re.search(r"/ ([\d.]+)\)", behind)[1]) < 0.2

@@ -8,11 +8,14 @@ _TYPE = {"fontSize": 13, "fontFamily": "Helvetica, Arial, sans-serif"}
 _LOW_BAR = {"minHeight": "48px !important"}
 # Margins of a paragraph and of an empty title would move the words of an alert below its icon.
 _ALERT_WORDS = {"& p": {"margin": 0}, "& .MuiAlertTitle-root:empty": {"display": "none"}}
+# Labels of choices are otherwise smaller than those of entries, and than the gap in their frame.
+_LABEL = {"fontSize": "13.8px !important", "lineHeight": "20px !important"}
 
 PAGE_STYLE = {
     "typography": _TYPE,
     "components": {
         "MuiToolbar": {"styleOverrides": {"root": _LOW_BAR}},
+        "MuiInputLabel": {"styleOverrides": {"root": _LABEL}},
         "MuiAlert": {"styleOverrides": {"message": _ALERT_WORDS}},
     },
 }

@@ -40,7 +40,9 @@ _NARROW_CELLS = """
 :host .tabulator .tabulator-header .tabulator-col .tabulator-col-content .tabulator-col-sorter {
   right: 1px; }
 :host .tabulator .tabulator-header .tabulator-col .tabulator-col-sorter .tabulator-arrow {
-  border-left-width: 4px; border-right-width: 4px; }
+  border-left-width: 4px !important; border-right-width: 4px !important; }
+/* A column without width, after the last one. */
+:host .tabulator .tabulator-header .tabulator-col.empty .tabulator-col-sorter { display: none; }
 """
 _NO_ROWS = "There are no rows to show yet."
 # Bokeh's own formatter writes a hyphen before negative numbers, and before a zero that is rounded.

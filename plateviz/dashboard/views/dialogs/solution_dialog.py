@@ -121,7 +121,7 @@ class SolutionDialog(pn.viewable.Viewer):
         """List the solutions; return them by their labels."""
         options = by_label(self._list.entries())
         before = self._chosen
-        same = (one for one in options.values() if before and one.what == before.what)
+        same = (one for one in options.values() if before and _is_same(one, before))
         value = next(same, next(iter(options.values()), None))
         self._choice.param.update(options=options, value=value)
         self._choose()
@@ -131,7 +131,7 @@ class SolutionDialog(pn.viewable.Viewer):
         entry, before = self._chosen, self._described
         self._described = entry
         name, path = (entry.name, entry.note_path) if entry else ("", None)
-        is_same = entry is not None and before is not None and entry.what == before.what
+        is_same = entry is not None and before is not None and _is_same(entry, before)
         if not is_same or before is None or name != before.name:
             self._name.value = name
         is_made = entry is not None and isinstance(entry.what, MadeSolution)
@@ -241,6 +241,13 @@ class SolutionDialog(pn.viewable.Viewer):
         # It is taken for Markdown, in which HTML would be kept.
         text = text[:1].upper() + text[1:]
         self._message.param.update(object=escape(text), visible=bool(text), severity=severity)
+
+
+def _is_same(one: Entry, other: Entry) -> bool:
+    """Whether both are the same solution, which may have got another name."""
+    if isinstance(one.what, MadeSolution) and isinstance(other.what, MadeSolution):
+        return one.what.is_of(other.what)
+    return one.what == other.what
 
 
 def _is_kept(entry: Entry, name: str) -> bool:

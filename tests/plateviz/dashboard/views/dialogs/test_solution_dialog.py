@@ -71,6 +71,22 @@ def test_fast_clicks_keep_a_solution_once(page, window, fit_result):
     assert window._message.object == "It is kept on disk as mine."
 
 
+def test_a_solution_stays_chosen_when_it_gets_another_name(page, window, fit_result):
+    for order in (3, 4):
+        page.session.show_result(Solution(0, FitSettings(order=order), fit_result))
+    window.open()
+    first, second = (
+        one for one in window._choice.options.values() if isinstance(one.what, MadeSolution)
+    )
+    # The one further down in the list: without a choice, the list begins with the first.
+    window._choice.value = second
+    for name in ("mine", "yours"):
+        window._name.value = name
+        window._rename.clicks += 1
+        assert window._chosen.what == second.what._replace(name=name)
+    assert first.what in [one.what for one in window._choice.options.values()]
+
+
 def test_typed_characters_are_kept_before_the_browser_has_left_the_field(page, window):
     window._text.value_input = "half"
     page.session.journal.param.trigger("made")

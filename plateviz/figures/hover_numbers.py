@@ -10,6 +10,7 @@ from plateviz.figures.figure import Tooltips
 _FIELD = re.compile(r"(@\{\w+\}|\$[xy])\{0[0,.]*\}")
 # Bokeh's own formatter writes "-0.00" for a small negative number.
 _WRITE = """
+    if (value == null || Number.isNaN(value)) return "–"
     const decimals = (format.split(".")[1] ?? "").length
     const options = {
       minimumFractionDigits: decimals, maximumFractionDigits: decimals,

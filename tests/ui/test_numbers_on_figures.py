@@ -1,9 +1,10 @@
-"""Labels of ticks that are left out where they have no room, as a real Chromium chooses them."""
+"""Numbers at ticks and in hovers, as a real Chromium chooses and writes them."""
 
 import pytest
 from bokeh.models import LinearAxis
 
 from plateviz.figures.figure import Axis
+from plateviz.figures.hover_numbers import hover_formatters
 from plateviz.figures.tick_labels import follow_policy
 
 pytestmark = pytest.mark.ui
@@ -35,3 +36,16 @@ def test_labels_are_left_out_evenly(browser, widths, expected):
     )
     page.close()
     assert kept == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [("-1234.5678", "−1,234.57"), ("-0.001", "0.00"), ("NaN", "–"), ("null", "–")],
+)
+def test_hover_has_a_dash_where_there_is_no_number(browser, value, expected):
+    (writer,) = hover_formatters([("per cell", "@{n}{0,0.00}")], {}).values()
+    page = browser.new_page()
+    code = f"code => new Function('value', 'format', code)({value}, '0,0.00')"
+    written = page.evaluate(code, writer.code)
+    page.close()
+    assert written == expected

@@ -62,6 +62,7 @@ _MEASUREMENTS = (
     "and detector that measured it first. So does a tap on the point of an orbit in the figures."
 )
 _NO_SOURCES = "No orbit of this run is fitted yet. Its sources are listed here once one is."
+_NO_RUN = "The sources cannot be listed: the run is not on the disk any more."
 
 
 class SourcePage(pn.viewable.Viewer):
@@ -203,7 +204,10 @@ class SourcePage(pn.viewable.Viewer):
                 self._invitation = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
                 self._list.show(pd.DataFrame(columns=list(SOURCES_OF_RUN)))
                 return
-            self._invitation = _NO_SOURCES if sources.empty else _INVITATION
+            self._invitation = _INVITATION
+            if sources.empty:
+                # A run that has been removed has none, as one that has just begun.
+                self._invitation = _NO_SOURCES if run.is_there() else f"{_NO_RUN} {_WHAT_TO_DO}"
             self._list.show(sources)
 
     def _show(self, *_: object) -> None:

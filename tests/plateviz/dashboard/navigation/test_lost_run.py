@@ -38,6 +38,14 @@ def test_removed_run_is_said_until_it_is_there_again(fit_result, survey_folder):
     assert len(notice) == 0
 
 
+def test_sources_of_a_removed_run_are_not_awaited(fit_result, survey_folder):
+    run = begin_run(survey_folder, "default", FitSettings())
+    navigation = Navigation(Session(SurveyStore(fit_result, survey_runs(survey_folder))))
+    assert "No orbit of this run" in SourcePage(navigation, id)._head.object
+    shutil.move(run.directory, survey_folder / "elsewhere")
+    assert "the run is not on the disk any more" in SourcePage(navigation, id)._head.object
+
+
 def test_run_that_was_made_again_with_other_settings_is_said(fit_result, survey_folder):
     run = begin_run(survey_folder, "default", FitSettings())
     navigation = Navigation(Session(SurveyStore(fit_result, survey_runs(survey_folder))))

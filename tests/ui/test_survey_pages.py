@@ -262,6 +262,9 @@ def test_titles_of_selected_sources_are_not_cut(served, open_page, simulated):
 def test_a_source_is_looked_for_and_carried_by_the_address(page, open_page, tmp_path):
     turn_to(page, "Source")
     expect(page.locator("p.empty:visible")).to_contain_text("Write a source's id")
+    labels = page.locator("label.MuiInputLabel-root:visible")
+    assert labels.count() > 1
+    assert len(set(labels.evaluate_all("all => all.map(e => getComputedStyle(e).fontSize)"))) == 1
     entry = page.get_by_label("Source id")
     entry.fill("17")
     entry.press("Enter")

@@ -78,7 +78,7 @@ def _groups(result: FitResult) -> list[_Group]:
 
 def _cause(result: FitResult, groups: list[_Group]) -> Cause:
     detector = groups[0].detector
-    fields = " and ".join(str(one.field) for one in sorted(groups))
+    fields = ", ".join(str(one.field) for one in sorted(groups))
     count, expected = sum(one.count for one in groups), sum(one.expected for one in groups)
     shift = groups[0].shift
     words = (

@@ -1,7 +1,6 @@
 """The causes of a run's flaws in words: what, how certain, what it spoils, what to do."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -10,30 +9,22 @@ from plateviz.tables.labels import id_strings, unit_text
 from plateviz.tables.rounded import rounded
 from plateviz.tables.run_diagnosis import RunDiagnosis, RunTests
 from plateviz.verdict.causes import Cause
+from plateviz.verdict.run_case import RunCase
+from plateviz.verdict.zonal_cause import zonal_cause
 from solver.results.diagnosis.table import CARE_RATE
-from solver.results.diagnosis.test import Test
 
 # A cause after the first one is named if it has this share of its sigmas: it may be a result of it.
 _OF_ITS_OWN = 0.5
 # A cause that orbits name counts from this share of them; chance makes some, each another.
 _LEAST_SHARE, _LEAST_ORBITS = 0.1, 2
-# Zonal errors larger than this share of the positions' uncertainty make it wrong by a tenth.
-_LARGE_SHARE = 0.5
-_MOST_NAMED, _MIN_ORBITS_OF_SOURCE = 8, 4
+_MOST_NAMED = 8
 _OF_CATALOGUE = ("wrong-epoch", "wrong-references", "reference-errors", "wrong-catalogue")
+# The cause that one source scatters, which is no reference star: those move all others.
+_OF_ONE = "source-scatters"
 # χ² per degree of freedom of the motions from which their uncertainties are a fifth too small.
 _LARGE_SCATTER = 1.5
 # Tests of what orbits find, which say less than the causes that orbits name.
 _OF_ORBITS = ("together", "care", "bad", "orbit")
-
-
-class RunCase(NamedTuple):
-    """A test that finds something, and the run in which it does."""
-
-    test: Test
-    diagnosis: RunDiagnosis
-    tables: RunTests
-    motions: pd.DataFrame
 
 
 def run_causes(diagnosis: RunDiagnosis, tables: RunTests, motions: pd.DataFrame) -> list[Cause]:
@@ -56,15 +47,22 @@ def run_causes(diagnosis: RunDiagnosis, tables: RunTests, motions: pd.DataFrame)
         # What orbits name themselves is also found in all of them together.
         if words is not None and not (test.subject in _OF_ORBITS and is_explained):
             causes.append(words(RunCase(test, diagnosis, tables, motions)))
-    causes.sort(key=lambda cause: -cause.significance)
+    are_spoiled = any(cause.is_large for cause in causes)
+    causes.sort(key=lambda cause: (are_spoiled and _is_of_one(cause), -cause.significance))
     return _of_their_own(causes)
+
+
+def _is_of_one(cause: Cause) -> bool:
+    """Whether a cause is one star, which brings about nothing else, however far off it is."""
+    return cause.name == _OF_ONE
 
 
 def _of_their_own(causes: list[Cause]) -> list[Cause]:
     """Return one cause of each name, without those that the first one may have brought about."""
     unique = {cause.name: cause for cause in reversed(causes)}
     ordered = [cause for cause in causes if unique[cause.name] is cause]
-    least = _OF_ITS_OWN * ordered[0].significance if ordered else 0.0
+    first = next((cause for cause in ordered if not _is_of_one(cause)), None)
+    least = _OF_ITS_OWN * first.significance if first else 0.0
     return [cause for cause in ordered if cause.significance >= least]
 
 
@@ -108,58 +106,6 @@ def _repeated(rows: pd.DataFrame, total: int, diagnosis: RunDiagnosis) -> Cause:
         tuple(str(worst["options"]).splitlines()),
         bool(rows["is_large"].mean() > 0.5),
     )
-
-
-def _zonal(case: RunCase) -> Cause:
-    row = case.tables.zonal.iloc[0]
-    rms = float(row["rms"])
-    typical = _typical_sigma(case.motions)
-    spoils = (
-        f"It spoils all positions, by about {rounded(rms)} mas, which more orbits do not reduce"
-    )
-    if np.isfinite(typical):
-        spoils += (
-            f"; the motions fitted to all orbits have a typical uncertainty of {rounded(typical)} "
-            "mas"
-        )
-    words = (
-        "The reference stars of neighbouring places deviate together, and the frames of the "
-        "orbits and their distortion follow as they would the catalogue, not the focal plane: "
-        f"χ² {case.test.statistic:.1f}, expected {case.test.expected:.0f} ± "
-        f"{case.test.scatter:.1f}. The field has an rms of about {rounded(rms)} mas along "
-        "each axis."
-    )
-    return Cause(
-        "zonal-errors",
-        "the reference catalogue has smooth errors, which neighbouring stars share",
-        words,
-        float(case.test.sigma),
-        f"{spoils}.",
-        "state larger errors of the reference stars, or use another catalogue",
-        (f"--prior sources={max(_widened(case, rms), 1.1):.2f}",),
-        rms > _LARGE_SHARE * typical,
-    )
-
-
-def _typical_sigma(motions: pd.DataFrame) -> float:
-    """Return the median uncertainty of the fitted positions, mas; NaN if none is fitted."""
-    many = ~motions["is_reference"].astype(bool) & (motions["n_orbits"] >= _MIN_ORBITS_OF_SOURCE)
-    rows = motions[many] if many.any() else motions
-    return _median(rows[["sigma_ra", "sigma_dec"]])
-
-
-def _widened(case: RunCase, rms: float) -> float:
-    """Return the factor on the errors of the reference stars that has room for the field."""
-    rows = case.motions[case.motions["is_reference"].astype(bool)]
-    stated = _median(rows[["sigma_catalogue_ra", "sigma_catalogue_dec"]])
-    return float(np.hypot(1.0, rms / stated)) if stated > 0.0 else 1.1
-
-
-def _median(table: pd.DataFrame) -> float:
-    """Return the median of the known values of a table; NaN if there is none."""
-    values = table.to_numpy(dtype=float)
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else float("nan")
 
 
 def _against_time(case: RunCase) -> Cause:
@@ -287,7 +233,7 @@ def _motions(case: RunCase) -> Cause:
 
 
 _WORDS: dict[str, Callable[[RunCase], Cause]] = {
-    "zonal": _zonal,
+    "zonal": zonal_cause,
     "trend": _against_time,
     "jump": _against_time,
     "season": _against_time,

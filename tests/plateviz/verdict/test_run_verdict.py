@@ -196,14 +196,32 @@ def test_trend_of_the_calibration_needs_care_and_spoils_no_position(good):
     assert "no position" in verdict.causes[0].spoils
 
 
-def test_source_that_scatters_is_named(good):
-    orbits, motions = good
+def with_a_source_that_scatters(motions, ratio):
+    """Return motions of which one, of no reference star, has a chi2 so many times too large."""
     motions = motions.copy()
     row = motions.index[(motions["dof"] > 20) & ~motions["is_reference"]][0]
-    motions.loc[row, "chi2"] = 20.0 * motions.loc[row, "dof"]
+    motions.loc[row, "chi2"] = ratio * motions.loc[row, "dof"]
+    return motions, str(motions.loc[row, "source_id"])
+
+
+def test_source_that_scatters_is_named(good):
+    orbits, motions = good
+    motions, name = with_a_source_that_scatters(motions, 20.0)
     verdict = run_verdict(orbits, motions, tables())
     assert verdict.causes[0].name == "source-scatters"
-    assert str(motions.loc[row, "source_id"]) in verdict.causes[0].title
+    assert name in verdict.causes[0].title
+
+
+def test_source_that_scatters_is_named_after_what_spoils_all_orbits(good):
+    orbits, motions = good
+    motions, name = with_a_source_that_scatters(motions, 1000.0)
+    drifting = tables(orbit_causes=causes(30), orbit_tests=orbit_tests(5.0))
+    verdict = run_verdict(orbits, motions, drifting)
+    assert [one.name for one in verdict.causes] == ["distortion-drifts", "source-scatters"]
+    # However far off the star is, it neither leads nor hides the other.
+    assert verdict.causes[1].significance > 2.0 * verdict.causes[0].significance
+    assert verdict.headline.endswith(": in many orbits, the distortion drifts.")
+    assert name in verdict.causes[1].title
 
 
 @pytest.mark.parametrize(("share", "state"), [(1.0, "good"), (1.45, "warn"), (2.5, "bad")])

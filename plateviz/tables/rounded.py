@@ -14,6 +14,19 @@ def rounded(value: float, digits: int = 2) -> str:
     return with_minus_signs(f"{Decimal(text):,f}" if math.isfinite(value) else text)
 
 
+def with_error(value: float, error: float, digits: int = 2) -> str:
+    """Return a number with its uncertainty, both to the decimals of that: "1,240 ± 60".
+
+    Parameters
+    ----------
+    error : greater than zero
+    digits : significant ones of the uncertainty
+    """
+    last = math.floor(math.log10(float(f"{error:.{digits - 1}e}"))) - digits + 1
+    texts = (f"{round(one, -last):,.{max(-last, 0)}f}" for one in (value, error))
+    return with_minus_signs(" ± ".join(texts))
+
+
 def with_minus_signs(text: str) -> str:
     """Return a text with minus signs in place of hyphens before numbers, and none before zero.
 

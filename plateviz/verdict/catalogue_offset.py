@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plateviz.tables.rounded import rounded
+from plateviz.tables.rounded import rounded, with_error
 from plateviz.verdict.causes import Cause
 from solver.data.result import FitResult
 from solver.results.diagnosis.rate import sigmas
@@ -27,7 +27,7 @@ _MUCH = 0.5
 _SIGMA_OF_DISTANCE, _SIGMA_OF_MEDIAN = 1.4826, 1.2533
 
 
-class _Offset(NamedTuple):
+class CatalogueOffset(NamedTuple):
     """Median distance of the other stars from the catalogue; pairs are of α cos δ and δ, mas.
 
     Attributes
@@ -53,10 +53,32 @@ class _Offset(NamedTuple):
         ratios = np.divide(self.median, self.expected)
         return -0.5 * float(np.sum(ratios**2))
 
-    def words(self) -> str:
-        """Return it as a sentence."""
+    @property
+    def is_contradiction(self) -> bool:
+        """Whether the two parts of the catalogue are further apart than they can be."""
+        return self.size >= _MUCH * self.stated
+
+    def cause(self) -> Cause:
+        """Return it as what spoils the solution."""
+        return Cause(
+            "catalogue-offset",
+            "the reference stars and the other stars of the catalogue are apart",
+            self._words(),
+            sigmas(self.log_chance),
+            self._harm(),
+            "compare the reference stars with another catalogue, and check the frame and the epoch "
+            "of both parts of this one",
+            (),
+            is_large=True,
+        )
+
+    def sentences(self) -> str:
+        """Return it as what stands out, but is no fault."""
+        return f"{self._words()} {self._harm()}"
+
+    def _words(self) -> str:
         by_axis = " and ".join(
-            f"{rounded(value, 3)} ± {rounded(error)} mas in {name}"
+            f"{with_error(value, error)} mas in {name}"
             for value, error, name in zip(self.median, self.expected, ("α cos δ", "δ"), strict=True)
         )
         return (
@@ -64,8 +86,7 @@ class _Offset(NamedTuple):
             "has them."
         )
 
-    def harm(self) -> str:
-        """Return what it spoils."""
+    def _harm(self) -> str:
         return (
             "If the reference stars are displaced, so are all positions, by "
             f"{rounded(self.size, 3)} mas, and no residual shows it; if the others are, nothing is "
@@ -73,35 +94,7 @@ class _Offset(NamedTuple):
         )
 
 
-def displaced_references(result: FitResult) -> list[Cause]:
-    """Return as a cause that the reference stars and the others are further apart than stated."""
-    found = _offset(result)
-    if found is None or found.size < _MUCH * found.stated:
-        return []
-    return [
-        Cause(
-            "catalogue-offset",
-            "the reference stars and the other stars of the catalogue are apart",
-            found.words(),
-            sigmas(found.log_chance),
-            found.harm(),
-            "compare the reference stars with another catalogue, and check the frame and the epoch "
-            "of both parts of this one",
-            (),
-            is_large=True,
-        )
-    ]
-
-
-def offset_sentences(result: FitResult) -> list[str]:
-    """Return sentences on an offset that is certain, but less than a star's stated error."""
-    found = _offset(result)
-    if found is None or found.size >= _MUCH * found.stated:
-        return []
-    return [f"{found.words()} {found.harm()}"]
-
-
-def _offset(result: FitResult) -> _Offset | None:
+def catalogue_offset(result: FitResult) -> CatalogueOffset | None:
     """Return the offset if it is none by accident; single stars that are far off make none."""
     sources = result.sources
     others = sources[~sources["is_reference"].to_numpy(dtype=bool)]
@@ -114,5 +107,5 @@ def _offset(result: FitResult) -> _Offset | None:
     shared = [float(result.summary[f"mean_error_{axis}"]) for axis in _AXES]
     expected = np.hypot(_SIGMA_OF_MEDIAN * spread / np.sqrt(len(others)), shared)
     stated = np.median(others[[f"prior_sigma_{axis}" for axis in _AXES]].to_numpy(dtype=float))
-    found = _Offset(len(others), tuple(median), tuple(expected), float(stated))
+    found = CatalogueOffset(len(others), tuple(median), tuple(expected), float(stated))
     return found if found.log_chance < _LOG_CHANCE else None

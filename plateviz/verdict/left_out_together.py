@@ -13,6 +13,7 @@ import pandas as pd
 from plateviz.tables.rounded import rounded
 from plateviz.verdict.causes import Cause
 from plateviz.verdict.remedy import remedied
+from solver.data.plural import plural
 from solver.data.result import FitResult
 from solver.results.diagnosis.rate import log_chance_poisson, sigmas
 from solver.units import RAD_PER_MAS
@@ -83,7 +84,7 @@ def _cause(result: FitResult, groups: list[_Group]) -> Cause:
     shift = groups[0].shift
     words = (
         f"Of the measurements left out as outliers, {count:,} are on it in "
-        f"field{'s' if len(groups) > 1 else ''} {fields}, where {rounded(expected)} would be its "
+        f"{plural(len(groups), 'field')} {fields}, where {rounded(expected)} would be its "
         f"share, and they are displaced in the same direction, by {rounded(shift, 3)} pixels."
     )
     alone = result.residuals.groupby("source_id")["detector_id"].agg(["min", "max"])

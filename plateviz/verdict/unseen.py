@@ -1,5 +1,7 @@
 """What no test of one orbit can see, and how large it could be."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from plateviz.tables.rounded import rounded
@@ -57,21 +59,34 @@ def unseen_sentences(result: FitResult, epoch: EpochOffset, are_noticed: bool = 
     return sentences
 
 
-def references_left_out(result: FitResult) -> list[str]:
-    """Return a title and a sentence if many reference stars are left out; else nothing."""
+class ReferencesLeftOut(NamedTuple):
+    """Many reference stars are left out of a solution.
+
+    Attributes
+    ----------
+    title : of few words
+    sentences : what it means for the others
+    """
+
+    title: str
+    sentences: str
+
+
+def references_left_out(result: FitResult) -> ReferencesLeftOut | None:
+    """Return that many reference stars are left out; None if few are."""
     summary = result.summary
     # Results of older versions lack it.
     left_out = int(summary.get("n_reference_excluded", 0))
     total = left_out + int(summary["n_reference"])
     if left_out < _MANY * max(total, 1):
-        return []
-    return [
+        return None
+    return ReferencesLeftOut(
         f"{left_out} of its {total} reference stars are left out",
         f"Where {left_out} of {total} reference stars are left out because they are wrong, others "
         "are likely to be off by less than a test can see: all positions may be wrong by more "
         "than the error that they share. Use another catalogue, or state larger errors "
         "(`--prior sources=2`).",
-    ]
+    )
 
 
 def quadratic_mas(result: FitResult) -> float:

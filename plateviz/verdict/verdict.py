@@ -9,7 +9,7 @@ from scipy.special import chdtrc
 
 from plateviz.tables.source_profile import source_strip
 from plateviz.tables.summary import State, SummaryItem, summary_strip
-from plateviz.verdict.catalogue_offset import displaced_references, offset_sentences
+from plateviz.verdict.catalogue_offset import CatalogueOffset, catalogue_offset
 from plateviz.verdict.causes import Cause, causes_in_words, wrong_catalogue
 from plateviz.verdict.estimated_noise import noise_sentences
 from plateviz.verdict.left_out_together import moved_detectors
@@ -19,7 +19,7 @@ from plateviz.verdict.unseen import references_left_out, unseen_sentences
 from solver.data.result import FitResult, FitStatus
 from solver.data.settings import COUNTED
 from solver.results.diagnosis.causes import find_causes
-from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, diagnose
+from solver.results.diagnosis.table import BAD_RATE, CARE_RATE, Diagnosis, diagnose
 
 # Of the verdict in the summary of a result.
 _NAME = "verdict"
@@ -110,39 +110,72 @@ def _judge(result: FitResult) -> Verdict:
     if the alarm is also one of `BAD_RATE`, and a cause spoils much.
     """
     diagnosis = diagnose(result)
-    found, certain = diagnosis.found(CARE_RATE), diagnosis.found(BAD_RATE)
-    converged = bool(result.summary["converged"])
-    has_causes = found or not converged
-    causes = causes_in_words(result, diagnosis, find_causes(diagnosis)) if has_causes else []
-    state: State = "warn" if found else "good"
-    is_large = any(cause.is_large for cause in causes if not cause.instead_of)
-    is_epoch = any(cause.name == "wrong-epoch" for cause in causes)
-    # What no residual of the solution shows.
-    hidden = [] if is_epoch else wrong_catalogue(result)
-    hidden += [*moved_detectors(result), *displaced_references(result)] if converged else []
-    named = {cause.title for cause in causes}
-    hidden = [cause for cause in hidden if cause.title not in named]
-    if not converged or (certain and is_large) or any(cause.is_large for cause in hidden):
-        state = "bad"
-    causes = [*hidden, *causes]
+    alarms, converged = diagnosis.found(CARE_RATE), bool(result.summary["converged"])
+    causes = []
+    if alarms or not converged:
+        causes = causes_in_words(result, diagnosis, find_causes(diagnosis))
+    offset = catalogue_offset(result) if converged else None
+    hidden = _hidden_causes(result, causes, offset)
     left_out = references_left_out(result)
-    state = worst([state, "warn" if left_out or hidden else "good"])
-    titles = [*_first(causes), *left_out[:1]]
+    state = worst([_state_of_residuals(diagnosis, causes, converged), _state_of_hidden(hidden)])
+    if left_out:
+        state = worst([state, "warn"])
+    causes = [*hidden, *causes]
+    titles = [*_first(causes), *([left_out.title] if left_out else [])]
     headline = f"{_HEADLINES[state][:-1]}: {titles[0]}." if titles else _HEADLINES[state]
-    items = summary_strip(result)
-    reasons = [_converged(result), *(cause.sentence() for cause in causes), *left_out[1:]]
-    reasons += [discoveries_in_words(diagnosis.tests, found), *map(_sentence, _judged(items))]
+    in_doubt = [left_out.sentences] if left_out else []
+    discoveries = discoveries_in_words(diagnosis.tests, alarms)
     are_noticed = any(cause.name in _OF_REFERENCES for cause in causes)
-    reasons += [*_common_error(result), *unseen_sentences(result, diagnosis.epoch, are_noticed)]
-    faults = [] if converged else [_converged(result)]
-    faults += [f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes]
-    faults += left_out[1:]
-    if found and not causes:
-        faults.append(discoveries_in_words(diagnosis.tests, found))
-    tests = tests_in_words(diagnosis)
+    reasons = [
+        _converged(result),
+        *(cause.sentence() for cause in causes),
+        *in_doubt,
+        discoveries,
+        *map(_sentence, _judged(summary_strip(result))),
+        *_common_error(result),
+        *unseen_sentences(result, diagnosis.epoch, are_noticed),
+    ]
+    faults = [
+        *([] if converged else [_converged(result)]),
+        *(f"{cause.heading()}, {cause.significance:.0f} sigma." for cause in causes),
+        *in_doubt,
+        *([discoveries] if alarms and not causes else []),
+    ]
     notable = [*noise_sentences(result), *notable_sentences(result)]
-    notable += offset_sentences(result) if converged else []
-    return Verdict(state, headline, reasons, notable, faults, causes, tests)
+    if offset and not offset.is_contradiction:
+        notable.append(offset.sentences())
+    return Verdict(state, headline, reasons, notable, faults, causes, tests_in_words(diagnosis))
+
+
+def _hidden_causes(
+    result: FitResult, causes: Sequence[Cause], offset: CatalogueOffset | None
+) -> list[Cause]:
+    """Return causes that no residual of the solution shows, without those that are known.
+
+    Parameters
+    ----------
+    causes : those that residuals show
+    """
+    is_epoch = any(cause.name == "wrong-epoch" for cause in causes)
+    hidden = [] if is_epoch else wrong_catalogue(result)
+    if result.summary["converged"]:
+        hidden += moved_detectors(result)
+    if offset and offset.is_contradiction:
+        hidden.append(offset.cause())
+    known = {cause.title for cause in causes}
+    return [cause for cause in hidden if cause.title not in known]
+
+
+def _state_of_residuals(diagnosis: Diagnosis, causes: Sequence[Cause], converged: bool) -> State:
+    """Return how good a solution is by its tests, and by the causes that they have."""
+    is_large = any(cause.is_large for cause in causes if not cause.instead_of)
+    if not converged or (is_large and diagnosis.found(BAD_RATE)):
+        return "bad"
+    return "warn" if diagnosis.found(CARE_RATE) else "good"
+
+
+def _state_of_hidden(hidden: Sequence[Cause]) -> State:
+    return worst("bad" if cause.is_large else "warn" for cause in hidden)
 
 
 def _first(causes: Sequence[Cause]) -> list[str]:

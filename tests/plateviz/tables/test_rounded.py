@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plateviz.tables.rounded import rounded, with_minus_signs
+from plateviz.tables.rounded import rounded, with_error, with_minus_signs
 
 
 @pytest.mark.parametrize(
@@ -36,3 +36,17 @@ def test_number_has_a_few_digits_and_no_exponent(value, digits, text):
 )
 def test_negative_numbers_have_a_minus_sign_and_zero_has_none(text, expected):
     assert with_minus_signs(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (9.79, 63.4, "10 ± 63"),
+        (1236.0, 634.0, "1,240 ± 630"),
+        (-0.12345, 0.0678, "−0.123 ± 0.068"),
+        (0.2, 0.0996, "0.20 ± 0.10"),
+        (-0.001, 0.99, "0.00 ± 0.99"),
+    ],
+)
+def test_number_has_the_decimals_of_its_uncertainty(value, error, text):
+    assert with_error(value, error) == text

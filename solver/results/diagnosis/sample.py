@@ -11,7 +11,7 @@ from solver.results.diagnosis.rows import Camera, Rows
 # Measurements of a sample, and exposures of each span.
 _MOST_ROWS, _LEAST_EXPOSURES = 12_000, 4
 # Measurements of a sample that has all exposures.
-_MOST_OF_ALL_EXPOSURES = 24_000
+_MOST_OF_ALL_EXPOSURES = 60_000
 # Of sums of weights, relative.
 _ROUNDING = 1e-9
 # Bits of a coordinate in the order of the sources.

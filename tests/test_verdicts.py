@@ -19,9 +19,10 @@ def test_every_trial_is_scheduled_once():
     trials = [trial_of(number) for number in numbers()]
     assert len(set(numbers())) == len(trials)
     cells = Counter(
-        (one.case.name, one.factor, one.is_modelled) for one in trials if one.case is not None
+        (one.case, one.factor, one.is_modelled) for one in trials if one.case is not None
     )
-    assert set(cells.values()) == {ORBITS}
+    for (case, _, is_modelled), count in cells.items():
+        assert count == (case.modelled_orbits if is_modelled else ORBITS)
     modelled = sum(bool(case.modelled) for case in CASES)
     assert len(cells) == len(CASES) * len(FACTORS) + modelled
     assert sum(one.case is None for one in trials) == CLEAN
@@ -29,8 +30,8 @@ def test_every_trial_is_scheduled_once():
 
 def test_first_trials_hold_all_defects_alike():
     first = [trial_of(number) for number in numbers()[:200]]
-    counts = Counter(one.case.name for one in first if one.case and not one.is_modelled)
-    assert set(counts) == {case.name for case in CASES}
+    counts = Counter(one.case for one in first if one.case and not one.is_modelled)
+    assert set(counts) == set(CASES)
     assert max(counts.values()) - min(counts.values()) <= 4
 
 
@@ -105,7 +106,7 @@ def test_records_of_a_case_stay_if_a_verdict_differs(tmp_path, change):
     before = read_records(path, "a")
     other = lambda number: trial(number) | (change if number == odd else {})  # noqa: E731
     carried, (line,) = carry_over(path, other, "a", "b", 10_000)
-    assert line.startswith(f"{trial_of(odd).case.name}, {odd}: recorded state")
+    assert line.startswith(f"{trial_of(odd).case.title}, {odd}: recorded state")
     # Those of the defect at any amplitude, and not those with its cause modelled.
     assert set(read_records(path, "a")) == {1001, 2001, 3001, 4001, 5001}
     assert carried == len(before) - 5

@@ -80,12 +80,12 @@ def is_same(record: Record, other: Record) -> bool:
 def _case_of(number: int) -> tuple[str, bool]:
     """Return the defect of a trial, and whether its cause is modelled."""
     trial = trial_of(number)
-    return (trial.case.name if trial.case else "", trial.is_modelled)
+    return (trial.case.title if trial.case else "clean", trial.is_modelled)
 
 
 def _words(number: int) -> str:
     name, is_modelled = _case_of(number)
-    return f"{name or 'clean'}{' modelled' if is_modelled else ''}"
+    return f"{name}{' modelled' if is_modelled else ''}"
 
 
 def _said(record: Record) -> str:

@@ -39,7 +39,8 @@ from solver.units import MAS_PER_DEG
 from tests.benchmarks.machine import write
 from tests.campaigns.trials import Record, run_trials
 
-# An orbit has a twentieth of the survey's stars.
+FULL_SETTINGS = SurveySettings(orbits=100, magnitudes=True)
+# A sparse orbit has a twentieth of the survey's stars.
 SETTINGS = replace(SurveySettings(orbits=100).scaled(28_000), magnitudes=True)
 MIN_MEASUREMENTS = 20
 # A pull of 1.1 less what noise makes.
@@ -112,6 +113,12 @@ def mean_square(seed: int, defects: tuple[str, ...]) -> float:
 def sparse_orbit(seed: int, defects: tuple[str, ...] = ()) -> OrbitData:
     """Return the orbit of a survey whose number is the last two digits of the seed."""
     settings = replace(SETTINGS, seed=seed, defects=defects)
+    return defective_orbit(settings, seed % settings.orbits)[0]
+
+
+def full_orbit(seed: int, defects: tuple[str, ...] = ()) -> OrbitData:
+    """Return such an orbit of the paper's survey, with twenty times the stars."""
+    settings = replace(FULL_SETTINGS, seed=seed, defects=defects)
     return defective_orbit(settings, seed % settings.orbits)[0]
 
 

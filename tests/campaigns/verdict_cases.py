@@ -4,8 +4,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from solver.data.orbit import OrbitData
 from solver.simulate.defects.table import BY_NAME
 from solver.simulate.defects.text import format_defect
+from tests.campaigns.defects import full_orbit, sparse_orbit
 
 # Of the amplitude of each defect.
 FACTORS = (0.25, 0.5, 1.0, 2.0, 5.0)
@@ -27,12 +29,25 @@ class DefectCase:
     amplitude : of pulls of 1.1, in the unit of its table, measured by `defects.py`
     causes : names of causes in the verdict that are right
     modelled : settings of a fit that models it; empty if there are none
+    modelled_orbits : fitted in this way; more where the pulls of a single orbit say little
+    is_full : whether the orbits are those of the paper, not sparse
     """
 
     name: str
     amplitude: float
     causes: tuple[str, ...]
     modelled: Mapping[str, Any] = field(default_factory=dict)
+    modelled_orbits: int = ORBITS
+    is_full: bool = False
+
+    @property
+    def title(self) -> str:
+        """What the page calls it."""
+        return f"`{self.name}`, full orbits" if self.is_full else f"`{self.name}`"
+
+    def orbits(self, column: int) -> int:
+        """Return the number of orbits at a factor, or with the cause modelled."""
+        return self.modelled_orbits if column == len(FACTORS) else ORBITS
 
     def text(self, factor: float) -> str:
         """Return the defect as a setting of a survey."""
@@ -59,10 +74,19 @@ CASES = (
     DefectCase("outliers", 0.066, ("outliers",), {"robust": True}),
     # A single one spoils the positions of two stars; so the amplitude is one that occurs.
     DefectCase("swapped", 0.2, ("swapped",), {"robust": True}),
-    DefectCase("reference-errors", 440.0, ("reference-errors",), {"reference_scale": True}),
+    # The errors of the frame are common to all stars of an orbit, so that its pulls are 0.7 to 1.4.
+    DefectCase(
+        "reference-errors",
+        440.0,
+        ("reference-errors",),
+        {"reference_scale": True},
+        modelled_orbits=160,
+    ),
     # At five times that no more than the reference stars about the target.
     DefectCase("binaries", 7.0, ("wrong-references",)),
     DefectCase("exposure-times", 1.2e6, ("wrong-epoch",)),
+    # Sparse orbits have too few reference stars to show it.
+    DefectCase("exposure-times", 1.05e6, ("wrong-epoch",), is_full=True),
 )
 
 
@@ -81,6 +105,19 @@ class Trial(NamedTuple):
     factor: float
     is_modelled: bool
     orbit: int
+
+    def simulated(self) -> OrbitData:
+        """Return the simulated orbit.
+
+        Raises
+        ------
+        InputError
+            If the orbit has no room for the defect.
+        """
+        if self.case is None:
+            return sparse_orbit(self.orbit)
+        simulate = full_orbit if self.case.is_full else sparse_orbit
+        return simulate(self.orbit, (self.case.text(self.factor),))
 
 
 def trial_of(number: int) -> Trial:
@@ -111,12 +148,14 @@ def _of_rounds() -> Iterator[int]:
         if orbit % _ROUNDS_PER_OTHERS == _ROUNDS_PER_OTHERS - 1:
             yield from _of_orbit(others, following)
             following += 1
-    for orbit in range(following, ORBITS):
+    for orbit in range(following, max(case.modelled_orbits for case in CASES)):
         yield from _of_orbit(others, orbit)
+        yield from _of_orbit([len(FACTORS)] if orbit >= ORBITS else [], orbit)
 
 
 def _of_orbit(columns: list[int], orbit: int) -> Iterator[int]:
     for place, case in enumerate(CASES):
         for column in columns:
-            if column < len(FACTORS) or case.modelled:
+            is_tried = column < len(FACTORS) or case.modelled
+            if is_tried and orbit < case.orbits(column):
                 yield (1 + _SLOTS_PER_DEFECT * place + column) * _PER_SLOT + orbit

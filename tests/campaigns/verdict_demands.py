@@ -78,7 +78,7 @@ def of_defects(of_cases: Mapping[DefectCase, Mapping[float | str, Sequence[Recor
         is_met = count >= _LEAST_SEEN * len(records) and right >= _LEAST_NAMED * count
         pull = rms_pull(records)
         lines.append(
-            f"| `{case.name}` | × {factor:g} | {'-' if pull > _HIGHEST_SENSIBLE else f'{pull:.3f}'}"
+            f"| {case.title} | × {factor:g} | {'-' if pull > _HIGHEST_SENSIBLE else f'{pull:.3f}'}"
             f" | {_share(count, len(records))} | {_share(right, count)} | {_met(is_met)} |"
         )
     return lines
@@ -88,7 +88,7 @@ def of_modelled(
     of_cases: Mapping[DefectCase, Sequence[Record]],
 ) -> list[str]:
     """Return a sentence on the pulls of fits that model the cause."""
-    pulls = {case.name: rms_pull(records) for case, records in of_cases.items() if records}
+    pulls = {case.title: rms_pull(records) for case, records in of_cases.items() if records}
     outside = {
         name: pull for name, pull in pulls.items() if not _LOWEST_PULL <= pull <= _HIGHEST_PULL
     }
@@ -97,7 +97,7 @@ def of_modelled(
         f"{len(pulls) - len(outside)} of {len(pulls)} causes have them"
     )
     if outside:
-        text += "; not " + ", ".join(f"`{name}` ({pull:.3f})" for name, pull in outside.items())
+        text += "; not " + ", ".join(f"{name} ({pull:.3f})" for name, pull in outside.items())
     return [f"{text}."]
 
 

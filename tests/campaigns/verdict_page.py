@@ -40,7 +40,7 @@ def figure(records: Mapping[int, Record]) -> str:
     """Return the chart of what is seen and what is named, as SVG."""
     of_cases = _by_case(records)
     panels = {
-        case.name: {
+        case.title.replace("`", ""): {
             "seen": [(f, _share(seen(of_case[f]))) for f in FACTORS if of_case[f]],
             "named rightly": [(f, _share(named(case, of_case[f]))) for f in FACTORS if of_case[f]],
         }
@@ -94,16 +94,16 @@ def tables(records: Mapping[int, Record]) -> str:
     return "\n".join(lines)
 
 
-def _by_case(records: Mapping[int, Record]) -> dict[DefectCase, _Records]:
-    found: dict[str, dict[float | str, list[Record]]] = {
-        case.name: {key: [] for key in (*FACTORS, _MODELLED)} for case in CASES
+def _by_case(records: Mapping[int, Record]) -> Mapping[DefectCase, _Records]:
+    found: dict[DefectCase, dict[float | str, list[Record]]] = {
+        case: {key: [] for key in (*FACTORS, _MODELLED)} for case in CASES
     }
     for number, record in sorted(records.items()):
         trial = trial_of(number)
         if trial.case and record["state"] != IMPOSSIBLE:
             key = _MODELLED if trial.is_modelled else trial.factor
-            found[trial.case.name][key].append(record)
-    return {case: found[case.name] for case in CASES}
+            found[trial.case][key].append(record)
+    return found
 
 
 def _clean(records: Mapping[int, Record]) -> list[Record]:
@@ -116,13 +116,13 @@ def _seen_row(case: DefectCase, of_case: _Records) -> str:
         for rows in (of_case[factor] for factor in FACTORS)
     ]
     amplitude = f"{case.amplitude:g} {BY_NAME[case.name].unit}".rstrip()
-    return _row(f"`{case.name}`", amplitude, *cells)
+    return _row(case.title, amplitude, *cells)
 
 
 def _named_row(case: DefectCase, records: Sequence[Record]) -> str:
     first = Counter(one["causes"][0] if one["causes"] else _NO_CAUSE for one in records)
     named = ", ".join(f"{name} {count}" for name, count in first.most_common())
-    return _row(f"`{case.name}`", _pull(records), named)
+    return _row(case.title, _pull(records), named)
 
 
 def _modelled_row(case: DefectCase, records: Sequence[Record]) -> str:
@@ -133,7 +133,7 @@ def _modelled_row(case: DefectCase, records: Sequence[Record]) -> str:
     if squares:
         values, counts = np.array(squares).T
         deviation = f"{np.sqrt(np.average(values**2, weights=counts)):.2f}"
-    return _row(f"`{case.name}`", options, str(len(records)), trusted, _pull(records), deviation)
+    return _row(case.title, options, str(len(records)), trusted, _pull(records), deviation)
 
 
 def _pull(records: Sequence[Record]) -> str:

@@ -19,7 +19,7 @@ HOSTILE = 'a"><img src=x onerror="window.ran = 1"><b class=hostile>'
 # Whether a script of such a text ran, or an element of it is anywhere on the page.
 FOUND = """() => {
   const walk = root => [...root.querySelectorAll('*')].some(
-    e => e.matches('img[src=x], b.hostile') || (e.shadowRoot && walk(e.shadowRoot)));
+    e => e.matches('img[src=x], b.hostile, a[href*=evil]') || (e.shadowRoot && walk(e.shadowRoot)));
   return Boolean(window.ran) || walk(document); }"""
 
 
@@ -62,7 +62,11 @@ def test_dashboard_shows_hostile_names_as_text(survey, open_page):
         client = open_page(f"{address}?view=source&source={HOSTILE}&run={HOSTILE}&orbit={HOSTILE}")
         client.get_by_text("plateviz").first.wait_for()
         assert_harmless(client)
-        for one in (page, failed, copied, client):
+        link = open_page(f"{address}?view=survey&run=[log in](https://evil.example)&unit=__own__")
+        link.get_by_text("found '[log in](https://evil.example)'").wait_for()
+        link.get_by_text("found '__own__'").wait_for()
+        assert_harmless(link)
+        for one in (page, failed, copied, client, link):
             one.context.close()
 
 

@@ -1,7 +1,6 @@
 """RefitView: request fits and what-ifs of the orbit, show their progress, and cancel them."""
 
 from collections.abc import Callable, Iterable
-from html import escape
 
 import panel as pn
 import panel_material_ui as pmui
@@ -14,6 +13,7 @@ from plateviz.dashboard.views.controls.fit_controls import TIGHT, controls, widt
 from plateviz.dashboard.views.dialogs.code_dialog import code_button
 from plateviz.dashboard.views.dialogs.dialog import dialog_button
 from plateviz.dashboard.views.dialogs.solution_dialog import SolutionDialog
+from plateviz.dashboard.views.elements.markup import alert_words
 from solver.data.parameter_group import Group
 from solver.data.parameters import OPTIONAL_GROUPS, PARAMETERS
 from solver.data.setting_kinds import Choice, Positive, Setting, Switch, Whole
@@ -164,8 +164,7 @@ class RefitView(pn.viewable.Viewer):
         self._bar.visible = is_busy
         self._stop.disabled = not is_busy
         self._message.param.update(
-            # It is taken for Markdown, in which HTML would be kept.
-            object=escape(message),
+            object=alert_words(message),
             visible=bool(message),
             severity="error" if stage is Stage.FAILED else "info",
         )

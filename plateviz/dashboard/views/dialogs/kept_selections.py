@@ -1,7 +1,5 @@
 """KeptSelectionsDialog: a dialog in which selections are kept under names and taken up again."""
 
-from html import escape
-
 import panel as pn
 import panel_material_ui as pmui
 
@@ -9,6 +7,7 @@ from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.selection.selected import checked_name, selection_words
 from plateviz.dashboard.session.selection_actions import SelectionActions, look_for_kept
 from plateviz.dashboard.views.dialogs.dialog import dialog
+from plateviz.dashboard.views.elements.markup import alert_words
 from solver.data.subset import Subset
 from solver.errors import InputError
 
@@ -61,7 +60,7 @@ class KeptSelectionsDialog(pn.viewable.Viewer):
                 return
             why = self._actions.keep(name)
             if why:
-                self._say(f"It is kept in this session only: {escape(why)}.", "warning")
+                self._say(f"It is kept in this session only: {why}.", "warning")
         except InputError as error:
             self._say(f"It was not kept: {error}.", "error")
 
@@ -96,5 +95,4 @@ class KeptSelectionsDialog(pn.viewable.Viewer):
             )
 
     def _say(self, text: str, severity: str = "info") -> None:
-        # It is taken for Markdown: no text of a person's may be in it.
-        self._words.param.update(object=text, severity=severity)
+        self._words.param.update(object=alert_words(text), severity=severity)

@@ -1,7 +1,6 @@
 """SolutionDialog: the solutions of a page in a dialog, to be shown, named, kept and noted upon."""
 
 from collections.abc import Callable
-from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +12,7 @@ from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.solution_list import Entry, SolutionList, by_label
 from plateviz.dashboard.session.solution import Request
 from plateviz.dashboard.views.dialogs.dialog import dialog
+from plateviz.dashboard.views.elements.markup import alert_words
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
 from plateviz.runs.kept_solutions import KeptSolution, require_name
@@ -238,9 +238,8 @@ class SolutionDialog(pn.viewable.Viewer):
             self._say(str(error))
 
     def _say(self, text: str, severity: str = "error") -> None:
-        # It is taken for Markdown, in which HTML would be kept.
         text = text[:1].upper() + text[1:]
-        self._message.param.update(object=escape(text), visible=bool(text), severity=severity)
+        self._message.param.update(object=alert_words(text), visible=bool(text), severity=severity)
 
 
 def _is_same(one: Entry, other: Entry) -> bool:

@@ -50,6 +50,15 @@ def judged(verdict: Verdict, *, is_open: bool = True) -> str:
     )
 
 
+def alert_words(text: str) -> str:
+    """Return plain text for an alert, which takes its text for Markdown and keeps HTML in it.
+
+    A name in it may be of a person, or of an address that somebody sent: a block of HTML has
+    neither emphasis nor links.
+    """
+    return f"<p>{'<br>'.join(escape(text).splitlines())}</p>" if text else ""
+
+
 def heading(text: str) -> pmui.Typography:
     """Return the heading of a part of the page or of its sidebar."""
     return pmui.Typography(text, variant="subtitle1", margin=(10, 10, 4, 10))

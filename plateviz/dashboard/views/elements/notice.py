@@ -1,11 +1,10 @@
 """NoticeView: what cannot be shown, that the run is gone, and what is to be done, in words."""
 
-from html import escape
-
 import panel as pn
 import panel_material_ui as pmui
 
 from plateviz.dashboard.session.session import Session
+from plateviz.dashboard.views.elements.markup import alert_words
 
 
 class NoticeView(pn.viewable.Viewer):
@@ -44,8 +43,7 @@ class NoticeView(pn.viewable.Viewer):
 
 def _alert(text: str, closeable: bool = False, severity: str = "warning") -> pmui.Alert:
     return pmui.Alert(
-        # It is taken for Markdown, in which HTML would be kept.
-        object=escape(text),
+        object=alert_words(text),
         severity=severity,
         closeable=closeable,
         margin=(6, 0),

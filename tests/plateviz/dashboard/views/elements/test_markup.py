@@ -1,8 +1,12 @@
 """Pieces of HTML of the pages."""
 
-import pytest
+from html import escape, unescape
 
-from plateviz.dashboard.views.elements.markup import judged, paragraph
+import panel_material_ui as pmui
+import pytest
+from bokeh.document import Document
+
+from plateviz.dashboard.views.elements.markup import alert_words, judged, paragraph
 from plateviz.verdict.verdict import Verdict
 
 VERDICT = Verdict("warn", "The headline.", ["A reason."], ["What stands out."])
@@ -29,3 +33,12 @@ def test_verdict_is_text():
     html = judged(Verdict("bad", "<b>", ["<img src=x onerror=alert(1)>"], []))
     assert "<b>" not in html
     assert "<img" not in html
+
+
+def test_name_in_an_alert_is_neither_emphasis_nor_a_link():
+    text = "found '__import__', '[log in](http://evil.example)', 'https://evil.example/', '<b>'"
+    alert = pmui.Alert(object=alert_words(f"{text}\n\n# second *line*"))
+    shown = alert.get_root(Document()).data.object
+    once = unescape(shown).strip()
+    assert once == f"<p>{escape(text)}<br><br># second *line*</p>"
+    assert alert_words("") == ""

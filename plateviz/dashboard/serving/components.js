@@ -19,6 +19,8 @@
 // Columns of texts arrive packed.
 //
 // A table follows its model from when it is drawn.
+//
+// What the server has sent is not sent back to it.
 
 // Milliseconds that a layout waits for components that are being drawn.
 const LONGEST = 2000
@@ -109,6 +111,23 @@ document.addEventListener("DOMContentLoaded", () => {
     return numbers === undefined
       ? words : Array.from(deserializer.decode(numbers), number => words[number])
   })
+
+  // What the server has sent it knows. Bokeh sends it back as new with the first change that refers
+  // to it, such as the styles that a table gets when it is drawn, and the server complains.
+  const { decode } = Deserializer.prototype
+  Deserializer.prototype.decode = function (value, buffers) {
+    const { finalize, _decoding: isWithin } = this
+    if (isWithin || finalize === undefined) return decode.call(this, value, buffers)
+    this.finalize = model => {
+      finalize(model)
+      model.document?._new_models.delete(model)
+    }
+    try {
+      return decode.call(this, value, buffers)
+    } finally {
+      this.finalize = finalize
+    }
+  }
 
   // After 0.3 s without a move, BokehJS takes a drag for a press, to which nothing here answers.
   // A hand may rest before it drags, and a busy browser may be late. This is the longest timeout.

@@ -44,3 +44,10 @@ def unknown_parts(address: Mapping[str, str], known: Collection[str]) -> list[st
     told = ", ".join(map(quoted, names[:_MOST_NAMED]))
     more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
     return [f"unknown parts, as of another version: {told}{more}"]
+
+
+def repeated_parts(address: Mapping[str, Collection[object]]) -> list[str]:
+    """Return which parts an address has more than once with different values, in words."""
+    names = [name for name, values in address.items() if len({*values}) > 1]
+    told = ", ".join(map(quoted, names[:_MOST_NAMED]))
+    return [f"expected once, of which the first one is shown: {told}"] if names else []

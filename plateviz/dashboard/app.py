@@ -10,6 +10,7 @@ from bokeh.themes import Theme
 from panel.io.resources import get_dist_path
 from param.parameterized import Watcher
 
+from plateviz.dashboard.address_parts import repeated_parts
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.selection.large_selections import LargeSelections
 from plateviz.dashboard.serving.page_request import WINDOW
@@ -129,6 +130,7 @@ def _pages(
 ) -> tuple[Navigation, Ticker, Pages]:
     navigation, ticker = Navigation(Session(store, large)), Ticker()
     navigation.begin(_arguments())
+    navigation.session.note(repeated_parts(pn.state.session_args))
     pn.state.on_session_destroyed(lambda _: navigation.session.close())
     return navigation, ticker, Pages(navigation, ticker.wake, window, rooms)
 

@@ -27,6 +27,7 @@ from plateviz.dashboard.serving.quick_models import make_models_quick
 from plateviz.dashboard.serving.refused_requests import refuse_floods, refuse_paths
 from plateviz.dashboard.serving.returned_memory import ReturnedMemory, keep_no_first_page
 from plateviz.dashboard.serving.rooms import Rooms
+from plateviz.dashboard.serving.unread_queries import ignore_unreadable_queries
 from plateviz.dashboard.serving.waiting_messages import send_waiting_messages
 from plateviz.dashboard.serving.websocket import LIMITS, check_websockets
 from plateviz.solving.solution_store import SolutionStore
@@ -38,6 +39,8 @@ _LOST_MILLISECONDS = 60_000
 _LOOK_MILLISECONDS = 5000
 # A page sends events and a few properties; a selection of 8000 sources takes 60 kB.
 _MESSAGE_BYTES = 2**20
+# An address up to this long is answered in words; a browser shows an error of its own for others.
+_HEADER_BYTES = 2**18
 _HOST = re.compile(r"[a-z0-9]([a-z0-9.-]*[a-z0-9])?(:\d{1,5})?")
 _PATH = re.compile(r"[A-Za-z0-9._~-]+(/[A-Za-z0-9._~-]+)*")
 # Each open page takes some 10 MB.
@@ -107,6 +110,7 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
     make_models_quick()
     make_components_quick()
     send_waiting_messages()
+    ignore_unreadable_queries()
     check_websockets()
     hosts = sorted({endpoint.address, "localhost", "127.0.0.1"})
     rooms, large = Rooms(), LargeSelections()
@@ -134,6 +138,7 @@ def _server(store: SolutionStore, endpoint: Endpoint) -> Any:  # noqa: ANN401 of
         sign_sessions=True,
         secret_key=secrets.token_bytes(),
         websocket_max_message_size=_MESSAGE_BYTES,
+        http_server_kwargs={"max_header_size": _HEADER_BYTES},
         cookie_secret=secrets.token_hex(),
         **_login(endpoint.password),
     )

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import re
+import secrets
 from concurrent.futures import ThreadPoolExecutor
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -81,6 +82,23 @@ def test_every_response_has_the_security_headers(address):
 def test_path_with_a_nul_character_is_not_found(address):
     for path in ("static/%00", "static/js/a%00.js", "%00", "static/extensions/panel/%00/x"):
         assert answer(address + path)[0] == 404
+
+
+def test_long_address_is_answered_in_words_unless_it_can_be_shown(address, open_page):
+    for length in (21_000, 200_000):
+        status, _, page = answer(f"{address}?sources={'1' * length}")
+        assert status == 414
+        assert "This address is too long to be read: it has more than 20,000 characters." in page
+    # The longest one that is read.
+    numbers = "".join(secrets.choice("0123456789") for _ in range(19_950))
+    page = open_page(f"{address}?orbit=0&sources={numbers}&unit=mas&unit=mpix")
+    page.get_by_text("sources: expected 20 ids or fewer").wait_for()
+    page.get_by_text("expected once, of which the first one is shown: 'unit'").wait_for()
+
+
+@pytest.mark.parametrize("query", ["orbit=%C2%B2", f"orbit={'1' * 5000}", "theme=%ff&orbit=x"])
+def test_address_that_no_program_would_write_opens_a_page(address, open_page, query):
+    open_page(f"{address}?{query}").get_by_text("orbit: expected one of 0, found").wait_for()
 
 
 def test_websocket_needs_a_token_of_the_server(address):

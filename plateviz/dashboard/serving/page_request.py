@@ -11,6 +11,7 @@ import secrets
 import time
 from collections.abc import Callable
 from html import escape
+from http import HTTPStatus
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -29,12 +30,17 @@ from panel.io.server import DocHandler, server_html_page_for_session
 from tornado.web import Application, RequestHandler, authenticated
 
 from plateviz.dashboard.serving.limits import Limits
+from plateviz.dashboard.serving.unread_queries import readable
 from plateviz.dashboard.serving.websocket import is_valid_token
 
 WINDOW = "window"
 """Name under which a session's token has the window of its browser: `rooms.browser_window_from`."""
 
+LONGEST_ADDRESS = 20_000
+"""Most characters of an address: its websocket sends it once more, with a token that repeats it."""
+
 _FULL = Path(__file__).with_name("full.html")
+_TOO_LONG = Path(__file__).with_name("too_long.html")
 _BEGIN = Path(__file__).with_name("begin.js")
 _COMPONENTS = Path(__file__).with_name("components.js")
 _OPENING = Path(__file__).with_name("opening.html")
@@ -80,6 +86,10 @@ class PageHandler(DocHandler):
             query = f"?{self.request.query}" if self.request.query else ""
             self.redirect(f"{prefix}/{query}")
             return
+        if len(self.request.uri or "") > LONGEST_ADDRESS:
+            self.set_status(HTTPStatus.REQUEST_URI_TOO_LONG)
+            self.render(str(_TOO_LONG), most=f"{LONGEST_ADDRESS:,}", page=f"{prefix}/")
+            return
         reason = self._limits.pages.reason(self._limits.client_of(self.request))
         if reason:
             self.set_status(503)
@@ -89,6 +99,11 @@ class PageHandler(DocHandler):
         self.set_header("Content-Type", "text/html")
         self.write(self._page.with_token(self._token()))
 
+    def _log(self) -> None:
+        """Log no address that is too long to be read."""
+        if self.get_status() != HTTPStatus.REQUEST_URI_TOO_LONG:
+            super()._log()
+
     def _token(self) -> str:
         """Return a new token, which has what the page's address requests."""
         own = self.application
@@ -97,7 +112,7 @@ class PageHandler(DocHandler):
             generate_session_id(**key),
             expiration=own.session_token_expiration,
             extra_payload={
-                "arguments": self.request.arguments,
+                "arguments": readable(self.request.arguments),
                 "query": self.request.query,
                 "app_path": "/",
             },

@@ -2,7 +2,7 @@
 
 import pytest
 
-from plateviz.dashboard.address_parts import unknown_parts
+from plateviz.dashboard.address_parts import repeated_parts, unknown_parts
 from plateviz.dashboard.navigation.navigation import View
 from plateviz.plots.explore.explored_rows import ExploredColumns
 from plateviz.plots.explore.explored_text import parts_of
@@ -51,3 +51,9 @@ def test_every_part_that_is_written_is_known(navigation, survey):
     assert len(explored) == 9
     navigation.begin({"view": View.SURVEY.value, **explored})
     assert "unknown" not in navigation.session.notice
+
+
+def test_parts_that_an_address_repeats_are_named():
+    address = {"view": [b"orbit", b"survey"], "unit": [b"mas", b"mas"], "orbit": [b"3"]}
+    assert repeated_parts(address) == ["expected once, of which the first one is shown: 'view'"]
+    assert repeated_parts({"orbit": [b"3"]}) == []

@@ -13,8 +13,9 @@ import pandas as pd
 from pyarrow.compute import Expression
 from pyarrow.compute import field as col
 
-from plateviz.runs.fitted_orbit import is_complete, kept_table, read_fitted_orbit, read_summary
+from plateviz.runs.fitted_orbit import is_complete, kept_table, read_summary
 from plateviz.runs.orbit_cache import OrbitCache
+from plateviz.runs.orbit_of_run import read_orbit
 from plateviz.runs.run import (
     ERRORS_FILE,
     HISTORY_FILE,
@@ -215,10 +216,10 @@ class SurveyRun:
         Raises
         ------
         InputError
-            If it does not exist, or the survey has another instrument now.
+            If it is not there, or is another one, or the survey has another instrument now.
         """
-        read = read_fitted_orbit if self._cache is None else self._cache.read
-        result, where = read(self._run.orbit_directory(orbit)), f"{self.directory}: orbit {orbit}"
+        read, directory = self._cache and self._cache.read, self._run.orbit_directory(orbit)
+        result, where = read_orbit(directory, orbit, read), f"{self.directory}: orbit {orbit}"
         expected, remedy = read_survey_instrument(self.survey), "fit the orbits in another run"
         require_instrument(result, expected, where, remedy)
         return result
@@ -237,8 +238,7 @@ class SurveyRun:
     def history_files(self) -> list[str]:
         """Return the gathered history, or its parts; InputError if a file is damaged.
 
-        Each is read as a whole once: the checksums of its pages do not protect the names of the
-        columns.
+        Each is read as a whole once: checksums of pages do not protect the names of columns.
         """
         gathered = self.directory / HISTORY_FILE
         if self.is_complete or gathered.is_file():

@@ -263,6 +263,16 @@ def test_copied_orbit_is_refused(survey):
         fit_survey(survey, "another", FitSettings(order=3), workers=1)
 
 
+def test_solution_of_another_orbit_is_refused(survey):
+    run = Run(survey, "default")
+    shutil.rmtree(run.orbit_directory(1))
+    shutil.copytree(run.orbit_directory(0), run.orbit_directory(1))
+    opened = SurveyRun(run)
+    with pytest.raises(InputError, match=r"orbit=0001: expected orbit 1, found 0; remove the dir"):
+        opened.result(1)
+    assert set(opened.result(0).exposures["orbit_id"]) == {0}
+
+
 def test_solution_is_not_removed_where_its_measurements_cannot_be_fitted_again(survey):
     path, settings = measurement_path(survey, 1), FitSettings(order=3)
     (survey / "manifest.sha256").unlink()

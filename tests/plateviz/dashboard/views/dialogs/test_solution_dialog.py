@@ -68,7 +68,7 @@ def test_fast_clicks_keep_a_solution_once(page, window, fit_result):
         window._keep.clicks = clicks
     assert [one.name for one in store.kept.all()] == ["mine", "old"]
     assert window._message.severity == "success"
-    assert window._message.object == "It is kept on disk as mine."
+    assert window._message.object == "<p>It is kept on disk as mine.</p>"
 
 
 def test_a_solution_stays_chosen_when_it_gets_another_name(page, window, fit_result):
@@ -163,4 +163,5 @@ def test_kept_solution_is_shown_by_its_name_and_said_to_be_kept(
     monkeypatch.setattr(window._list, "keep", lambda _, name: kept.keep(name, 0, False, fit_result))
     window._name.value = " new "
     window._keep_on_disk()
-    assert (window._chosen.name, window._message.object) == ("new", "It is kept on disk as new.")
+    assert window._chosen.name == "new"
+    assert window._message.object == "<p>It is kept on disk as new.</p>"

@@ -208,7 +208,7 @@ def test_change_without_a_what_if_says_what_to_do_until_it_is_done(
     actions.leave_out()
     assert (len(live.store.requested), live.stage) == (before, Stage.READY)
     assert words in live.advice
-    assert (notice[0].object, notice[0].severity) == (live.advice, "info")
+    assert (notice[0].object, notice[0].severity) == (f"<p>{live.advice}</p>", "info")
     live.refit()
     assert (live.advice, len(notice)) == ("", 0)
     finish(live)

@@ -11,7 +11,6 @@ The verdict may follow later, and the eigenmodes if somebody asks for them. Who 
 import json
 import math
 import shutil
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -20,8 +19,8 @@ from tempfile import mkdtemp
 from typing import Any
 
 import pandas as pd
-import pyarrow as pa
 
+from plateviz.runs.scratch_table import read_scratch_table, write_scratch_table
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
 from solver.data.instrument import instrument_from, instrument_text
 from solver.data.result import FitResult
@@ -35,8 +34,6 @@ _HEAD, _JUDGEMENT = "result.json", "verdict.json"
 VERDICT, EIGENMODES = "verdict", "eigenmodes"
 """Parts of a result that may be written later."""
 _LATER = tuple(table.name for table in EIGENMODE_TABLES)
-# Windows removes no file that is read in place.
-_IS_IN_PLACE = sys.platform != "win32"
 # A page may ask again and again for longer than a thread waits.
 _PATIENCE_SECONDS, _PATIENCE_OF_PAGE, _LOOK_SECONDS = 10.0, 60.0, 0.005
 # A solver with other requests puts a verdict off, and in the end gives it up. So a page that is
@@ -69,7 +66,7 @@ def write_scratch_result(
             for table in RESULT_TABLES:
                 frame = getattr(result, table.name)
                 if frame is not None:
-                    _write_table(staging / f"{table.name}.arrow", frame)
+                    write_scratch_table(staging / f"{table.name}.arrow", frame)
             head = {
                 "settings": result.settings.to_dict(),
                 "summary": dict(result.summary),
@@ -89,7 +86,7 @@ def write_eigenmodes(directory: Path, tables: Mapping[str, pd.DataFrame]) -> Non
     """Add the eigenmodes to a result that was written without; errors as above."""
     with writing(directory, "to write the eigenmodes of a fit"):
         for name in _LATER:
-            _write_table(directory / f"{name}.part", tables[name])
+            write_scratch_table(directory / f"{name}.part", tables[name])
             (directory / f"{name}.part").rename(directory / f"{name}.arrow")
 
 
@@ -107,8 +104,14 @@ def write_verdict(directory: Path, verdict: Mapping[str, Any]) -> None:
 
 
 def is_judged_later(result: FitResult) -> bool:
-    """Return whether the verdict on a result is to come, and is not there yet."""
+    """Return whether the verdict on a result is to follow, is not there yet, nor given up."""
     return isinstance(result.summary, _JudgedLater) and result.summary.is_to_come
+
+
+def request_late_verdict(result: FitResult) -> None:
+    """Have the verdict on a result made if it is late, unless it has been requested."""
+    if isinstance(result.summary, _JudgedLater):
+        result.summary.request_if_late()
 
 
 def are_eigenmodes_written(directory: Path) -> bool:
@@ -122,9 +125,16 @@ def is_verdict_written(directory: Path) -> bool:
 
 
 def are_eigenmodes_to_come(result: FitResult) -> bool:
-    """Return whether the eigenmodes of a result are not there yet; ask for them then."""
+    """Return whether the eigenmodes of a result are not there yet, and are not given up."""
     awaited = vars(result)[_LATER[0]]
-    return isinstance(awaited, _Awaited) and awaited.is_to_come()
+    return isinstance(awaited, _Awaited) and awaited.is_to_come
+
+
+def request_eigenmodes(result: FitResult) -> None:
+    """Have the eigenmodes of a result made, unless they are there or have been requested."""
+    awaited = vars(result)[_LATER[0]]
+    if isinstance(awaited, _Awaited):
+        awaited.request()
 
 
 def is_written(directory: Path) -> bool:
@@ -150,7 +160,7 @@ def read_scratch_result(directory: Path, complete: Complete = lambda _: True) ->
         tables: dict[str, pd.DataFrame | _Awaited | None] = {
             table.name: eigenmodes
             if head["is_partial"] and table.name in _LATER
-            else _read_table(directory / f"{table.name}.arrow")
+            else read_scratch_table(directory / f"{table.name}.arrow")
             for table in RESULT_TABLES
         }
         summary = head["summary"]
@@ -171,37 +181,40 @@ class _Awaited:
 
     def __init__(self, path: Path, complete: Callable[[], bool]) -> None:
         self.path, self._complete = path, complete
-        # When a page gives up, as `time.monotonic`; None until somebody has asked.
+        # When a page gives up, as `time.monotonic`; None until it is requested.
         self._end: float | None = None
 
     @property
     def is_there(self) -> bool:
         return self.path.is_file()
 
+    @property
     def is_to_come(self) -> bool:
-        """Return whether it is not there yet, but will be; ask for it once."""
-        if self.is_there:
-            return False
-        if self._end is None:
+        """Whether it is not there yet, and is not given up."""
+        return not self.is_there and (self._end is None or time.monotonic() < self._end)
+
+    def request(self) -> None:
+        """Have it made, unless it is there or has been requested."""
+        if self._end is None and not self.is_there:
             self._end = time.monotonic() + _PATIENCE_OF_PAGE if self._complete() else -math.inf
-        return time.monotonic() < self._end
 
     def wait(self, end: float) -> bool:
-        """Wait for it until some `time.monotonic`; return whether it is there."""
-        while self.is_to_come() and time.monotonic() < end:
+        """Request it, and wait for it until some `time.monotonic`; return whether it is there."""
+        self.request()
+        while self.is_to_come and time.monotonic() < end:
             time.sleep(_LOOK_SECONDS)
         return self.is_there
 
     def table(self, name: str) -> pd.DataFrame | None:
         """Return a table beside it once it is there."""
         if not self.wait(time.monotonic() + _PATIENCE_SECONDS):
-            # Who uses it next asks anew.
+            # Who uses it next requests it anew.
             self._end = None
             raise InputError(
                 f"{self.path}: expected the eigenmodes of the solution, found that the solver "
                 "ended or had no time to write them; fit again"
             )
-        return _read_table(self.path.with_name(f"{name}.arrow"))
+        return read_scratch_table(self.path.with_name(f"{name}.arrow"))
 
 
 def _last_of_eigenmodes(directory: Path) -> Path:
@@ -220,7 +233,11 @@ class _JudgedLater(Mapping[str, Any]):
     def is_to_come(self) -> bool:
         if VERDICT in self._known or self._verdict.is_there or self._is_missing:
             return False
-        return time.monotonic() < self._late or self._verdict.is_to_come()
+        return time.monotonic() < self._late or self._verdict.is_to_come
+
+    def request_if_late(self) -> None:
+        if self.is_to_come and time.monotonic() >= self._late:
+            self._verdict.request()
 
     def __getitem__(self, key: str) -> Any:  # noqa: ANN401 whatever a summary holds
         return (self._whole() if key == VERDICT else self._known)[key]
@@ -264,22 +281,3 @@ class ScratchResult(FitResult):
     eigenmodes = _Later()  # type: ignore[assignment]
     mode_parameters = _Later()  # type: ignore[assignment]
     mode_shifts = _Later()  # type: ignore[assignment]
-
-
-def _write_table(path: Path, frame: pd.DataFrame) -> None:
-    content = pa.table({name: _arrow(frame[name]) for name in frame})
-    with pa.OSFile(str(path), "wb") as sink, pa.ipc.new_file(sink, content.schema) as writer:
-        writer.write_table(content)
-
-
-def _arrow(column: pd.Series) -> pa.Array:
-    """Return a column; numbers are neither copied nor searched for NaN, which stays NaN."""
-    return pa.array(column.to_numpy() if column.dtype.kind in "biuf" else column)
-
-
-def _read_table(path: Path) -> pd.DataFrame | None:
-    if not path.is_file():
-        return None
-    with pa.memory_map(str(path)) if _IS_IN_PLACE else pa.OSFile(str(path)) as source:
-        # One block for each column: columns would be copied into a common one.
-        return pa.ipc.open_file(source).read_all().to_pandas(split_blocks=True)

@@ -4,7 +4,7 @@ from concurrent.futures import Executor, Future
 from contextlib import suppress
 from weakref import finalize
 
-from plateviz.runs.scratch_result import is_judged_later
+from plateviz.runs.scratch_result import is_judged_later, request_late_verdict
 from plateviz.verdict.verdict import is_judged, orbit_verdict
 from solver.data.result import FitResult
 
@@ -23,20 +23,26 @@ class Judge:
         self._begun: dict[int, Future[None]] = {}
 
     def has_judged(self, result: FitResult) -> bool:
-        """Return whether `orbit_verdict` takes no time any more; if not, somebody is at it.
+        """Return whether `orbit_verdict` takes no time any more.
 
-        That is the solver process, if it has just made the solution, or another thread. Called
-        from one thread. Of a solution that cannot be judged, `orbit_verdict` says why.
+        Of a solution that cannot be judged, `orbit_verdict` says why.
         """
         if is_judged_later(result):
             return False
-        if is_judged(result):
-            return True
+        begun = self._begun.get(id(result))
+        return is_judged(result) or (begun is not None and begun.done())
+
+    def request(self, result: FitResult) -> None:
+        """Have a solution judged, unless it is or somebody is at it; called from one thread.
+
+        The solver process judges what it has just made, another thread what comes from elsewhere
+        or what the solver process has given up.
+        """
+        request_late_verdict(result)
         key = id(result)
-        if key not in self._begun:
+        if not (is_judged_later(result) or is_judged(result) or key in self._begun):
             self._begun[key] = self._executor.submit(_judge, result)
             finalize(result, self._begun.pop, key, None)
-        return self._begun[key].done()
 
 
 def _judge(result: FitResult) -> None:

@@ -4,6 +4,7 @@ from typing import Any
 
 import param
 
+from plateviz.dashboard.session.solution import Solution
 from plateviz.solving.judge import Judge
 
 
@@ -25,9 +26,12 @@ class Judging(param.Parameterized):
         session.param.watch(self.look, ["shown", "other"])
 
     def look(self, *_: object) -> None:
-        """Look whether the verdicts are there; called again and again while they are not."""
-        shown, other = (
-            one is not None and not self._judge.has_judged(one.result)
-            for one in (self._session.shown, self._session.other)
-        )
+        """Request verdicts that are not there; called again and again until they are."""
+        shown, other = map(self._is_pending, (self._session.shown, self._session.other))
         self.param.update(is_pending=shown, is_any_pending=shown or other)
+
+    def _is_pending(self, solution: Solution | None) -> bool:
+        if solution is None:
+            return False
+        self._judge.request(solution.result)
+        return not self._judge.has_judged(solution.result)

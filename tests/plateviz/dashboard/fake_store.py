@@ -43,6 +43,9 @@ class JudgedAll:
     def has_judged(self, result):
         return True
 
+    def request(self, result):
+        pass
+
 
 class FakeStore:
     """A store without a solver, which records its requests."""

@@ -14,6 +14,8 @@ from plateviz.runs.scratch_result import (
     is_judged_later,
     is_written,
     read_scratch_result,
+    request_eigenmodes,
+    request_late_verdict,
     write_eigenmodes,
     write_scratch_result,
     write_verdict,
@@ -66,7 +68,7 @@ def test_result_is_read_after_its_folder_was_removed(fit_result, tmp_path):
 
 
 def test_half_written_result_is_never_read(fit_result, tmp_path, monkeypatch):
-    written, write = [], scratch_result._write_table
+    written, write = [], scratch_result.write_scratch_table
 
     def write_two(path, frame):
         assert not is_written(tmp_path / "result")
@@ -75,7 +77,7 @@ def test_half_written_result_is_never_read(fit_result, tmp_path, monkeypatch):
         written.append(path)
         write(path, frame)
 
-    monkeypatch.setattr(scratch_result, "_write_table", write_two)
+    monkeypatch.setattr(scratch_result, "write_scratch_table", write_two)
     with pytest.raises(DiskError, match="expected to write the result of a fit, found a full disk"):
         write_scratch_result(tmp_path / "result", fit_result)
     assert len(written) == 2
@@ -125,6 +127,16 @@ def test_who_uses_eigenmodes_asks_for_them_once(fit_result, partial):
     assert asked == ["eigenmodes"]
 
 
+def test_question_whether_eigenmodes_are_to_come_requests_none(partial):
+    directory, finish = partial
+    asked = []
+    result = read_scratch_result(directory, complete=lambda part: asked.append(part) or True)
+    assert are_eigenmodes_to_come(result)
+    assert not asked
+    finish()
+    assert not are_eigenmodes_to_come(result)
+
+
 def test_eigenmodes_that_never_come_are_an_error_at_once(partial):
     result = read_scratch_result(partial[0], complete=lambda _: False)
     for name in EIGENMODES:
@@ -138,11 +150,13 @@ def test_page_that_has_given_up_does_not_wait_again(partial, monkeypatch):
     monkeypatch.setattr(scratch_result.time, "sleep", lambda _: pytest.fail("waited"))
     asked = []
     result = read_scratch_result(partial[0], complete=lambda part: asked.append(part) or True)
+    request_eigenmodes(result)
     assert not are_eigenmodes_to_come(result)
     with pytest.raises(InputError, match="had no time"):
         result.eigenmodes.head()
     assert asked == ["eigenmodes"]
     monkeypatch.setattr(scratch_result, "_PATIENCE_OF_PAGE", 60.0)
+    request_eigenmodes(result)
     assert are_eigenmodes_to_come(result)
     assert asked == ["eigenmodes", "eigenmodes"]
 
@@ -196,11 +210,15 @@ def test_result_whose_verdict_never_comes_has_none(fit_result, unjudged):
 def test_page_asks_once_for_a_verdict_that_is_late(unjudged, monkeypatch):
     asked = []
     result = read_scratch_result(unjudged[0], complete=lambda part: asked.append(part) or True)
+    request_late_verdict(result)
     assert is_judged_later(result)
     assert not asked
     monkeypatch.setattr(scratch_result, "_LATE_SECONDS", 0.0)
     result = read_scratch_result(unjudged[0], complete=lambda part: asked.append(part) or True)
     assert is_judged_later(result)
+    assert not asked
+    request_late_verdict(result)
+    request_late_verdict(result)
     assert is_judged_later(result)
     assert asked == ["verdict"]
 

@@ -22,17 +22,23 @@ def test_solution_is_judged_once_for_all_pages(fit_result):
     waiting, result = Waiting(), replace(fit_result)
     judge = Judge(waiting)
     assert not judge.has_judged(result)
+    assert not waiting.waiting
+    judge.request(result)
+    judge.request(result)
     assert not judge.has_judged(result)
     ((work, arguments, _),) = waiting.waiting
     work(*arguments)
     assert is_judged(result)
     assert judge.has_judged(result)
+    judge.request(result)
     assert len(waiting.waiting) == 1
 
 
 def test_solution_that_comes_with_its_verdict_is_not_judged_again(fit_result):
     waiting = Waiting()
-    assert Judge(waiting).has_judged(with_verdict(fit_result))
+    judge, judged = Judge(waiting), with_verdict(fit_result)
+    judge.request(judged)
+    assert judge.has_judged(judged)
     assert not waiting.waiting
 
 
@@ -41,6 +47,7 @@ def test_solution_of_the_solver_is_judged_there(fit_result, tmp_path):
     judge, judged = Judge(waiting), with_verdict(fit_result)
     write_scratch_result(tmp_path / "result", fit_result, is_judged=False)
     result = read_scratch_result(tmp_path / "result", complete=lambda _: pytest.fail("waited"))
+    judge.request(result)
     assert not judge.has_judged(result)
     write_verdict(tmp_path / "result", judged.summary["verdict"])
     assert judge.has_judged(result)
@@ -53,7 +60,7 @@ def test_solution_whose_solver_has_ended_is_judged_here(fit_result, tmp_path, mo
     waiting = Waiting()
     write_scratch_result(tmp_path / "result", fit_result, is_judged=False)
     result = read_scratch_result(tmp_path / "result", complete=lambda _: False)
-    assert not Judge(waiting).has_judged(result)
+    Judge(waiting).request(result)
     ((work, arguments, _),) = waiting.waiting
     work(*arguments)
     assert is_judged(result)
@@ -64,7 +71,7 @@ def test_solution_that_cannot_be_judged_says_so_where_its_verdict_is_used(fit_re
     broken = replace(fit_result, summary={})
     with ThreadPoolExecutor(1) as threads:
         judge = Judge(threads)
-        judge.has_judged(broken)
+        judge.request(broken)
     assert judge.has_judged(broken)
     with pytest.raises(KeyError, match="order"):
         orbit_verdict(broken)
@@ -79,7 +86,7 @@ def test_solution_that_cannot_be_judged_says_so_where_its_verdict_is_used(fit_re
 def test_judge_forgets_a_solution_that_nobody_shows(fit_result):
     waiting = Waiting()
     judge, result = Judge(waiting), replace(fit_result)
-    judge.has_judged(result)
+    judge.request(result)
     waiting.waiting.clear()
     del result
     gc.collect()

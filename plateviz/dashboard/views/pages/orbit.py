@@ -32,7 +32,7 @@ from plateviz.figures.figure import Figure
 from plateviz.plots.comparison.both_solutions import BOTH, figure_of_both
 from plateviz.plots.diagnostic import Diagnostic
 from plateviz.plots.workspace import OrbitWorkspace
-from plateviz.runs.scratch_result import are_eigenmodes_to_come
+from plateviz.runs.scratch_result import are_eigenmodes_to_come, request_eigenmodes
 from solver.data.subset import KINDS
 
 
@@ -154,7 +154,7 @@ class OrbitPage(pn.viewable.Viewer):
 
     def _plot(self, diagnostic: Diagnostic) -> Figure | Pending | None:
         of_both = self._compare.figure if diagnostic is BOTH and self._compare else None
-        if self._is_to_come(diagnostic if of_both is None else of_both, of_both is not None):
+        if self._is_pending(diagnostic if of_both is None else of_both, of_both is not None):
             return PENDING
         chosen = chosen_of(self._session)
         if chosen is None:
@@ -162,20 +162,24 @@ class OrbitPage(pn.viewable.Viewer):
         figure = figure_of_both(of_both, chosen) if of_both else figure_of(diagnostic, chosen)
         return self._session.units.figure(figure)
 
-    def _is_to_come(self, diagnostic: Diagnostic, is_of_both: bool) -> bool:
-        """Whether a part that a figure needs of its solution, or of both, is still being made."""
+    def _is_pending(self, diagnostic: Diagnostic, is_of_both: bool) -> bool:
+        """Whether a part that a figure needs of its solution, or of both, is still being made.
+
+        Nobody else requests eigenmodes: they are made for the figures that need them.
+        """
         session = self._session
-        judging, drawn = session.judging, [session.shown]
-        if is_of_both:
-            drawn.append(session.other)
-        if diagnostic.needs_verdict:
-            is_pending = judging.is_any_pending if is_of_both else judging.is_pending
-            if is_pending:
-                return True
+        judging = session.judging
+        if diagnostic.needs_verdict and (
+            judging.is_any_pending if is_of_both else judging.is_pending
+        ):
+            return True
         if not diagnostic.needs_eigenmodes:
             return False
-        # A list, no generator: each solution that lacks its eigenmodes asks for them here.
-        return any([one is not None and are_eigenmodes_to_come(one.result) for one in drawn])
+        drawn = (session.shown, session.other) if is_of_both else (session.shown,)
+        results = [one.result for one in drawn if one is not None]
+        for result in results:
+            request_eigenmodes(result)
+        return any(map(are_eigenmodes_to_come, results))
 
     def _show_workspace(self, *_: object) -> None:
         self._stack.show(self._navigation.orbit_workspace)

@@ -13,7 +13,7 @@ import typer
 
 from plateviz.cache import cache_directory
 from plateviz.runs.new_run import PACKAGES, begin_run
-from plateviz.runs.run import DEFAULT_RUN, Run
+from plateviz.runs.run_directory import DEFAULT_RUN, RunDirectory
 from plateviz.solving.job import Job, JobStatus
 from plateviz.solving.progress import Reporter, reporting
 from plateviz.solving.solution_store import SolutionStore
@@ -44,7 +44,7 @@ def demo_directory() -> Path:
     return cache_directory() / f"demo-{digest}" / "demo"
 
 
-def make_survey(directory: Path, solver: SolverQueue, reporter: Reporter) -> Run:
+def make_survey(directory: Path, solver: SolverQueue, reporter: Reporter) -> RunDirectory:
     """Simulate the survey and begin its run, unless they are there; the run, complete or not.
 
     Of two processes that do so at once, the second waits and finds them.
@@ -59,7 +59,7 @@ def make_survey(directory: Path, solver: SolverQueue, reporter: Reporter) -> Run
         return begin_run(directory, DEFAULT_RUN, FitSettings())
 
 
-def request_first_orbit(store: SolutionStore, run: Run) -> Job | None:
+def request_first_orbit(store: SolutionStore, run: RunDirectory) -> Job | None:
     """Ask for the orbit that the page opens with; None if the run has it."""
     first = store.orbits[0]
     return None if first in run.complete_orbits() else store.request(first, FitSettings())
@@ -73,7 +73,7 @@ def _finish(job: Job, reporter: Reporter) -> None:
 class BackgroundFit:
     """A fit of all orbits of a run in a process of its own, which ends with this one."""
 
-    def __init__(self, run: Run, first: Job | None) -> None:
+    def __init__(self, run: RunDirectory, first: Job | None) -> None:
         """Take a run, and the job of another process that is to be over before the fit starts."""
         self._run, self._first = run, first
         self._lock = threading.Lock()
@@ -126,7 +126,7 @@ class BackgroundFit:
             return self._solver.submit(Job(request))
 
 
-def _outcome(job: Job, run: Run) -> str:
+def _outcome(job: Job, run: RunDirectory) -> str:
     """Return what became of a background fit that was not stopped."""
     if job.status is JobStatus.FAILED:
         return f"plateviz stopped fitting the other orbits: {job.message}"

@@ -21,14 +21,14 @@ def inspect(
     """
     from plateviz.cli.output import print_inspection, print_json
     from plateviz.runs.changed_inputs import changed_inputs
-    from plateviz.runs.run import runs_of
+    from plateviz.runs.run_directory import run_directories
     from solver.io.inspect import inspect_files
 
     found = inspect_files(files)
     for path, one in zip(files, found, strict=True):
         if one["kind"] == "survey":
             one["runs"] = []
-            for run in runs_of(path):
+            for run in run_directories(path):
                 one["problems"] += [*run.changes(), *changed_inputs(run).values()]
                 one["runs"].append({"name": run.name, "orbits": len(run.complete_orbits())})
     if as_json:

@@ -23,7 +23,7 @@ from plateviz.cli.report import report
 from plateviz.cli.reproduce import reproduce
 from plateviz.cli.serve import open_endpoint, run_server, serve
 from plateviz.cli.watch import watch
-from plateviz.runs.run import DEFAULT_RUN
+from plateviz.runs.run_directory import DEFAULT_RUN
 from plateviz.tables.counts import orbits_text
 from solver.data.settings import ENGINES
 from solver.errors import DistrustError, FitError, InputError

@@ -7,7 +7,7 @@ import pandas as pd
 from plateviz.cache import keep_compilations
 from plateviz.cli.survey_progress import fit_and_report, require_all
 from plateviz.runs.queries import SurveyRun, open_run
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from plateviz.solving.origin import SurveyFolder
 from plateviz.solving.progress import reporting
 from plateviz.tables.reproduction import OFTEN, SurveyFigures, reproduction
@@ -31,7 +31,7 @@ def reproduced(survey: Path, run: str, workers: int | None) -> pd.DataFrame:
     """
     if not (survey / HEADER).is_file():
         _simulate(survey)
-    if not Run(survey, run).is_complete:
+    if not RunDirectory(survey, run).is_complete:
         require_all(fit_and_report(survey, run, FitSettings(), workers=workers))
     return reproduction(figures_of(open_run(survey, run)))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from plateviz.cli import options
-from plateviz.runs.run import DEFAULT_RUN
+from plateviz.runs.run_directory import DEFAULT_RUN
 from solver.errors import InputError
 
 if TYPE_CHECKING:

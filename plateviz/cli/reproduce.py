@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from plateviz.runs.run import DEFAULT_RUN
+from plateviz.runs.run_directory import DEFAULT_RUN
 
 
 def reproduce(

@@ -24,7 +24,7 @@ from plateviz.notebook.table import OpenTable, input_table
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
-from plateviz.runs.run import DEFAULT_RUN
+from plateviz.runs.run_directory import DEFAULT_RUN
 from plateviz.runs.run_tables import read_run_verdict
 from plateviz.solving.job import Job
 from plateviz.solving.origin import SurveyFolder

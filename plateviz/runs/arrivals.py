@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from plateviz.runs.fitted_exposures import FittedExposures, digest_of
 from plateviz.runs.fitted_orbit import read_provenance
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from solver.data.schema import ENVIRONMENT
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
@@ -79,7 +79,7 @@ _Signature = tuple[_State | None, str | None, str | None]
 class Arrivals:
     """The orbits of a growing survey, look by look."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: RunDirectory) -> None:
         """Begin without a look.
 
         Parameters

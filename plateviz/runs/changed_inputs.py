@@ -1,14 +1,14 @@
 """Whether the measurements of the orbits of a run are still those that were fitted."""
 
 from plateviz.runs.fitted_orbit import read_provenance
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
 from solver.io.survey import measurement_path
 from solver.io.survey_manifest import listed_files
 
 
-def changed_inputs(run: Run) -> dict[int, str]:
+def changed_inputs(run: RunDirectory) -> dict[int, str]:
     """Return a message for each fitted orbit whose file of measurements is another one by now.
 
     An orbit whose file is gone keeps its solution, which nothing could replace.
@@ -25,7 +25,7 @@ def changed_inputs(run: Run) -> dict[int, str]:
         try:
             fitted = read_provenance(run.orbit_directory(orbit)).get(name)
         except InputError:
-            # The orbit is damaged, which `Run.changes` says.
+            # The orbit is damaged, which `RunDirectory.changes` says.
             continue
         if fitted is None or not path.is_file():
             continue

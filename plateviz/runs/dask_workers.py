@@ -15,7 +15,7 @@ import dask.config
 from distributed import Client, Future, KilledWorker, LocalCluster, as_completed
 
 from plateviz.cache import keep_compilations
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from plateviz.runs.worker_scratch import worker_scratch
 from plateviz.verdict.verdict import orbit_verdict, with_verdict
 from solver.data.result import FitResult
@@ -51,7 +51,7 @@ def fit_survey_orbit(survey: str, name: str, orbit: int) -> Outcome:
     that of a full disk, which all orbits share.
     """
     start = time.perf_counter()
-    run, message = Run(Path(survey), name), ""
+    run, message = RunDirectory(Path(survey), name), ""
     keep_memory()
     keep_compilations()
     use_one_thread()
@@ -65,7 +65,7 @@ def fit_survey_orbit(survey: str, name: str, orbit: int) -> Outcome:
     return Outcome(orbit, time.perf_counter() - start, message)
 
 
-def _fit(run: Run, orbit: int) -> None:
+def _fit(run: RunDirectory, orbit: int) -> None:
     # Imported here, because JAX sets its number of threads when it is imported.
     from solver.fit import OrbitFitter
 
@@ -177,7 +177,7 @@ def _blocked_for_new_processes() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def fit_on_workers(client: Client, run: Run, orbits: list[int]) -> Iterator[Outcome]:
+def fit_on_workers(client: Client, run: RunDirectory, orbits: list[int]) -> Iterator[Outcome]:
     """Fit orbits, and yield the outcome of each when it is done.
 
     Raises
@@ -209,7 +209,7 @@ def fit_on_workers(client: Client, run: Run, orbits: list[int]) -> Iterator[Outc
         yield Outcome(orbit, float("nan"), message)
 
 
-def _reason(error: BaseException, run: Run, orbit: int) -> str:
+def _reason(error: BaseException, run: RunDirectory, orbit: int) -> str:
     """Return why an orbit failed; raise the errors that all orbits share."""
     if isinstance(error, DiskError):
         raise error

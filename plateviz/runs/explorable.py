@@ -15,7 +15,7 @@ import pandas as pd
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.file_rows import DerivedColumn, FileRows, RowKind
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from plateviz.tables.explore import (
     CHI2_PER_DOF,
     OF_DEVIATION,
@@ -192,7 +192,7 @@ def _orbits(run: SurveyRun) -> ExplorableTable:
 
 
 def _exposures(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
-    of_run = Run(run.survey, run.name)
+    of_run = RunDirectory(run.survey, run.name)
     files = [of_run.orbit_directory(orbit) / _EXPOSURES for orbit in of_run.complete_orbits()]
     rows = FileRows(_EXPOSURE_ROWS, files, _state(files), kept)
 
@@ -214,7 +214,7 @@ def _exposures(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
 
 
 def _measurements(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
-    of_run = Run(run.survey, run.name)
+    of_run = RunDirectory(run.survey, run.name)
     every, orbits = _thinned(of_run)
     files = [of_run.orbit_directory(orbit) / "residuals.parquet" for orbit in orbits]
     rows = FileRows(_MEASUREMENTS, files, _state(files), kept)
@@ -262,7 +262,7 @@ def _of_files(
     )
 
 
-def _thinned(run: Run) -> tuple[int, list[int]]:
+def _thinned(run: RunDirectory) -> tuple[int, list[int]]:
     """Return n, and every nth fitted orbit, so that the measurements are not too many."""
     orbits = run.complete_orbits()
     if not orbits:

@@ -21,7 +21,7 @@ from plateviz.runs.fitted_orbit import read_summary
 from plateviz.runs.gathered_diagnosis import write_test_tables
 from plateviz.runs.gathered_history import gather_history
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run
+from plateviz.runs.run_directory import ERRORS_FILE, MOTIONS_FILE, RunDirectory
 from plateviz.runs.worker_scratch import remove_worker_scratch
 from plateviz.tables.counts import orbits_are
 from solver.data.settings import FitSettings
@@ -62,7 +62,7 @@ class SurveyOutcome(NamedTuple):
     distrusted : reasons why solutions of these orbits should not be trusted, by orbit
     """
 
-    run: Run
+    run: RunDirectory
     fitted: list[int]
     kept: list[int]
     failed: dict[int, str]
@@ -125,7 +125,7 @@ def fit_survey(
 
 
 def fit_missing(
-    run: Run,
+    run: RunDirectory,
     wanted: list[int],
     workers: int | None,
     scheduler: str | None,
@@ -166,7 +166,7 @@ def fit_missing(
     return SurveyOutcome(run, fitted, kept, failed, distrusted, time.perf_counter() - start)
 
 
-def _distrusted(run: Run, orbits: list[int]) -> dict[int, list[str]]:
+def _distrusted(run: RunDirectory, orbits: list[int]) -> dict[int, list[str]]:
     """Return the reasons of bad verdicts, which runs of older versions do not have."""
     found = {}
     for orbit in orbits:
@@ -176,7 +176,7 @@ def _distrusted(run: Run, orbits: list[int]) -> dict[int, list[str]]:
     return found
 
 
-def _needed(run: Run, missing: list[int]) -> str:
+def _needed(run: RunDirectory, missing: list[int]) -> str:
     """Return how much room the orbits that are still missing need, as text."""
     complete = run.complete_orbits()
     left = sorted(set(missing) - set(complete))
@@ -200,14 +200,14 @@ def _wanted(survey: Path, orbits: list[int] | None) -> list[int]:
     return sorted(set(orbits))
 
 
-def close_run(run: Run) -> None:
+def close_run(run: RunDirectory) -> None:
     """Mark a run as complete if every orbit of the survey is fitted and gathered."""
     complete = run.complete_orbits()
     if not run.is_complete and complete and complete == survey_orbits(run.survey):
         run.mark_complete()
 
 
-def gather(run: Run) -> None:
+def gather(run: RunDirectory) -> None:
     """Write the tables over all orbits, unless they are there."""
     complete = run.complete_orbits()
     if run.is_complete or not complete or run.gathered_orbits() == complete:
@@ -218,7 +218,7 @@ def gather(run: Run) -> None:
     run.mark_gathered(complete)
 
 
-def _write_tables(run: Run) -> None:
+def _write_tables(run: RunDirectory) -> None:
     history = parquet.ParquetFile(gather_history(run))
     epochs = np.unique(_column(history, "epoch"))
     epoch = float(julian_year(epochs).mean())

@@ -12,7 +12,7 @@ import pandas as pd
 import pyarrow as pa
 
 from plateviz.runs.fitted_orbit import read_summary
-from plateviz.runs.run import HISTORY_FILE, Run
+from plateviz.runs.run_directory import HISTORY_FILE, RunDirectory
 from solver.data.columns import Table
 from solver.data.run_schema import (
     CALIBRATIONS,
@@ -40,7 +40,7 @@ _NO_CAUSE = {
 }
 
 
-def write_test_tables(run: Run) -> None:
+def write_test_tables(run: RunDirectory) -> None:
     """Write `run_schema.RUN_TABLES` of the fitted orbits of a run, whose history is gathered."""
     orbits = run.complete_orbits()
     summaries = {orbit: read_summary(run.orbit_directory(orbit)) for orbit in orbits}
@@ -77,7 +77,7 @@ def _causes(verdict: dict) -> Iterator[dict]:
         yield {**plain, "state": state, "options": "\n".join(cause["options"])}
 
 
-def _zonal(run: Run, summaries: dict[int, dict]) -> pd.DataFrame:
+def _zonal(run: RunDirectory, summaries: dict[int, dict]) -> pd.DataFrame:
     """Return `ZONAL_FIELD`; no rows for too few orbits, or orbits of older versions."""
     found = {}
     for orbit, summary in summaries.items():
@@ -100,11 +100,11 @@ def _zonal(run: Run, summaries: dict[int, dict]) -> pd.DataFrame:
     return zonal_field(zonal, centre)
 
 
-def _sky_file(run: Run, orbit: int, table: Table) -> Path:
+def _sky_file(run: RunDirectory, orbit: int, table: Table) -> Path:
     return run.orbit_directory(orbit) / f"{table.name}.parquet"
 
 
-def _write(run: Run, table: Table, frame: pd.DataFrame) -> None:
+def _write(run: RunDirectory, table: Table, frame: pd.DataFrame) -> None:
     with write_atomically(run.directory / f"{table.name}.parquet") as temporary:
         content = pa.Table.from_pandas(frame[table.names], preserve_index=False)
         write_parquet(content, temporary)

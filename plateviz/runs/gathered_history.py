@@ -4,7 +4,7 @@ from pathlib import Path
 
 import duckdb
 
-from plateviz.runs.run import HISTORY_FILE, Run
+from plateviz.runs.run_directory import HISTORY_FILE, RunDirectory
 from solver.io.atomic import write_atomically
 from solver.io.parquet import count_rows, write_batches
 
@@ -19,7 +19,7 @@ def rows_of_a_group(n_rows: int) -> int:
     return max(_SMALLEST_GROUP, n_rows // _MOST_GROUPS)
 
 
-def gather_history(run: Run) -> Path:
+def gather_history(run: RunDirectory) -> Path:
     """Write the history of all fitted orbits sorted by source and epoch; return its path."""
     target = run.directory / HISTORY_FILE
     parts = [str(run.orbit_directory(orbit) / HISTORY_FILE) for orbit in run.complete_orbits()]

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from plateviz.runs.run import GROWS, RUN_FILE, Run
+from plateviz.runs.run_directory import GROWS, RUN_FILE, RunDirectory
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
@@ -19,7 +19,7 @@ PACKAGES = ("plateviz", "jax", "numpy", "scipy", "pyerfa")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
 
 
-def begin_run(survey: Path, name: str, settings: FitSettings, grows: bool = False) -> Run:
+def begin_run(survey: Path, name: str, settings: FitSettings, grows: bool = False) -> RunDirectory:
     """Create a run, or return an existing one with the same settings.
 
     Parameters
@@ -39,7 +39,7 @@ def begin_run(survey: Path, name: str, settings: FitSettings, grows: bool = Fals
             f"--run: expected a name of up to 100 letters, digits, '.', '-' and '_' that "
             f"begins with a letter or digit, found {name[:60]!r}"
         )
-    run = Run(Path(survey), name)
+    run = RunDirectory(Path(survey), name)
     path = run.directory / RUN_FILE
     if path.is_file():
         _check_same(path, run, _content(run.survey, settings, run.grows))
@@ -69,7 +69,7 @@ def _content(survey: Path, settings: FitSettings, grows: bool) -> dict[str, obje
     }
 
 
-def _check_same(path: Path, run: Run, wanted: Mapping[str, object]) -> None:
+def _check_same(path: Path, run: RunDirectory, wanted: Mapping[str, object]) -> None:
     found = read_header(run.directory, RUN_FILE, "run")
     different = [
         f"{title} ({name})"

@@ -16,14 +16,14 @@ from pyarrow.compute import field as col
 from plateviz.runs.fitted_orbit import is_complete, kept_table, read_summary
 from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.orbit_of_run import read_orbit
-from plateviz.runs.run import (
+from plateviz.runs.run_directory import (
     ERRORS_FILE,
     HISTORY_FILE,
     MOTIONS_FILE,
     RUN_FILE,
-    Run,
+    RunDirectory,
     Written,
-    runs_of,
+    run_directories,
 )
 from solver.data.result import FitResult
 from solver.data.survey_schema import ERRORS_BY_COUNT, HISTORY, MOTIONS, RUN_ORBITS
@@ -55,36 +55,36 @@ FROM rows GROUP BY source_class ORDER BY source_class
 class SurveyRun:
     """Queries over the orbits of one run; reads files and keeps nothing large in memory."""
 
-    def __init__(self, run: Run, cache: OrbitCache | None = None) -> None:
+    def __init__(self, directory: RunDirectory, cache: OrbitCache | None = None) -> None:
         """Open a run, complete or not; `cache` is of its fitted orbits."""
-        self._run, self._cache = run, cache
+        self._files, self._cache = directory, cache
         self._unchanged, self._had_history = UnchangedFiles(), False
         self._first_header = self._header_bytes()
 
     @property
     def name(self) -> str:
         """Name of the run."""
-        return self._run.name
+        return self._files.name
 
     @property
     def survey(self) -> Path:
         """The survey's directory."""
-        return self._run.survey
+        return self._files.survey
 
     @property
     def directory(self) -> Path:
         """The run's directory."""
-        return self._run.directory
+        return self._files.directory
 
     @property
     def is_complete(self) -> bool:
         """Whether every orbit of the survey is fitted and gathered."""
-        return self._run.is_complete
+        return self._files.is_complete
 
     @property
     def is_gathered(self) -> bool:
         """Whether the tables over all orbits are there: of all orbits or of those not failed."""
-        return self._run.is_gathered
+        return self._files.is_gathered
 
     def is_there(self) -> bool:
         """Return whether nobody has removed the run; costs one look at its directory."""
@@ -105,7 +105,7 @@ class SurveyRun:
 
     def written(self) -> Written:
         """Return what the run has now; takes a millisecond for each hundred orbits."""
-        return self._run.written()
+        return self._files.written()
 
     def stamp(self) -> Hashable:
         """Return what differs once anything of the run is written; InputError if it is gone."""
@@ -115,19 +115,19 @@ class SurveyRun:
 
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""
-        return self._run.header()
+        return self._files.header()
 
     def failures(self) -> dict[int, str]:
         """Return the reasons why orbits have no solution, by orbit."""
-        return self._run.failures()
+        return self._files.failures()
 
     def has_fitted(self, orbit: int) -> bool:
         """Return whether the run has a solution of an orbit."""
-        return is_complete(self._run.orbit_directory(orbit))
+        return is_complete(self._files.orbit_directory(orbit))
 
     def orbits(self) -> pd.DataFrame:
         """Return `survey_schema.RUN_ORBITS`, a row per orbit of the survey."""
-        complete, failures = set(self._run.complete_orbits()), self._run.failures()
+        complete, failures = set(self._files.complete_orbits()), self._files.failures()
         rows = []
         for orbit in survey_orbits(self.survey):
             row: dict[str, object] = {"orbit_id": orbit, "status": "missing"}
@@ -156,14 +156,14 @@ class SurveyRun:
     def errors_by_count(self) -> pd.DataFrame | None:
         """Return `survey_schema.ERRORS_BY_COUNT` of the artificial sources, or None."""
         if not (self.directory / ERRORS_FILE).is_file():
-            self._run.require_unchanged(ERRORS_FILE)
+            self._files.require_unchanged(ERRORS_FILE)
             return None
         return self._table(ERRORS_FILE, ERRORS_BY_COUNT.names)
 
     def test_table(self, name: str) -> pd.DataFrame | None:
         """Return one of the tables from which the run is tested; None if it has none."""
         if not self.is_gathered or not (self.directory / name).is_file():
-            self._run.require_unchanged(name)
+            self._files.require_unchanged(name)
             return None
         return self._table(name)
 
@@ -218,7 +218,7 @@ class SurveyRun:
         InputError
             If it is not there, or is another one, or the survey has another instrument now.
         """
-        read, directory = self._cache and self._cache.read, self._run.orbit_directory(orbit)
+        read, directory = self._cache and self._cache.read, self._files.orbit_directory(orbit)
         result, where = read_orbit(directory, orbit, read), f"{self.directory}: orbit {orbit}"
         expected, remedy = read_survey_instrument(self.survey), "fit the orbits in another run"
         require_instrument(result, expected, where, remedy)
@@ -227,11 +227,11 @@ class SurveyRun:
     def expect(self, orbit: int | None) -> None:
         """Read a fitted orbit ahead, which is likely to be asked for next, if it exists."""
         if orbit is not None and self._cache is not None and self.has_fitted(orbit):
-            self._cache.expect(self._run.orbit_directory(orbit))
+            self._cache.expect(self._files.orbit_directory(orbit))
 
     def _has_history(self) -> bool:
         """Return whether the run has a history, or had one before it was removed."""
-        is_there = (self.directory / HISTORY_FILE).is_file() or bool(self._run.complete_orbits())
+        is_there = (self.directory / HISTORY_FILE).is_file() or bool(self._files.complete_orbits())
         self._had_history |= is_there
         return self._had_history
 
@@ -242,13 +242,13 @@ class SurveyRun:
         """
         gathered = self.directory / HISTORY_FILE
         if self.is_complete or gathered.is_file():
-            self._run.require_unchanged(HISTORY_FILE, self._unchanged.require)
+            self._files.require_unchanged(HISTORY_FILE, self._unchanged.require)
             return [str(gathered)]
-        orbits = map(self._run.orbit_directory, self._run.complete_orbits())
+        orbits = map(self._files.orbit_directory, self._files.complete_orbits())
         return [str(kept_table(orbit, "history", self._unchanged)) for orbit in orbits]
 
     def _figures(self, orbit: int) -> dict[str, object]:
-        directory = self._run.orbit_directory(orbit)
+        directory = self._files.orbit_directory(orbit)
         summary = read_summary(directory)
         with reading(str(directory), "the summary of a fitted orbit"):
             figures = {name: summary.get(name) for name in RUN_ORBITS.names if name in summary}
@@ -261,7 +261,7 @@ class SurveyRun:
         self, name: str, columns: list[str] | None = None, rows: Expression | None = None
     ) -> pd.DataFrame:
         """Return a table over all orbits, checked as a whole if the run is complete."""
-        self._run.require_unchanged(name)
+        self._files.require_unchanged(name)
         return read_frame(self.directory / name, columns, rows)
 
     def _ask(self, question: str, *values: object) -> pd.DataFrame:
@@ -275,7 +275,7 @@ class SurveyRun:
 
 def survey_runs(survey: Path, cache: OrbitCache | None = None) -> list[SurveyRun]:
     """Return the runs of a survey directory, by name; `cache` is of their fitted orbits."""
-    return [SurveyRun(run, cache) for run in runs_of(survey)]
+    return [SurveyRun(directory, cache) for directory in run_directories(survey)]
 
 
 def open_run(survey: Path, name: str) -> SurveyRun:
@@ -286,10 +286,10 @@ def open_run(survey: Path, name: str) -> SurveyRun:
     InputError
         If the survey has no run of that name.
     """
-    for run in survey_runs(survey):
-        if run.name == name:
-            return run
-    names = ", ".join(run.name for run in survey_runs(survey)) or "none"
+    runs = {run.name: run for run in survey_runs(survey)}
+    if name in runs:
+        return runs[name]
+    names = ", ".join(runs) or "none"
     raise InputError(
         f"{survey}: expected a run {name!r}, found {names}; `plateviz survey` creates one"
     )

@@ -16,7 +16,7 @@ from plateviz.runs.dask_workers import Outcome
 from plateviz.runs.fit_survey import Progress, close_run, fit_missing
 from plateviz.runs.fitted_orbit import read_summary
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from plateviz.tables.counts import orbits_are, orbits_text
 from solver.data.settings import FitSettings
 from solver.errors import InputError
@@ -127,7 +127,7 @@ class Watch:
         figures = {"fitted": self.fitted, "failed": sorted(self.failed)}
         self._say("ended", words, **figures, distrusted=self.distrusted)
 
-    def _follow(self, run: Run, interval: float, ends: Ends) -> None:
+    def _follow(self, run: RunDirectory, interval: float, ends: Ends) -> None:
         """Look and fit until the watch ends."""
         arrivals, standing = Arrivals(run), frozenset[Remark]()
         there = run.complete_orbits()
@@ -153,7 +153,7 @@ class Watch:
                 self.tell(Event(remark.kind, remark.orbit, remark.message, {}))
         return frozenset(remarks)
 
-    def _fit(self, run: Run, arrivals: Arrivals, orbits: list[int]) -> None:
+    def _fit(self, run: RunDirectory, arrivals: Arrivals, orbits: list[int]) -> None:
         """Fit orbits that are whole, and gather those that were fitted and not gathered before."""
         if not orbits and run.gathered_orbits() == run.complete_orbits():
             return
@@ -169,7 +169,7 @@ class Watch:
 
         fit_missing(run, orbits, self.workers, None, tell, closes=False)
 
-    def _tell_outcome(self, run: Run, outcome: Outcome, is_as_tried: bool) -> None:
+    def _tell_outcome(self, run: RunDirectory, outcome: Outcome, is_as_tried: bool) -> None:
         """Say what became of an orbit, unless it is tried again since its files were written."""
         orbit, seconds = outcome.orbit, outcome.seconds
         if not outcome.message:
@@ -186,10 +186,10 @@ class Watch:
             self.failed[orbit] = outcome.message
             self.tell(Event("failed", orbit, outcome.message, {"seconds": seconds}))
 
-    def _done(self, run: Run) -> int:
+    def _done(self, run: RunDirectory) -> int:
         return len(run.complete_orbits()) + len(self.failed)
 
-    def _close(self, run: Run) -> None:
+    def _close(self, run: RunDirectory) -> None:
         """Mark the run as complete if no orbit of the survey is missing."""
         close_run(run)
         if run.is_complete:
@@ -199,7 +199,7 @@ class Watch:
         self.tell(Event(kind, None, message, figures))
 
 
-def _require_nothing_new(run: Run) -> None:
+def _require_nothing_new(run: RunDirectory) -> None:
     """Refuse a complete run of a survey that has more orbits."""
     others = sorted(set(survey_orbits(run.survey)) - set(run.complete_orbits()))
     if others:
@@ -209,5 +209,5 @@ def _require_nothing_new(run: Run) -> None:
         )
 
 
-def _beginning(run: Run, there: list[int]) -> str:
+def _beginning(run: RunDirectory, there: list[int]) -> str:
     return f"watching {run.survey} for the run {run.name}; {orbits_are(len(there))} fitted already"

@@ -18,7 +18,7 @@ from plateviz.runs.kept_selections import KeptSelections
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.orbit_cache import OrbitCache
 from plateviz.runs.queries import SurveyRun, survey_runs
-from plateviz.runs.run import runs_of
+from plateviz.runs.run_directory import run_directories
 from plateviz.runs.scratch_result import is_written
 from plateviz.solving.background import Background
 from plateviz.solving.job import Job, JobStatus
@@ -241,7 +241,7 @@ class SolutionStore:
         """Return the solution of a run from which a what-if can start, for `base_of`."""
         if not isinstance(self.origin, SurveyFolder):
             return None
-        for run in runs_of(Path(self.origin.directory)):
+        for run in run_directories(Path(self.origin.directory)):
             directory = run.orbit_directory(orbit)
             # Whoever looks at a damaged run is told so.
             with suppress(InputError):

@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import solver  # noqa: F401, I001
 
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from solver.data.instrument import MINI_MOCK
 from solver.io.survey import read_survey_orbit
 from solver.problem.problem import build_problem
@@ -57,7 +57,7 @@ def main() -> None:
                 "survey", survey, "--run", f"by-{workers}", "--workers", workers
             )
         report(seconds, arguments.orbits, unit)
-        one, two = (Run(survey, f"by-{workers}") for workers in (1, 2))
+        one, two = (RunDirectory(survey, f"by-{workers}") for workers in (1, 2))
         write(f"\ntwo workers compared with one: {ratio(seconds):.2f} times as fast")
         write(f"identical files from both: {contents(one) == contents(two)}")
         peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * _MIB_PER_KIB
@@ -102,7 +102,7 @@ def report(seconds: dict[str, float], orbits: int, unit: float) -> None:
         write(f"{name:<24}{value:9.1f}{each:11.2f}{each / unit:8.1f}{whole:6.1f} min")
 
 
-def contents(run: Run) -> dict[str, bytes]:
+def contents(run: RunDirectory) -> dict[str, bytes]:
     """Return the bytes of every file of a run, except the file of timings."""
     return {
         str(path.relative_to(run.directory)): path.read_bytes()
@@ -123,9 +123,11 @@ def time_queries(run: SurveyRun) -> None:
         write(f"{name}: {1e3 * time_of(query, 5):.0f} ms")
 
 
-def survives_kills(survey: Path, uninterrupted: Run, arguments: argparse.Namespace) -> bool:
+def survives_kills(
+    survey: Path, uninterrupted: RunDirectory, arguments: argparse.Namespace
+) -> bool:
     """Return whether a run that is killed repeatedly writes the same files as another run."""
-    rng, run = random.Random(0), Run(survey, "killed")
+    rng, run = random.Random(0), RunDirectory(survey, "killed")
     finished: set[int] = set()
     for kill in range(arguments.kills):
         arguments_of_run = command("survey", survey, "--run", run.name)

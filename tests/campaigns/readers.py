@@ -15,7 +15,7 @@ from plateviz.dashboard.session.session import Session
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.runs.load_tables import survey_tables
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from plateviz.solving.origin import SurveyFolder
 from solver.data.columns import Table, numpy_dtype
 from solver.data.instrument import read_instrument
@@ -232,7 +232,7 @@ def _orbits_of_run(folder: Path) -> Values:
 
 
 def _changes(folder: Path) -> Values:
-    for message in Run(folder, RUN).changes():
+    for message in RunDirectory(folder, RUN).changes():
         check_words(message, str(folder))
     return {}
 
@@ -249,7 +249,7 @@ def _page(folder: Path) -> Values:
 
 _RUN_READERS: dict[str, Callable[[Path], Values]] = {
     "header": lambda folder: {"header": _run(folder).header()},
-    "settings": lambda folder: {"settings": Run(folder, RUN).settings()},
+    "settings": lambda folder: {"settings": RunDirectory(folder, RUN).settings()},
     "orbits": lambda folder: {"orbits": _run(folder).orbits()},
     "results": _orbits_of_run,
     "motions": lambda folder: {"motions": _run(folder).motions()},
@@ -258,7 +258,7 @@ _RUN_READERS: dict[str, Callable[[Path], Values]] = {
     "classes": lambda folder: {"classes": _run(folder).classes(1).reset_index()},
     "sources": _one_by_one,
     "failures": lambda folder: {"failures": _run(folder).failures()},
-    "gathered": lambda folder: {"gathered": Run(folder, RUN).gathered_orbits()},
+    "gathered": lambda folder: {"gathered": RunDirectory(folder, RUN).gathered_orbits()},
     "survey tables": _read_survey_tables,
     "page": _page,
     "changes": _changes,

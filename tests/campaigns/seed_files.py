@@ -13,7 +13,7 @@ from astropy.table import Table as RawTable
 
 from plateviz.runs.gathered_history import gather_history
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.run import ERRORS_FILE, MOTIONS_FILE, Run
+from plateviz.runs.run_directory import ERRORS_FILE, MOTIONS_FILE, RunDirectory
 from solver.data.columns import Table
 from solver.data.instrument import MINI_MOCK, write_instrument
 from solver.data.orbit import OrbitData
@@ -189,7 +189,7 @@ def make_unlisted_survey(folder: Path, orbit: OrbitData) -> None:
     (folder / "manifest.sha256").unlink()
 
 
-def make_run(folder: Path, orbit: OrbitData, complete: bool = True) -> Run:
+def make_run(folder: Path, orbit: OrbitData, complete: bool = True) -> RunDirectory:
     """Make a survey and a run of all its orbits, or of the first only."""
     make_survey(folder, orbit)
     settings = FitSettings(order=3, prior_widths={"detector_x": 2.0})
@@ -209,7 +209,7 @@ def make_run(folder: Path, orbit: OrbitData, complete: bool = True) -> Run:
     return run
 
 
-def _gather(run: Run, random: np.random.Generator) -> None:
+def _gather(run: RunDirectory, random: np.random.Generator) -> None:
     gather_history(run)
     motions = random_table(MOTIONS, N_SOURCES, random).assign(
         source_id=FIRST_ID + np.arange(N_SOURCES)

@@ -29,7 +29,7 @@ from plateviz.plots.gallery import diagnostics, survey_figures
 from plateviz.reports import folder
 from plateviz.reports import orbit as orbit_pages
 from plateviz.reports import survey as survey_pages
-from plateviz.runs.run import Run, runs_of
+from plateviz.runs.run_directory import RunDirectory, run_directories
 from plateviz.solving.job import JobStatus
 from plateviz.solving.origin import SurveyFolder
 from plateviz.solving.solution_store import SolutionStore
@@ -227,7 +227,7 @@ class Survey(Victim):
         return place.start("survey", "work", "--workers", self.workers)
 
     def finished(self, place: Place) -> Files:
-        orbits = Run(place.work, "default").complete_orbits()
+        orbits = RunDirectory(place.work, "default").complete_orbits()
         names = {f"orbit={orbit:04d}" for orbit in orbits}
         return digests(place.work, lambda path: "runs" not in path.parts or path.parts[2] in names)
 
@@ -236,7 +236,7 @@ class Survey(Victim):
 
     def faults(self, place: Place) -> list[str]:
         return survey_changes(place.work) + [
-            change for run in runs_of(place.work) for change in run.changes()
+            change for run in run_directories(place.work) for change in run.changes()
         ]
 
 

@@ -13,7 +13,7 @@ import pytest
 from plateviz.cli import demo
 from plateviz.cli.demo import BackgroundFit, demo_directory, make_survey, request_first_orbit
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run import DEFAULT_RUN, Run
+from plateviz.runs.run_directory import DEFAULT_RUN, RunDirectory
 from plateviz.solving.job import Job
 from plateviz.solving.origin import SurveyFolder
 from plateviz.solving.progress import reporting
@@ -148,7 +148,7 @@ def test_closed_background_fit_is_resumed(made):
 def test_background_fit_waits_for_the_first_orbit_and_ends_when_closed(small, monkeypatch):
     monkeypatch.setattr(demo, "SolverQueue", lambda *_: pytest.fail("expected no second solver"))
     first = Job({"do": "fit"})
-    fit = BackgroundFit(Run(small, DEFAULT_RUN), first)
+    fit = BackgroundFit(RunDirectory(small, DEFAULT_RUN), first)
     fit.start()
     fit_thread = fit._thread
     assert fit_thread.is_alive()

@@ -10,7 +10,7 @@ import pytest
 from plateviz.reports.folder import _workers
 from plateviz.runs.fitted_orbit import write_fitted_orbit
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from solver.data.settings import FitSettings
 from solver.io.result import write_result
 
@@ -100,7 +100,7 @@ def test_page_of_an_orbit_lists_the_versions_of_the_fit(run, run_dir, tmp_path):
 
 
 def test_run_of_a_newer_version_is_refused(run, run_dir, tmp_path):
-    head = Run(run_dir, "default").orbit_directory(0) / "result.json"
+    head = RunDirectory(run_dir, "default").orbit_directory(0) / "result.json"
     head.write_text(json.dumps({**json.loads(head.read_text()), "format": 99}))
     head.with_name("COMPLETE").write_text("")
     code, _, err = run("report", run_dir, "--orbit", 0, "-o", tmp_path / "r.html")
@@ -141,7 +141,7 @@ def test_pdf_without_chromium_is_refused_before_writing(run, run_dir, tmp_path, 
 @pytest.fixture
 def whole_run(run_dir, fit_result):
     """A run in which two orbits are fitted and one has failed."""
-    write_fitted_orbit(Run(run_dir, "default").orbit_directory(2), fit_result)
+    write_fitted_orbit(RunDirectory(run_dir, "default").orbit_directory(2), fit_result)
     return run_dir
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from plateviz.runs.fit_survey import fit_survey
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from solver.data.instrument import write_instrument
 from solver.data.schema import ENVIRONMENT, MEASUREMENT
 from solver.data.settings import FitSettings
@@ -81,7 +81,7 @@ def read_all(run):
 
 
 def test_whole_run_has_no_changes(whole):
-    run = Run(whole, "default")
+    run = RunDirectory(whole, "default")
     assert run.changes() == []
     read_all(run)
 
@@ -117,7 +117,7 @@ def test_fitted_orbit_without_a_manifest_is_named(run, survey):
     code, out, _ = run("inspect", survey)
     assert code == 2
     assert f"{manifest}: the manifest of a fitted orbit is missing" in out.replace("\n", "")
-    assert Run(survey, "default").remove_damaged() == [1]
+    assert RunDirectory(survey, "default").remove_damaged() == [1]
     assert not manifest.parent.exists()
 
 
@@ -134,7 +134,7 @@ def test_fitted_orbit_without_a_manifest_is_named(run, survey):
     ],
 )
 def test_flipped_bit_of_a_run_is_refused_by_name(survey, name):
-    run = Run(survey, "default")
+    run = RunDirectory(survey, "default")
     path = run.directory / name
     intact = path.read_bytes()
     for position in positions(path, 2):
@@ -149,7 +149,7 @@ def test_flipped_bit_of_a_run_is_refused_by_name(survey, name):
 
 def test_page_of_the_history_is_checked_where_the_file_is_not(survey):
     """Reading one source does not read the whole file, and yet no changed value is returned."""
-    run = SurveyRun(Run(survey, "default"))
+    run = SurveyRun(RunDirectory(survey, "default"))
     path = run.directory / "history.parquet"
     intact, sources = path.read_bytes(), run.motions()["source_id"]
     before = {source: run.history(source) for source in sources.iloc[::40]}
@@ -165,7 +165,7 @@ def test_page_of_the_history_is_checked_where_the_file_is_not(survey):
 
 
 def test_history_of_a_run_that_is_gone_is_refused_in_words(survey):
-    run = SurveyRun(Run(survey, "default"))
+    run = SurveyRun(RunDirectory(survey, "default"))
     source = run.motions()["source_id"].iloc[0]
     assert len(run.history(source)) > 0
     shutil.rmtree(run.directory)
@@ -183,17 +183,17 @@ def test_history_of_a_run_that_is_gone_is_refused_in_words(survey):
     ],
 )
 def test_repaired_run_has_the_same_bytes(whole, survey, name):
-    run = Run(survey, "default")
+    run = RunDirectory(survey, "default")
     path = run.directory / name
     flip(path, path.stat().st_size // 2)
     report = fit_survey(survey, "default", FitSettings(order=3), workers=1, repair=True)
     assert report.fitted == ([1] if name.startswith("orbit") else [])
     assert run.changes() == []
-    assert contents(run.directory) == contents(Run(whole, "default").directory)
+    assert contents(run.directory) == contents(RunDirectory(whole, "default").directory)
 
 
 def test_orbit_is_not_removed_if_it_could_not_be_fitted_again(survey):
-    run = Run(survey, "default")
+    run = RunDirectory(survey, "default")
     flip(run.orbit_directory(1) / "timings.json", 20)
     flip(measurement_path(survey, 1), 2000)
     before = contents(survey)
@@ -204,14 +204,14 @@ def test_orbit_is_not_removed_if_it_could_not_be_fitted_again(survey):
 
 
 def test_repair_of_a_whole_run_changes_nothing(survey):
-    directory = Run(survey, "default").directory
+    directory = RunDirectory(survey, "default").directory
     before = {path: path.stat().st_mtime_ns for path in directory.rglob("*")}
     fit_survey(survey, "default", FitSettings(order=3), repair=True)
     assert {path: path.stat().st_mtime_ns for path in directory.rglob("*")} == before
 
 
 def test_run_of_an_older_version_without_manifests_is_read(survey):
-    run = Run(survey, "default")
+    run = RunDirectory(survey, "default")
     for complete in [run.directory / "COMPLETE", *run.directory.glob("orbit=*/COMPLETE")]:
         complete.write_text("")
     (survey / "manifest.sha256").unlink()
@@ -226,11 +226,11 @@ def test_survey_with_another_instrument_now_shows_none_of_its_solutions(survey):
     (survey / "manifest.sha256").unlink()
     write_header(survey, {**header, "instrument": write_instrument(camera)})
     with pytest.raises(InputError, match="orbit 0: expected a solution with the instrument of the"):
-        SurveyRun(Run(survey, "default")).result(0)
+        SurveyRun(RunDirectory(survey, "default")).result(0)
 
 
 def test_source_is_found_once_its_orbit_is_fitted(survey):
-    run, history = Run(survey, "default"), survey / "hidden"
+    run, history = RunDirectory(survey, "default"), survey / "hidden"
     source = SurveyRun(run).motions()["source_id"].iloc[0]
     run.directory.rename(history)
     opened = SurveyRun(run)

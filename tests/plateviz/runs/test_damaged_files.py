@@ -10,7 +10,7 @@ import pytest
 import solver.io.survey as survey_module
 from plateviz.runs.load_tables import survey_tables
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from plateviz.solving.origin import SurveyFolder
 from solver.data.schema import CATALOGUE, TRUTH
 from solver.errors import InputError
@@ -45,7 +45,7 @@ def survey(made, tmp_path):
 def run(survey):
     """The run, as if it were not complete: its files are not compared with a manifest."""
     (survey / "runs" / RUN / "COMPLETE").unlink()
-    return SurveyRun(Run(survey, RUN))
+    return SurveyRun(RunDirectory(survey, RUN))
 
 
 def edit(path, old, new):
@@ -130,7 +130,7 @@ def test_changed_table_of_a_survey_is_refused_by_name(survey, name, schema):
         ("history.parquet", lambda run: run.history(FIRST_ID)),
         ("history.parquet", lambda run: run.classes(1)),
         ("errors_by_count.parquet", lambda run: run.errors_by_count()),
-        ("gathered.json", lambda run: Run(run.survey, RUN).gathered_orbits()),
+        ("gathered.json", lambda run: RunDirectory(run.survey, RUN).gathered_orbits()),
     ],
 )
 def test_missing_table_of_a_complete_run_is_refused_by_name(survey, name, read):
@@ -178,7 +178,7 @@ def test_field_of_a_survey_has_to_be_two_numbers(survey, value):
 def test_wrong_settings_of_a_run_are_refused_by_name(run, old, new, found):
     edit(run.directory / "run.toml", old, new)
     with pytest.raises(InputError, match=rf"run\.toml: .*{found}"):
-        Run(run.survey, RUN).settings()
+        RunDirectory(run.survey, RUN).settings()
 
 
 def test_damaged_history_is_refused_in_words(run):
@@ -218,14 +218,14 @@ def test_columns_with_exchanged_names_are_refused(survey, state):
     for read in (lambda: run.history(FIRST_ID), lambda: run.classes(1)):
         with pytest.raises(InputError, match=r"history\.parquet: expected the file that was writt"):
             read()
-    assert any("history.parquet" in message for message in Run(survey, RUN).changes())
+    assert any("history.parquet" in message for message in RunDirectory(survey, RUN).changes())
 
 
 def test_run_of_an_older_version_lists_orbits_only(survey):
     run = _run(survey)
     (run.directory / "COMPLETE").unlink()
     (run.directory / "gathered.json").write_text("[0, 1]", encoding="utf-8")
-    assert Run(survey, RUN).gathered_orbits() == [0, 1]
+    assert RunDirectory(survey, RUN).gathered_orbits() == [0, 1]
     assert len(run.history(FIRST_ID)) == 2
 
 
@@ -244,4 +244,4 @@ def test_file_that_was_checked_is_checked_again_when_it_is_written(tmp_path, mon
 
 
 def _run(survey):
-    return SurveyRun(Run(survey, RUN))
+    return SurveyRun(RunDirectory(survey, RUN))

@@ -13,7 +13,7 @@ from distributed import KilledWorker, LocalCluster
 
 from plateviz.runs import dask_workers, fit_survey
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from solver.data.settings import FitSettings
 from solver.errors import DiskError, FitError, InputError
 from solver.io.lock import locked
@@ -77,7 +77,7 @@ def test_full_disk_stops_the_survey_with_one_message(survey_folder, fit_as, fit_
     with pytest.raises(DiskError, match=r"orbit=000\d: expected to write .* a full disk"):
         fit_survey.fit_survey(survey_folder, "full", SETTINGS, workers=1)
     assert len(tried) < 3
-    run = Run(survey_folder, "full")
+    run = RunDirectory(survey_folder, "full")
     assert names(run.directory) == ["run.toml"]
     tried.clear()
     fit_as(fit)
@@ -165,7 +165,7 @@ def test_second_repair_at_once_is_refused(survey_folder):
 def test_clock_that_went_back_changes_nothing(survey_folder, fit_as, fit_result):
     fit_as(lambda run, orbit: run.keep(orbit, fit_result, {"history": fit_result.sources}))
     fit_survey.fit_survey(survey_folder, "clock", SETTINGS, [0, 1], workers=1)
-    run = Run(survey_folder, "clock")
+    run = RunDirectory(survey_folder, "clock")
     future = time.time() + 10 * 365 * 86400
     for path in survey_folder.rglob("*"):
         os.utime(path, (future, future))
@@ -178,7 +178,7 @@ def test_clock_that_went_back_changes_nothing(survey_folder, fit_as, fit_result)
 
 def test_orbit_that_kills_its_workers_is_told_in_words(tmp_path):
     error = KilledWorker("task", None, 3)
-    message = dask_workers._reason(error, Run(tmp_path, "r"), 7)
+    message = dask_workers._reason(error, RunDirectory(tmp_path, "r"), 7)
     assert "orbit 7: expected a worker process that fits it, found that each of the 4" in message
     assert "--workers" in message
 

@@ -14,7 +14,7 @@ from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.gathered_history import gather_history
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from plateviz.tables.explore import EXPLORABLE, explorable_measurements
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import HISTORY
@@ -50,7 +50,7 @@ def results(make_fit_result):
 def made(results, fitted_survey):
     """A run with three orbits that nobody has gathered."""
     begin_run(fitted_survey, "default", FitSettings())
-    run = Run(fitted_survey, "default")
+    run = RunDirectory(fitted_survey, "default")
     for orbit, result in results.items():
         run.keep(orbit, result, {"history": history_of(result, orbit)})
     return run
@@ -65,7 +65,7 @@ def run(made):
 def copied(made, tmp_path):
     """A private copy of the run, which may be damaged."""
     survey = shutil.copytree(made.survey, tmp_path / "survey")
-    return Run(survey, "default")
+    return RunDirectory(survey, "default")
 
 
 def residuals(run, kept=None):

@@ -17,7 +17,7 @@ from plateviz.cli.survey import parse_orbits
 from plateviz.runs.fit_survey import fit_survey
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun, open_run, survey_runs
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from plateviz.runs.run_tables import read_run_tests, read_run_verdict
 from solver.data.run_schema import RUN_TABLES
 from solver.data.settings import FitSettings
@@ -120,7 +120,7 @@ def test_run_in_parts_and_with_a_failed_orbit_ends_as_the_same_run(report, fitte
 def test_killed_run_continues_with_the_missing_orbits(report, fitted_survey):
     command = [sys.executable, "-m", "plateviz.cli.main", "survey", str(fitted_survey)]
     process = subprocess.Popen([*command, "--run", "killed"], start_new_session=True)
-    killed = Run(fitted_survey, "killed")
+    killed = RunDirectory(fitted_survey, "killed")
     deadline = time.monotonic() + 120.0
     while not killed.complete_orbits() and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -213,11 +213,11 @@ def test_statistics_of_classes_agree_with_their_sources(run):
 
 
 def test_paper_is_reproduced_from_an_existing_run(run, fitted_survey):
-    before = contents(Run(fitted_survey, run.name))
+    before = contents(RunDirectory(fitted_survey, run.name))
     table = reproduced(fitted_survey, run.name, None).set_index("quantity")
     assert table.loc["uncertainty times sqrt(N)", "ratio"] == pytest.approx(1.0, abs=1e-3)
     assert table.loc["time per orbit", "ratio"] < 1.0
-    assert contents(Run(fitted_survey, run.name)) == before
+    assert contents(RunDirectory(fitted_survey, run.name)) == before
 
 
 def test_runs_are_found_by_name(run, fitted_survey):

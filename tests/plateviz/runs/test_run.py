@@ -4,7 +4,7 @@ import pytest
 
 from plateviz.runs.new_run import begin_run
 from plateviz.runs.queries import SurveyRun, Written
-from plateviz.runs.run import runs_of
+from plateviz.runs.run_directory import run_directories
 from plateviz.tables import source_list
 from solver.data.settings import FitSettings
 from solver.errors import InputError
@@ -21,7 +21,7 @@ def test_run_stores_its_settings(survey_folder):
     assert begin_run(survey_folder, "odd", ODD) == run
     assert not run.is_complete
     assert run.complete_orbits() == []
-    assert run in runs_of(survey_folder)
+    assert run in run_directories(survey_folder)
 
 
 def test_run_with_other_settings_is_refused(survey_folder):
@@ -53,7 +53,7 @@ def test_folder_that_is_not_a_run_is_refused(survey_folder):
 
 
 def test_folder_that_is_not_a_survey_has_no_runs(tmp_path):
-    assert runs_of(tmp_path) == []
+    assert run_directories(tmp_path) == []
     with pytest.raises(InputError, match=r"expected a survey with a file survey\.toml"):
         begin_run(tmp_path, "one", FitSettings())
 

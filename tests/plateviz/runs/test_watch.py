@@ -12,7 +12,7 @@ import pytest
 from plateviz.runs import dask_workers, fit_survey, watch
 from plateviz.runs.fitted_exposures import FittedExposures
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from plateviz.runs.watch import Ends, Watch
 from plateviz.verdict.verdict import with_verdict
 from solver.data.schema import ENVIRONMENT
@@ -119,7 +119,7 @@ def test_orbits_are_fitted_as_they_arrive_and_a_restart_goes_on(growing, watched
     said = watched(lambda: growing.append(2))
     assert "2 orbits are fitted already" in message(said, "watching")
     assert kinds(said) == [("fitted", 2)]
-    run = Run(growing.directory, "watched")
+    run = RunDirectory(growing.directory, "watched")
     assert run.complete_orbits() == [0, 1, 2]
     assert (run.grows, run.is_complete) == (True, False)
 
@@ -226,7 +226,7 @@ def test_failure_of_an_orbit_that_is_written_meanwhile_is_not_told(growing, watc
 @pytest.mark.usefixtures("fits")
 def test_changed_orbit_is_named_and_keeps_its_solution(growing, watched):
     watched(lambda: growing.append(1))
-    run = Run(growing.directory, "watched")
+    run = RunDirectory(growing.directory, "watched")
     before = {path: path.stat().st_mtime_ns for path in run.directory.glob("orbit=*/*")}
     whole = growing.file(0).read_bytes()
 
@@ -290,7 +290,7 @@ def test_exposures_that_were_written_after_the_look_and_before_the_fit_are_no_ch
 @pytest.mark.usefixtures("fits")
 def test_damaged_record_of_exposures_is_named(growing, watched):
     watched(ends=ONCE)
-    (Run(growing.directory, "watched").directory / "exposures.json").write_text("[]")
+    (RunDirectory(growing.directory, "watched").directory / "exposures.json").write_text("[]")
     with pytest.raises(InputError, match=r"exposures.json: expected digests of exposures"):
         watched(ends=ONCE)
 
@@ -324,7 +324,7 @@ def test_listed_file_that_is_not_there_and_a_wrong_name_are_told(growing, watche
 def test_run_is_completed_when_the_awaited_orbits_are_done(growing, watched):
     said = watched(lambda: growing.append(1), ends=Ends(until=2))
     assert kinds(said) == [("fitted", 0), ("fitted", 1), ("complete", None)]
-    run = Run(growing.directory, "watched")
+    run = RunDirectory(growing.directory, "watched")
     assert run.is_complete
     assert kinds(watched(ends=Ends(until=2))) == [("complete", None)]
     growing.append(2)
@@ -383,7 +383,7 @@ def test_watched_run_has_the_tables_of_a_run_of_all_orbits(growing, watched):
         growing.append(orbit)
     watched(ends=Ends(until=3))
     whole = fit_survey.fit_survey(growing.directory, "whole", FitSettings(), workers=1).run
-    run = Run(growing.directory, "watched")
+    run = RunDirectory(growing.directory, "watched")
     assert run.is_complete
     assert run.changes() == []
     for name in ("history.parquet", "motions.parquet", "orbit=0001/sources.parquet"):

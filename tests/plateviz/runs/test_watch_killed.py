@@ -9,7 +9,7 @@ import time
 import pytest
 
 from plateviz.runs.fit_survey import fit_survey
-from plateviz.runs.run import Run
+from plateviz.runs.run_directory import RunDirectory
 from solver.data.settings import FitSettings
 from solver.io.scratch import is_scratch
 from tests.solver.growing_survey import GrowingSurvey
@@ -36,7 +36,7 @@ def watch(directory, *options):
 @pytest.mark.parametrize("moment", MOMENTS)
 def test_killed_watch_is_gone_on_with(made_survey, tmp_path, moment):
     growing = GrowingSurvey(made_survey, tmp_path / "survey", 1)
-    run = Run(growing.directory, "watched")
+    run = RunDirectory(growing.directory, "watched")
     process = watch(growing.directory)
     end = time.monotonic() + 300.0
     while not list(run.directory.glob(moment)):

@@ -93,8 +93,8 @@ class Written(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Run:
-    """One run of a survey.
+class RunDirectory:
+    """The files of one run of a survey, which fits write; `plateviz.runs.queries` reads them.
 
     Attributes
     ----------
@@ -293,8 +293,8 @@ def _gathered(path: Path) -> _Gathered:
         return _Gathered([int(orbit) for orbit in found["orbits"]], digests)
 
 
-def runs_of(survey: Path) -> list[Run]:
-    """Return the runs of a survey, by name."""
+def run_directories(survey: Path) -> list[RunDirectory]:
+    """Return the directories of the runs of a survey, by name."""
     folder = Path(survey) / "runs"
     names = sorted(path.parent.name for path in folder.glob(f"*/{RUN_FILE}"))
-    return [Run(Path(survey), name) for name in names]
+    return [RunDirectory(Path(survey), name) for name in names]

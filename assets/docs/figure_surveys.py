@@ -13,7 +13,7 @@ import pandas as pd
 
 from plateviz.runs.fit_survey import fit_survey
 from plateviz.runs.load_tables import survey_tables
-from plateviz.runs.queries import SurveyRun, open_run
+from plateviz.runs.run import Run, open_run
 from plateviz.tables.survey_tables import SourceTables, SurveyTables
 from solver.data.schema import MEASUREMENT
 from solver.data.settings import FitSettings
@@ -40,22 +40,22 @@ class Surveys:
     folder: Path
 
     @cached_property
-    def good(self) -> SurveyRun:
+    def good(self) -> Run:
         """A survey fitted with the true order of its distortion."""
         return _fitted(self._simulated("good", _SKY), "default", FitSettings())
 
     @cached_property
-    def low_order(self) -> SurveyRun:
+    def low_order(self) -> Run:
         """The same survey fitted with an order that is too low."""
         return _fitted(self.good.survey, "low", FitSettings(order=3))
 
     @cached_property
-    def high_order(self) -> SurveyRun:
+    def high_order(self) -> Run:
         """The same survey fitted with an order that is higher than needed."""
         return _fitted(self.good.survey, "high", FitSettings(order=6))
 
     @cached_property
-    def ageing(self) -> SurveyRun:
+    def ageing(self) -> Run:
         """The same survey with measurement errors that grow with time, but not as stated."""
         directory = self.folder / "ageing"
         # Without the manifest, since its measurements are to be changed.
@@ -67,18 +67,18 @@ class Surveys:
         return _fitted(directory, "default", FitSettings())
 
     @cached_property
-    def trending(self) -> SurveyRun:
+    def trending(self) -> Run:
         """The same survey with a distortion that changes from orbit to orbit."""
         settings = replace(_SKY, defects=("distortion-trend=0.3um",))
         return _fitted(self._simulated("trending", settings), "default", FitSettings())
 
     @cached_property
-    def wide(self) -> SurveyRun:
+    def wide(self) -> Run:
         """A survey whose fields move as far as the paper's."""
         return _fitted(self._simulated("wide", _WIDE), "default", FitSettings())
 
     @cached_property
-    def zonal(self) -> SurveyRun:
+    def zonal(self) -> Run:
         """The same survey with a catalogue whose errors neighbouring stars share."""
         settings = replace(_WIDE, defects=("zonal-errors=1mas",))
         return _fitted(self._simulated("zonal", settings), "default", FitSettings())
@@ -106,7 +106,7 @@ def surveys() -> Iterator[Surveys]:
         yield Surveys(Path(folder))
 
 
-def _fitted(directory: Path, name: str, settings: FitSettings) -> SurveyRun:
+def _fitted(directory: Path, name: str, settings: FitSettings) -> Run:
     fit_survey(directory, name, settings, workers=1)
     return open_run(directory, name)
 
@@ -140,14 +140,14 @@ def _overconfident(catalogue: pd.DataFrame) -> None:
         catalogue.loc[references, name] /= 3.0
 
 
-def _source(run: SurveyRun) -> SourceTables:
+def _source(run: Run) -> SourceTables:
     motions = run.motions()
     often = motions[motions["is_artificial"]].nlargest(1, "n_orbits")
     chosen = int(often["source_id"].iloc[0])
     return SourceTables(run.history(chosen), run.motion(chosen))
 
 
-def _compared(run: SurveyRun, other: SurveyRun) -> SurveyTables:
+def _compared(run: Run, other: Run) -> SurveyTables:
     return replace(survey_tables(run), other=survey_tables(other))
 
 

@@ -6,7 +6,7 @@ import pandas as pd
 
 from plateviz.cache import keep_compilations
 from plateviz.cli.survey_progress import fit_and_report, require_all
-from plateviz.runs.queries import SurveyRun, open_run
+from plateviz.runs.run import Run, open_run
 from plateviz.runs.run_directory import RunDirectory
 from plateviz.solving.origin import SurveyFolder
 from plateviz.solving.progress import reporting
@@ -36,7 +36,7 @@ def reproduced(survey: Path, run: str, workers: int | None) -> pd.DataFrame:
     return reproduction(figures_of(open_run(survey, run)))
 
 
-def figures_of(run: SurveyRun) -> SurveyFigures:
+def figures_of(run: Run) -> SurveyFigures:
     """Return the tables for the paper's numbers; InputError if the run has no fitted orbit."""
     errors = run.errors_by_count()
     if errors is None:

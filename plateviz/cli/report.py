@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from plateviz.reports.more_figures import MoreFigures
     from plateviz.reports.report import Facts, Report
     from plateviz.runs.kept_solutions import KeptSolution
-    from plateviz.runs.queries import SurveyRun
+    from plateviz.runs.run import Run
     from solver.data.result import FitResult
 
 
@@ -121,7 +121,7 @@ def _write_pages(request: ReportRequest, folder: Path, has_more: bool, workers: 
             "--pages: expected no option but --run and --workers, found an option of a single page"
         )
     from plateviz.reports.folder import write_folder
-    from plateviz.runs.queries import open_run
+    from plateviz.runs.run import open_run
     from plateviz.solving.progress import reporting
 
     with reporting("reading") as reporter:
@@ -180,7 +180,7 @@ def _compose(request: ReportRequest) -> "Report":
     if request.explore and request.source is not None:
         raise InputError("--explore: expected with an orbit or a survey, found --source")
     from plateviz.reports.survey import source_report, survey_orbit_report, survey_report
-    from plateviz.runs.queries import open_run
+    from plateviz.runs.run import open_run
 
     run, facts = open_run(request.path, request.run), _facts(request.run)
     if request.source is not None:
@@ -233,7 +233,7 @@ def _other_solution(request: ReportRequest, orbit: int) -> "FitResult | None":
     """Return the solution of `--other`: a result file, or the orbit in another run."""
     if request.other is None:
         return None
-    from plateviz.runs.queries import open_run
+    from plateviz.runs.run import open_run
     from solver.io.result import read_result
 
     path = Path(request.other)
@@ -242,12 +242,12 @@ def _other_solution(request: ReportRequest, orbit: int) -> "FitResult | None":
     )
 
 
-def _other_run(request: ReportRequest) -> "SurveyRun | None":
+def _other_run(request: ReportRequest) -> "Run | None":
     if request.other is None:
         return None
     if request.other == request.run:
         raise InputError(f"--other: expected another run than {request.run!r}, found the same")
-    from plateviz.runs.queries import open_run
+    from plateviz.runs.run import open_run
 
     return open_run(request.path, request.other)
 

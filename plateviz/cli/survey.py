@@ -85,10 +85,10 @@ def run_survey(request: SurveyRequest, as_json: bool) -> None:
         request.repair,
     )
     # Imported here, because it takes a while, and a mistake in the request should be told at once.
-    from plateviz.runs.queries import SurveyRun
+    from plateviz.runs.run import Run
     from plateviz.runs.run_tables import read_run_verdict
 
-    verdict = read_run_verdict(SurveyRun(outcome.run))
+    verdict = read_run_verdict(Run(outcome.run))
     if as_json:
         print_json(_as_json(outcome, verdict))
     else:

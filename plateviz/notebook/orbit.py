@@ -13,7 +13,7 @@ from plateviz.notebook.lazy_collection import LazyCollection, unknown_name
 from plateviz.notebook.lazy_solver import HasSolver, LazySolver
 from plateviz.notebook.solution import OpenSolution
 from plateviz.notebook.table import OpenTable
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.tables import SummaryItem
 from solver.data.orbit import OrbitData
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT, TRUTH
@@ -38,7 +38,7 @@ class OpenOrbit(HasSolver):
     """
 
     def __init__(
-        self, solver: LazySolver, orbit: int | None, call: str, run: SurveyRun | None = None
+        self, solver: LazySolver, orbit: int | None, call: str, run: Run | None = None
     ) -> None:
         """Read and check the orbit.
 
@@ -150,7 +150,7 @@ class OpenOrbit(HasSolver):
     def _label(self) -> str:
         return self.solution.settings.describe()
 
-    def _of_run(self, run: SurveyRun) -> OpenSolution | None:
+    def _of_run(self, run: Run) -> OpenSolution | None:
         orbits = run.orbits().set_index("orbit_id")["status"]
         if orbits.get(self._data.orbit_id) != "complete":
             return None

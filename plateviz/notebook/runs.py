@@ -12,7 +12,7 @@ import pandas as pd
 
 from plateviz.notebook.figures import FigureSpec
 from plateviz.runs.load_tables import compared_run, require_same_catalogue, survey_tables
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_tables import read_run_tables
 from plateviz.tables.survey_tables import SurveyTables
 from plateviz.verdict.run_changes import ComparedRun, run_changes
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from plateviz.plots.survey_figure import SurveyFigure
 
 
-def changes_of(a: SurveyRun, b: SurveyRun) -> pd.DataFrame:
+def changes_of(a: Run, b: Run) -> pd.DataFrame:
     """Return `verdict.run_changes` of two runs.
 
     Raises
@@ -34,7 +34,7 @@ def changes_of(a: SurveyRun, b: SurveyRun) -> pd.DataFrame:
     return run_changes(_compared(a), _compared(b))
 
 
-def figures_of_run(other: SurveyRun | None, run: SurveyRun) -> list[FigureSpec]:
+def figures_of_run(other: Run | None, run: Run) -> list[FigureSpec]:
     """Return the figures of a run, and those of the two if there is one to compare with."""
     from plateviz.plots.gallery import survey_figures
 
@@ -42,19 +42,19 @@ def figures_of_run(other: SurveyRun | None, run: SurveyRun) -> list[FigureSpec]:
     return _specs((one for one in survey_figures() if one.has_data(tables)), tables)
 
 
-def figures_of_both(other: SurveyRun, run: SurveyRun) -> list[FigureSpec]:
+def figures_of_both(other: Run, run: Run) -> list[FigureSpec]:
     """Return the figures of a run, each drawn of both runs."""
     from plateviz.plots.comparison.both_runs import comparable_survey_figures, of_both_runs
 
     return _specs(map(of_both_runs, comparable_survey_figures()), _tables(other, run))
 
 
-def _compared(run: SurveyRun) -> ComparedRun:
+def _compared(run: Run) -> ComparedRun:
     tables = read_run_tables(run)
     return compared_run(run, tables, run_verdict(*tables))
 
 
-def _tables(other: SurveyRun | None, run: SurveyRun) -> SurveyTables:
+def _tables(other: Run | None, run: Run) -> SurveyTables:
     if other is None:
         return survey_tables(run)
     require_same_catalogue(other, run)

@@ -14,7 +14,7 @@ from plateviz.notebook.figures import FigureSpec, HasFigures, NotebookFigure, fi
 from plateviz.notebook.lazy_collection import LazyCollection
 from plateviz.notebook.report import write_report
 from plateviz.notebook.table import OpenTable
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.tables import motion_table, source_class, source_strip, time_series
 from plateviz.verdict.verdict import Verdict, source_verdict
 from solver.data.ids import is_id
@@ -34,7 +34,7 @@ class OpenSource(HasFigures):
     kind : "reference", "non-reference" or "artificial"
     """
 
-    def __init__(self, run: SurveyRun, source_id: int | str, call: str) -> None:
+    def __init__(self, run: Run, source_id: int | str, call: str) -> None:
         """Find a source in a run.
 
         Parameters

@@ -23,7 +23,7 @@ from plateviz.notebook.source import OpenSource
 from plateviz.notebook.table import OpenTable, input_table
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
-from plateviz.runs.queries import SurveyRun, open_run, survey_runs
+from plateviz.runs.run import Run, open_run, survey_runs
 from plateviz.runs.run_directory import DEFAULT_RUN
 from plateviz.runs.run_tables import read_run_verdict
 from plateviz.solving.job import Job
@@ -273,12 +273,12 @@ class OpenSurvey(HasSolver, HasFigures, Explores):
         complete = [run for run in runs if run.is_complete]
         return (complete or runs)[0].name if runs else None
 
-    def _run(self) -> SurveyRun:
+    def _run(self) -> Run:
         if self.run_name is None:
             raise InputError(f"{self.directory}: expected a run, found none; .fit() makes one")
         return open_run(self.directory, self.run_name)
 
-    def _other(self) -> SurveyRun:
+    def _other(self) -> Run:
         if self.other_name is None:
             raise InputError("expected a run to compare with, found none; .compared_with(RUN)")
         return open_run(self.directory, self.other_name)

@@ -15,7 +15,7 @@ from pathlib import Path
 from plateviz.reports.page import page_of
 from plateviz.reports.report import Facts, Link, Report
 from plateviz.reports.survey import survey_orbit_report, survey_report
-from plateviz.runs.queries import SurveyRun, open_run
+from plateviz.runs.run import Run, open_run
 from solver.errors import FitError, InputError
 from solver.io.atomic import sha256_of, write_atomically
 from solver.io.disk import writing
@@ -29,7 +29,7 @@ _PACKAGES = ("plateviz", "bokeh")
 
 
 def write_folder(
-    run: SurveyRun,
+    run: Run,
     folder: Path,
     facts: Facts,
     workers: int | None = None,
@@ -112,7 +112,7 @@ def _wait_for_parent() -> None:
         os._exit(1)
 
 
-def _begin(run: SurveyRun, folder: Path) -> None:
+def _begin(run: Run, folder: Path) -> None:
     """Create the folder, or check that its pages are of the same run."""
     head = {"run": sha256_of(run.directory / "run.toml"), "versions": versions_of(_PACKAGES)}
     path = folder / _HEAD

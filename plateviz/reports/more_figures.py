@@ -13,7 +13,7 @@ from plateviz.plots.survey_figure import SurveyFigure
 from plateviz.reports.report import ReportFigure
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.tables.explore import EXPLORABLE, ExplorableTable
 from plateviz.tables.survey_tables import SurveyTables
 from solver.errors import InputError
@@ -46,7 +46,7 @@ def more_of_orbit(more: MoreFigures, chosen: Chosen) -> list[ReportFigure]:
     return [*both, *_explored(more.explored, EXPLORABLE, table)]
 
 
-def more_of_run(more: MoreFigures, run: SurveyRun, tables: SurveyTables) -> list[ReportFigure]:
+def more_of_run(more: MoreFigures, run: Run, tables: SurveyTables) -> list[ReportFigure]:
     """Return the figures of a run; InputError if one cannot be drawn.
 
     Parameters

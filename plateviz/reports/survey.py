@@ -9,7 +9,7 @@ from plateviz.reports.more_figures import NO_MORE, MoreFigures, more_of_run
 from plateviz.reports.orbit import failed_orbit_report, orbit_report
 from plateviz.reports.report import SOLVED, Facts, Report, ReportFigure, plain
 from plateviz.runs.load_tables import compared_run, require_same_catalogue, survey_tables
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_tables import RunTables
 from plateviz.solving.origin import SurveyFolder
 from plateviz.tables import (
@@ -34,7 +34,7 @@ from solver.io.survey_header import section
 
 
 def survey_report(
-    run: SurveyRun, facts: Facts, other: SurveyRun | None = None, more: MoreFigures = NO_MORE
+    run: Run, facts: Facts, other: Run | None = None, more: MoreFigures = NO_MORE
 ) -> Report:
     """Return the report of a run of a survey.
 
@@ -76,7 +76,7 @@ def survey_report(
 
 
 def survey_orbit_report(
-    run: SurveyRun,
+    run: Run,
     orbit: int,
     facts: Facts,
     other: FitResult | None = None,
@@ -109,7 +109,7 @@ def survey_orbit_report(
     return orbit_report(result, instrument, facts, other, has_choices, simulation, more)
 
 
-def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
+def source_report(run: Run, source_id: int, facts: Facts) -> Report:
     """Return the report of one source of a run.
 
     Raises
@@ -133,7 +133,7 @@ def source_report(run: SurveyRun, source_id: int, facts: Facts) -> Report:
     )
 
 
-def _whole(run: SurveyRun) -> SurveyTables:
+def _whole(run: Run) -> SurveyTables:
     """Return the tables of a run; InputError if orbits are missing."""
     tables = survey_tables(run)
     missing = int((tables.orbits["status"] == MISSING).sum())
@@ -145,12 +145,12 @@ def _whole(run: SurveyRun) -> SurveyTables:
     return tables
 
 
-def _compared(run: SurveyRun, tables: SurveyTables) -> ComparedRun:
+def _compared(run: Run, tables: SurveyTables) -> ComparedRun:
     read = RunTables(tables.orbits, tables.motions, tables.tests)
     return compared_run(run, read, run_verdict(*read))
 
 
-def _of_run(run: SurveyRun) -> Facts:
+def _of_run(run: Run) -> Facts:
     """Return versions, settings and inputs of the run."""
     header = run.header()
     titles = {SOLVED: "versions", "Settings": "settings", "Inputs (SHA-256)": "inputs"}

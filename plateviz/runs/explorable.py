@@ -14,7 +14,7 @@ import pandas as pd
 
 from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.file_rows import DerivedColumn, FileRows, RowKind
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_directory import RunDirectory
 from plateviz.tables.explore import (
     CHI2_PER_DOF,
@@ -160,7 +160,7 @@ COLUMNS_OF_RUN: Mapping[str, Mapping[str, Column]] = MappingProxyType(
 """What a row is -> name -> definition of the columns of a run that are numbers."""
 
 
-def explorable_of_run(run: SurveyRun, rows: str, kept: ColumnCache) -> ExplorableTable:
+def explorable_of_run(run: Run, rows: str, kept: ColumnCache) -> ExplorableTable:
     """Return a table of a run.
 
     Parameters
@@ -184,14 +184,14 @@ def explorable_of_run(run: SurveyRun, rows: str, kept: ColumnCache) -> Explorabl
     return _measurements(run, kept) if rows == "measurements" else _history(run, kept)
 
 
-def _orbits(run: SurveyRun) -> ExplorableTable:
+def _orbits(run: Run) -> ExplorableTable:
     frame = run.orbits()
     names = frame["orbit_id"].astype(str).to_numpy()
     orbit = RUN_ORBITS["orbit_id"]
     return explorable("orbits", frame, RUN_ORBITS, [orbit], {"orbit_id": names.__getitem__})
 
 
-def _exposures(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
+def _exposures(run: Run, kept: ColumnCache) -> ExplorableTable:
     of_run = RunDirectory(run.survey, run.name)
     files = [of_run.orbit_directory(orbit) / _EXPOSURES for orbit in of_run.complete_orbits()]
     rows = FileRows(_EXPOSURE_ROWS, files, _state(files), kept)
@@ -213,7 +213,7 @@ def _exposures(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
     )
 
 
-def _measurements(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
+def _measurements(run: Run, kept: ColumnCache) -> ExplorableTable:
     of_run = RunDirectory(run.survey, run.name)
     every, orbits = _thinned(of_run)
     files = [of_run.orbit_directory(orbit) / "residuals.parquet" for orbit in orbits]
@@ -227,7 +227,7 @@ def _measurements(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
     return _of_files("measurements", rows, run, orbit_of)._replace(note=note)
 
 
-def _history(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
+def _history(run: Run, kept: ColumnCache) -> ExplorableTable:
     files = list(map(Path, run.history_files()))
     rows = FileRows(_HISTORY, files, _state(files), kept)
     return _of_files(
@@ -239,7 +239,7 @@ def _history(run: SurveyRun, kept: ColumnCache) -> ExplorableTable:
 
 
 def _of_files(
-    name: str, rows: FileRows, run: SurveyRun, orbit_of: Callable[[np.ndarray], np.ndarray]
+    name: str, rows: FileRows, run: Run, orbit_of: Callable[[np.ndarray], np.ndarray]
 ) -> ExplorableTable:
     @cache
     def classes() -> np.ndarray:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_tables import RunTables, read_run_tables
 from plateviz.tables.survey_tables import SurveyTables
 from plateviz.verdict.run_changes import ComparedRun
@@ -17,7 +17,7 @@ from solver.io.survey import REFERENCE, TRUTH_FILE, has_survey_table, read_surve
 from solver.io.survey_header import HEADER, read_header, section
 
 
-def survey_tables(run: SurveyRun, read: RunTables | None = None) -> SurveyTables:
+def survey_tables(run: Run, read: RunTables | None = None) -> SurveyTables:
     """Return the tables of a run and of its survey.
 
     Parameters
@@ -43,7 +43,7 @@ def survey_tables(run: SurveyRun, read: RunTables | None = None) -> SurveyTables
     )
 
 
-def compared_run(run: SurveyRun, read: RunTables, verdict: Verdict) -> ComparedRun:
+def compared_run(run: Run, read: RunTables, verdict: Verdict) -> ComparedRun:
     """Return what of a run is compared with another one.
 
     Parameters
@@ -60,7 +60,7 @@ def compared_run(run: SurveyRun, read: RunTables, verdict: Verdict) -> ComparedR
     return ComparedRun(run.name, settings, *read, verdict)
 
 
-def require_same_catalogue(a: SurveyRun, b: SurveyRun) -> None:
+def require_same_catalogue(a: Run, b: Run) -> None:
     """Raise InputError if the catalogue was another when one of two runs was made.
 
     The motions of a run are relative to its catalogue.

@@ -3,7 +3,7 @@
     runs/NAME/run.toml                    settings, versions, hashes of the inputs; written first
     runs/NAME/orbit=0000/                 one fitted orbit (`plateviz.runs.fitted_orbit`)
     runs/NAME/failed/orbit=0000.json      why an orbit has no solution
-    runs/NAME/history.parquet             all orbits sorted by source (`plateviz.runs.queries`)
+    runs/NAME/history.parquet             all orbits sorted by source (`plateviz.runs.run`)
     runs/NAME/motions.parquet, ...        tables computed from it and from the orbits
     runs/NAME/gathered.json               the orbits in these tables, and the tables' SHA-256;
                                           removed before they are written, and written after them
@@ -94,7 +94,7 @@ class Written(NamedTuple):
 
 @dataclass(frozen=True)
 class RunDirectory:
-    """The files of one run of a survey, which fits write; `plateviz.runs.queries` reads them.
+    """The files of one run of a survey, which fits write; `plateviz.runs.run` reads them.
 
     Attributes
     ----------

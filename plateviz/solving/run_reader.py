@@ -5,7 +5,7 @@ from collections.abc import Hashable
 from concurrent.futures import Executor, Future
 
 from plateviz.runs.load_tables import compared_run, survey_tables
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_tables import RunTables, read_run_tables
 from plateviz.tables.survey_tables import SurveyTables
 from plateviz.verdict.run_changes import ComparedRun
@@ -27,7 +27,7 @@ class ReadRun:
     compared : what of it is compared with another run
     """
 
-    def __init__(self, run: SurveyRun) -> None:
+    def __init__(self, run: Run) -> None:
         """Read and judge a run; InputError if it cannot be read."""
         self.run = run
         self.tables: RunTables = read_run_tables(run)
@@ -55,7 +55,7 @@ class RunReader:
         self._executor = executor
         self._begun: OrderedDict[tuple[str, str], tuple[Hashable, Future[ReadRun]]] = OrderedDict()
 
-    def read(self, run: SurveyRun) -> Future[ReadRun]:
+    def read(self, run: Run) -> Future[ReadRun]:
         """Return a run as it is now; read again only if anything was written since.
 
         Raises

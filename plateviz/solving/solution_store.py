@@ -17,7 +17,7 @@ from plateviz.runs.fitted_orbit import is_complete
 from plateviz.runs.kept_selections import KeptSelections
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
 from plateviz.runs.orbit_cache import OrbitCache
-from plateviz.runs.queries import SurveyRun, survey_runs
+from plateviz.runs.run import Run, survey_runs
 from plateviz.runs.run_directory import run_directories
 from plateviz.runs.scratch_result import is_written
 from plateviz.solving.background import Background
@@ -93,7 +93,7 @@ class SolutionStore:
             self._orbits = self.origin.orbits()
         return self._orbits
 
-    def runs(self) -> list[SurveyRun]:
+    def runs(self) -> list[Run]:
         """Return the current runs of the survey; none if the origin is files."""
         origin = self.origin
         if not isinstance(origin, SurveyFolder):

@@ -28,7 +28,7 @@ class SurveyFigures:
     orbits : `survey_schema.RUN_ORBITS`
     motions : `survey_schema.MOTIONS`
     errors : `survey_schema.ERRORS_BY_COUNT` of the artificial sources
-    classes : a row per class as from `plateviz.runs.queries.SurveyRun.classes`, by `source_class`
+    classes : a row per class as from `plateviz.runs.run.Run.classes`, by `source_class`
     mas_per_pixel : scale of the detectors
     """
 

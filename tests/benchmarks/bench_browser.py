@@ -27,7 +27,7 @@ from playwright.sync_api import Locator, Page, sync_playwright
 # Import this checkout, whatever the working directory.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from plateviz.runs.queries import survey_runs
+from plateviz.runs.run import survey_runs
 from tests.benchmarks.action_stages import report_stages
 from tests.benchmarks.machine import cpu_model, usable_cores, write
 

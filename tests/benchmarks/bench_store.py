@@ -22,7 +22,7 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from plateviz.runs.gathered_history import rows_of_a_group
-from plateviz.runs.queries import HISTORY_FILE, MOTIONS_FILE, SurveyRun
+from plateviz.runs.run import HISTORY_FILE, MOTIONS_FILE, Run
 from plateviz.runs.run_directory import RunDirectory
 from solver.data.survey_schema import HISTORY, MOTIONS
 from tests.benchmarks.machine import machine, time_of, write
@@ -35,7 +35,7 @@ _REPEAT = 5
 def main() -> None:
     arguments = parse_arguments()
     with TemporaryDirectory(prefix="plateviz-") as scratch:
-        run = SurveyRun(RunDirectory(Path(scratch), "made-up"))
+        run = Run(RunDirectory(Path(scratch), "made-up"))
         run.directory.mkdir(parents=True)
         write_tables(run.directory, arguments.orbits, arguments.sources)
         rows = arguments.orbits * arguments.sources

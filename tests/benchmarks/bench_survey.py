@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 # Imported before NumPy, as in the program, because it sets how long idle BLAS threads spin.
 import solver  # noqa: F401, I001
 
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_directory import RunDirectory
 from solver.data.instrument import MINI_MOCK
 from solver.io.survey import read_survey_orbit
@@ -64,7 +64,7 @@ def main() -> None:
         write(f"peak memory of one process: {peak:.0f} MiB")
         disk = sum(path.stat().st_size for path in two.directory.rglob("*") if path.is_file())
         write(f"disk: {disk / arguments.orbits / 2**20:.1f} MiB for each orbit")
-        time_queries(SurveyRun(two))
+        time_queries(Run(two))
         if arguments.kills:
             is_same = survives_kills(survey, two, arguments)
             write(f"identical files after {arguments.kills} kills: {is_same}")
@@ -111,7 +111,7 @@ def contents(run: RunDirectory) -> dict[str, bytes]:
     }
 
 
-def time_queries(run: SurveyRun) -> None:
+def time_queries(run: Run) -> None:
     """Time the queries of a run with warm caches."""
     counts = run.counts()
     most_frequent = int(counts.loc[counts["n_orbits"].idxmax(), "source_id"])

@@ -14,7 +14,7 @@ from plateviz.dashboard.navigation.navigation import Navigation, View
 from plateviz.dashboard.session.session import Session
 from plateviz.runs.kept_solutions import KeptSolutions
 from plateviz.runs.load_tables import survey_tables
-from plateviz.runs.queries import SurveyRun, open_run, survey_runs
+from plateviz.runs.run import Run, open_run, survey_runs
 from plateviz.runs.run_directory import RunDirectory
 from plateviz.solving.origin import SurveyFolder
 from solver.data.columns import Table, numpy_dtype
@@ -203,11 +203,11 @@ class MutatedStore(FakeStore):
         self.instrument = self.origin.read_instrument()
         self.kept = KeptSolutions(self.origin.solutions)
 
-    def runs(self) -> list[SurveyRun]:
+    def runs(self) -> list[Run]:
         return survey_runs(Path(self.origin.directory))
 
 
-def _run(folder: Path) -> SurveyRun:
+def _run(folder: Path) -> Run:
     return open_run(folder, RUN)
 
 

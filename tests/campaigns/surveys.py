@@ -31,7 +31,7 @@ from plateviz.cache import keep_compilations
 from plateviz.runs.dask_workers import fit_survey_orbit
 from plateviz.runs.fit_survey import gather
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_tables import read_run_tests
 from plateviz.tables.run_diagnosis import RunTests
 from plateviz.verdict.run_verdict import run_verdict
@@ -116,7 +116,7 @@ def fit(trial: Trial, folder: Path) -> None:
         for orbit in range(ORBITS):
             fit_survey_orbit(str(survey), run.name, orbit)
         gather(run)
-        found = SurveyRun(run)
+        found = Run(run)
         folder.mkdir(parents=True, exist_ok=True)
         tests = read_run_tests(found)
         frames = (tests.calibrations, tests.orbit_tests, tests.orbit_causes, tests.zonal)

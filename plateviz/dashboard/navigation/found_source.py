@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from solver.data.ids import ID, is_id
 
 
@@ -17,7 +17,7 @@ class FoundSource(NamedTuple):
     motion: pd.Series | None
 
 
-def find_source(run: SurveyRun, text: str) -> tuple[FoundSource | None, str]:
+def find_source(run: Run, text: str) -> tuple[FoundSource | None, str]:
     """Return a source of a run, or a message on why there is none."""
     if not re.fullmatch(ID, text) or not is_id(int(text)):
         return None, f"Expected the id of a source, a whole number, found {text[:40]!r}."

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from shlex import quote
 
-from plateviz.runs.queries import Written
+from plateviz.runs.run import Written
 from plateviz.solving.origin import Origin, SurveyFolder
 from plateviz.tables.counts import duration_text, orbits_are
 

@@ -2,12 +2,12 @@
 
 from contextlib import suppress
 
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.solving.solution_store import SolutionStore
 from solver.errors import InputError
 
 
-class KnownRuns(dict[str, SurveyRun]):
+class KnownRuns(dict[str, Run]):
     """Name -> run, in the order of the store; a run that is removed stays known."""
 
     def __init__(self, store: SolutionStore) -> None:
@@ -17,14 +17,14 @@ class KnownRuns(dict[str, SurveyRun]):
         self.look()
 
     @property
-    def first(self) -> SurveyRun | None:
+    def first(self) -> Run | None:
         """The first whole run, or else the first one; None if there is none."""
         runs = list(self.values())
         return next((run for run in runs if run.is_complete), runs[0] if runs else None)
 
     def look(self) -> bool:
         """Look for runs that have begun by now; return whether there are some."""
-        found: list[SurveyRun] = []
+        found: list[Run] = []
         with suppress(InputError, OSError):
             found = self._store.runs()
         if all(run.name in self for run in found):

@@ -2,7 +2,7 @@
 
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.plots.workspace import SurveyWorkspace
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 
 
 def look_for_run(navigation: Navigation) -> None:
@@ -21,7 +21,7 @@ def look_for_run(navigation: Navigation) -> None:
         navigation.session.run_comparison.look(navigation.run_name, runs)
 
 
-def _loss(run: SurveyRun) -> str:
+def _loss(run: Run) -> str:
     """Return what has become of a run; empty if it is as it was."""
     if not run.is_there():
         return (

@@ -20,7 +20,7 @@ from plateviz.dashboard.session.solution_address import find_solution, solution_
 from plateviz.dashboard.session.units import NAMES, OWN
 from plateviz.plots.workspace import OrbitWorkspace, SourceWorkspace, SurveyWorkspace, Workspace
 from plateviz.runs.explorable import COLUMNS_OF_RUN
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.tables.explore import EXPLORABLE
 from solver.data.subset import KINDS
 from solver.errors import InputError
@@ -46,7 +46,7 @@ class Navigation(param.Parameterized):
     orbit_workspace = param.Selector(objects=list(OrbitWorkspace), doc="of the Orbit view")
     source_workspace = param.Selector(objects=list(SourceWorkspace), doc="of the Source view")
     run_name = param.Selector(default=None, objects=[None], doc="run of the survey")
-    written = param.Parameter(default=None, doc="what the run has, see `SurveyRun.written`")
+    written = param.Parameter(default=None, doc="what the run has, see `Run.written`")
     growth = param.String(default="", doc="how far the run is; empty once it is complete")
     found = param.ClassSelector(class_=FoundSource, default=None, allow_None=True)
     message = param.String(default="", doc="why no source is shown")
@@ -60,7 +60,7 @@ class Navigation(param.Parameterized):
         self._source_text, self._next_orbit = "", NextOrbit()
         self._named: dict[str, str] = {}
         self._of_address: object = None
-        self._growth: tuple[SurveyRun, Growth] | None = None
+        self._growth: tuple[Run, Growth] | None = None
         runs = self.known_runs = KnownRuns(session.store)
         if runs.first is not None:
             self.param["run_name"].objects = list(runs)
@@ -81,12 +81,12 @@ class Navigation(param.Parameterized):
         return list(self.param[WORKSPACES[self.view]].objects)
 
     @property
-    def run(self) -> SurveyRun | None:
+    def run(self) -> Run | None:
         """The run on the screen; None if there is none."""
         return self.known_runs.get(self.run_name)
 
     @property
-    def runs(self) -> list[SurveyRun]:
+    def runs(self) -> list[Run]:
         """The runs of the survey, by name."""
         return list(self.known_runs.values())
 

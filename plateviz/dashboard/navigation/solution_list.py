@@ -9,7 +9,7 @@ from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.dashboard.session.solution_address import read_kept, run_settings, solution_of_run
 from plateviz.runs.kept_solutions import KeptSolution
 from plateviz.runs.note import NOTE_FILE
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.solving.made_solutions import MadeSolution
 from solver.errors import InputError
 
@@ -19,7 +19,7 @@ _DAMAGED = "damaged"
 class OfRun(NamedTuple):
     """The solution of one orbit in a run."""
 
-    run: SurveyRun
+    run: Run
     orbit: int
 
 
@@ -137,13 +137,13 @@ class SolutionList:
             settings = _DAMAGED
         return Entry(kept, kept.orbit, kept.name, settings, f"{_how(kept.is_what_if)}, kept")
 
-    def _of_run(self, run: SurveyRun, orbit: int | None) -> Entry | None:
+    def _of_run(self, run: Run, orbit: int | None) -> Entry | None:
         if orbit is None or not run.has_fitted(orbit):
             return None
         return Entry(OfRun(run, orbit), orbit, run.name, _described(run), "run")
 
 
-def _described(run: SurveyRun) -> str:
+def _described(run: Run) -> str:
     try:
         return run_settings(run).describe()
     except InputError:

@@ -24,7 +24,7 @@ from plateviz.dashboard.session.solution_address import run_settings
 from plateviz.plots.diagnostic import Chosen
 from plateviz.plots.gallery import source_figures, survey_figures
 from plateviz.plots.workspace import OrbitWorkspace, SurveyWorkspace, title_of
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.solving.origin import SurveyFolder
 from plateviz.verdict.verdict import orbit_verdict
 from solver.data.settings import FitSettings
@@ -144,14 +144,14 @@ def _free_name(navigation: Navigation, name: str, settings: FitSettings) -> str:
     return next(one for one in names if one not in runs or _has_settings(runs[one], settings))
 
 
-def _has_settings(run: SurveyRun, settings: FitSettings) -> bool:
+def _has_settings(run: Run, settings: FitSettings) -> bool:
     try:
         return run_settings(run) == settings
     except InputError:
         return False
 
 
-def _of_survey(navigation: Navigation, run: SurveyRun) -> PageCode:
+def _of_survey(navigation: Navigation, run: Run) -> PageCode:
     workspace, theme = navigation.workspace, _keywords(navigation.session, None)
     figures = [one for one in survey_figures() if one.workspace is workspace]
     calls: list[FigureCall] = [(one.name, theme) for one in figures]
@@ -169,7 +169,7 @@ def _of_survey(navigation: Navigation, run: SurveyRun) -> PageCode:
 
 def _of_run(
     navigation: Navigation,
-    run: SurveyRun,
+    run: Run,
     calls: Sequence[FigureCall],
     variable: str,
     call: str,

@@ -15,7 +15,7 @@ from plateviz.reports.orbit import orbit_report
 from plateviz.reports.page import page_of
 from plateviz.reports.report import Facts, Report
 from plateviz.reports.survey import source_report, survey_report
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.turns import Turns
 from solver.errors import InputError
@@ -58,7 +58,7 @@ def _on_screen(navigation: Navigation) -> MoreFigures:
     return NO_MORE
 
 
-def _other_run(navigation: Navigation) -> SurveyRun | None:
+def _other_run(navigation: Navigation) -> Run | None:
     """Return the run that is compared with, if it is on the screen."""
     if navigation.workspace is not SurveyWorkspace.COMPARE:
         return None
@@ -107,13 +107,13 @@ def _solution(
     return replace(report, subtitle="; ".join(words))
 
 
-def _survey(run: SurveyRun, other: SurveyRun | None, more: MoreFigures) -> Report:
+def _survey(run: Run, other: Run | None, more: MoreFigures) -> Report:
     compared = () if other is None else ("--other", other.name)
     both = (word for name in more.both for word in ("--both", name))
     command = report_of_run(str(run.survey), run.name, "--survey", *compared, *both)
     return survey_report(run, facts_of(command, run.name), other, more)
 
 
-def _source(run: SurveyRun, found: FoundSource) -> Report:
+def _source(run: Run, found: FoundSource) -> Report:
     command = report_of_run(str(run.survey), run.name, "--source", str(found.source_id))
     return source_report(run, found.source_id, facts_of(command, run.name))

@@ -8,7 +8,7 @@ from astropy.table import Table
 
 from plateviz.dashboard.navigation.navigation import Navigation, View
 from plateviz.dashboard.saving.downloads import described, rows_of
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.tables.explore import (
     explorable_exposures,
     explorable_measurements,
@@ -75,12 +75,12 @@ def _of_solution(result: FitResult, selected: frozenset[int]) -> Table:
     return rows_of(table, np.isin(table.read("source_id"), list(selected)))
 
 
-def _of_run(run: SurveyRun, selected: frozenset[int]) -> Table:
+def _of_run(run: Run, selected: frozenset[int]) -> Table:
     rows = run.motions() if run.is_gathered else run.counts()
     return described(rows[rows["source_id"].isin(selected)], MOTIONS)
 
 
-def _places_in_run(run: SurveyRun, selected: frozenset[int]) -> Table:
+def _places_in_run(run: Run, selected: frozenset[int]) -> Table:
     """Return the sources of a run with their places in the catalogue, at its epoch."""
     table = _of_run(run, selected)
     catalogue = read_survey_table(run.survey / REFERENCE, CATALOGUE).set_index("source_id")

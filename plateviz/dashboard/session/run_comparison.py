@@ -11,7 +11,7 @@ import param
 
 from plateviz.dashboard.address_parts import chosen
 from plateviz.plots.comparison.both_runs import comparable_survey_figures
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from solver.errors import InputError
 
 OF_RUNS = ("other", "figure")
@@ -27,9 +27,9 @@ class RunComparison(param.Parameterized):
 
     other = param.String(default="", doc="name of the run that is compared with")
     figure = param.String(default="orbit-health", doc="name of what is drawn of both runs")
-    state = param.Parameter(default=None, doc="see `SurveyRun.stamp`; why there is none if so")
+    state = param.Parameter(default=None, doc="see `Run.stamp`; why there is none if so")
 
-    def run(self, on_screen: str | None, runs: Mapping[str, SurveyRun]) -> SurveyRun | None:
+    def run(self, on_screen: str | None, runs: Mapping[str, Run]) -> Run | None:
         """Return the run that is compared with; None if the survey has no second one.
 
         Parameters
@@ -40,7 +40,7 @@ class RunComparison(param.Parameterized):
         others = {name: run for name, run in runs.items() if name != on_screen}
         return others.get(self.other) or next(iter(others.values()), None)
 
-    def look(self, on_screen: str | None, runs: Mapping[str, SurveyRun]) -> None:
+    def look(self, on_screen: str | None, runs: Mapping[str, Run]) -> None:
         """Look whether anything of the other run has been written, or it is gone."""
         other = self.run(on_screen, runs)
         try:
@@ -49,7 +49,7 @@ class RunComparison(param.Parameterized):
             self.state = str(error)
 
     def restore(
-        self, address: Mapping[str, str], on_screen: str | None, runs: Mapping[str, SurveyRun]
+        self, address: Mapping[str, str], on_screen: str | None, runs: Mapping[str, Run]
     ) -> list[str]:
         """Compare what an address requests; return what of it is invalid, in words."""
         problems: list[str] = []
@@ -61,7 +61,7 @@ class RunComparison(param.Parameterized):
         )
         return problems
 
-    def address(self, on_screen: str | None, runs: Mapping[str, SurveyRun]) -> dict[str, str]:
+    def address(self, on_screen: str | None, runs: Mapping[str, Run]) -> dict[str, str]:
         """Return what is compared as the query of the page's address; `restore` reads it back."""
         other = self.run(on_screen, runs)
         return {} if other is None else {"other": other.name, "figure": self.figure}

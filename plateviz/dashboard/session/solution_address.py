@@ -16,7 +16,7 @@ from plateviz.dashboard.selection.large_selections import LargeSelections
 from plateviz.dashboard.selection.selected import MANY, keys_of, parsed
 from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.runs.kept_solutions import KeptSolution, KeptSolutions
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from solver.data.ids import ID
 from solver.data.setting_words import parse_setting_words, setting_words
 from solver.data.settings import FitSettings
@@ -70,8 +70,8 @@ def solution_query(
 def find_solution(
     text: str | None,
     orbit: int | None,
-    run: SurveyRun | None,
-    runs: Mapping[str, SurveyRun],
+    run: Run | None,
+    runs: Mapping[str, Run],
     kept: KeptSolutions,
     large: LargeSelections,
 ) -> Solution | Request:
@@ -133,7 +133,7 @@ def read_kept(kept: KeptSolutions, one: KeptSolution) -> Solution:
     return Solution(one.orbit, result.settings, result, is_what_if=one.is_what_if, kept=one.name)
 
 
-def solution_of_run(run: SurveyRun | None, orbit: int | None) -> Solution | None:
+def solution_of_run(run: Run | None, orbit: int | None) -> Solution | None:
     """Return the solution of an orbit in a run, None if it has none; InputError if damaged."""
     if run is None or orbit is None or not run.has_fitted(orbit):
         return None
@@ -141,7 +141,7 @@ def solution_of_run(run: SurveyRun | None, orbit: int | None) -> Solution | None
     return Solution(orbit, result.settings, result, run=run.name)
 
 
-def run_settings(run: SurveyRun) -> FitSettings:
+def run_settings(run: Run) -> FitSettings:
     """Return the settings of a run; InputError if they cannot be read."""
     return parse_settings(run.header().get("settings"), f"run {run.name}")
 

@@ -12,7 +12,7 @@ import pytest
 
 from plateviz.cli import demo
 from plateviz.cli.demo import BackgroundFit, demo_directory, make_survey, request_first_orbit
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_directory import DEFAULT_RUN, RunDirectory
 from plateviz.solving.job import Job
 from plateviz.solving.origin import SurveyFolder
@@ -115,7 +115,7 @@ def test_background_fit_completes_the_run_and_a_second_start_does_nothing(small,
     assert run.is_complete
     assert run.complete_orbits() == [0, 1]
     assert "has fitted all orbits" in capsys.readouterr().out
-    assert SurveyRun(run).motions()["rms_truth_2d"].notna().all()
+    assert Run(run).motions()["rms_truth_2d"].notna().all()
 
     before = files(small)
     with reporting("simulating") as reporter:

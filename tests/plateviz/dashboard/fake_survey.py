@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from plateviz.runs.queries import Written
+from plateviz.runs.run import Written
 from plateviz.solving.origin import SurveyFolder
 from solver.data.settings import FitSettings
 from tests.plateviz.dashboard.fake_store import FakeStore

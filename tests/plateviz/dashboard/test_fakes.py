@@ -8,7 +8,7 @@ import dis
 import inspect
 
 from plateviz.runs.kept_selections import KeptSelections
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.solving.judge import Judge
 from plateviz.solving.solution_store import SolutionStore
 from plateviz.solving.solver_pool import Solver
@@ -48,7 +48,7 @@ def parameters(function):
 def fakes(fit_result, survey):
     run = "default", survey, fit_result
     for fake in (FakeRun, ComparedRun, LostRun):
-        yield fake(*run), SurveyRun
+        yield fake(*run), Run
     for store in (FakeStore(fit_result), SurveyStore(fit_result, []), SharedStore(fit_result)):
         yield store, SolutionStore
     yield store.selections, KeptSelections

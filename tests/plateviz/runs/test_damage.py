@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from plateviz.runs.fit_survey import fit_survey
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_directory import RunDirectory
 from solver.data.instrument import write_instrument
 from solver.data.schema import ENVIRONMENT, MEASUREMENT
@@ -66,7 +66,7 @@ def positions(path, seed):
 
 def read_all(run):
     """Read a run as the dashboard and the reports do."""
-    opened = SurveyRun(run)
+    opened = Run(run)
     opened.header()
     opened.orbits()
     for orbit in run.complete_orbits():
@@ -149,7 +149,7 @@ def test_flipped_bit_of_a_run_is_refused_by_name(survey, name):
 
 def test_page_of_the_history_is_checked_where_the_file_is_not(survey):
     """Reading one source does not read the whole file, and yet no changed value is returned."""
-    run = SurveyRun(RunDirectory(survey, "default"))
+    run = Run(RunDirectory(survey, "default"))
     path = run.directory / "history.parquet"
     intact, sources = path.read_bytes(), run.motions()["source_id"]
     before = {source: run.history(source) for source in sources.iloc[::40]}
@@ -165,7 +165,7 @@ def test_page_of_the_history_is_checked_where_the_file_is_not(survey):
 
 
 def test_history_of_a_run_that_is_gone_is_refused_in_words(survey):
-    run = SurveyRun(RunDirectory(survey, "default"))
+    run = Run(RunDirectory(survey, "default"))
     source = run.motions()["source_id"].iloc[0]
     assert len(run.history(source)) > 0
     shutil.rmtree(run.directory)
@@ -226,14 +226,14 @@ def test_survey_with_another_instrument_now_shows_none_of_its_solutions(survey):
     (survey / "manifest.sha256").unlink()
     write_header(survey, {**header, "instrument": write_instrument(camera)})
     with pytest.raises(InputError, match="orbit 0: expected a solution with the instrument of the"):
-        SurveyRun(RunDirectory(survey, "default")).result(0)
+        Run(RunDirectory(survey, "default")).result(0)
 
 
 def test_source_is_found_once_its_orbit_is_fitted(survey):
     run, history = RunDirectory(survey, "default"), survey / "hidden"
-    source = SurveyRun(run).motions()["source_id"].iloc[0]
+    source = Run(run).motions()["source_id"].iloc[0]
     run.directory.rename(history)
-    opened = SurveyRun(run)
+    opened = Run(run)
     run.directory.mkdir()
     assert opened.history(source).empty
     run.directory.rmdir()
@@ -251,7 +251,7 @@ def test_orbit_whose_measurements_were_changed_is_fitted_again_by_a_repair(surve
         fit_survey(survey, "default", settings, workers=1)
     report = fit_survey(survey, "default", settings, workers=1, repair=True)
     assert report.fitted == [1]
-    assert len(SurveyRun(report.run).result(1).residuals) == len(measurements) - 1
+    assert len(Run(report.run).result(1).residuals) == len(measurements) - 1
 
 
 def test_copied_orbit_is_refused(survey):

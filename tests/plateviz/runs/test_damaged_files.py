@@ -9,7 +9,7 @@ import pytest
 
 import solver.io.survey as survey_module
 from plateviz.runs.load_tables import survey_tables
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_directory import RunDirectory
 from plateviz.solving.origin import SurveyFolder
 from solver.data.schema import CATALOGUE, TRUTH
@@ -45,7 +45,7 @@ def survey(made, tmp_path):
 def run(survey):
     """The run, as if it were not complete: its files are not compared with a manifest."""
     (survey / "runs" / RUN / "COMPLETE").unlink()
-    return SurveyRun(RunDirectory(survey, RUN))
+    return Run(RunDirectory(survey, RUN))
 
 
 def edit(path, old, new):
@@ -244,4 +244,4 @@ def test_file_that_was_checked_is_checked_again_when_it_is_written(tmp_path, mon
 
 
 def _run(survey):
-    return SurveyRun(RunDirectory(survey, RUN))
+    return Run(RunDirectory(survey, RUN))

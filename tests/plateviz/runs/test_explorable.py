@@ -13,7 +13,7 @@ from plateviz.runs.column_cache import ColumnCache
 from plateviz.runs.explorable import COLUMNS_OF_RUN, explorable_of_run
 from plateviz.runs.gathered_history import gather_history
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from plateviz.runs.run_directory import RunDirectory
 from plateviz.tables.explore import EXPLORABLE, explorable_measurements
 from solver.data.settings import FitSettings
@@ -58,7 +58,7 @@ def made(results, fitted_survey):
 
 @pytest.fixture
 def run(made):
-    return SurveyRun(made)
+    return Run(made)
 
 
 @pytest.fixture
@@ -131,9 +131,9 @@ def test_only_columns_that_are_asked_for_are_read_and_once(run, monkeypatch):
 
 
 def test_sources_per_orbit_are_the_same_before_and_after_gathering(copied):
-    before = explorable_of_run(SurveyRun(copied), "sources per orbit", ColumnCache())
+    before = explorable_of_run(Run(copied), "sources per orbit", ColumnCache())
     gather_history(copied)
-    after = explorable_of_run(SurveyRun(copied), "sources per orbit", ColumnCache())
+    after = explorable_of_run(Run(copied), "sources per orbit", ColumnCache())
     assert before.size == after.size
     for name in ("epoch", "offset_ra", "chi2_per_dof", "is_reference"):
         found = [np.sort(table.numbers(name)) for table in (before, after)]
@@ -179,10 +179,10 @@ def test_of_too_many_residuals_those_of_every_nth_orbit_are_shown(run, results, 
 def test_orbit_that_is_added_is_there(copied, results):
     kept = ColumnCache()
     shutil.move(copied.orbit_directory(2), copied.directory / "later")
-    before = residuals(SurveyRun(copied), kept)
+    before = residuals(Run(copied), kept)
     before.numbers("nx")
     shutil.move(copied.directory / "later", copied.orbit_directory(2))
-    after = residuals(SurveyRun(copied), kept)
+    after = residuals(Run(copied), kept)
     assert len(after.numbers("nx")) == before.size + len(results[2].residuals)
 
 
@@ -190,7 +190,7 @@ def test_run_without_an_orbit_has_no_rows(copied):
     for orbit in ORBITS:
         shutil.rmtree(copied.orbit_directory(orbit))
     for rows in ("measurements", "sources per orbit"):
-        table = explorable_of_run(SurveyRun(copied), rows, ColumnCache())
+        table = explorable_of_run(Run(copied), rows, ColumnCache())
         assert (table.size, len(table.numbers("chi2" if "orbit" in rows else "nx"))) == (0, 0)
 
 
@@ -202,14 +202,14 @@ def test_damaged_column_is_refused_by_name_and_the_others_are_read(copied):
     start = place["nx"].data_page_offset + place["nx"].total_compressed_size // 2
     content[start] ^= 8
     path.write_bytes(content)
-    table = residuals(SurveyRun(copied))
+    table = residuals(Run(copied))
     with pytest.raises(InputError, match=r"orbit=0001/residuals\.parquet"):
         table.numbers("nx")
     assert np.isfinite(table.numbers("ny")).all()
 
 
 def test_run_that_is_removed_meanwhile_is_refused_by_name(copied):
-    table = residuals(SurveyRun(copied))
+    table = residuals(Run(copied))
     known = table.numbers("nx")
     shutil.rmtree(copied.directory)
     with pytest.raises(InputError, match=r"residuals\.parquet"):
@@ -222,4 +222,4 @@ def test_columns_of_one_name_are_refused(copied):
     path = copied.orbit_directory(0) / "residuals.parquet"
     path.write_bytes(path.read_bytes().replace(b"residual_x", b"residual_y"))
     with pytest.raises(InputError, match="once each"):
-        residuals(SurveyRun(copied)).numbers("residual_y")
+        residuals(Run(copied)).numbers("residual_y")

@@ -16,7 +16,7 @@ from plateviz.cli.paper_survey import reproduced
 from plateviz.cli.survey import parse_orbits
 from plateviz.runs.fit_survey import fit_survey
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.queries import SurveyRun, open_run, survey_runs
+from plateviz.runs.run import Run, open_run, survey_runs
 from plateviz.runs.run_directory import RunDirectory
 from plateviz.runs.run_tables import read_run_tests, read_run_verdict
 from solver.data.run_schema import RUN_TABLES
@@ -49,7 +49,7 @@ def report(fitted_survey):
 
 @pytest.fixture(scope="module")
 def run(report):
-    return SurveyRun(report.run)
+    return Run(report.run)
 
 
 def test_every_orbit_is_fitted(report):
@@ -102,10 +102,10 @@ def test_run_in_parts_and_with_a_failed_orbit_ends_as_the_same_run(report, fitte
         assert "orbit=0001.parquet" in broken.failed[1]
         assert not broken.run.is_complete
         assert [step.done for step in seen] == [0, 1, 2]
-        assert len(SurveyRun(broken.run).motions()) > 0
-        table = SurveyRun(broken.run).orbits().set_index("orbit_id")
+        assert len(Run(broken.run).motions()) > 0
+        table = Run(broken.run).orbits().set_index("orbit_id")
         assert table["status"].tolist() == ["missing", "failed", "complete"]
-        has_fitted = [SurveyRun(broken.run).has_fitted(orbit) for orbit in table.index]
+        has_fitted = [Run(broken.run).has_fitted(orbit) for orbit in table.index]
         assert has_fitted == [False, False, True]
         assert "orbit=0001.parquet" in table.loc[1, "message"]
     finally:
@@ -231,11 +231,11 @@ def test_unreadable_table_is_reported(fitted_survey):
     torn = begin_run(fitted_survey, "torn", SETTINGS)
     (torn.directory / "history.parquet").write_bytes(b"PAR1")
     with pytest.raises(InputError, match=r"history\.parquet: expected a table of plateviz, found"):
-        SurveyRun(torn).history(1)
+        Run(torn).history(1)
 
 
 def test_new_run_is_empty(fitted_survey):
-    empty = SurveyRun(begin_run(fitted_survey, "empty", SETTINGS))
+    empty = Run(begin_run(fitted_survey, "empty", SETTINGS))
     assert empty.history(1).empty
     assert empty.counts().empty
     assert empty.motions().empty

@@ -3,7 +3,7 @@
 import pytest
 
 from plateviz.runs.fit_survey import fit_survey
-from plateviz.runs.queries import SurveyRun
+from plateviz.runs.run import Run
 from solver.data.settings import FitSettings
 from solver.data.survey_schema import MOTION_PARAMETERS
 from solver.simulate.settings import SurveySettings
@@ -18,7 +18,7 @@ def run(tmp_path_factory):
     simulate_survey(survey, SurveySettings())
     report = fit_survey(survey, "default", FitSettings())
     assert report.run.is_complete
-    return SurveyRun(report.run)
+    return Run(report.run)
 
 
 @pytest.mark.parametrize("parameter", MOTION_PARAMETERS)

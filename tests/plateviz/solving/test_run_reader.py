@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.queries import open_run
+from plateviz.runs.run import open_run
 from plateviz.runs.run_tables import read_run_verdict
 from plateviz.solving import run_reader
 from plateviz.solving.run_reader import RunReader

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from plateviz.dashboard.navigation.growth import Growth, how_to_make_another_run
-from plateviz.runs.queries import Written
+from plateviz.runs.run import Written
 from plateviz.solving.origin import SurveyFolder
 
 

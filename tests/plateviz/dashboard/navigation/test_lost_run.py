@@ -13,7 +13,7 @@ from plateviz.dashboard.views.elements.notice import NoticeView
 from plateviz.dashboard.views.pages.source import SourcePage
 from plateviz.dashboard.views.pages.survey import SurveyPage
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.queries import survey_runs
+from plateviz.runs.run import survey_runs
 from solver.data.settings import FitSettings
 from solver.errors import InputError
 from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore

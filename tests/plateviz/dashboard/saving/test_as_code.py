@@ -28,7 +28,7 @@ from plateviz.plots.explore.explored_rows import ExploredColumns
 from plateviz.plots.explore.explored_text import text_of
 from plateviz.plots.gallery import diagnostics
 from plateviz.reports.summary_strip import strip
-from plateviz.runs.queries import open_run
+from plateviz.runs.run import open_run
 from plateviz.solving.origin import OrbitFiles, SurveyFolder
 from plateviz.tables import summary_strip
 from plateviz.tables.explore import EXPLORABLE

@@ -1,4 +1,4 @@
-"""Queries over the orbits of a fitted survey, answered from its files by DuckDB.
+"""A run of a survey, to be read: queries over its orbits, answered from its files by DuckDB.
 
 Each orbit's directory contains its part of the history. After orbits are added, the parts are
 gathered into one file sorted by source, from which one source can be read without the rest.
@@ -52,8 +52,8 @@ FROM rows GROUP BY source_class ORDER BY source_class
 """
 
 
-class SurveyRun:
-    """Queries over the orbits of one run; reads files and keeps nothing large in memory."""
+class Run:
+    """One run of a survey; its methods read files and keep nothing large in memory."""
 
     def __init__(self, directory: RunDirectory, cache: OrbitCache | None = None) -> None:
         """Open a run, complete or not; `cache` is of its fitted orbits."""
@@ -137,7 +137,9 @@ class SurveyRun:
             elif orbit in failures:
                 row |= {"status": "failed", "message": failures[orbit]}
             rows.append(row)
-        return _typed(pd.DataFrame(rows, columns=RUN_ORBITS.names))
+        kinds = {c.name: np.float64 for c in RUN_ORBITS if c.dtype == "float64"}
+        table = pd.DataFrame(rows, columns=RUN_ORBITS.names)
+        return table.astype({**kinds, "orbit_id": np.int64})
 
     def motions(self) -> pd.DataFrame:
         """Return `survey_schema.MOTIONS`; no rows until the orbits are gathered."""
@@ -273,12 +275,12 @@ class SurveyRun:
             raise InputError(message) from error
 
 
-def survey_runs(survey: Path, cache: OrbitCache | None = None) -> list[SurveyRun]:
+def survey_runs(survey: Path, cache: OrbitCache | None = None) -> list[Run]:
     """Return the runs of a survey directory, by name; `cache` is of their fitted orbits."""
-    return [SurveyRun(directory, cache) for directory in run_directories(survey)]
+    return [Run(directory, cache) for directory in run_directories(survey)]
 
 
-def open_run(survey: Path, name: str) -> SurveyRun:
+def open_run(survey: Path, name: str) -> Run:
     """Return a run of a survey.
 
     Raises
@@ -290,11 +292,5 @@ def open_run(survey: Path, name: str) -> SurveyRun:
     if name in runs:
         return runs[name]
     names = ", ".join(runs) or "none"
-    raise InputError(
-        f"{survey}: expected a run {name!r}, found {names}; `plateviz survey` creates one"
-    )
-
-
-def _typed(table: pd.DataFrame) -> pd.DataFrame:
-    kinds = {c.name: np.float64 for c in RUN_ORBITS if c.dtype == "float64"}
-    return table.astype({**kinds, "orbit_id": np.int64})
+    message = f"{survey}: expected a run {name!r}, found {names}; `plateviz survey` creates one"
+    raise InputError(message)

@@ -67,7 +67,7 @@ class Ticker:
         session.shown_part.param.watch(self.wake, [*SHOWN])
         session.selection.param.watch(self.wake, [*KINDS])
         session.units.param.watch(self.wake, "unit")
-        names = ["view", *WORKSPACES.values(), "run_name", "written", "found"]
+        names = ["view", *WORKSPACES.values(), "run_name", "run_progress", "found"]
         navigation.param.watch(self.wake, names)
         navigation.param.watch(self._follow_run, "run_name")
 

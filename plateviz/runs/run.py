@@ -22,7 +22,7 @@ from plateviz.runs.run_directory import (
     MOTIONS_FILE,
     RUN_FILE,
     RunDirectory,
-    Written,
+    RunProgress,
     run_directories,
 )
 from solver.data.result import FitResult
@@ -103,15 +103,15 @@ class Run:
         except OSError:
             return b""
 
-    def written(self) -> Written:
+    def progress(self) -> RunProgress:
         """Return what the run has now; takes a millisecond for each hundred orbits."""
-        return self._files.written()
+        return self._files.progress()
 
     def stamp(self) -> Hashable:
         """Return what differs once anything of the run is written; InputError if it is gone."""
         with reading(str(self.directory), "a run"):
             found = [path.stat() for path in (self.directory, self.survey)]
-        return self.written(), *((one.st_ino, one.st_mtime_ns) for one in found)
+        return self.progress(), *((one.st_ino, one.st_mtime_ns) for one in found)
 
     def header(self) -> Mapping[str, object]:
         """Return the header of the run: `settings`, `versions`, hashes of the `inputs`."""

@@ -70,8 +70,8 @@ _ORBIT = re.compile(r"orbit=(\d{4,})")
 Check = Callable[[Path, str | None, str], None]
 
 
-class Written(NamedTuple):
-    """What a run has so far.
+class RunProgress(NamedTuple):
+    """How far a run is: what of it has been written.
 
     Attributes
     ----------
@@ -125,11 +125,11 @@ class RunDirectory:
         """Whether the tables over all orbits are there: of all orbits or of those not failed."""
         return self.is_complete or (self.directory / MOTIONS_FILE).is_file()
 
-    def written(self) -> Written:
+    def progress(self) -> RunProgress:
         """Return what the run has now; takes a millisecond for each hundred orbits."""
         # The other way round, an orbit that is being written could be missing in a complete run.
         is_complete, is_gathered = self.is_complete, self.is_gathered
-        return Written(
+        return RunProgress(
             len(survey_orbits(self.survey)),
             len(self.complete_orbits()),
             len(self.failures()),

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from shlex import quote
 
-from plateviz.runs.run import Written
+from plateviz.runs.run import RunProgress
 from plateviz.solving.origin import Origin, SurveyFolder
 from plateviz.tables.counts import duration_text, orbits_are
 
@@ -33,38 +33,38 @@ class Growth:
         self._arguments = f"{quote(str(directory))} --run {quote(run)}"
         self._clock = clock
         self._first: tuple[float, int] | None = None
-        self._last: tuple[float, Written] | None = None
+        self._last: tuple[float, RunProgress] | None = None
 
-    def look(self, written: Written) -> str:
+    def look(self, progress: RunProgress) -> str:
         """Take what the run has now; return how far it is, or "" if nothing is to come."""
-        now, done = self._clock(), written.n_fitted + written.n_failed
+        now, done = self._clock(), progress.n_fitted + progress.n_failed
         if self._first is None:
             self._first = now, done
-        if self._last is None or self._last[1] != written:
-            self._last = now, written
-        is_over = done >= written.n_orbits
-        if written.is_complete:
+        if self._last is None or self._last[1] != progress:
+            self._last = now, progress
+        is_over = done >= progress.n_orbits
+        if progress.is_complete:
             return ""
-        if is_over and written.is_gathered:
-            return _OPEN if written.grows else ""
-        counts = f"{done:,} of {orbits_are(written.n_orbits)} done"
+        if is_over and progress.is_gathered:
+            return _OPEN if progress.grows else ""
+        counts = f"{done:,} of {orbits_are(progress.n_orbits)} done"
         if is_over:
             words = f"{counts}; the tables over all of them are missing yet."
         else:
-            words = f"{counts}{self._rest(now, written)}."
+            words = f"{counts}{self._rest(now, progress)}."
         if now - self._last[0] > _PATIENCE:
-            command = f"`plateviz {'watch' if written.grows else 'survey'} {self._arguments}`"
+            command = f"`plateviz {'watch' if progress.grows else 'survey'} {self._arguments}`"
             return f"{words} Nothing has been added for some minutes: {command} continues it."
         return f"{words} This page follows by itself."
 
-    def _rest(self, now: float, written: Written) -> str:
+    def _rest(self, now: float, progress: RunProgress) -> str:
         """Return the rate and the time that the rest takes at that rate."""
         started, before = self._first or (now, 0)
-        done = written.n_fitted + written.n_failed
+        done = progress.n_fitted + progress.n_failed
         if done - before < _FEW or self._last is None:
             return ""
         per_second = (done - before) / (self._last[0] - started)
-        seconds = (written.n_orbits - done) / per_second
+        seconds = (progress.n_orbits - done) / per_second
         return f", {60 * per_second:.2g} per minute, about {duration_text(seconds)} left"
 
 

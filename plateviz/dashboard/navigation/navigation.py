@@ -46,7 +46,7 @@ class Navigation(param.Parameterized):
     orbit_workspace = param.Selector(objects=list(OrbitWorkspace), doc="of the Orbit view")
     source_workspace = param.Selector(objects=list(SourceWorkspace), doc="of the Source view")
     run_name = param.Selector(default=None, objects=[None], doc="run of the survey")
-    written = param.Parameter(default=None, doc="what the run has, see `Run.written`")
+    run_progress = param.Parameter(default=None, doc="what the run has, see `Run.progress`")
     growth = param.String(default="", doc="how far the run is; empty once it is complete")
     found = param.ClassSelector(class_=FoundSource, default=None, allow_None=True)
     message = param.String(default="", doc="why no source is shown")
@@ -103,14 +103,14 @@ class Navigation(param.Parameterized):
         if self._growth is None or self._growth[0] is not run:
             self._growth = run, Growth(run.survey, run.name)
         try:
-            written = run.written()
+            progress = run.progress()
         except InputError as error:  # While a file is replaced, or the run: the next look tells.
-            self.message = str(error) if self.written is None else self.message
+            self.message = str(error) if self.run_progress is None else self.message
             return True
         with param.parameterized.batch_call_watchers(self):
-            self.growth = self._growth[1].look(written)
-            if written != self.written:
-                self.written = written
+            self.growth = self._growth[1].look(progress)
+            if progress != self.run_progress:
+                self.run_progress = progress
                 self.session.shown_part.offer_orbits(self.session.store.orbits)
                 self._look()
         return bool(self.growth)
@@ -287,7 +287,7 @@ class Navigation(param.Parameterized):
 
     def _begin_run(self, *_: object) -> None:
         # Nothing of the run before is shown under the name of this one, even if it is unreadable.
-        self.param.update(written=None, growth="", found=None, message="")
+        self.param.update(run_progress=None, growth="", found=None, message="")
         self.look_again()
 
     def _look(self) -> None:

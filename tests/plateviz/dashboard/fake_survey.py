@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from plateviz.runs.run import Written
+from plateviz.runs.run import RunProgress
 from plateviz.solving.origin import SurveyFolder
 from solver.data.settings import FitSettings
 from tests.plateviz.dashboard.fake_store import FakeStore
@@ -28,13 +28,13 @@ class FakeRun:
         return None
 
     def stamp(self):
-        return self.written()
+        return self.progress()
 
     def header(self):
         return {"settings": self._settings.to_dict()}
 
-    def written(self):
-        found = Written(2, self.n_fitted, 0, self.is_gathered, self.is_complete)
+    def progress(self):
+        found = RunProgress(2, self.n_fitted, 0, self.is_gathered, self.is_complete)
         return found._replace(**self.also_written)
 
     def has_fitted(self, orbit):

@@ -3,7 +3,7 @@
 import pytest
 
 from plateviz.runs.new_run import begin_run
-from plateviz.runs.run import Run, Written
+from plateviz.runs.run import Run, RunProgress
 from plateviz.runs.run_directory import run_directories
 from plateviz.tables import source_list
 from solver.data.settings import FitSettings
@@ -70,10 +70,10 @@ def test_failure_is_recorded_until_the_orbit_is_fitted(survey_folder, fit_result
 def test_what_is_written_is_counted(survey_folder, fit_result):
     run = begin_run(survey_folder, "counted", FitSettings())
     n_orbits = len(survey_orbits(survey_folder))
-    assert Run(run).written() == Written(n_orbits, 0, 0, False, False)
+    assert Run(run).progress() == RunProgress(n_orbits, 0, 0, False, False)
     run.keep_failure(1, "orbit 1: no light")
     run.keep(0, fit_result, {"history": fit_result.sources})
-    assert Run(run).written() == Written(n_orbits, 1, 1, False, False)
+    assert Run(run).progress() == RunProgress(n_orbits, 1, 1, False, False)
 
 
 def test_incomplete_orbit_is_not_listed(survey_folder):

@@ -127,8 +127,8 @@ class SourcePage(pn.viewable.Viewer):
         """Follow what a person enters, the navigation and the session."""
         navigation = self._navigation
         self._entry.param.watch(lambda event: navigation.find_source(event.new), "value")
-        navigation.param.watch(self._list_sources, ["run_name", "written"])
-        navigation.param.watch(self._show, ["run_name", "written", "found", "message"])
+        navigation.param.watch(self._list_sources, ["run_name", "run_progress"])
+        navigation.param.watch(self._show, ["run_name", "run_progress", "found", "message"])
         navigation.param.watch(self._show_workspace, "source_workspace")
         self._session.param.watch(self._show, "theme")
         self._session.units.param.watch(self._show, "unit")

@@ -96,7 +96,7 @@ class SurveyPage(pn.viewable.Viewer):
             sizing_mode="stretch_width",
             margin=0,
         )
-        navigation.param.watch(self._read, ["run_name", "written"])
+        navigation.param.watch(self._read, ["run_name", "run_progress"])
         navigation.param.watch(self._show_head, ["growth", "survey_workspace"])
         navigation.param.watch(self._show_workspace, "survey_workspace")
         self._session.param.watch(self._show, "theme")

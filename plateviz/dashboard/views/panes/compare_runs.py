@@ -78,7 +78,7 @@ class CompareRunsView(pn.viewable.Viewer):
         self._run.param.watch(self._choose, "value")
         self._comparison.param.watch(lambda _: change(), "figure")
         self._comparison.param.watch(self._read, ["other", "state"])
-        navigation.param.watch(self._read, ["view", "survey_workspace", "run_name", "written"])
+        navigation.param.watch(self._read, ["view", "survey_workspace", "run_name", "run_progress"])
         navigation.param.watch(self._read, "run_name", what="objects")
         self._session.param.watch(self._fill, "theme")
         self._session.units.param.watch(self._fill, "unit")

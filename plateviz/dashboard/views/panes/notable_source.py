@@ -29,7 +29,7 @@ class NotableSourceLink(pn.viewable.Viewer):
             variant="text", icon="insights", size="small", margin=(4, 2), sx=_STYLE
         )
         self._button.on_click(lambda _: navigation.open_source(self._source_id))
-        navigation.param.watch(self._read, ["run_name", "written"])
+        navigation.param.watch(self._read, ["run_name", "run_progress"])
         navigation.session.units.param.watch(self._read, "unit")
         self._read()
 

@@ -25,7 +25,7 @@ class RunRemark(pn.viewable.Viewer):
         self._pane = markup_pane()
         self._being_read: Future[ReadRun] | None = None
         self._headline = ""
-        navigation.param.watch(self._read, ["view", "run_name", "written", "found"])
+        navigation.param.watch(self._read, ["view", "run_name", "run_progress", "found"])
         navigation.session.param.watch(self._show, "theme")
         self._read()
 

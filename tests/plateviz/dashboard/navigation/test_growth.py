@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from plateviz.dashboard.navigation.growth import Growth, how_to_make_another_run
-from plateviz.runs.run import Written
+from plateviz.runs.run import RunProgress
 from plateviz.solving.origin import SurveyFolder
 
 
@@ -28,51 +28,52 @@ def growth(clock):
     return Growth(Path("a sky"), "default", clock)
 
 
-def written(n_fitted, n_failed=0, is_gathered=False, is_complete=False):
-    return Written(54, n_fitted, n_failed, is_gathered, is_complete)
+def progress(n_fitted, n_failed=0, is_gathered=False, is_complete=False):
+    return RunProgress(54, n_fitted, n_failed, is_gathered, is_complete)
 
 
 def test_rate_and_rest_are_those_of_what_was_added(growth, clock):
-    assert growth.look(written(10)) == "10 of 54 orbits are done. This page follows by itself."
+    assert growth.look(progress(10)) == "10 of 54 orbits are done. This page follows by itself."
     clock.now = 30.0
-    words = growth.look(written(25))
+    words = growth.look(progress(25))
     assert words.startswith("25 of 54 orbits are done, 30 per minute, about 58 s left.")
     # Waiting changes neither: the rate is that of the orbits that are there.
     clock.now = 32.0
-    assert growth.look(written(25)) == words
+    assert growth.look(progress(25)) == words
 
 
 def test_single_orbit_takes_the_singular(growth):
-    assert growth.look(Written(1, 0, 0, False, False)).startswith("0 of 1 orbit is done. ")
+    assert growth.look(RunProgress(1, 0, 0, False, False)).startswith("0 of 1 orbit is done. ")
 
 
 def test_failed_orbits_are_done(growth, clock):
-    growth.look(written(10))
+    growth.look(progress(10))
     clock.now = 60.0
-    assert "16 of 54 orbits are done, 6 per minute, about 6 min left" in growth.look(written(14, 2))
+    words = growth.look(progress(14, 2))
+    assert "16 of 54 orbits are done, 6 per minute, about 6 min left" in words
 
 
 def test_command_is_given_if_nothing_is_added(growth, clock):
-    growth.look(written(10))
+    growth.look(progress(10))
     clock.now = 121.0
-    words = growth.look(written(10))
+    words = growth.look(progress(10))
     assert words.endswith("some minutes: `plateviz survey 'a sky' --run default` continues it.")
-    assert growth.look(written(11)).endswith("follows by itself.")
+    assert growth.look(progress(11)).endswith("follows by itself.")
 
 
 def test_tables_are_the_last_to_be_written(growth):
-    assert growth.look(written(53, 1)).startswith("54 of 54 orbits are done; the tables over all")
+    assert growth.look(progress(53, 1)).startswith("54 of 54 orbits are done; the tables over all")
 
 
 @pytest.mark.parametrize(
-    "last", [written(54, is_gathered=True, is_complete=True), written(53, 1, is_gathered=True)]
+    "last", [progress(54, is_gathered=True, is_complete=True), progress(53, 1, is_gathered=True)]
 )
 def test_nothing_is_said_when_nothing_is_to_come(growth, last):
     assert growth.look(last) == ""
 
 
 def test_run_of_a_watched_survey_waits_for_the_next_orbit(growth, clock):
-    done = Written(4, 4, 0, True, False, (0, 1, 2, 3), grows=True)
+    done = RunProgress(4, 4, 0, True, False, (0, 1, 2, 3), grows=True)
     assert growth.look(done).startswith("All orbits that have arrived are done.")
     assert growth.look(done._replace(n_orbits=5)).startswith("4 of 5 orbits are done.")
     clock.now = 121.0

@@ -111,7 +111,7 @@ def test_source_of_one_run_is_not_shown_under_the_name_of_another(fit_result, su
     def fail():
         raise InputError("gathered.json: expected the file that was written")
 
-    runs[0].written = runs[0].counts = fail
+    runs[0].progress = runs[0].counts = fail
     navigation.run_name = "damaged"
     assert navigation.found is None
     assert navigation.message == "gathered.json: expected the file that was written"

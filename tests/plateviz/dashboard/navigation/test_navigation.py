@@ -243,13 +243,13 @@ def test_what_is_added_to_a_run_is_seen_at_the_next_look(fit_result, survey):
     run = FakeRun("default", survey, fit_result, is_complete=False)
     navigation = Navigation(Session(SurveyStore(fit_result, [run])))
     changed = []
-    navigation.param.watch(lambda event: changed.append(event.new), "written")
+    navigation.param.watch(lambda event: changed.append(event.new), "run_progress")
     assert navigation.growth.startswith("1 of 2 orbits are done")
     assert navigation.look_again()
     assert changed == []
     run.n_fitted, run.is_complete, run.is_gathered = 2, True, True
     assert not navigation.look_again()
-    assert changed == [run.written()]
+    assert changed == [run.progress()]
     assert navigation.growth == ""
 
 
@@ -277,7 +277,7 @@ def test_tables_that_are_written_again_are_read_again(fit_result, survey):
     run = FakeRun("watched", survey, fit_result, is_complete=False)
     run.is_gathered, run.also_written = True, {"grows": True, "gathered": (0,)}
     navigation, seen = Navigation(Session(SurveyStore(fit_result, [run]))), []
-    navigation.param.watch(seen.append, "written")
+    navigation.param.watch(seen.append, "run_progress")
     navigation.look_again()
     assert seen == []
     run.also_written["gathered"] = (0, 1)

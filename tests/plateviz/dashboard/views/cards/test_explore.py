@@ -290,7 +290,7 @@ def test_drag_selects_what_is_chosen(of_orbit, executor, navigation, kind):
 
 def test_run_that_grows_is_read_again(view, executor, navigation):
     draw(view, executor)
-    navigation.written = navigation.written._replace(n_fitted=5)
+    navigation.run_progress = navigation.run_progress._replace(n_fitted=5)
     card(view).change("light")
     view.grid.draw_due()
     assert len(executor.waiting) == 1

@@ -46,7 +46,7 @@ class ComparedRun(FakeRun):
     def stamp(self):
         if self.is_lost:
             raise InputError(f"runs/{self.name}: expected a run, found nothing")
-        return self.written()
+        return self.progress()
 
 
 @pytest.fixture

@@ -37,61 +37,73 @@ _CONTROLS_SECONDS = 3.0
 
 
 class Ticker:
+    """Ticks for a page from when it has loaded on: to draw before would delay it."""
+
+    def __init__(self) -> None:
+        """Begin without a page."""
+        self._of_page: PageTicker | None = None
+
+    def follow(self, navigation: Navigation, pages: Pages) -> None:
+        """Begin once the page has loaded."""
+
+        def begin() -> None:
+            self._of_page = PageTicker(navigation, pages)
+
+        pn.state.onload(begin)
+
+    def wake(self, *_: object) -> None:
+        """Tick until nothing is left to do; nothing happens before the page has loaded."""
+        if self._of_page is not None:
+            self._of_page.wake()
+
+
+class PageTicker:
     """Follows job and run, draws figures that are due and completes the page, while there is need.
 
     A job belongs to the server and may outlive the page: it calls when it is over, and what it
     says in between is looked at now and then.
     """
 
-    def __init__(self) -> None:
-        """Begin without a page."""
+    def __init__(self, navigation: Navigation, pages: Pages) -> None:
+        """Begin to follow a page that has loaded."""
+        session = navigation.session
+        self._navigation, self._pages = navigation, pages
+        # None for a page in a notebook without a server.
+        self._document: Document | None = pn.state.curdoc
+        self._loop = IOLoop.current()
         self._progress = pn.state.add_periodic_callback(
             self._tick, period=_PROGRESS_MILLISECONDS, start=False
         )
         self._looks = pn.state.add_periodic_callback(self._look, period=_LOOK, start=False)
-        self._navigation: Navigation | None = None
-        self._pages: Pages | None = None
         self._watched: Job | None = None
-        self._document: Document | None = None
-        self._loop: IOLoop | None = None
         self._is_to_tick = False
         self._later: TimeoutCallback | None = None
-        self._expected: ExpectedWhatIfs | None = None
-        self._rest: AtRest | None = None
+        # A timer of this page's context would keep the page until its time has come.
+        later = None if self._document is None else partial(Context().run, self._loop.call_later)
+        self._expected = ExpectedWhatIfs(session)
+        self._rest = AtRest(self._expected.ask_for_fit, _REST_SECONDS, later)
+        self._watch_page()
+        self.wake()
+        self._follow_run()
         self._looks_for_run: AtRest | None = None
+        if later is not None:
+            self._looks_for_run = AtRest(self._look_soon, _LOOK_FOR_RUN_SECONDS, later)
+            self._looks_for_run.begin()
 
-    def follow(self, navigation: Navigation, pages: Pages) -> None:
-        """Begin once the page has loaded; drawing before would delay it."""
-        session = navigation.session
+    def _watch_page(self) -> None:
+        navigation, session = self._navigation, self._navigation.session
         session.param.watch(self.wake, ["stage", "shown", "other", "theme"])
         session.shown_part.param.watch(self.wake, [*SHOWN])
         session.selection.param.watch(self.wake, [*KINDS])
         session.units.param.watch(self.wake, "unit")
+        session.choices.param.watch(self._expect_typed, "typed")
         names = ["view", *WORKSPACES.values(), "run_name", "run_progress", "found"]
         navigation.param.watch(self.wake, names)
         navigation.param.watch(self._follow_run, "run_name")
 
-        def begin() -> None:
-            self._navigation, self._pages = navigation, pages
-            self._document, self._loop = pn.state.curdoc, IOLoop.current()
-            # A timer of this page's context would keep the page until its time has come.
-            later = (
-                None if self._document is None else partial(Context().run, self._loop.call_later)
-            )
-            self._expected = ExpectedWhatIfs(session)
-            session.choices.param.watch(self._expect_typed, "typed")
-            self._rest = AtRest(self._expected.ask_for_fit, _REST_SECONDS, later)
-            self.wake()
-            self._follow_run()
-            if later is not None:
-                self._looks_for_run = AtRest(self._look_soon, _LOOK_FOR_RUN_SECONDS, later)
-                self._looks_for_run.begin()
-
-        pn.state.onload(begin)
-
     def wake(self, *_: object) -> None:
         """Tick until nothing is left to do."""
-        if self._navigation is None or self._is_to_tick:
+        if self._is_to_tick:
             return
         if self._document is None:
             # Nothing calls back into a page without a document.
@@ -106,13 +118,12 @@ class Ticker:
             self._progress.start()
 
     def _expect_typed(self, event: Event) -> None:
-        if self._expected is not None and event.new:
+        if event.new:
             self._expected.ask()
 
     def _call(self) -> None:
         """Tick soon; called from any thread."""
-        if self._loop is not None:
-            self._loop.add_callback(self._tick_now)
+        self._loop.add_callback(self._tick_now)
 
     def _tick_now(self) -> None:
         """Tick, without a wait for what is being made."""
@@ -124,14 +135,14 @@ class Ticker:
 
     def _follow_run(self, *_: object) -> None:
         """Look again and again what a run has that is not complete."""
-        if self._navigation is not None and self._navigation.growth and not self._looks.running:
+        if self._navigation.growth and not self._looks.running:
             self._looks.start()
 
     def _look(self) -> None:
-        if self._pages is not None and self._pages.is_due:
+        if self._pages.is_due:
             # A table that the browser is still making takes no other rows.
             return
-        if self._navigation is None or not self._navigation.look_again():
+        if not self._navigation.look_again():
             self._looks.stop()
 
     @property
@@ -144,14 +155,12 @@ class Ticker:
             self._document.add_next_tick_callback(self._look_for_run)
 
     def _look_for_run(self) -> None:
-        if self._navigation is not None and self._looks_for_run is not None:
-            look_for_run(self._navigation)
+        look_for_run(self._navigation)
+        if self._looks_for_run is not None:
             self._looks_for_run.begin()
 
     def _tick(self) -> None:
         self._is_to_tick, self._later = False, None
-        if self._navigation is None or self._pages is None:
-            return
         session = self._navigation.session
         # What follows from a new solution is sent as one message.
         with pn.io.hold(), one_search(self._document):
@@ -165,7 +174,7 @@ class Ticker:
         elif self._pages.is_due or self._pages.complete(_is_brief(job)):
             self.wake()
         elif job is None:
-            self._come_to_rest(self._navigation)
+            self._come_to_rest()
 
     def _watch(self, job: Job | None) -> None:
         """Follow a job that is new."""
@@ -183,14 +192,13 @@ class Ticker:
         self._later = self._document.add_timeout_callback(self._tick, _PENDING_MILLISECONDS)
         session.store.background.listen(self._call)
 
-    def _come_to_rest(self, navigation: Navigation) -> None:
+    def _come_to_rest(self) -> None:
         """Stop looking, and prepare what a person is likely to do next."""
         if self._progress.running:
             self._progress.stop()
-        navigation.expect_orbit()
-        if self._expected is not None and self._rest is not None:
-            self._expected.ask()
-            self._rest.begin()
+        self._navigation.expect_orbit()
+        self._expected.ask()
+        self._rest.begin()
 
 
 def _is_brief(job: Job | None) -> bool:

@@ -1,15 +1,18 @@
 """A page that nobody touches says that its run is gone, and no more once it is there again."""
 
+import asyncio
 import shutil
 
 from bokeh.document import Document
+from panel.io.state import set_curdoc
 
 from plateviz.dashboard.navigation.lost_run import look_for_run
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.session.session import Session
-from plateviz.dashboard.ticker import Ticker
+from plateviz.dashboard.ticker import PageTicker
 from plateviz.dashboard.views.controls.run_selector import run_selector
 from plateviz.dashboard.views.elements.notice import NoticeView
+from plateviz.dashboard.views.pages.pages import Pages
 from plateviz.dashboard.views.pages.source import SourcePage
 from plateviz.dashboard.views.pages.survey import SurveyPage
 from plateviz.runs.new_run import begin_run
@@ -66,14 +69,19 @@ def test_page_of_files_has_no_run_to_lose(fit_result):
 
 
 def test_page_that_has_ended_is_neither_looked_at_nor_woken(fit_result):
-    ticker, document, follower = Ticker(), Document(), id
-    ticker._navigation = Navigation(Session(SurveyStore(fit_result, [])))
-    ticker._document = document
-    document.on_change(follower)
-    document.destroy(follower)
-    ticker._look_soon()
-    ticker.wake()
-    assert not ticker._is_to_tick
+    navigation = Navigation(Session(SurveyStore(fit_result, [])))
+
+    async def end_page():
+        document, follower = Document(), id
+        with set_curdoc(document):
+            ticker = PageTicker(navigation, Pages(navigation, id))
+        document.on_change(follower)
+        document.destroy(follower)
+        ticker._look_soon()
+        ticker.wake()
+        return ticker
+
+    assert not asyncio.run(end_page())._is_to_tick
 
 
 def test_run_that_begins_is_offered_and_the_first_one_shown(fit_result, survey_folder):

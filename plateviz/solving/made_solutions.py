@@ -37,7 +37,7 @@ class MadeSolution(NamedTuple):
 
     def is_of(self, other: "MadeSolution") -> bool:
         """Whether both are the same solution, whatever their names."""
-        return self[:3] == other[:3]
+        return self == other._replace(name=self.name)
 
 
 class Awaited(NamedTuple):

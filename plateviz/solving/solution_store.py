@@ -202,7 +202,7 @@ class SolutionStore:
             If the solution is no longer there, the name is not valid or not free, or the disk
             takes no file.
         """
-        result = self.result(*made[:3])
+        result = self.result(made.orbit, made.settings, made.is_what_if)
         if result is None:
             raise InputError(
                 "expected a solution, found that it made room for others: show it first"

@@ -159,11 +159,8 @@ def label_of(solution: Solution, entries: Mapping[str, Entry]) -> str | None:
         elif isinstance(what, KeptSolution):
             is_same = what.name == solution.kept
         else:
-            is_same = not (solution.run or solution.kept) and what[:3] == (
-                solution.orbit,
-                solution.settings,
-                solution.is_what_if,
-            )
+            made = MadeSolution(solution.orbit, solution.settings, solution.is_what_if)
+            is_same = not (solution.run or solution.kept) and what.is_of(made)
         if is_same:
             return label
     return None

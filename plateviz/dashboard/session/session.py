@@ -85,8 +85,8 @@ class Session(SolutionsOnScreen):
     def open(self, solution: Solution | Request, other: Solution | Request | None = None) -> None:
         """Show a solution beside another one; what is not there yet is computed first."""
         before: list[Solution | Request] = []
-        if other is not None and other[0] == solution[0] and other[1] != solution[1]:
-            before = [other]
+        if other is not None and other.orbit == solution.orbit:
+            before = [other] if other.settings != solution.settings else []
         self._begin([*before, solution], is_opening=True)
         if isinstance(other, Solution) and not before:
             self.compare_with(other)
@@ -125,9 +125,9 @@ class Session(SolutionsOnScreen):
         if awaited is None or (self.shown is None and self.job is None):
             return
         self.journal.awaited = None
-        request, status = Request(*awaited.made[:3]), awaited.job.status
+        request, status = Request.of(awaited.made), awaited.job.status
         is_asked_for = self.job is not None and self._requested == request
-        is_shown = self.shown is not None and self.shown[:2] == request[:2]
+        is_shown = self.shown is not None and self.shown.answers(request)
         if request.orbit != self.shown_part.orbit or is_asked_for or is_shown:
             return
         if status is JobStatus.FAILED:
@@ -276,8 +276,7 @@ class Session(SolutionsOnScreen):
         if result is None:
             self.refuse("The result of the fit was removed.")
         else:
-            orbit, settings, is_what_if = request
-            self._put_on_screen(Solution(orbit, settings, result, is_what_if, is_what_if))
+            self._put_on_screen(Solution.of(request, result))
 
     def _put_on_screen(self, solution: Solution) -> None:
         problems = self.shown_part.limit_to(solution.result, self._detectors)

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from plateviz.solving.made_solutions import MadeSolution
 from solver.data.result import FitResult
 from solver.data.settings import FitSettings
 
@@ -21,6 +22,11 @@ class Request(NamedTuple):
     orbit: int | None
     settings: FitSettings
     is_what_if: bool = False
+
+    @classmethod
+    def of(cls, made: MadeSolution) -> "Request":
+        """Return the request for a solution that a session has made."""
+        return cls(made.orbit, made.settings, made.is_what_if)
 
 
 class Solution(NamedTuple):
@@ -44,6 +50,12 @@ class Solution(NamedTuple):
     run: str = ""
     kept: str = ""
 
+    @classmethod
+    def of(cls, request: Request, result: FitResult) -> "Solution":
+        """Return the solution that answers a request; the next what-if replaces a what-if."""
+        orbit, settings, is_what_if = request
+        return cls(orbit, settings, result, is_replaceable=is_what_if, is_what_if=is_what_if)
+
     @property
     def label(self) -> str:
         """Short description of the solution."""
@@ -52,9 +64,14 @@ class Solution(NamedTuple):
             return f"{self.kept}: {text}"
         return _OF_WHAT_IF.format(text) if self.is_replaceable else text
 
+    def answers(self, request: "Request | Solution") -> bool:
+        """Whether it is of the orbit and the settings of a request, or of another solution."""
+        return (self.orbit, self.settings) == (request.orbit, request.settings)
+
     def equals(self, other: "Solution") -> bool:
         """Whether both are the same solution of the same orbit."""
-        return self[:2] == other[:2] and self[4:] == other[4:]
+        mine, theirs = ((one.is_what_if, one.run, one.kept) for one in (self, other))
+        return self.answers(other) and mine == theirs
 
 
 def what_if_settings(settings: FitSettings, fitted: FitSettings) -> FitSettings:

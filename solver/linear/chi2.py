@@ -1,6 +1,5 @@
 """The data's chi2 and its gradient, without the Hessian, in one reverse pass of the model."""
 
-from collections import deque
 from typing import NamedTuple
 
 import jax
@@ -8,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from solver.linear.chunks_in_turn import chunks_in_turn
 from solver.model.forward import (
     DIRECTING,
     AnyArray,
@@ -22,7 +22,6 @@ from solver.model.forward import (
 )
 from solver.problem.parameter_vector import local_groups, walk_groups
 from solver.problem.problem import Problem
-from solver.runtime.interruption import give_way
 
 
 class Gradient(NamedTuple):
@@ -44,16 +43,14 @@ def gradient(
     """Return chi2 of the data and its gradient at one point."""
     offsets, geometry = jax.device_put((problem.offsets(theta, sources), problem.geometry))
     sky = _directions(offsets, geometry)
-    n_chunks, pending, total = len(problem.measurements.tiles.measured), deque(), None
-    for i in range(n_chunks + _MAX_PENDING):
-        give_way()
-        if i < n_chunks:
-            pending.append(
-                _value_and_gradient(sky, offsets, geometry, *problem.measurements.tiles.chunk(i))
-            )
-        if i >= _MAX_PENDING and pending:
-            of_chunk = jax.tree.map(np.asarray, pending.popleft())
-            total = of_chunk if total is None else jax.tree.map(np.add, total, of_chunk)
+    tiles, total = problem.measurements.tiles, None
+
+    def launch(i: int) -> _ValueAndGradient:
+        return _value_and_gradient(sky, offsets, geometry, *tiles.chunk(i))
+
+    for launched in chunks_in_turn(launch, len(tiles.measured), ahead=_MAX_PENDING):
+        of_chunk = jax.tree.map(np.asarray, launched)
+        total = of_chunk if total is None else jax.tree.map(np.add, total, of_chunk)
     half, by_group = jax.tree.map(np.asarray, _with_offset_gradient(total, offsets, geometry))
     by_theta, by_source = problem.gathered(by_group)
     return Gradient(2.0 * float(half), -by_theta, -by_source)

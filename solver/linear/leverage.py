@@ -5,7 +5,6 @@ parameters, H_k = J_k C J_k' (2 x 2). The expected chi2 of the measurement is
 2 - tr H_k, and (I - H_k)^(-1/2) r_k has unit covariance if model and sigmas are right.
 """
 
-from collections import deque
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -22,6 +21,7 @@ from solver.linear.chunk_leverage import (
     WalkCovariances,
     leverage,
 )
+from solver.linear.chunks_in_turn import chunks_in_turn
 from solver.linear.covariances import Covariances
 from solver.linear.linearise import linearise, turning
 from solver.model.forward import (
@@ -36,7 +36,6 @@ from solver.model.forward import (
     image,
 )
 from solver.problem.problem import Problem, pad
-from solver.runtime.interruption import give_way
 
 # Chunks computed at once: a single one does not keep all cores busy.
 _MAX_PENDING = 3
@@ -92,15 +91,11 @@ def residuals(
         found = leverage(jacobians, index.source, shared, of_chunk(index))
         return _columns(sky, at, geometry, index, measured, weight, found)
 
-    pending, n_chunks = deque(), len(tiles.measured)
     values = np.empty((_N_COLUMNS, *tiles.index.source.shape))
-    for i in range(n_chunks + _MAX_PENDING):
-        give_way()
-        if i < n_chunks:
-            pending.append(launch(i))
-        if i >= _MAX_PENDING and pending:
-            for number, column in enumerate(pending.popleft()):
-                values[number, i - _MAX_PENDING] = column
+    launched = chunks_in_turn(launch, len(tiles.measured), ahead=_MAX_PENDING)
+    for i, columns in enumerate(launched):
+        for number, column in enumerate(columns):
+            values[number, i] = column
     columns = np.take(values.reshape(_N_COLUMNS, -1), tiles.place, axis=1)
     whitened, standardised, pixel, ideal, focal = columns[:-1].reshape(5, 2, -1).swapaxes(1, 2)
     return Residuals(whitened, standardised, columns[-1], pixel, ideal, focal)

@@ -112,7 +112,7 @@ class Navigation(param.Parameterized):
             if progress != self.run_progress:
                 self.run_progress = progress
                 self.session.shown_part.offer_orbits(self.session.store.orbits)
-                self._look()
+                self._search_again()
         return bool(self.growth)
 
     def begin(self, address: Mapping[str, str]) -> None:
@@ -220,7 +220,7 @@ class Navigation(param.Parameterized):
     def find_source(self, text: str) -> None:
         """Search the run for a source by its id as text."""
         self._source_text = text.strip()
-        self._look()
+        self._search_again()
 
     def open_source(self, text: str) -> None:
         """Search for a source, and show the Source view."""
@@ -290,7 +290,7 @@ class Navigation(param.Parameterized):
         self.param.update(run_progress=None, growth="", found=None, message="")
         self.look_again()
 
-    def _look(self) -> None:
+    def _search_again(self) -> None:
         found, message = None, ""
         if self.run is not None and self._source_text:
             try:

@@ -27,8 +27,8 @@ class SolutionsOnScreen(RequestState):
         """Begin without a solution."""
         super().__init__()
         self._fitted: Solution | None = None
-        # What all solutions are compared with, in place of the one before each.
-        self.chosen: Solution | None = None
+        # What a person has chosen to compare all solutions with, in place of the one before each.
+        self.chosen_other: Solution | None = None
         # What was opened last, which may still be computed.
         self.coming: Solution | Request | None = None
         self.run_comparison = RunComparison()
@@ -64,14 +64,14 @@ class SolutionsOnScreen(RequestState):
         ----------
         solution : may be of another run or orbit
         """
-        self.chosen = solution
+        self.chosen_other = solution
         if self.shown is not None:
             self.other = self._beside(self.shown, self.fitted)
 
     def _beside(self, solution: Solution, before: Solution | None) -> Solution | None:
         """Return what a solution is compared with, given the one before it of the same orbit."""
-        if self.chosen is not None:
-            return None if self.chosen.equals(solution) else self.chosen
+        if self.chosen_other is not None:
+            return None if self.chosen_other.equals(solution) else self.chosen_other
         return None if before is None or before.settings == solution.settings else before
 
     def _return_to(self, solution: Solution) -> None:

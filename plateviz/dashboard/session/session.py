@@ -102,7 +102,7 @@ class Session(SolutionsOnScreen):
             self.solutions = []
             if self.shown is not None:
                 self.store.leave(self.shown.orbit)
-        self.chosen = self.other = None
+        self.chosen_other = self.other = None
         self._show_next()
 
     def _show_next(self) -> None:
@@ -248,8 +248,8 @@ class Session(SolutionsOnScreen):
         shown, other = self.shown, self.other
         if shown is None or other is None:
             return
-        if self.chosen is not None:
-            self.chosen = shown
+        if self.chosen_other is not None:
+            self.chosen_other = shown
         if shown.orbit != other.orbit:
             self._cancel_job()
             self.param.update(solutions=[] if other.is_replaceable else [other])

@@ -83,7 +83,7 @@ class CompareView(pn.viewable.Viewer):
         self._entries = by_label(entries)
         self._is_offering = True
         try:
-            chosen = self._session.chosen
+            chosen = self._session.chosen_other
             label = None if chosen is None else label_of(chosen, self._entries)
             self._other.param.update(options=[_BEFORE, *self._entries], value=label or _BEFORE)
         finally:

@@ -187,8 +187,8 @@ class Navigation(param.Parameterized):
         if session.shown is None or (session.is_opening and coming is self._of_address):
             return self._named
         shown = session.awaited_of(session.shown_part.orbit, session.is_opening) or session.shown
-        large = session.selection.large
-        return solution_query(shown, session.other, self.run_name, large, is_whole)
+        large = None if is_whole else session.selection.large
+        return solution_query(shown, session.other, self.run_name, large)
 
     def turn_to(self, view: View) -> None:
         """Show a view; the Orbit view requests its orbit when it is first shown."""

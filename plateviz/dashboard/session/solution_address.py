@@ -41,29 +41,24 @@ def solution_query(
     shown: Solution | Request,
     other: Solution | None,
     run: str | None,
-    large: LargeSelections,
-    is_whole: bool = False,
+    large: LargeSelections | None,
 ) -> dict[str, str]:
     """Return a solution, and the one that it is compared with, as parts of an address.
 
     Parameters
     ----------
     run : name of the run in the address
-    large : remembers what is left out, where that is too long for an address
-    is_whole : whether settings that are too long for an address are written, too
+    large : remembers what is left out, where that is too long for an address; None for a saved
+        view, which has room for all
     """
-
-    def text(solution: Solution | Request) -> str:
-        return _text(solution, shown.orbit, None if is_whole else large)
-
-    query = {"solution": text(shown)}
+    query = {"solution": _text(shown, shown.orbit, large)}
     kept, of_run = _where(shown)
     is_default = run is None and not (shown.is_what_if or kept)
     is_default = is_default and shown.settings == FitSettings()
     if is_default or (run is not None and of_run == run):
         query = {}
     if other is not None:
-        query["against"] = text(other)
+        query["against"] = _text(other, shown.orbit, large)
     return query
 
 
@@ -163,7 +158,7 @@ def _text(solution: Solution | Request, orbit: int | None, large: LargeSelection
 
     Parameters
     ----------
-    large : as of `solution_query`; None for a saved view, which has room for all
+    large : as of `solution_query`
     """
     kept, run = _where(solution)
     if kept:

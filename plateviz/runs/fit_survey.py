@@ -20,7 +20,7 @@ from plateviz.runs.dask_workers import Outcome, dask_client, fit_on_workers
 from plateviz.runs.fitted_orbit import read_summary
 from plateviz.runs.gathered_diagnosis import write_test_tables
 from plateviz.runs.gathered_history import gather_history
-from plateviz.runs.new_run import begin_run
+from plateviz.runs.new_run import begin_run, fitting_alone
 from plateviz.runs.run_directory import ERRORS_FILE, MOTIONS_FILE, RunDirectory
 from plateviz.runs.worker_scratch import remove_worker_scratch
 from plateviz.tables.counts import orbits_are
@@ -29,7 +29,6 @@ from solver.data.survey_schema import ERRORS_BY_COUNT, MOTIONS
 from solver.errors import DiskError, InputError
 from solver.io.atomic import write_atomically
 from solver.io.disk import size_text
-from solver.io.lock import locked
 from solver.io.parquet import write_parquet
 from solver.io.survey import orbit_ranges, read_survey_orbit, survey_orbits
 from solver.io.survey_manifest import survey_changes
@@ -103,12 +102,7 @@ def fit_survey(
     """
     wanted = _wanted(survey, orbits)
     run = begin_run(survey, name, settings)
-    with locked(run.directory) as is_ours:
-        if not is_ours:
-            raise InputError(
-                f"{run.directory}: expected a run that no other process is fitting, found one that "
-                "another process is fitting; wait for it, or give another --run NAME"
-            )
+    with fitting_alone(run):
         # Another process may have begun a run of that name at the same time.
         begin_run(survey, name, settings)
         refuse(copied_orbits(survey))

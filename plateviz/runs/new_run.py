@@ -1,7 +1,8 @@
-"""New runs: created with their settings, or found with the same ones."""
+"""New runs: created with their settings, or found with the same ones; and fitted by one process."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from plateviz.runs.run_directory import GROWS, RUN_FILE, RunDirectory
@@ -9,6 +10,7 @@ from solver.data.settings import FitSettings
 from solver.errors import InputError
 from solver.io.atomic import sha256_of
 from solver.io.disk import writing
+from solver.io.lock import locked
 from solver.io.scratch import is_scratch
 from solver.io.survey import EXPOSURES, REFERENCE, TRUTH_FILE, survey_orbits
 from solver.io.survey_header import HEADER, read_header, section, write_header
@@ -56,6 +58,18 @@ def begin_run(survey: Path, name: str, settings: FitSettings, grows: bool = Fals
     content = _content(run.survey, settings, grows)
     write_header(run.directory, {GROWS: True, **content} if grows else content, RUN_FILE)
     return run
+
+
+@contextmanager
+def fitting_alone(run: RunDirectory) -> Iterator[None]:
+    """Let no other process fit a run while the block runs; InputError if one is fitting it."""
+    with locked(run.directory) as is_ours:
+        if not is_ours:
+            raise InputError(
+                f"{run.directory}: expected a run that no other process is fitting, found one that "
+                "another process is fitting; wait for it, or give another --run NAME"
+            )
+        yield
 
 
 def _content(survey: Path, settings: FitSettings, grows: bool) -> dict[str, object]:

@@ -15,12 +15,11 @@ from plateviz.runs.arrivals import Arrivals, Remark
 from plateviz.runs.dask_workers import Outcome
 from plateviz.runs.fit_survey import Progress, close_run, fit_missing
 from plateviz.runs.fitted_orbit import read_summary
-from plateviz.runs.new_run import begin_run
+from plateviz.runs.new_run import begin_run, fitting_alone
 from plateviz.runs.run_directory import RunDirectory
 from plateviz.tables.counts import orbits_are, orbits_text
 from solver.data.settings import FitSettings
 from solver.errors import InputError
-from solver.io.lock import locked
 from solver.io.survey import survey_orbits
 from solver.io.table_check import refuse
 
@@ -104,12 +103,7 @@ class Watch:
             run is complete and the survey has more orbits, or another process is fitting the run.
         """
         run = begin_run(self.survey, self.name, self.settings, grows=True)
-        with locked(run.directory) as is_ours:
-            if not is_ours:
-                raise InputError(
-                    f"{run.directory}: expected a run that no other process is fitting, found one "
-                    "that another process is fitting; wait for it, or give another --run NAME"
-                )
+        with fitting_alone(run):
             if run.is_complete:
                 _require_nothing_new(run)
                 self._say("complete", f"{run.directory} is complete; nothing is left to fit")

@@ -108,6 +108,13 @@ class SolutionList:
             return Request(what.orbit, what.settings, what.is_what_if)
         return Solution(what.orbit, what.settings, result, is_what_if=what.is_what_if)
 
+    def to_compare_with(self, entry: Entry) -> Solution:
+        """Return a solution of the list; InputError if it is damaged or has to be fitted again."""
+        found = self.load(entry)
+        if isinstance(found, Request):
+            raise InputError("this solution has to be fitted again: show it first")
+        return found
+
     def rename(self, entry: Entry, name: str) -> None:
         """Give a solution of the session a name; a what-if on the screen stays in the list."""
         if isinstance(entry.what, MadeSolution):

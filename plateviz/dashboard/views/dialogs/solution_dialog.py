@@ -10,7 +10,6 @@ from astropy.table import Table
 
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.solution_list import Entry, SolutionList, by_label
-from plateviz.dashboard.session.solution import Request
 from plateviz.dashboard.views.dialogs.dialog import dialog
 from plateviz.dashboard.views.elements.markup import alert_words
 from plateviz.dashboard.views.saving.save_button import SaveButton
@@ -178,13 +177,7 @@ class SolutionDialog(pn.viewable.Viewer):
 
     def _compare(self) -> None:
         if (entry := self._chosen) is not None:
-            self._try(lambda: self._compare_with(entry))
-
-    def _compare_with(self, entry: Entry) -> None:
-        found = self._list.load(entry)
-        if isinstance(found, Request):
-            raise InputError("this solution has to be fitted again: show it first")
-        self._session.compare_with(found)
+            self._try(lambda: self._session.compare_with(self._list.to_compare_with(entry)))
 
     def _give_name(self) -> None:
         if (entry := self._chosen) is not None:

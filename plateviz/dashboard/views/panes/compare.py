@@ -9,7 +9,6 @@ from astropy.table import Table
 
 from plateviz.dashboard.navigation.navigation import Navigation
 from plateviz.dashboard.navigation.solution_list import Entry, SolutionList, by_label, label_of
-from plateviz.dashboard.session.solution import Request
 from plateviz.dashboard.views.elements.markup import markup_pane, numbers, paragraph, themed
 from plateviz.dashboard.views.saving.save_button import SaveButton
 from plateviz.dashboard.views.saving.save_choices import table_choices
@@ -95,9 +94,7 @@ class CompareView(pn.viewable.Viewer):
         entry = self._entries.get(str(self._other.value))
         self._message = ""
         try:
-            found = None if entry is None else self._list.load(entry)
-            if isinstance(found, Request):
-                raise InputError("this solution has to be fitted again: show it first")
+            found = None if entry is None else self._list.to_compare_with(entry)
             self._session.compare_with(found)
         except InputError as error:
             self._message = str(error)

@@ -264,10 +264,10 @@ def test_copied_orbit_is_refused(survey):
 
 
 def test_solution_of_another_orbit_is_refused(survey):
-    run = Run(survey, "default")
-    shutil.rmtree(run.orbit_directory(1))
-    shutil.copytree(run.orbit_directory(0), run.orbit_directory(1))
-    opened = SurveyRun(run)
+    files = RunDirectory(survey, "default")
+    shutil.rmtree(files.orbit_directory(1))
+    shutil.copytree(files.orbit_directory(0), files.orbit_directory(1))
+    opened = Run(files)
     with pytest.raises(InputError, match=r"orbit=0001: expected orbit 1, found 0; remove the dir"):
         opened.result(1)
     assert set(opened.result(0).exposures["orbit_id"]) == {0}

@@ -201,8 +201,9 @@ def make_run(folder: Path, orbit: OrbitData, complete: bool = True) -> RunDirect
             source_id=FIRST_ID + np.arange(N_SOURCES), orbit_id=number
         )
         summary = {**result.summary, "epoch_mjd": 62000.0 + number, "iterations": 3}
+        exposures = result.exposures.assign(orbit_id=number)
         changed = {"settings": settings, "summary": summary, "instrument": MINI_MOCK}
-        run.keep(number, replace(result, **changed), {"history": history})
+        run.keep(number, replace(result, exposures=exposures, **changed), {"history": history})
     if complete:
         _gather(run, random)
         run.mark_complete()

@@ -34,6 +34,7 @@ from solver.data.columns import Column, Table
 from solver.data.parameters import PARAMETERS
 from solver.data.schema import EXPOSURE_KEY, EXPOSURES, RESIDUALS
 from solver.data.survey_schema import HISTORY, MOTIONS, RUN_ORBITS
+from solver.errors import InputError
 from solver.io.parquet import count_rows, read_columns
 
 MOST_ROWS = 2**25
@@ -171,8 +172,10 @@ def explorable_of_run(run: Run, rows: str, kept: ColumnCache) -> ExplorableTable
     Raises
     ------
     InputError
-        If a file is missing or damaged; also from the methods of the table.
+        If the run is gone, or a file missing or damaged; also from the methods of the table.
     """
+    if not run.is_there():
+        raise InputError(f"the run {run.name} is not on the disk any more")
     if rows == "motions":
         motions = run.motions()
         added = {"chi2_per_dof": chi2_per_dof(motions), "source_class": class_names(motions)}

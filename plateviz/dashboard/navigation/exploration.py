@@ -48,6 +48,7 @@ class Exploration(param.Parameterized):
     is_log_y = param.Boolean(default=False, doc="whether the left axis is logarithmic")
     has_median = param.Boolean(default=False, doc="whether medians in bins are drawn")
     selects = param.Selector(objects=[*KINDS], doc="what a drag in the picture selects")
+    returns = param.Integer(default=0, doc="how often what the rows are of was gone, and came back")
     limits = param.Tuple(default=None, length=2, allow_None=True, doc="limits of the axes, or None")
 
     def __init__(self, tables: list[str], **values: Any) -> None:  # noqa: ANN401 as param

@@ -15,8 +15,11 @@ def look_for_run(navigation: Navigation) -> None:
     if runs.look() and runs.first is not None:
         navigation.param["run_name"].objects = list(runs)
         navigation.run_name = navigation.run_name or runs.first.name
-    run = navigation.run
+    run, before = navigation.run, navigation.session.loss
     navigation.session.loss = "" if run is None else _loss(run)
+    if before and not navigation.session.loss:
+        # What could not be read while it was gone is read now.
+        navigation.survey_exploration.returns += 1
     if navigation.workspace is SurveyWorkspace.COMPARE:
         navigation.session.run_comparison.look(navigation.run_name, runs)
 

@@ -112,7 +112,7 @@ class RunRows:
         run, name = self._navigation.run, self.exploration.table
         if run is None:
             return None
-        key = (run.name, self._navigation.run_progress, name)
+        key = (run.name, self._navigation.run_progress, self.exploration.returns, name)
         make = partial(explorable_of_run, run, name, self._columns)
         return TableRequest(list(COLUMNS_OF_RUN[name]), key, partial(self._once, key, make))
 

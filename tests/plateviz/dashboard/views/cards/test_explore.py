@@ -9,6 +9,7 @@ import pytest
 from bokeh.events import RangesUpdate, SelectionGeometry
 
 from plateviz.dashboard.navigation import rows_to_explore
+from plateviz.dashboard.navigation.lost_run import look_for_run
 from plateviz.dashboard.navigation.navigation import Navigation, View
 from plateviz.dashboard.navigation.rows_to_explore import OrbitRows, RunRows
 from plateviz.dashboard.saving import explored_file
@@ -101,6 +102,19 @@ def test_figure_is_drawn_when_its_columns_are_read(view, executor):
     assert len(executor.waiting) == 1
     draw(view, executor)
     assert title(view) == "residual_x against focal_x"
+
+
+def test_rows_of_a_run_that_was_gone_are_drawn_once_it_is_back(view, executor, navigation, broken):
+    navigation.run.is_there, navigation.run.is_replaced = lambda: not broken, lambda: False
+    broken.add("nx")
+    look_for_run(navigation)
+    navigation.survey_exploration.x = "nx"
+    draw(view, executor)
+    assert "This figure cannot be drawn" in card(view)._body[0].object
+    broken.clear()
+    look_for_run(navigation)
+    draw(view, executor)
+    assert title(view) == "residual_x against nx"
 
 
 def test_figure_on_the_screen_stays_while_the_next_is_made(view, executor, navigation):

@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import NamedTuple
 
-from astropy.table import Table
+import numpy as np
+from astropy.table import Column, Table
 from bokeh.core.enums import OutputBackendType
 from bokeh.embed import json_item
 
@@ -16,6 +17,9 @@ from plateviz.figures.figure_tables import figure_tables
 from solver.errors import InputError
 
 _PICTURES: Mapping[str, OutputBackendType] = {"png": "canvas", "svg": "svg"}
+
+# Columns of figures with the ids that the tables of files have.
+_IDS = {"id", "orbit_id", "detector_id"}
 
 
 class FigureOnScreen(NamedTuple):
@@ -63,11 +67,25 @@ def figure_choices(
 
     def tables() -> Mapping[str, Table]:
         figure = shown().figure
-        return figure_tables(figure) if saved.tables is None else saved.tables()
+        return figure_files(figure) if saved.tables is None else saved.tables()
 
     pictures = {suffix.upper(): partial(picture, suffix) for suffix in _PICTURES}
     data = table_choices(stem, tables)
     return pictures | {f"Data as {form}": make for form, make in data.items()}
+
+
+def figure_files(figure: Figure) -> dict[str, Table]:
+    """Return the tables of a figure for files, in which ids are whole numbers.
+
+    A browser has them as text, since its numbers have fewer digits.
+    """
+    tables = figure_tables(figure)
+    for table in tables.values():
+        for name in _IDS & {*table.colnames}:
+            texts = np.asarray(table[name])
+            if texts.dtype.kind == "U" and np.char.isdecimal(texts).all():
+                table[name] = Column(texts.astype(np.int64), description=table[name].description)
+    return tables
 
 
 def table_choices(stem: Callable[[], str], tables: Callable[[], Mapping[str, Table]]) -> Choices:

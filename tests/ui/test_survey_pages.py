@@ -263,9 +263,15 @@ def test_a_source_is_looked_for_and_carried_by_the_address(page, open_page, tmp_
     turn_to(page, "Source")
     expect(page.locator("p.empty:visible")).to_contain_text("Write a source's id")
     labels = page.locator("label.MuiInputLabel-root:visible")
-    assert labels.count() > 1
+    expect(labels.nth(1)).to_be_visible()
     assert len(set(labels.evaluate_all("all => all.map(e => getComputedStyle(e).fontSize)"))) == 1
+    # The entry is as high as the choices beside it, and its label in the middle of it.
+    frames = page.locator(".MuiOutlinedInput-root:visible")
+    assert len({round(one.bounding_box()["height"]) for one in frames.all()}) == 1
     entry = page.get_by_label("Source id")
+    middle = lambda box: box["y"] + box["height"] / 2  # noqa: E731
+    label = labels.filter(has_text="Source id").bounding_box()
+    assert abs(middle(label) - middle(entry.bounding_box())) < 1.5
     entry.fill("17")
     entry.press("Enter")
     expect(page.locator("p.empty:visible")).to_have_text("Run 'default' has no source 17.")

@@ -217,7 +217,7 @@ def test_run_that_is_removed_meanwhile_is_refused_by_name(copied):
     assert table.numbers("nx") is known
     for rows in COLUMNS_OF_RUN:
         with pytest.raises(InputError, match="the run default is not on the disk any more"):
-            explorable_of_run(SurveyRun(copied), rows, ColumnCache())
+            explorable_of_run(Run(copied), rows, ColumnCache())
 
 
 def test_columns_of_one_name_are_refused(copied):

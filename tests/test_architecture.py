@@ -47,12 +47,12 @@ FOLDERS = {
 DASHBOARD = (
     "serving",
     "address_parts",
+    "at_rest",
     "selection",
     "session",
     "navigation",
     "saving",
     "views",
-    "at_rest",
     "ticker",
     "app",
     "server",

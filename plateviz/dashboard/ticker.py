@@ -10,6 +10,7 @@ from param.parameterized import Event
 from tornado.ioloop import IOLoop
 
 from plateviz.dashboard.at_rest import AtRest
+from plateviz.dashboard.navigation.figures_ahead import FiguresAhead
 from plateviz.dashboard.navigation.lost_run import look_for_run
 from plateviz.dashboard.navigation.navigation import WORKSPACES, Navigation
 from plateviz.dashboard.serving.model_search import one_search
@@ -86,7 +87,9 @@ class PageTicker:
         self.wake()
         self._follow_run()
         self._looks_for_run: AtRest | None = None
+        self._ahead: FiguresAhead | None = None
         if later is not None:
+            self._ahead = FiguresAhead(navigation, self._expected, later)
             self._looks_for_run = AtRest(self._look_soon, _LOOK_FOR_RUN_SECONDS, later)
             self._looks_for_run.begin()
 
@@ -199,6 +202,8 @@ class PageTicker:
         self._navigation.expect_orbit()
         self._expected.ask()
         self._rest.begin()
+        if self._ahead is not None:
+            self._ahead.begin()
 
 
 def _is_brief(job: Job | None) -> bool:

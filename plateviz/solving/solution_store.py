@@ -193,6 +193,10 @@ class SolutionStore:
         """
         return self._results.get(self._directory(orbit, settings, what_if))
 
+    def has_result(self, orbit: int | None, settings: FitSettings, what_if: bool = False) -> bool:
+        """Return whether a solution is there, requested or expected; it is not read for that."""
+        return is_written(self._directory(orbit, settings, what_if))
+
     def keep(self, made: MadeSolution, name: str) -> KeptSolution:
         """Keep a solution on disk under a name.
 

@@ -1,5 +1,7 @@
 """ExpectedWhatIfs: what-ifs that a person may ask for next, which the solver makes while idle."""
 
+from contextlib import suppress
+
 from plateviz.dashboard.session.fit_choices import FitChoices
 from plateviz.dashboard.session.selection_actions import SelectionActions
 from plateviz.dashboard.session.session import Session
@@ -39,22 +41,42 @@ class ExpectedWhatIfs:
 
     def settings(self) -> list[FitSettings]:
         """Return their settings, the likeliest first."""
+        now, fitted = self._now(), self._session.fitted
+        if now is None or fitted is None:
+            return []
+        lowest = FitChoices.param["order"].bounds[0]
+        orders = [now.order - 1, now.order + 1]
+        of_orders = [
+            now.with_(order=order) for order in orders if lowest <= order <= fitted.settings.order
+        ]
+        return self._unknown([*self._typed(), *self._without_selected(now), *of_orders])
+
+    def without_selection(self) -> FitSettings | None:
+        """Return the settings of that without the selection; None if it is none of them."""
+        now = self._now()
+        found = [] if now is None else self._unknown(self._without_selected(now))
+        return found[0] if found else None
+
+    def _now(self) -> FitSettings | None:
+        """Return the settings of the controls; None if no what-if starts from them."""
+        with suppress(InputError):
+            now = self._session.choices.settings()
+            if self._session.fitted is not None and now.engine == ENGINES[0]:
+                return now
+        return None
+
+    def _without_selected(self, now: FitSettings) -> list[FitSettings]:
+        if not self._session.selection.selected or self._actions.is_left_out:
+            return []
+        return [self._actions.without_selected(now)]
+
+    def _unknown(self, found: list[FitSettings]) -> list[FitSettings]:
+        """Return what-ifs with some settings, but for those that are there."""
         session = self._session
         fitted = session.fitted
-        try:
-            now = session.choices.settings()
-        except InputError:
+        if fitted is None:
             return []
-        if fitted is None or now.engine != ENGINES[0]:
-            return []
-        found = self._typed()
-        if session.selection.selected and not self._actions.is_left_out:
-            found.append(self._actions.without_selected(now))
-        lowest = FitChoices.param["order"].bounds[0]
-        for order in (now.order - 1, now.order + 1):
-            if lowest <= order <= fitted.settings.order:
-                found.append(now.with_(order=order))
-        known = [now, *(solution.settings for solution in session.solutions)]
+        known = [self._now(), *(solution.settings for solution in session.solutions)]
         return [what_if_settings(one, fitted.settings) for one in found if one not in known]
 
     def _typed(self) -> list[FitSettings]:

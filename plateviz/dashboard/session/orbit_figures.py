@@ -54,12 +54,22 @@ def chosen_of(session: Session) -> Chosen | None:
     shown = session.shown
     if shown is None:
         return None
+    return _chosen(session, shown.result, session.other.result if session.other else None)
+
+
+def chosen_next(session: Session, result: FitResult) -> Chosen:
+    """Return what `chosen_of` will be with a what-if of the solution on the screen."""
+    other = session.chosen_other or session.fitted
+    return _chosen(session, result, other.result if other else None)
+
+
+def _chosen(session: Session, result: FitResult, other: FitResult | None) -> Chosen:
     return Chosen(
-        result=shown.result,
-        instrument=instrument_of(shown.result, otherwise=session.store.instrument),
-        exposures=tuple(session.shown_part.exposures_of(shown.result)),
+        result=result,
+        instrument=instrument_of(result, otherwise=session.store.instrument),
+        exposures=tuple(session.shown_part.exposures_of(result)),
         detector=session.shown_part.detector_id,
-        other=session.other.result if session.other else None,
+        other=other,
         simulation=session.store.simulation,
     )
 

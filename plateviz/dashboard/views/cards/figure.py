@@ -44,7 +44,7 @@ _AT_THE_TOP = {
     "align-items": "flex-start",
     "justify-content": "flex-start",
 }
-_WHAT_TO_DO = "The other figures do not depend on it; it is tried again with the next solution."
+_WHAT_TO_DO = "The other figures do not depend on it; it is tried again at the next change."
 _LOG = logging.getLogger(__name__)
 
 Part = pn.viewable.Viewable | pn.viewable.Viewer

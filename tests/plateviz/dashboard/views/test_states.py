@@ -248,7 +248,7 @@ def test_figure_that_cannot_be_drawn_has_no_words_or_numbers_of_the_one_before()
     view.visibility.param.update(is_near=True, room=[500, 400])
     view.draw()
     assert view._tools.summary == "This figure cannot be drawn: no sources"
-    assert "tried again with the next solution" in view._body[0].object
+    assert "tried again at the next change" in view._body[0].object
     assert view._text_tables() == []
 
 

@@ -4,6 +4,7 @@ import json
 import shutil
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 
@@ -15,11 +16,16 @@ from solver.data.settings import FitSettings
 from solver.io.result import write_result
 
 
+def of_orbit(result, orbit):
+    """Return a result as that of another orbit."""
+    return replace(result, exposures=result.exposures.assign(orbit_id=orbit))
+
+
 @pytest.fixture
 def run_dir(survey_folder, fit_result):
     """A survey with a run in which orbit 0 is fitted and orbit 1 has failed."""
     run = begin_run(survey_folder, "default", FitSettings())
-    write_fitted_orbit(run.orbit_directory(0), fit_result)
+    write_fitted_orbit(run.orbit_directory(0), of_orbit(fit_result, 0))
     run.keep_failure(1, "orbit 1: the data leave a direction unconstrained")
     return survey_folder
 
@@ -141,14 +147,14 @@ def test_pdf_without_chromium_is_refused_before_writing(run, run_dir, tmp_path, 
 @pytest.fixture
 def whole_run(run_dir, fit_result):
     """A run in which two orbits are fitted and one has failed."""
-    write_fitted_orbit(RunDirectory(run_dir, "default").orbit_directory(2), fit_result)
+    write_fitted_orbit(RunDirectory(run_dir, "default").orbit_directory(2), of_orbit(fit_result, 2))
     return run_dir
 
 
 def test_two_runs_are_compared(run, whole_run, fit_result, tmp_path):
     other = begin_run(whole_run, "low", FitSettings(order=3))
     for orbit in range(3):
-        write_fitted_orbit(other.orbit_directory(orbit), fit_result)
+        write_fitted_orbit(other.orbit_directory(orbit), of_orbit(fit_result, orbit))
     arguments = ["--other", "low", "--both", "orbit-health", "-o", tmp_path / "r.html"]
     code, _, _ = run("report", whole_run, *arguments)
     assert code == 0

@@ -2,6 +2,7 @@
 
 import asyncio
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 
 from bokeh.document import Document
 from panel.io.state import set_curdoc
@@ -81,7 +82,9 @@ def test_page_that_has_ended_is_neither_looked_at_nor_woken(fit_result):
         ticker.wake()
         return ticker
 
-    assert not asyncio.run(end_page())._is_to_tick
+    # The loop of a browser's tests may run in this one.
+    with ThreadPoolExecutor(1) as thread:
+        assert not thread.submit(lambda: asyncio.run(end_page())).result()._is_to_tick
 
 
 def test_run_that_begins_is_offered_and_the_first_one_shown(fit_result, survey_folder):

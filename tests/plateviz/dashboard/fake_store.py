@@ -58,7 +58,7 @@ class FakeStore:
     def __init__(self, result):
         self._result = result
         self.requested, self.prepared, self.cancelled, self.abandoned = [], [], [], []
-        self.left, self.pauses, self.has_made = [], 0, False
+        self.left, self.pauses, self._has_result = [], 0, False
         self.judge = JudgedAll()
         self.background = AtOnce()
         self.run_reader = RunReader(self.background)
@@ -92,4 +92,4 @@ class FakeStore:
         return self._result
 
     def has_result(self, orbit, settings, what_if=False):
-        return self.has_made
+        return self._has_result

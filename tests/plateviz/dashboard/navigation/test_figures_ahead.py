@@ -79,14 +79,14 @@ def test_they_are_made_once_the_solver_has_made_the_solution(live, ahead, timers
     ahead.begin()
     wait(timers)
     assert plotted == []
-    live.store.has_made = True
+    live.store._has_result = True
     wait(timers)
     assert len(plotted) > 2
     assert timers == []
 
 
 def test_a_click_finds_them(live, navigation, ahead, timers, following, plotted):
-    live.store.has_made = True
+    live.store._has_result = True
     ahead.begin()
     wait(timers)
     SelectionActions(live).leave_out()
@@ -101,7 +101,7 @@ def test_a_click_finds_them(live, navigation, ahead, timers, following, plotted)
 
 
 def test_nothing_is_made_without_a_selection(live, ahead, timers, plotted):
-    live.store.has_made = True
+    live.store._has_result = True
     live.selection.select_sources(frozenset())
     ahead.begin()
     wait(timers)

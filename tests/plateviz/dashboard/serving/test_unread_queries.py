@@ -12,7 +12,8 @@ def test_query_with_what_only_looks_like_a_number_is_no_error(value):
     ignore_unreadable_queries()
     location = Location()
     location.search = f"?orbit={value}"
-    assert location.query_params == {}
+    # Later versions of Panel read a superscript as a text.
+    assert location.query_params in ({}, {"orbit": value})
     location.search = "?orbit=3"
     assert location.query_params == {"orbit": 3}
 

@@ -39,8 +39,16 @@ WINDOW = "window"
 LONGEST_ADDRESS = 20_000
 """Most characters of an address: its websocket sends it once more, with a token that repeats it."""
 
-_FULL = Path(__file__).with_name("full.html")
-_TOO_LONG = Path(__file__).with_name("too_long.html")
+_REFUSED = Path(__file__).with_name("refused.html")
+_TOO_LONG = [
+    f"This address is too long to be read: it has more than {LONGEST_ADDRESS:,} characters. "
+    "Nothing of it is shown.",
+    "A selection or settings too large for an address are kept under a name, or sent as the file "
+    "that Save view in the bar of the page makes.",
+]
+_WHEN_FULL = "Close a page that is no longer needed. This one looks again every 30 seconds."
+# After so long, a page for which there was no room looks again.
+_AGAIN_SECONDS = 30
 _BEGIN = Path(__file__).with_name("begin.js")
 _COMPONENTS = Path(__file__).with_name("components.js")
 _OPENING = Path(__file__).with_name("opening.html")
@@ -88,16 +96,23 @@ class PageHandler(DocHandler):
             return
         if len(self.request.uri or "") > LONGEST_ADDRESS:
             self.set_status(HTTPStatus.REQUEST_URI_TOO_LONG)
-            self.render(str(_TOO_LONG), most=f"{LONGEST_ADDRESS:,}", page=f"{prefix}/")
+            self._refuse("the address is too long", _TOO_LONG, page=f"{prefix}/")
             return
         reason = self._limits.pages.reason(self._limits.client_of(self.request))
         if reason:
             self.set_status(503)
-            self.set_header("Retry-After", "30")
-            self.render(str(_FULL), reason=reason)
+            self.set_header("Retry-After", str(_AGAIN_SECONDS))
+            self._refuse("all pages are open", [reason, _WHEN_FULL], seconds=_AGAIN_SECONDS)
             return
         self.set_header("Content-Type", "text/html")
         self.write(self._page.with_token(self._token()))
+
+    def _refuse(
+        self, title: str, sentences: list[str], *, seconds: int = 0, page: str = ""
+    ) -> None:
+        """Say why there is no page: it looks again after some seconds, or links another one."""
+        words = {"title": title, "sentences": sentences, "seconds": seconds, "page": page}
+        self.render(str(_REFUSED), **words)
 
     def _log(self) -> None:
         """Log no address that is too long to be read."""

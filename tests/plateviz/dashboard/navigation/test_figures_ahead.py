@@ -9,22 +9,15 @@ from plateviz.dashboard.navigation.figures_ahead import FiguresAhead
 from plateviz.dashboard.session.expected_what_ifs import ExpectedWhatIfs
 from plateviz.dashboard.session.orbit_figures import chosen_of, figure_of, figures_of
 from plateviz.dashboard.session.selection_actions import SelectionActions
-from plateviz.dashboard.session.session import Session
 from plateviz.plots.workspace import OrbitWorkspace
-from solver.data.settings import FitSettings
-from tests.plateviz.dashboard.fake_store import FakeStore
-from tests.plateviz.dashboard.session.test_session import finish
+from tests.plateviz.dashboard.fake_store import finish
 
 
 @pytest.fixture
-def live(fit_result):
-    """A session with a solution on the screen and three sources selected."""
-    made = Session(FakeStore(fit_result))
-    made.show_orbit(0, FitSettings(order=5))
-    finish(made)
-    made.choices.load(FitSettings(order=5))
-    made.selection.select_sources(frozenset(fit_result.sources["source_id"].tolist()[:3]))
-    return made
+def live(live, fit_result):
+    """The session with three sources selected."""
+    live.selection.select_sources(frozenset(fit_result.sources["source_id"].tolist()[:3]))
+    return live
 
 
 @pytest.fixture

@@ -10,18 +10,8 @@ from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.controls.fit_controls import width_input
 from solver.data.parameters import BY_NAME
 from solver.data.settings import FitSettings
-from tests.plateviz.dashboard.fake_store import FakeStore
-from tests.plateviz.dashboard.session.test_session import finish, of_run
-
-
-@pytest.fixture
-def live(fit_result):
-    """A session with a solution of order 5 on the screen."""
-    made = Session(FakeStore(fit_result))
-    made.show_orbit(0, FitSettings(order=5))
-    finish(made)
-    made.choices.load(FitSettings(order=5))
-    return made
+from tests.plateviz.dashboard.fake_store import FakeStore, finish
+from tests.plateviz.dashboard.session.test_session import of_run
 
 
 @pytest.fixture

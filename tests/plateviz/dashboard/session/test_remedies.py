@@ -5,29 +5,18 @@ from dataclasses import replace
 import pytest
 
 from plateviz.dashboard.session.remedies import remedies, try_settings
-from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.views.panes.remedies import RemediesView
 from plateviz.verdict.causes import Cause
 from plateviz.verdict.verdict import Verdict
 from solver.data.settings import FitSettings
 from solver.data.subset import Subset
-from tests.plateviz.dashboard.fake_store import FakeStore
-from tests.plateviz.dashboard.session.test_session import finish
+from tests.plateviz.dashboard.fake_store import finish
 
 DRIFT = FitSettings(drift=2)
 
 
 def cause(*options, title="the distortion drifts"):
     return Cause("drift", title, "Evidence.", 43.2, "It spoils all.", "let it", options, True)
-
-
-@pytest.fixture
-def live(fit_result):
-    """A session with a solution on the screen, which shows a what-if at every change."""
-    made = Session(FakeStore(fit_result))
-    made.show_orbit(0)
-    finish(made)
-    return made
 
 
 @pytest.mark.parametrize("options", [(), ("--drift 2",), ("--of-another-version 3",)])

@@ -12,18 +12,8 @@ from plateviz.runs.kept_selections import KeptSelections
 from solver.data.settings import FitSettings
 from solver.data.subset import NOTHING, Subset
 from solver.errors import InputError
-from tests.plateviz.dashboard.fake_store import FakeStore
+from tests.plateviz.dashboard.fake_store import FakeStore, finish
 from tests.plateviz.dashboard.fake_survey import SurveyStore
-from tests.plateviz.dashboard.session.test_session import finish
-
-
-@pytest.fixture
-def live(fit_result):
-    """A session with a solution on the screen, which shows a what-if at every change."""
-    made = Session(FakeStore(fit_result))
-    made.show_orbit(0)
-    finish(made)
-    return made
 
 
 @pytest.fixture

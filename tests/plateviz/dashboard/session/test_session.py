@@ -9,7 +9,7 @@ from plateviz.dashboard.session.solution import Request, Solution
 from plateviz.dashboard.session.stage import Stage
 from solver.data.settings import SETTINGS, FitSettings
 from solver.errors import InputError
-from tests.plateviz.dashboard.fake_store import FakeStore
+from tests.plateviz.dashboard.fake_store import FakeStore, finish
 
 
 @pytest.fixture
@@ -30,11 +30,6 @@ def live(session):
 
 def of_run(result, orbit=0):
     return Solution(orbit, result.settings, result, run="default")
-
-
-def finish(session):
-    session.job.take({"event": "done"})
-    session.poll()
 
 
 def test_first_orbit_is_requested_with_the_settings_of_the_paper(session):

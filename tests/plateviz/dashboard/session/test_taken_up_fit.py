@@ -7,8 +7,7 @@ from plateviz.dashboard.session.session import Session
 from plateviz.dashboard.session.stage import Stage
 from plateviz.solving.job import JobStatus
 from solver.data.settings import FitSettings
-from tests.plateviz.dashboard.fake_store import FakeStore
-from tests.plateviz.dashboard.session.test_session import finish
+from tests.plateviz.dashboard.fake_store import FakeStore, finish
 
 KEY = "0123456789abcdef" * 2
 SETTINGS = FitSettings(order=4, engine="svi")

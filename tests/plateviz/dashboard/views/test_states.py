@@ -25,8 +25,8 @@ from plateviz.runs.scratch_result import (
 )
 from plateviz.solving.run_reader import RunReader
 from solver.errors import InputError
+from tests.plateviz.dashboard.fake_store import finish
 from tests.plateviz.dashboard.fake_survey import FakeRun, SurveyStore
-from tests.plateviz.dashboard.session.test_session import finish
 from tests.plateviz.solving.waiting import Waiting
 
 LOADING = "The first solution is being computed."

@@ -29,6 +29,7 @@ from plateviz.dashboard.views.elements.markup import (
 )
 from plateviz.dashboard.views.elements.stack import Stack
 from plateviz.dashboard.views.elements.table import DataTable
+from plateviz.dashboard.views.pages.unread_run import RELOAD, unread_run
 from plateviz.dashboard.views.panes.notable_source import NotableSourceLink
 from plateviz.dashboard.views.panes.run_remark import RunRemark
 from plateviz.dashboard.views.saving.save_button import SaveButton
@@ -56,7 +57,6 @@ _INVITATION = (
     "Write a source's id on the left, choose one below, or tap its point in a figure of the "
     "Survey or the Orbit view and open it."
 )
-_WHAT_TO_DO = "Reload the page once the run is there again."
 _MEASUREMENTS = (
     "A click on an orbit opens it with this source selected, on the residual map of the exposure "
     "and detector that measured it first. So does a tap on the point of an orbit in the figures."
@@ -201,13 +201,13 @@ class SourcePage(pn.viewable.Viewer):
             try:
                 sources = source_list(run.counts())
             except InputError as error:
-                self._invitation = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
+                self._invitation = unread_run(error)
                 self._list.show(pd.DataFrame(columns=list(SOURCES_OF_RUN)))
                 return
             self._invitation = _INVITATION
             if sources.empty:
                 # A run that has been removed has none, as one that has just begun.
-                self._invitation = _NO_SOURCES if run.is_there() else f"{_NO_RUN} {_WHAT_TO_DO}"
+                self._invitation = _NO_SOURCES if run.is_there() else f"{_NO_RUN} {RELOAD}"
             self._list.show(sources)
 
     def _show(self, *_: object) -> None:

@@ -32,6 +32,7 @@ from plateviz.dashboard.views.elements.markup import (
 )
 from plateviz.dashboard.views.elements.stack import Stack
 from plateviz.dashboard.views.elements.table import DataTable
+from plateviz.dashboard.views.pages.unread_run import unread_run
 from plateviz.dashboard.views.panes.compare_runs import CompareRunsView
 from plateviz.dashboard.views.panes.notable_source import NotableSourceLink
 from plateviz.dashboard.views.saving.save_button import SaveButton
@@ -52,7 +53,6 @@ from solver.errors import InputError
 # As high as the headline of a verdict, so that nothing moves when this comes.
 _BEING_READ = "<p class='verdict judging'>This run is being read and judged.</p>"
 _NO_OTHER = "No other run has been read."
-_WHAT_TO_DO = "What was read before stays. Reload the page once the run is there again."
 _COLUMNS = {SurveyWorkspace.VERDICT: 1, SurveyWorkspace.CATALOGUE: 3}
 
 
@@ -226,7 +226,7 @@ class SurveyPage(pn.viewable.Viewer):
         try:
             self._shown = read.result()
         except InputError as error:
-            self._failure = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
+            self._failure = unread_run(error, has_before=True)
 
     def _read(self, *_: object) -> None:
         run, store = self._navigation.run, self._session.store
@@ -236,7 +236,7 @@ class SurveyPage(pn.viewable.Viewer):
             try:
                 self._being_read = store.run_reader.read(run)
             except InputError as error:
-                self._failure = f"The run cannot be read: {error}. {_WHAT_TO_DO}"
+                self._failure = unread_run(error, has_before=True)
         if run is not None and self._shown is not None and self._shown.run.name != run.name:
             self._shown = None
         if self._being_read is not None and self._being_read.done():

@@ -39,7 +39,8 @@ WINDOW = "window"
 LONGEST_ADDRESS = 20_000
 """Most characters of an address: its websocket sends it once more, with a token that repeats it."""
 
-_REFUSED = Path(__file__).with_name("refused.html")
+# Tornado looks for templates beside this file.
+_REFUSED = "refused.html"
 _TOO_LONG = [
     f"This address is too long to be read: it has more than {LONGEST_ADDRESS:,} characters. "
     "Nothing of it is shown.",
@@ -112,7 +113,7 @@ class PageHandler(DocHandler):
     ) -> None:
         """Say why there is no page: it looks again after some seconds, or links another one."""
         words = {"title": title, "sentences": sentences, "seconds": seconds, "page": page}
-        self.render(str(_REFUSED), **words)
+        self.render(_REFUSED, **words)
 
     def _log(self) -> None:
         """Log no address that is too long to be read."""

@@ -17,7 +17,8 @@ from solver.errors import InputError
 # Too many to be guessed through a network.
 _SHORTEST = 12
 _LARGEST_BYTES = 1024
-_PAGE = Path(__file__).with_name("login.html")
+# Tornado looks for templates beside this file.
+_PAGE = "login.html"
 _USER, _COOKIE = "plateviz", "plateviz-login"
 _DELAY_SECONDS = 1.0
 # A second slash, or a backslash, would begin the name of another host.
@@ -113,7 +114,7 @@ class _LoginPage(RequestHandler):
 
     def _ask(self, is_wrong: bool) -> None:
         self.set_header("Cache-Control", "no-store")
-        self.render(str(_PAGE), is_wrong=is_wrong, next=self._next())
+        self.render(_PAGE, is_wrong=is_wrong, next=self._next())
 
     def _next(self) -> str:
         """Return the path to go on to, which is one of this server."""

@@ -7,7 +7,7 @@ from typing import TypeVar
 _Name = TypeVar("_Name")
 # Characters of an invalid value that a message repeats.
 _LONGEST = 40
-# Unknown parts that a message names.
+# Parts that a message names.
 _MOST_NAMED = 3
 # Bokeh adds some where the page is a part of another one, and Panel reads its theme.
 _OF_OTHERS = re.compile("bokeh-.*|theme")
@@ -39,15 +39,19 @@ def chosen(
 def unknown_parts(address: Mapping[str, str], known: Collection[str]) -> list[str]:
     """Return that parts of an address are unknown, in words; nothing if all are known."""
     names = [one for one in address if one not in known and not _OF_OTHERS.fullmatch(one)]
-    if not names:
-        return []
-    told = ", ".join(map(quoted, names[:_MOST_NAMED]))
-    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-    return [f"unknown parts, as of another version: {told}{more}"]
+    told = _listed([quoted(one) for one in names])
+    return [f"unknown parts, as of another version: {told}"] if told else []
 
 
 def repeated_parts(address: Mapping[str, Collection[object]]) -> list[str]:
     """Return which parts an address has more than once with different values, in words."""
-    names = [name for name, values in address.items() if len({*values}) > 1]
-    told = ", ".join(map(quoted, names[:_MOST_NAMED]))
-    return [f"expected once, of which the first one is shown: {told}"] if names else []
+    repeated = {name: len(values) for name, values in address.items() if len({*values}) > 1}
+    told = _listed([f"{quoted(name)} {count} times" for name, count in repeated.items()])
+    first = "the first one" if len(repeated) == 1 else "the first of each"
+    return [f"the address gives {told}, and {first} is shown"] if told else []
+
+
+def _listed(words: list[str]) -> str:
+    """Return the first of some words, and how many there are besides."""
+    more = f" and {len(words) - _MOST_NAMED} more" if len(words) > _MOST_NAMED else ""
+    return ", ".join(words[:_MOST_NAMED]) + more

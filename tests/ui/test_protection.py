@@ -93,7 +93,7 @@ def test_long_address_is_answered_in_words_unless_it_can_be_shown(address, open_
     numbers = "".join(secrets.choice("0123456789") for _ in range(19_950))
     page = open_page(f"{address}?orbit=0&sources={numbers}&unit=mas&unit=mpix")
     page.get_by_text("sources: expected 20 ids or fewer").wait_for()
-    page.get_by_text("expected once, of which the first one is shown: 'unit'").wait_for()
+    page.get_by_text("the address gives 'unit' 2 times, and the first one is shown").wait_for()
 
 
 @pytest.mark.parametrize("query", ["orbit=%C2%B2", f"orbit={'1' * 5000}", "theme=%ff&orbit=x"])

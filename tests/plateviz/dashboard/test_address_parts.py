@@ -53,7 +53,27 @@ def test_every_part_that_is_written_is_known(navigation, survey):
     assert "unknown" not in navigation.session.notice
 
 
-def test_parts_that_an_address_repeats_are_named():
-    address = {"view": [b"orbit", b"survey"], "unit": [b"mas", b"mas"], "orbit": [b"3"]}
-    assert repeated_parts(address) == ["expected once, of which the first one is shown: 'view'"]
-    assert repeated_parts({"orbit": [b"3"]}) == []
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"orbit": [b"3"], "unit": [b"mas", b"mas"]}, []),
+        (
+            {"view": [b"orbit", b"survey"], "unit": [b"mas", b"mas"], "orbit": [b"3"]},
+            ["the address gives 'view' 2 times, and the first one is shown"],
+        ),
+        (
+            {"view": [b"orbit", b"survey"], "unit": [b"mas", b"own", b"mas"]},
+            ["the address gives 'view' 2 times, 'unit' 3 times, and the first of each is shown"],
+        ),
+        (
+            dict.fromkeys("abcde", [b"1", b"2"]),
+            [
+                "the address gives 'a' 2 times, 'b' 2 times, 'c' 2 times and 2 more, "
+                "and the first of each is shown"
+            ],
+        ),
+    ],
+    ids=["none", "one", "two", "many"],
+)
+def test_parts_that_an_address_repeats_are_told(given, told):
+    assert repeated_parts(given) == told

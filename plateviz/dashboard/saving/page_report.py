@@ -21,6 +21,8 @@ from plateviz.solving.turns import Turns
 from solver.errors import InputError
 from solver.io.result_instrument import instrument_of
 
+_SOLUTION, _OTHER = "Solution", "Compared with solution"
+
 
 def page_report(navigation: Navigation) -> Later:
     """Return the report of the view on the screen as it is now; a thread makes it in its turn.
@@ -71,9 +73,9 @@ def _of_solution(navigation: Navigation) -> Later:
     if shown is None:
         raise InputError("no solution is shown yet")
     facts = facts_of(as_command(session.store.origin, shown.orbit, shown.settings))
-    facts["Report"]["Solution"] = shown.label
+    facts["Report"][_SOLUTION] = session.journal.label(shown)
     if other is not None:
-        facts["Report"]["Compared with solution"] = other.label
+        facts["Report"][_OTHER] = session.journal.label(other)
     make = partial(_solution, shown, other, session.store, facts, _on_screen(navigation))
     stem = session.shown_part.subject() + ("-what-if" if shown.is_replaceable else "")
     return _later(stem, make, session.store.reports)
@@ -102,8 +104,9 @@ def _solution(
         simulation=store.simulation,
         more=more,
     )
-    words = [report.subtitle, shown.label]
-    words += [f"compared with {other.label}"] if other is not None else []
+    labels = facts["Report"]
+    words = [report.subtitle, labels[_SOLUTION]]
+    words += [f"compared with {labels[_OTHER]}"] if other is not None else []
     return replace(report, subtitle="; ".join(words))
 
 

@@ -73,9 +73,21 @@ class Journal(param.Parameterized):
     def add(self, solution: Solution) -> None:
         """Remember a solution, unless it is on disk, or the next what-if replaces it."""
         if not (solution.run or solution.kept or solution.is_replaceable):
-            self.rename(MadeSolution(solution.orbit, solution.settings, solution.is_what_if), "")
+            self.rename(_made(solution), "")
 
     def rename(self, made: MadeSolution, name: str) -> None:
         """Give a solution of the session a name."""
         self._store.remember(self._key, made._replace(name=name))
         self.look()
+
+    def label(self, solution: Solution) -> str:
+        """Return the label of a solution, after the name that a person has given it."""
+        if solution.run or solution.kept:
+            # It was not made in this session, even if one with its settings was.
+            return solution.label
+        name = next((one.name for one in self.made if one.is_of(_made(solution))), "")
+        return f"{name}: {solution.label}" if name else solution.label
+
+
+def _made(solution: Solution) -> MadeSolution:
+    return MadeSolution(solution.orbit, solution.settings, solution.is_what_if)

@@ -99,6 +99,7 @@ class RefitView(pn.viewable.Viewer):
         session.choices.param.watch(self._show_widths, "prior_widths")
         session.param.watch(self._show_stage, ["stage", "message", "is_brief"])
         session.param.watch(self._show_solutions, ["solutions", "shown"])
+        session.journal.param.watch(self._show_solutions, "made")
         self._show_stage()
         self._show_solutions()
 
@@ -178,10 +179,11 @@ class RefitView(pn.viewable.Viewer):
         if shown is not None and not any(one is shown for one in listed):
             listed.append(shown)
         solutions: dict[str, Solution] = {}
-        for solution in listed:
+        labels = [self._session.journal.label(one) for one in listed]
+        for number, (label, solution) in enumerate(zip(labels, listed, strict=True)):
             # Different sources may be left out, of which the label has the number only.
-            same = sum(other.label == solution.label for other in solutions.values())
-            solutions[solution.label + (f" ({same + 1})" if same else "")] = solution
+            same = labels[:number].count(label)
+            solutions[label + (f" ({same + 1})" if same else "")] = solution
         chosen = next((s for s in solutions.values() if s is shown), None)
         self._solutions.param.update(options=solutions, value=chosen, visible=len(solutions) > 1)
 

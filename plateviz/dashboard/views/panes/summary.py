@@ -36,6 +36,7 @@ class HeadView(pn.viewable.Viewer):
         )
         self._session.param.watch(self._write, ["shown", "other", "stage", "theme"])
         self._session.judging.param.watch(self._write, "is_pending")
+        self._session.journal.param.watch(self._write, "made")
         self._session.units.param.watch(self._write, "unit")
         told = ["shown", "stage", "message", "is_brief", "theme"]
         self._session.param.watch(self._write_outdated, told)
@@ -54,9 +55,9 @@ class HeadView(pn.viewable.Viewer):
             self._head.object = paragraph(missing_text(session), "empty", session.theme)
             return
         is_open = self._navigation.orbit_workspace is OrbitWorkspace.VERDICT
-        names = [_name(shown, "(B) Solution" if other else "Solution")]
+        names = [self._name(shown, "(B) Solution" if other else "Solution")]
         if other is not None:
-            names.append(_name(other, "(A) Compared with solution"))
+            names.append(self._name(other, "(A) Compared with solution"))
         stale = " stale" if session.stage is Stage.STALE else ""
         verdict = session.units.text(self._verdict(shown.result, is_open))
         self._head.object = (
@@ -68,6 +69,10 @@ class HeadView(pn.viewable.Viewer):
         words = outdated_text(self._session)
         markup = paragraph(words, "outdated", self._session.theme) if words else ""
         self._outdated.param.update(object=markup, visible=bool(words))
+
+    def _name(self, solution: Solution, role: str) -> str:
+        of_orbit = "" if solution.orbit is None else f" of orbit {solution.orbit}"
+        return titled(role + of_orbit, self._session.journal.label(solution))
 
     def _verdict(self, result: FitResult, is_open: bool) -> str:
         if not self._session.store.judge.has_judged(result):
@@ -102,8 +107,3 @@ class StripView(pn.viewable.Viewer):
         stale = " stale" if session.stage is Stage.STALE else ""
         markup = session.units.text(numbers)
         self._strip.object = f"<div class='{session.theme}{stale}'>{markup}</div>"
-
-
-def _name(solution: Solution, role: str) -> str:
-    of_orbit = "" if solution.orbit is None else f" of orbit {solution.orbit}"
-    return titled(role + of_orbit, solution.label)

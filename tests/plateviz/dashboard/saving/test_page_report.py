@@ -67,6 +67,15 @@ def test_report_of_a_what_if_is_named_and_compared(navigation):
     assert "--order 3" in page
 
 
+def test_report_has_the_name_that_a_person_has_given_the_solution(navigation):
+    session = navigation.session
+    session.param.update(shown=session.shown._replace(run=""))
+    session.journal.add(session.shown)
+    session.journal.rename(session.journal.made[0], "mine")
+    _, page = made(page_report(navigation))
+    assert "mine: order 5" in page
+
+
 def test_report_has_what_explore_draws_while_it_is_on_the_screen(navigation):
     drawn = navigation.exploration
     drawn.table = "sources"

@@ -177,6 +177,22 @@ def test_two_solutions_that_are_exchanged_are_no_step_of_the_history(fresh):
     assert not bar.is_blink
 
 
+def test_solution_is_shown_with_the_name_that_a_person_gives_it(fresh):
+    session = fresh.session
+    head, choice = HeadView(fresh).__panel__()[0], RefitView(fresh)._solutions
+    finish(session)
+    (made,) = session.journal.made
+    session.journal.rename(made, "<first>")
+    assert "Solution of orbit 0:</span> <b>&lt;first&gt;: order 5</b>" in head.object
+    assert list(choice.options) == ["<first>: order 5"]
+    session.journal.rename(made, "mine")
+    of_run = session.shown._replace(run="default")
+    session.compare_with(of_run)
+    assert "<b>mine: order 5</b>" in head.object
+    # The solution of a run has the same settings, and is another one.
+    assert "<b>order 5</b>" in head.object
+
+
 def test_solution_of_another_run_is_among_those_to_choose_while_it_is_shown(fresh):
     session = fresh.session
     finish(session)

@@ -13,6 +13,9 @@ _ALONG_X = ("x", "x0", "x1", "xs", "left", "right")
 _ALONG_Y = ("y", "y0", "y1", "y2", "ys", "bottom", "top")
 _GREEK = re.compile("[α-ωΑ-Ω]")
 _UNIT = re.compile("_(mas|uas|mpix)$")
+# Units of a column with its name, and of an axis with its label: "x (mas, East to the left)".
+_OF_NAME = re.compile("_(mas|uas|arcmin|deg|mpix|mm|um|nm)$")
+_OF_LABEL = re.compile(r"\((mas|µas|arcmin|deg|mpix²?|pix|pixel|mm|µm|min|mag)[,)]")
 # Names at their places, which other marks have as well.
 _WITHOUT_NUMBERS = ("texts",)
 
@@ -25,8 +28,8 @@ def figure_tables(figure: Figure) -> dict[str, Table]:
     Name -> table. Coordinates are described by the label of their axis, with its unit. Of several
     frames, a name begins with the number of its frame, from 1. An image has a row per cell that
     has a value, at the cell's centre; outlines have a row per point, numbered by `path`. A unit at
-    the end of a column's name is that of its values. Names of tables are in ASCII, since those of
-    FITS have to be: `1σ expected` is `1sigma_expected`.
+    the end of a column's name, or in the label of its axis, is that of its values. Names of tables
+    are in ASCII, since those of FITS have to be: `1σ expected` is `1sigma_expected`.
     """
     found: dict[str, Table] = {}
     for number, frame in enumerate(figure, 1):
@@ -54,7 +57,9 @@ def _table(frame: Frame, glyphs: Glyphs) -> Table:
         in_file = _in_unit(name, glyphs.units.get(name))
         # A number in two units may be there twice in one that a person has chosen.
         if in_file not in table.colnames:
-            table[in_file] = Column(plain, description=described.get(name))
+            label = described.get(name)
+            unit = _unit(in_file, label) if plain.dtype.kind in "fiu" else None
+            table[in_file] = Column(plain, unit=unit, description=label)
     return table
 
 
@@ -66,6 +71,12 @@ def _in_ascii(name: str) -> str:
 def _in_unit(name: str, unit: str | None) -> str:
     """Return the name of a column with another unit at its end, if there was one."""
     return name if unit is None else _UNIT.sub(f"_{unit.replace('µ', 'u')}", name)
+
+
+def _unit(name: str, label: str | None) -> str | None:
+    """Return the unit of a column of numbers; None if it has none, or one for each row."""
+    found = _OF_NAME.search(name) or _OF_LABEL.search(label or "")
+    return None if found is None else found[1]
 
 
 def _cells(glyphs: Glyphs) -> Mapping[str, np.ndarray]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from plateviz.figures.figure import Figure, side_by_side
 from plateviz.figures.figure_tables import figure_tables
-from plateviz.figures.glyphs import line
+from plateviz.figures.glyphs import line, points
 
 
 def test_every_kind_of_mark_but_names_has_a_table(every_kind):
@@ -17,6 +17,16 @@ def test_every_kind_of_mark_but_names_has_a_table(every_kind):
     assert points["x"].tolist() == [1.0, 2.0, 3.0]
     assert points["id"].tolist() == ["7", "4611686018427387904", "9"]
     assert points["x"].description == "x (mm)"
+
+
+def test_columns_of_numbers_have_the_units_of_their_names_and_axes(framed_glyphs):
+    table = {"x": [1.0], "y": [2.0], "sigma_mas": [3.0], "n": [4], "name_mas": ["a"]}
+    hover = [("σ", "@{sigma_mas} mas"), ("n", "@{n}"), ("name", "@{name_mas}")]
+    frame = framed_glyphs([points(table, "x", "y", name="sources", color="mark", hover=hover)])[0]
+    labels = replace(frame.x, label="Δα cos δ (µas, East to the left)"), replace(frame.y, label="σ")
+    saved = figure_tables(Figure((replace(frame, x=labels[0], y=labels[1]),)))["sources"]
+    units = {name: saved[name].unit for name in saved.colnames}
+    assert units == {"x": "uas", "y": None, "sigma_mas": "mas", "n": None, "name_mas": None}
 
 
 def test_image_has_a_row_per_cell_at_its_centre(every_kind):

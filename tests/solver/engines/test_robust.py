@@ -64,7 +64,7 @@ def test_undisturbed_sources_are_not_biased(found, clean, axis):
     assert np.sqrt((moved**2).mean()) < 0.1
 
 
-@pytest.fixture(scope="module", params=["all", "exposure"])
+@pytest.fixture(scope="module", params=[pytest.param("all", marks=pytest.mark.full), "exposure"])
 def understated(request, found):
     """The disturbed orbit with half the uncertainties, of all exposures or of every third one."""
     rows = found[1].measurements

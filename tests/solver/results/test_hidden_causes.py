@@ -21,7 +21,7 @@ def subjects(result):
     return [one.test.subject for one in find_causes(diagnose(result)).found]
 
 
-@pytest.mark.parametrize("noise", ["noise=15%", "noise=-20%"])
+@pytest.mark.parametrize("noise", ["noise=15%", pytest.param("noise=-20%", marks=pytest.mark.full)])
 def test_tails_do_not_hide_noise_of_another_size(noise):
     """The outliers that are too small to be found make tails."""
     data = orbit_of("outliers=1%", noise)
@@ -39,7 +39,7 @@ def test_uncertainties_in_another_unit_are_named_and_not_the_sources():
     assert subjects(result)[0] == "noise"
 
 
-@pytest.mark.parametrize("width", [0.1, 1e-3])
+@pytest.mark.parametrize("width", [pytest.param(0.1, marks=pytest.mark.full), 1e-3])
 def test_prior_is_named_however_narrow_it_is(width):
     """The narrower it is, the closer to its centre it holds the values."""
     settings = FitSettings(prior_widths={"position_angle": width})
@@ -86,7 +86,14 @@ def test_what_patterns_explain_is_not_taken_from_other_exposures_than_those_they
     assert [one.test.subject for one in causes.found] == ["swing"]
 
 
-@pytest.mark.parametrize(("amplitude", "orbit"), [("150mas", 3), ("500mas", 1), ("500mas", 3)])
+@pytest.mark.parametrize(
+    ("amplitude", "orbit"),
+    [
+        pytest.param("150mas", 3, marks=pytest.mark.full),
+        ("500mas", 1),
+        pytest.param("500mas", 3, marks=pytest.mark.full),
+    ],
+)
 def test_large_jitter_names_its_own_exposures_only(amplitude, orbit):
     diagnosis = diagnose(fitted(f"pointing-jitter={amplitude}", orbit=orbit))
     causes = find_causes(diagnosis)

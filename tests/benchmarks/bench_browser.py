@@ -43,6 +43,8 @@ _FIRST_VISITS = 3
 _VISIT_MS = 3000
 # Between two keys of a person who types.
 _KEY_MS = 200
+# Exposures that are turned to in one direction; a field has 24.
+_TURNS = 20
 # Sources in the box that is drawn in the footprint.
 _MANY = 1000
 _ALL_NEW = "strip and all visible figures"
@@ -132,14 +134,15 @@ def actions(survey: Path) -> list[Action]:
 
 
 def next_exposure_or_detector(page: Page, number: int) -> Taken:
-    """Select the next exposure, or another detector."""
+    """Select the next exposure, to and fro, or another detector."""
     if number % 2:
         # The first option is all detectors.
         detector = unfolded(page, "Detector").nth(1 + (number + 1) // 2 % 4)
         return answered(page, detector.click, "residual-map", words=False)
     thumb = page.get_by_role("slider", name="Exposures of the field").last
     thumb.focus()
-    return answered(page, lambda: thumb.press("ArrowRight"), "residual-map", words=False)
+    key = "ArrowRight" if number // 2 // _TURNS % 2 == 0 else "ArrowLeft"
+    return answered(page, lambda: thumb.press(key), "residual-map", words=False)
 
 
 def next_order(page: Page, number: int) -> Taken:

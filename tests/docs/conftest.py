@@ -2,12 +2,10 @@
 
 import shutil
 import sys
-from contextlib import contextmanager
 
 import pytest
 from astropy.io import fits
 from astropy.table import Table
-from distributed import Client
 
 from plateviz.cli.main import main
 from solver.data.schema import CATALOGUE, ENVIRONMENT, MEASUREMENT
@@ -15,6 +13,7 @@ from solver.fit import fit_orbit
 from solver.io.result import write_result
 from solver.io.survey import read_survey_orbit
 from tests.docs.pages import REPOSITORY, built_site
+from tests.fitting import fitting_in_this_process
 
 
 @pytest.fixture(scope="session")
@@ -49,14 +48,13 @@ def workplace(stock, tmp_path, monkeypatch):
 def command(workplace, monkeypatch):
     """Return the function that runs a command line in this process and returns its exit code.
 
-    A worker in this process fits surveys; nothing is served or opened.
+    It fits surveys there, too; nothing is served or opened.
     """
-    monkeypatch.setattr("plateviz.runs.fit_survey.dask_client", _worker_here)
     monkeypatch.setattr("plateviz.cli.serve.run_server", lambda store, *_: store.close())
 
     def run(words):
         monkeypatch.setattr(sys, "argv", words)
-        with pytest.raises(SystemExit) as ended:
+        with fitting_in_this_process(), pytest.raises(SystemExit) as ended:
             main()
         return ended.value.code or 0
 
@@ -67,14 +65,6 @@ def command(workplace, monkeypatch):
 def site(tmp_path_factory):
     """The site, built once."""
     return built_site(tmp_path_factory)
-
-
-@contextmanager
-def _worker_here(*_):
-    with Client(
-        processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0"
-    ) as one:
-        yield one
 
 
 def _hdu(frame, table):

@@ -19,6 +19,7 @@ from solver.data.result import FitResult, FitStatus
 from solver.data.settings import FitSettings
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
+from tests.fitting import fitting_in_this_process
 from tests.plateviz.survey_tables import SurveySample, synthetic_survey
 
 FIRST_ID = 4_057_482_027_171_038_209
@@ -66,6 +67,13 @@ def run(monkeypatch, capsys):
         return ended.value.code or 0, printed.out, printed.err
 
     return call
+
+
+@pytest.fixture
+def without_workers():
+    """Fit the orbits of a survey in the process of the test."""
+    with fitting_in_this_process():
+        yield
 
 
 @pytest.fixture

@@ -112,6 +112,7 @@ def test_wrong_references_end_with_exit_code_three(run, orbit, measured_referenc
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_workers")
 def test_survey_names_the_orbits_whose_solutions_should_not_be_trusted(run, made_survey, tmp_path):
     survey = shutil.copytree(made_survey, tmp_path / "survey")
     # Changed on purpose.

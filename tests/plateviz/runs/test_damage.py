@@ -25,8 +25,9 @@ from solver.io.survey import (
     write_survey_table,
 )
 from solver.io.survey_header import read_header, write_header
+from tests.fitting import fitting_in_this_process
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_workers")]
 
 # Flips of one bit at places spread over a file; the quick share of a campaign.
 FLIPS = 6
@@ -36,7 +37,8 @@ FLIPS = 6
 def whole(made_survey, tmp_path_factory):
     """A survey of three orbits with a complete run."""
     survey = shutil.copytree(made_survey, tmp_path_factory.mktemp("whole") / "survey")
-    fit_survey(survey, "default", FitSettings(order=3), workers=1)
+    with fitting_in_this_process():
+        fit_survey(survey, "default", FitSettings(order=3), workers=1)
     return survey
 
 

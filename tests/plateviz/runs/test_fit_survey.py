@@ -73,6 +73,7 @@ def test_complete_run_is_not_changed(report, fitted_survey):
     assert {p: p.stat().st_mtime_ns for p in report.run.directory.rglob("*")} == before
 
 
+@pytest.mark.usefixtures("without_workers")
 def test_orbit_without_a_solution_says_what_to_do(tmp_path):
     survey = tmp_path / "sky"
     settings = SurveySettings(orbits=1, seed=3, defects=("swapped=5%",)).scaled(4_000)
@@ -84,6 +85,7 @@ def test_orbit_without_a_solution_says_what_to_do(tmp_path):
     )
 
 
+@pytest.mark.usefixtures("without_workers")
 def test_orbit_that_was_ended_early_says_that_only(fitted_survey):
     hurried = SETTINGS.with_(max_iterations=1)
     failed = fit_survey(fitted_survey, "hurried", hurried, [0], workers=1).failed

@@ -3,7 +3,6 @@
 import json
 import shutil
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
 from dataclasses import replace
 
 import pandas as pd
@@ -30,19 +29,9 @@ from solver.io.survey import (
 from solver.io.survey_manifest import MANIFEST, survey_changes
 from tests.solver.growing_survey import GrowingSurvey
 
+pytestmark = pytest.mark.usefixtures("without_workers")
+
 ONCE = Ends(at_once=True)
-
-
-@pytest.fixture(autouse=True)
-def _without_workers(monkeypatch):
-    """Fit in this process, in which a test may replace functions."""
-
-    def fit(_, run, orbits):
-        return (dask_workers.fit_survey_orbit(str(run.survey), run.name, one) for one in orbits)
-
-    monkeypatch.setattr(fit_survey, "dask_client", lambda *_: nullcontext())
-    monkeypatch.setattr(fit_survey, "fit_on_workers", fit)
-    monkeypatch.setattr(dask_workers, "use_one_thread", lambda: None)
 
 
 @pytest.fixture

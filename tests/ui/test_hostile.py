@@ -7,9 +7,12 @@ from urllib.parse import quote
 
 import pytest
 
+from plateviz.runs.fit_survey import fit_survey
+from solver.data.settings import FitSettings
 from solver.io.survey import measurement_path
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
+from tests.fitting import fitting_in_this_process
 from tests.ui.conftest import see, serving
 
 pytestmark = [pytest.mark.ui, pytest.mark.slow]
@@ -29,9 +32,8 @@ def survey(tmp_path_factory, chromium_path):
     directory = tmp_path_factory.mktemp("surveys") / HOSTILE
     simulate_survey(directory, SurveySettings(orbits=2, seed=5).scaled(3_000))
     measurement_path(directory, 1).write_bytes(b"PAR1")
-    command = [sys.executable, "-m", "plateviz.cli.main", "survey", str(directory)]
-    run = subprocess.run([*command, "--workers", "1"], capture_output=True, text=True)
-    assert "1 orbit failed" in run.stderr
+    with fitting_in_this_process():
+        assert list(fit_survey(directory, "default", FitSettings()).failed) == [1]
     # The command refuses such a name, and a folder may be copied to it.
     shutil.copytree(directory / "runs" / "default", directory / "runs" / HOSTILE)
     return directory

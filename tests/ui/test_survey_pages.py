@@ -1,17 +1,18 @@
 """The three views of a fitted survey in a real Chromium: from an orbit to a source and back."""
 
 import re
-import subprocess
-import sys
 
 import pytest
 from playwright.sync_api import expect
 
 from plateviz.plots.gallery import diagnostics, source_figures, survey_figures
 from plateviz.plots.workspace import SourceWorkspace, SurveyWorkspace
+from plateviz.runs.fit_survey import fit_survey
+from solver.data.settings import FitSettings
 from solver.io.survey import read_survey_orbit
 from solver.simulate.settings import SurveySettings
 from solver.simulate.survey import simulate_survey
+from tests.fitting import fitting_in_this_process
 from tests.ui.accessibility import require_accessible
 from tests.ui.conftest import (
     VIEWS,
@@ -60,9 +61,9 @@ def simulated(tmp_path_factory, chromium_path):
 
 @pytest.fixture(scope="module")
 def served(simulated):
-    program = [sys.executable, "-m", "plateviz.cli.main", "survey", str(simulated)]
-    for more in ([], ["--run", "low", "--order", "3", "--accept"]):
-        subprocess.run([*program, "--workers", "1", *more], check=True, capture_output=True)
+    with fitting_in_this_process():
+        for run, settings in (("default", FitSettings()), ("low", FitSettings(order=3))):
+            assert not fit_survey(simulated, run, settings).failed
     with serving("serve", str(simulated), "--port", "0") as address:
         yield address
 

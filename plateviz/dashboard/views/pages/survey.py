@@ -32,7 +32,7 @@ from plateviz.dashboard.views.elements.markup import (
 )
 from plateviz.dashboard.views.elements.stack import Stack
 from plateviz.dashboard.views.elements.table import DataTable
-from plateviz.dashboard.views.pages.unread_run import unread_run
+from plateviz.dashboard.views.pages.unread_run import STAYS, unread_run
 from plateviz.dashboard.views.panes.compare_runs import CompareRunsView
 from plateviz.dashboard.views.panes.notable_source import NotableSourceLink
 from plateviz.dashboard.views.saving.save_button import SaveButton
@@ -226,7 +226,7 @@ class SurveyPage(pn.viewable.Viewer):
         try:
             self._shown = read.result()
         except InputError as error:
-            self._failure = unread_run(error, has_before=True)
+            self._failure = unread_run(error)
 
     def _read(self, *_: object) -> None:
         run, store = self._navigation.run, self._session.store
@@ -236,7 +236,7 @@ class SurveyPage(pn.viewable.Viewer):
             try:
                 self._being_read = store.run_reader.read(run)
             except InputError as error:
-                self._failure = unread_run(error, has_before=True)
+                self._failure = unread_run(error)
         if run is not None and self._shown is not None and self._shown.run.name != run.name:
             self._shown = None
         if self._being_read is not None and self._being_read.done():
@@ -270,7 +270,7 @@ class SurveyPage(pn.viewable.Viewer):
             grid.change(theme)
 
     def _show_head(self, *_: object) -> None:
-        if self._navigation.run is None:
+        if self._navigation.run is None or not self._below.visible:
             return
         is_compared = self._navigation.survey_workspace is SurveyWorkspace.COMPARE
         title = titled("(B) Run" if is_compared else "Run", self._navigation.run_name)
@@ -281,7 +281,7 @@ class SurveyPage(pn.viewable.Viewer):
         head = f"<div class='head'>{verdict}{title}</div>"
         self._below.styles = below_lines(bool(self._failure) + bool(self._navigation.growth))
         if self._failure:
-            head += paragraph(self._failure, "outdated", self._session.theme)
+            head += paragraph(f"{self._failure} {STAYS}", "outdated", self._session.theme)
         if self._navigation.growth:
             head += paragraph(self._navigation.growth, "caption", self._session.theme)
         self._head.object = themed(head, self._session.theme)

@@ -296,6 +296,7 @@ def test_run_that_is_gone_is_said_and_what_was_read_stays(fit_result, survey):
     page._read()
     assert "The run cannot be read: runs/default: expected a run" in page._head.object
     assert "Reload the page once the run is there again." in page._head.object
+    assert "What was read before stays." in page._head.object
     assert page._below.visible
     assert page._table._table.value.equals(rows)
     run.is_lost = False
@@ -371,4 +372,7 @@ def test_run_that_was_gone_before_the_page_is_said_instead(fit_result, survey):
     survey_page, source_page = SurveyPage(navigation, wake), SourcePage(navigation, wake)
     assert "The run cannot be read" in survey_page._head.object
     assert not survey_page._below.visible
+    navigation.turn_to_workspace(SurveyWorkspace.CATALOGUE)
+    assert "The run cannot be read" in survey_page._head.object
+    assert "stays" not in survey_page._head.object
     assert "The run cannot be read" in source_page._head.object

@@ -28,8 +28,9 @@ def figure_tables(figure: Figure) -> dict[str, Table]:
     Name -> table. Coordinates are described by the label of their axis, with its unit. Of several
     frames, a name begins with the number of its frame, from 1. An image has a row per cell that
     has a value, at the cell's centre; outlines have a row per point, numbered by `path`. A unit at
-    the end of a column's name, or in the label of its axis, is that of its values. Names of tables
-    are in ASCII, since those of FITS have to be: `1σ expected` is `1sigma_expected`.
+    the end of a column's name, or in the label of its axis, is that of its values; but the ends of
+    arrows have none, which are enlarged: the numbers are with their tails. Names of tables are in
+    ASCII, since those of FITS have to be: `1σ expected` is `1sigma_expected`.
     """
     found: dict[str, Table] = {}
     for number, frame in enumerate(figure, 1):
@@ -58,7 +59,10 @@ def _table(frame: Frame, glyphs: Glyphs) -> Table:
         # A number in two units may be there twice in one that a person has chosen.
         if in_file not in table.colnames:
             label = described.get(name)
-            unit = _unit(in_file, label) if plain.dtype.kind in "fiu" else None
+            has_unit = plain.dtype.kind in "fiu" and not glyphs.arrow_rows
+            unit = _unit(in_file, label) if has_unit else None
+            if label and glyphs.arrow_rows:
+                label += "; an enlarged arrow as it is drawn"
             table[in_file] = Column(plain, unit=unit, description=label)
     return table
 

@@ -3,10 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
 from plateviz.figures.figure import Figure, side_by_side
 from plateviz.figures.figure_tables import figure_tables
 from plateviz.figures.glyphs import line, points
+from plateviz.plots.elements.arrows import Field, arrows
 
 
 def test_every_kind_of_mark_but_names_has_a_table(every_kind):
@@ -27,6 +29,19 @@ def test_columns_of_numbers_have_the_units_of_their_names_and_axes(framed_glyphs
     saved = figure_tables(Figure((replace(frame, x=labels[0], y=labels[1]),)))["sources"]
     units = {name: saved[name].unit for name in saved.colnames}
     assert units == {"x": "uas", "y": None, "sigma_mas": "mas", "n": None, "name_mas": None}
+
+
+def test_ends_of_arrows_have_no_unit_since_they_are_enlarged(framed_glyphs):
+    vectors = pd.DataFrame({"x": [1.0], "y": [2.0], "u": [1e-3], "v": [0.0], "u_um": [1.0]})
+    area, hover = Field((0.0, 5.0), (0.0, 4.0)), [("u", "@{u_um} µm")]
+    drawn = arrows(vectors, scale=1000.0, field=area, colour="mark", hover=hover)
+    frame = framed_glyphs(drawn)[0]
+    tables = figure_tables(Figure((replace(frame, x=replace(frame.x, label="x (mm)")),)))
+    strokes, tails = tables["arrows"], tables["tails"]
+    assert (strokes["x1"] - strokes["x0"])[0] == 1.0
+    assert {strokes[name].unit for name in strokes.colnames} == {None}
+    assert strokes["x1"].description == "x (mm); an enlarged arrow as it is drawn"
+    assert (tails["x"].unit, tails["u_um"].unit) == ("mm", "um")
 
 
 def test_image_has_a_row_per_cell_at_its_centre(every_kind):

@@ -71,9 +71,10 @@ def test_report_has_the_name_that_a_person_has_given_the_solution(navigation):
     session = navigation.session
     session.param.update(shown=session.shown._replace(run=""))
     session.journal.add(session.shown)
-    session.journal.rename(session.journal.made[0], "mine")
+    session.journal.rename(session.journal.made[0], "<b>mine")
     _, page = made(page_report(navigation))
-    assert "mine: order 5" in page
+    assert "&lt;b&gt;mine: order 5" in page
+    assert "<b>mine" not in page
 
 
 def test_report_has_what_explore_draws_while_it_is_on_the_screen(navigation):

@@ -12,6 +12,9 @@ from solver.problem.problem import Problem
 
 # Memory for precomputed warm starts, bytes.
 _MAX_BYTES = 2**29
+# Longest step of a what-if, sigma. After steps of up to 10 the calibration was off by 0.001 sigma
+# at most, after steps of 50 by up to 0.3.
+_LONGEST = 25.0
 # How near its mode a lower order is solved that somebody waits for, sigma.
 _NEAR = 0.3
 
@@ -42,15 +45,15 @@ class WarmStarts:
         """Return the mode of a changed problem, or None if it needs a fit of its own.
 
         It is found by a step, or where the model is not linear enough for one, by iterations that
-        begin at the warm start. A lower order is solved first, for this what-if and those that
-        follow it.
+        begin at the warm start. A lower order is solved first, with the priors that are asked for
+        but all measurements, for this what-if and those that follow it.
         """
-        self._add(settings.order, _NEAR)
+        self._add(settings.with_(exclusions=self._fit.settings.exclusions), _NEAR)
         base = self._nearest(settings.order)
         self._latest = base.settings.order
         if base.settings.order < settings.order:
             return None
-        mode = solve_what_if(base.mode, base.problem, problem, settings)
+        mode = solve_what_if(base.mode, base.problem, problem, settings, _LONGEST)
         return mode or _iterated(base, problem, settings)
 
     def add(self, order: int) -> bool:
@@ -58,7 +61,11 @@ class WarmStarts:
 
         It may have no solution.
         """
-        return self._add(order, self._fit.settings.tolerance)
+        settings = self._fit.settings.with_(order=order)
+        if not self._add(settings, settings.tolerance):
+            return False
+        self._lower.setdefault(order, None)
+        return True
 
     def likely(self, order: int) -> list[int]:
         """Return the orders of likely what-ifs that need Jacobians of their own: lower ones.
@@ -85,10 +92,14 @@ class WarmStarts:
         """Forget the solutions of all lower orders but that of the latest what-if."""
         self.keep([self._latest])
 
-    def _add(self, order: int, tolerance: float) -> bool:
+    def _add(self, settings: FitSettings, tolerance: float) -> bool:
+        """Solve a lower order that was not tried before; return whether it was not."""
+        order = settings.order
         if order >= self._fit.settings.order or order in self._lower:
             return False
-        self._lower[order] = self._solved(order, tolerance)
+        solved = self._solved(settings, tolerance)
+        if solved is not None:
+            self._lower[order] = solved
         return True
 
     def _nearest(self, order: int) -> WarmStart:
@@ -96,19 +107,18 @@ class WarmStarts:
         orders = [n for n, one in self._lower.items() if one is not None and n >= order]
         return (self._lower[min(orders)] if orders else None) or self._fit
 
-    def _solved(self, order: int, tolerance: float) -> WarmStart | None:
+    def _solved(self, settings: FitSettings, tolerance: float) -> WarmStart | None:
         """Solve a lower order; None if it has no solution.
 
         It is too far for a step: new Jacobians on the way take less time than a step that fails.
         """
-        found, base = self._problem(order), self._nearest(order)
-        mode = found and _iterated(base, found[1], found[0].with_(tolerance=tolerance))
-        return WarmStart(*found, mode) if found and mode else None
+        problem, base = self._problem(settings), self._nearest(settings.order)
+        mode = problem and _iterated(base, problem, settings.with_(tolerance=tolerance))
+        return WarmStart(settings, problem, mode) if problem and mode else None
 
-    def _problem(self, order: int) -> tuple[FitSettings, Problem] | None:
-        settings = self._fit.settings.with_(order=order)
+    def _problem(self, settings: FitSettings) -> Problem | None:
         try:
-            return settings, self._problem_of(settings)
+            return self._problem_of(settings)
         except InputError:
             # A prior is shifted for a term that the lower order lacks, or too few data remain.
             return None

@@ -46,7 +46,11 @@ def _updated(mode: Mode, solved: Problem, changed: Problem) -> Mode | None:
 
 @one_blas_thread()
 def solve_what_if(
-    mode: Mode, solved: Problem, changed: Problem, settings: FitSettings
+    mode: Mode,
+    solved: Problem,
+    changed: Problem,
+    settings: FitSettings,
+    longest: float = np.inf,
 ) -> Mode | None:
     """Return the mode of a changed problem, from the mode of a solved one.
 
@@ -54,6 +58,7 @@ def solve_what_if(
     ----------
     mode : solution of `solved`, with normal equations near it
     settings : settings of `changed`
+    longest : maximum length of the first step, sigma
 
     Returns
     -------
@@ -65,7 +70,7 @@ def solve_what_if(
     if start is None or start.reduced is None:
         return None
     theta, sources, reduced, trace = start.theta, start.sources, start.reduced, start.trace
-    at, weak, limit = start.equations.gradient, None, np.inf
+    at, weak, limit = start.equations.gradient, None, longest
     largest, parameter = float("nan"), ""
     while len(trace) <= _MAX_STEPS:
         total, elapsed = objective(changed, theta, sources, at), time.perf_counter() - begin

@@ -308,6 +308,28 @@ def test_lower_order_is_solved_once(orbit, solved_orders):
     assert fitter.what_if(FitSettings(order=6, prior_widths={"sources": 2.0})) is not None
 
 
+def test_lower_order_is_solved_with_the_priors_that_are_asked_for(orbit, solved_orders):
+    """A long step from the fit's own priors left the calibration up to 0.3 sigma off."""
+    fitter = fitted(OrbitFitter(orbit.data, orbit.instrument))
+    settings = FitSettings(order=4, prior_widths={"sources": 9.0})
+    found = fitter.what_if(settings)
+    assert found.trace["largest_step"].max() < 1.0
+    expected = fit_orbit(orbit.data, orbit.instrument, settings).calibration
+    moved = (found.calibration["offset"] - expected["offset"]).abs()
+    # Coefficients that are fixed have no uncertainty.
+    assert (moved <= 0.05 * expected["sigma_marginal"]).all()
+    assert solved_orders == [4]
+
+
+def test_lower_order_without_some_measurements_is_a_start_for_what_has_all(orbit, solved_orders):
+    fitter = fitted(OrbitFitter(orbit.data, orbit.instrument))
+    without = Subset(frozenset(first(orbit.data, "source_id")))
+    assert fitter.what_if(FitSettings(order=5, exclusions=without)) is not None
+    found = fitter.what_if(FitSettings(order=5))
+    assert found.summary["reason"] == FitStatus.WHAT_IF.value
+    assert solved_orders == [5]
+
+
 def test_change_too_large_for_a_linear_model_is_solved_by_iterations(orbit, fitter, monkeypatch):
     monkeypatch.setattr(warm_starts, "solve_what_if", lambda *_: None)
     settings = FitSettings(order=6, prior_widths={"sources": 2.0})
@@ -330,6 +352,8 @@ def test_change_that_iterations_do_not_solve_needs_a_refit(fitter, monkeypatch):
         # Directions kept fixed in the second step follow in the third.
         ((0.7, 1.5e-3, 8e-3, 1e-5), True),
         ((0.7, 0.1, 0.05, 1e-4), True),
+        ((24.0, 1e-4), True),
+        ((26.0, 1e-4), False),
         ((0.7, 0.8), False),
         ((0.7, 1.5e-3, 0.8), False),
         ((0.7, 1.5e-3, 8e-3, 9e-3), False),

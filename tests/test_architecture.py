@@ -91,6 +91,7 @@ WITH_JAX = (
     "plateviz.solving.fitters",
     "plateviz.solving.preparation",
     "plateviz.solving.solver_process",
+    "plateviz.solving.survey_jobs",
     "plateviz.runs.fit_survey",
     "plateviz.runs.watch",
 )

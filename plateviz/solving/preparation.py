@@ -44,6 +44,21 @@ class Preparation(NamedTuple):
         return renewed._replace(is_urgent=False, is_paused=True)
 
 
+def get_ready(fitters: Fitters, request: Request) -> Preparation:
+    """Make the orbit of a request ready for what-ifs, and compile what they need.
+
+    Raises
+    ------
+    InputError, FitError
+        If it cannot be read or fitted.
+    """
+    fitter, base = fitters.of(request), base_of(request)
+    if base is not None:
+        fitter.prepare_what_ifs(base.settings, solution=base.solution)
+        fitter.partial_what_if(base.settings.with_(order=max(1, base.settings.order - 1)))
+    return Preparation()
+
+
 def prepare(fitters: Fitters, request: Request, requests: Requests, put_off: PutOff) -> Preparation:
     """Make the likely what-ifs of a solution, and precompute what later ones need.
 

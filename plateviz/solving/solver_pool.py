@@ -3,10 +3,12 @@
 Half of the processes, the first among them, do quick work only: fits with the first engine and
 what-ifs. The others give way to them: each runs long fits, one after the other, and quick work only
 while it has none. A what-if goes to the process that has fitted its orbit, since another one would
-have to fit it again.
+have to fit it again; but if many wait there, to another one that can begin with the solution of a
+run. What nobody waits for yet, and a long fit, pause while somebody waits for a quick one.
 """
 
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -20,9 +22,13 @@ from plateviz.solving.solver_queue import SolverQueue
 
 # How far the processes give way to those of the server and of a browser, for which many wait, and
 # the one of long fits to the others.
-_QUICK, _LONG = 2, 12
-# Quick jobs that wait for one process before another is started, which takes some seconds itself.
+_QUICK, _LONG = 2, 19
+# Quick jobs of one process before another is started for the next one, which has to fit its orbit.
 _FEW = 3
+# After so long without another person's request, what one person may ask for next is prepared.
+_BUSY_SECONDS = 5.0
+# How many more jobs than elsewhere wait before an orbit is made ready in another process.
+_MORE = 2
 
 
 class Solver(Protocol):
@@ -76,6 +82,8 @@ class SolverPool:
         self._quick, self._long = [self._start(niceness=_QUICK)], list[SolverQueue]()
         # The queue that has last fitted an orbit, the latest last.
         self._warm: OrderedDict[str, SolverQueue] = OrderedDict()
+        # When something quick was last asked for, by orbit, as from `time.monotonic`.
+        self._asked: dict[str, float] = {}
         # The queue of each job that somebody still knows.
         self._of_job: WeakKeyDictionary[Job, SolverQueue] = WeakKeyDictionary()
 
@@ -87,6 +95,9 @@ class SolverPool:
             self._warm.move_to_end(_orbit(job.request))
             while len(self._warm) > self._n_ready:
                 self._warm.popitem(last=False)
+            if not is_long(job.request):
+                self._asked[_orbit(job.request)] = time.monotonic()
+                self._pause_others(queue)
             return queue.submit(job)
 
     def prepare(self, request: Mapping[str, object]) -> None:
@@ -94,7 +105,9 @@ class SolverPool:
         with self._lock:
             queue = self._warm.get(_orbit(request), self._quick[0])
             self._warm[_orbit(request)] = queue
-        queue.prepare(request)
+            queue.prepare(request)
+            if self._is_busy(_orbit(request)):
+                queue.pause()
 
     def pause(self) -> None:
         """Let what processes prepare wait for a moment."""
@@ -127,22 +140,43 @@ class SolverPool:
         with self._lock:
             return [*self._quick, *self._long]
 
+    def _is_busy(self, orbit: str) -> bool:
+        """Return whether somebody has just asked for something quick of another orbit."""
+        since = time.monotonic() - _BUSY_SECONDS
+        self._asked = {one: at for one, at in self._asked.items() if at > since}
+        return any(one != orbit for one in self._asked)
+
+    def _pause_others(self, queue: SolverQueue) -> None:
+        """Leave the cores to a job that somebody waits for."""
+        for other in (*self._quick, *self._long):
+            if other is not queue:
+                other.pause()
+
     def _queue_for(self, request: Mapping[str, Any]) -> SolverQueue:
         if self._most == 1:
             return self._quick[0]
         if is_long(request):
             return self._queue_of_long_fits()
         free = [q for q in self._long if not any(is_long(job.request) for job in q.jobs)]
+        best = _least_busy(candidates := [*self._quick, *free])
+        has_room = len(self._quick) < self._most - self._most_long
+        if has_room and _can_begin_elsewhere(request) and _is_awaited(best):
+            self._start_beside(request)
+            has_room = False
         warm = self._warm.get(_orbit(request))
-        if warm in (candidates := [*self._quick, *free]):
+        if warm in candidates and not (_can_begin_elsewhere(request) and _is_behind(warm, best)):
             return warm
-        best = _least_busy(candidates)
         if len(best.jobs) <= _FEW:
             return best
-        if len(self._quick) < self._most - self._most_long:
+        if has_room:
             self._quick.append(self._start(niceness=_QUICK))
             return self._quick[-1]
         return best if self._long else self._queue_of_long_fits()
+
+    def _start_beside(self, request: Mapping[str, Any]) -> None:
+        """Start another process for quick work, which gets ready while the others go on."""
+        self._quick.append(self._start(niceness=_QUICK))
+        self._quick[-1].submit(Job({**request, "do": "get ready"}))
 
     def _queue_of_long_fits(self) -> SolverQueue:
         """Return the queue of long fits with the fewest jobs, a new one if none is without."""
@@ -155,6 +189,21 @@ class SolverPool:
 
 def _least_busy(queues: list[SolverQueue]) -> SolverQueue:
     return min(queues, key=lambda queue: len(queue.jobs))
+
+
+def _is_awaited(queue: SolverQueue) -> bool:
+    """Return whether somebody waits for a job of a queue."""
+    return not all(job.status.is_over for job in queue.jobs)
+
+
+def _is_behind(queue: SolverQueue, best: SolverQueue) -> bool:
+    """Return whether the jobs of a queue take longer than to make an orbit ready in another one."""
+    return len(queue.jobs) - len(best.jobs) >= _MORE
+
+
+def _can_begin_elsewhere(request: Mapping[str, Any]) -> bool:
+    """Return whether a process can begin a what-if from a run, if it has not fitted the orbit."""
+    return request.get("base") is not None
 
 
 def _orbit(request: Mapping[str, Any]) -> str:

@@ -1,17 +1,18 @@
 """The solver process: reads requests from standard input, writes events to standard output.
 
-Each line is one JSON object, in both directions. This is the only process of a plateviz server
-that imports JAX. It keeps its compilations between fits, and ends when its standard input ends or
-by SIGTERM; what it has not finished is removed. An unexpected exception ends it with a traceback
-on standard error; `plateviz.solving.solver_queue` reports that and starts another process.
+Each line is one JSON object. This is the only process of a plateviz server that imports JAX. It
+keeps its compilations between fits, and ends when its standard input ends or by SIGTERM; what it
+has not finished is removed. An unexpected exception ends it with a traceback on standard error;
+`plateviz.solving.solver_queue` reports that and starts another process.
 
 Requests: {"do": "fit", "job", "origin", "orbit", "settings", "what_if", "directory", "base"},
-{"do": "simulate", "job", "directory", "settings", "catalogue"}, {"do": "survey", "job",
-"directory", "run", "settings", "orbits", "workers"}, {"do": "cancel", "job"}, and without events
-{"do": "prepare", "origin", "orbit", "settings", "base", "may_fit", "likely", "is_urgent"}: while
-idle, make the likely what-ifs of a solution, each {"settings", "directory"}, and with "may_fit" fit
-what they start from, {"do": "pause"}: let that wait while a page opens, {"do": "rest"}: give it up,
-and {"do": "complete", "part"} with the rest of a "fit" that is done: write a part that its result
+{"do": "get ready", "job", "origin", "orbit", "base"}: for what-ifs, {"do": "simulate", "job",
+"directory", "settings", "catalogue"}, {"do": "survey", "job", "directory", "run", "settings",
+"orbits", "workers"}, {"do": "cancel", "job"}, and without events {"do": "prepare", "origin",
+"orbit", "settings", "base", "may_fit", "likely", "is_urgent"}: while idle, make the likely what-ifs
+of a solution, each {"settings", "directory"}, and with "may_fit" fit what they start from,
+{"do": "pause"}: let that, or a long fit, wait for a moment, {"do": "rest"}: give it up, and
+{"do": "complete", "part"} with the rest of a "fit" that is done: write a part that its result
 lacks, `VERDICT` or `EIGENMODES` of `plateviz.runs.scratch_result`. "base" is the solution of a run
 from which the what-ifs of the orbit can start, {"settings", "directory"}, or None.
 Events: {"event": "ready"}, and with "job": "progress", "done", "failed", "cancelled".
@@ -39,8 +40,11 @@ from plateviz.runs.scratch_result import (
     write_eigenmodes,
 )
 from plateviz.solving.fitters import Base, Fitters, Request, base_of, base_settings
-from plateviz.solving.preparation import Preparation, prepare
+from plateviz.solving.forecast import is_long
+from plateviz.solving.preparation import Preparation, get_ready, prepare
 from plateviz.solving.put_off import PutOff, judge
+from plateviz.solving.survey_jobs import fit_run, simulate
+from plateviz.solving.waiting_moments import WaitingMoments
 from solver.data.eigenmode_schema import EIGENMODE_TABLES
 from solver.data.settings import COUNTED, ENGINES, FitSettings
 from solver.engines.gauss_newton import Iteration
@@ -50,8 +54,6 @@ from solver.results.orbit_result import PartialResult
 from solver.runtime.interruption import interruptible
 from solver.runtime.memory import keep_memory
 from solver.runtime.termination import EXIT_CODE, ending_on_sigterm
-from solver.simulate.settings import SurveySettings
-from solver.simulate.survey import simulate_survey
 
 Send = Callable[[dict], None]
 # Idle seconds before the verdict is begun. In these the server sends the solution, a browser draws
@@ -60,8 +62,7 @@ _NEXT_S = 0.4
 # Idle seconds after that before speculative work starts. Where it shares the cores with a browser
 # that draws the verdict, this would take a third longer.
 _IDLE_S = 1.0
-# Seconds for which nothing speculative starts when a page opens: its browser and its session need
-# both cores.
+# Seconds for which nothing speculative starts when a page opens or others ask for something.
 _PAUSE_S = 2.0
 # Time in which the process removes what it has not finished, once its server has ended.
 _END_S = 3.0
@@ -88,6 +89,13 @@ class _Cancellations:
             raise CancelledError(job)
 
 
+class _Heard(NamedTuple):
+    """What the thread that reads requests tells the one that works, at once."""
+
+    cancellations: _Cancellations
+    moments: WaitingMoments
+
+
 def main() -> None:
     """Serve requests until standard input ends."""
     try:
@@ -103,9 +111,8 @@ def _serve_all() -> None:
     keep_compilations()
     send = _sender()
     requests: queue.Queue[Request | None] = queue.Queue()
-    cancellations = _Cancellations()
-    reader = threading.Thread(target=_read, args=(sys.stdin, requests, cancellations), daemon=True)
-    reader.start()
+    heard = _Heard(_Cancellations(), WaitingMoments())
+    threading.Thread(target=_read, args=(sys.stdin, requests, heard), daemon=True).start()
     send({"event": "ready"})
     preparation = Preparation()
     kept = _Kept(Fitters(), PutOff())
@@ -119,7 +126,7 @@ def _serve_all() -> None:
         elif request["do"] == "rest":
             preparation = Preparation()
         else:
-            preparation = _serve(request, send, cancellations, kept)
+            preparation = _serve(request, send, heard, kept)
 
 
 def _next_request(
@@ -163,32 +170,44 @@ def _sender() -> Send:
     return send
 
 
-def _read(
-    lines: TextIO, requests: "queue.Queue[Request | None]", cancellations: _Cancellations
-) -> None:
+def _read(lines: TextIO, requests: "queue.Queue[Request | None]", heard: _Heard) -> None:
     for line in lines:
-        request = json.loads(line)
-        if request["do"] == "cancel":
-            cancellations.add(request["job"])
-        else:
-            requests.put(request)
+        _hear(json.loads(line), requests, heard)
     # The server has ended: stop, even during a fit.
     os.kill(os.getpid(), signal.SIGTERM)
     time.sleep(_END_S)
     os._exit(EXIT_CODE)
 
 
-def _serve(request: Request, send: Send, cancellations: _Cancellations, kept: _Kept) -> Preparation:
-    job = request["job"]
-    work = {"fit": _fit, "simulate": _simulate, "survey": _survey}[request["do"]]
+def _hear(request: Request, requests: "queue.Queue[Request | None]", heard: _Heard) -> None:
+    if request["do"] == "cancel":
+        heard.cancellations.add(request["job"])
+        return
+    if request["do"] == "pause":
+        heard.moments.ask()
+    requests.put(request)
+
+
+def _serve(request: Request, send: Send, heard: _Heard, kept: _Kept) -> Preparation:
+    job, is_patient = request["job"], request["do"] == "fit" and is_long(request)
+    work = _WORK[request["do"]]
+
+    def check() -> None:
+        heard.cancellations.check(job)
+
+    def give_way() -> None:
+        if is_patient:
+            heard.moments.wait(check)
 
     def progress(**values: object) -> None:
-        cancellations.check(job)
+        check()
         send({"event": "progress", "job": job, **values})
+        give_way()
 
     try:
-        cancellations.check(job)
-        preparation = work(request, progress, kept)
+        check()
+        with interruptible(give_way):
+            preparation = work(request, progress, kept)
         send({"event": "done", "job": job})
         return preparation
     except CancelledError:
@@ -269,31 +288,12 @@ def _complete(request: Request, kept: _Kept) -> None:
             write_eigenmodes(directory, tables)
 
 
-def _simulate(request: Request, progress: Callable[..., None], _: _Kept) -> Preparation:
-    settings = SurveySettings.from_dict(request["settings"])
-    catalogue = request.get("catalogue")
-    simulate_survey(
-        Path(request["directory"]),
-        settings,
-        catalogue=None if catalogue is None else Path(catalogue),
-        progress=lambda done, total: progress(stage="simulating", done=done, total=total),
-    )
-    return Preparation()
-
-
-def _survey(request: Request, progress: Callable[..., None], _: _Kept) -> Preparation:
-    # Imported here since Dask takes half a second to import.
-    from plateviz.runs.fit_survey import fit_survey
-
-    fit_survey(
-        Path(request["directory"]),
-        request["run"],
-        FitSettings.from_dict(request["settings"]),
-        request["orbits"],
-        request["workers"],
-        progress=lambda now: progress(stage="fitting orbits", done=now.done, total=now.total),
-    )
-    return Preparation()
+_WORK = {
+    "fit": _fit,
+    "get ready": lambda request, _, kept: get_ready(kept.fitters, request),
+    "simulate": lambda request, progress, _: simulate(request, progress),
+    "survey": lambda request, progress, _: fit_run(request, progress),
+}
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from tempfile import TemporaryFile
 from typing import IO
 
 from plateviz.cache import keep_compilations
+from plateviz.runs.scratch_result import VERDICT
 from plateviz.runs.worker_scratch import remove_worker_scratch
 from plateviz.solving.forecast import Forecast, JobTimes
 from plateviz.solving.job import Job
@@ -49,6 +50,8 @@ class SolverQueue:
         self._niceness = niceness
         self._lock = threading.RLock()
         self._jobs: deque[Job] = deque()
+        # Requests for verdicts, each with the job after which it is sent.
+        self._verdicts: list[tuple[Job, Mapping[str, object]]] = []
         self._process: subprocess.Popen[str] | None = None
         self._is_closed = False
         self._start()
@@ -112,12 +115,17 @@ class SolverQueue:
     def complete(self, job: Job, part: str) -> bool:
         """Let the process write a part of a result that it has put off; return whether it will.
 
-        A new process computes it again. After `close` there is none.
+        A verdict, which few wait for, follows the jobs that wait now. A new process computes the
+        part again. After `close` there is none.
         """
+        request = {**job.request, "do": "complete", "part": part}
         with self._lock:
             if self._is_closed:
                 return False
-            self._send({**job.request, "do": "complete", "part": part})
+            if part == VERDICT and self._jobs:
+                self._verdicts.append((self._jobs[-1], request))
+            else:
+                self._send(request)
             return True
 
     def cancel(self, job: Job) -> None:
@@ -146,6 +154,7 @@ class SolverQueue:
             for job in self._jobs:
                 job.cancel()
             self._jobs.clear()
+            self._verdicts.clear()
             self._is_closed = True
             process = self._process
             if process is not None:
@@ -217,8 +226,14 @@ class SolverQueue:
                 self._start_next_job()
 
     def _start_next_job(self) -> None:
-        """Remove the first job and start the next one."""
+        """Remove the first job and start the next one, after the verdicts that come before it."""
         self._jobs.popleft()
+        waiting, self._verdicts = self._verdicts, []
+        for last, request in waiting:
+            if last in self._jobs:
+                self._verdicts.append((last, request))
+            else:
+                self._send(request)
         if self._jobs:
             self._send(self._jobs[0].request)
 

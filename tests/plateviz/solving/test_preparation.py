@@ -7,7 +7,7 @@ import pytest
 from plateviz.runs.scratch_result import is_judged_later, is_written, read_scratch_result
 from plateviz.solving.fitters import Fitters
 from plateviz.solving.origin import SurveyFolder, origin_to_dict
-from plateviz.solving.preparation import prepare
+from plateviz.solving.preparation import get_ready, prepare
 from plateviz.solving.put_off import PutOff
 from solver.data.result import FitStatus
 from solver.data.settings import FitSettings
@@ -116,6 +116,17 @@ def test_what_if_of_a_prepared_orbit_needs_no_fit(requests, small_survey):
     assert kept.of(request).what_if(later) is None
     next(prepare(kept, request, requests, PutOff()).soon)
     assert kept.of(request).what_if(later).summary["reason"] == FitStatus.WHAT_IF.value
+
+
+def test_orbit_gets_ready_with_the_solution_of_a_run(small_survey, tmp_path):
+    settings = FitSettings(order=2)
+    base = {"settings": settings.to_dict(), "directory": str(tmp_path / "unread")}
+    origin = origin_to_dict(SurveyFolder(str(small_survey)))
+    request = {"do": "get ready", "origin": origin, "orbit": 0, "base": base}
+    kept = Fitters()
+    after = get_ready(kept, request)
+    assert [*after.soon, *after.later] == []
+    assert kept.of(request).fitted_settings == settings
 
 
 def test_what_is_wrong_with_an_orbit_is_not_said_unasked(monkeypatch, requests):

@@ -4,9 +4,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from plateviz.runs.scratch_result import EIGENMODES, VERDICT
+from plateviz.solving import solver_pool
 from plateviz.solving.forecast import JobTimes, is_long
 from plateviz.solving.job import Job
 from plateviz.solving.solver_pool import SolverPool
@@ -46,10 +49,15 @@ def made_pool(queues, most):
     return SolverPool(most, start)
 
 
-def fit(orbit, engine="gauss-newton", what_if=False):
+def fit(orbit, engine="gauss-newton", what_if=False, base=None):
     settings = FitSettings(engine=engine).to_dict()
     request = {"do": "fit", "origin": "sky", "orbit": orbit, "settings": settings}
-    return Job({**request, "what_if": what_if})
+    return Job({**request, "what_if": what_if, "base": base})
+
+
+def from_run(orbit):
+    """A what-if that any process can begin, with the solution of a run."""
+    return fit(orbit, what_if=True, base={"settings": {}, "directory": "run"})
 
 
 def test_what_if_does_not_wait_for_a_long_fit(pool, queues):
@@ -97,6 +105,97 @@ def test_what_if_goes_where_its_orbit_was_fitted(pool, queues):
     assert pool.submit(fit(4, what_if=True)) in queues[0].jobs
 
 
+def test_second_process_gets_ready_as_soon_as_one_waits_that_it_could_serve(queues):
+    pool = made_pool(queues, 3)
+    first, second = pool.submit(from_run(0)), pool.submit(from_run(0))
+    assert queues[0].jobs == [first, second]
+    (getting_ready,) = queues[1].jobs
+    assert getting_ready.request["do"] == "get ready"
+    assert getting_ready.request["base"] == second.request["base"]
+    assert not is_long(getting_ready.request)
+    queues[1].finish()
+    assert pool.submit(from_run(1)) in queues[1].jobs
+    assert len(queues) == 2
+
+
+def test_one_person_has_one_process(queues):
+    pool = made_pool(queues, 3)
+    for _ in range(3):
+        what_if = pool.submit(from_run(0))
+        # A new what-if takes the place of one that nobody waits for any more.
+        pool.cancel(what_if)
+    assert len(queues) == 1
+
+
+def test_what_if_of_a_run_goes_elsewhere_if_many_wait_where_its_orbit_is_ready(queues):
+    pool = made_pool(queues, 3)
+    of_orbit = [pool.submit(from_run(0)) for _ in range(3)]
+    queues[1].finish()
+    assert queues[0].jobs == of_orbit
+    elsewhere = pool.submit(from_run(0))
+    assert queues[1].jobs == [elsewhere]
+    queues[1].finish()
+    # The orbit is ready there now.
+    assert pool.submit(from_run(0)) in queues[1].jobs
+
+
+def test_what_if_without_a_run_waits_where_its_orbit_was_fitted(queues):
+    pool = made_pool(queues, 3)
+    jobs = [pool.submit(fit(0, what_if=True)) for _ in range(6)]
+    assert [queue.jobs for queue in queues] == [jobs]
+
+
+def test_nothing_is_prepared_beside_what_others_ask_for(queues, monkeypatch):
+    monkeypatch.setattr(solver_pool, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    now = [0.0]
+    pool = made_pool(queues, 3)
+    pool.submit(from_run(0))
+    pool.submit(from_run(0))
+    queues[1].finish()
+    for queue in queues:
+        queue._process, queue.sent = object(), []
+    pool.prepare({"origin": "sky", "orbit": 1})
+    assert pool.submit(from_run(2)) in queues[1].jobs
+    assert [queue.sent for queue in queues] == [["prepare", "pause", "pause"], ["fit"]]
+    now[0] = 60.0
+    pool.prepare({"origin": "sky", "orbit": 1})
+    assert queues[0].sent[3:] == ["prepare"]
+    pool.submit(from_run(1))
+    pool.prepare({"origin": "sky", "orbit": 1})
+    assert queues[0].sent[4:] == ["prepare"]
+
+
+def test_long_fit_stops_no_preparations(pool, queues):
+    queues[0]._process = object()
+    pool.submit(fit(0, "svi"))
+    assert queues[0].sent == []
+
+
+def test_verdict_follows_the_jobs_that_wait_but_eigenmodes_do_not(pool, queues):
+    judged = pool.submit(fit(0, what_if=True))
+    queues[0].finish()
+    for _ in range(2):
+        pool.submit(fit(0, what_if=True))
+    assert pool.complete(judged, VERDICT)
+    later = pool.submit(fit(0, what_if=True))
+    pool.complete(judged, EIGENMODES)
+    assert queues[0].sent == ["fit", "fit", "complete"]
+    queues[0].finish()
+    assert queues[0].sent[3:] == ["fit"]
+    queues[0].finish()
+    assert queues[0].sent[4:] == ["complete", "fit"]
+    assert queues[0].jobs == [later]
+
+
+def test_verdict_does_not_wait_for_a_job_that_is_cancelled(pool, queues):
+    judged = pool.submit(fit(0, what_if=True))
+    waiting = pool.submit(fit(0, what_if=True))
+    pool.complete(judged, VERDICT)
+    pool.cancel(waiting)
+    queues[0].finish()
+    assert queues[0].sent == ["fit", "complete"]
+
+
 def test_preparations_go_where_the_what_ifs_will(pool, queues):
     pool.submit(fit(0, "svi"))
     pool.prepare({"origin": "sky", "orbit": 3})
@@ -109,6 +208,7 @@ def test_preparations_go_where_the_what_ifs_will(pool, queues):
 
 def test_what_was_put_off_is_asked_of_the_process_that_put_it_off(pool, queues):
     what_if = pool.submit(fit(0, what_if=True))
+    queues[0].finish()
     pool.submit(fit(0, "svi"))
     assert pool.complete(what_if, "verdict")
     assert (queues[0].sent[-1], queues[1].sent[-1]) == ("complete", "fit")

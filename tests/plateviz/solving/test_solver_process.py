@@ -12,8 +12,15 @@ from plateviz.solving.fitters import Fitters
 from plateviz.solving.origin import SurveyFolder, origin_to_dict
 from plateviz.solving.preparation import Preparation
 from plateviz.solving.put_off import PutOff
-from plateviz.solving.solver_process import _next_request
-from solver.errors import InputError
+from plateviz.solving.solver_process import (
+    _Cancellations,
+    _hear,
+    _Heard,
+    _Kept,
+    _next_request,
+    _serve,
+)
+from solver.errors import CancelledError, InputError
 from solver.fit import OrbitFitter
 from solver.runtime.interruption import give_way
 
@@ -176,3 +183,56 @@ def test_only_the_latest_orbits_keep_lower_orders(small_survey, monkeypatch):
     kept = Fitters(most=2)
     first, second, _ = (kept.of({"origin": origin, "orbit": orbit}) for orbit in (0, 1, 0))
     assert forgetful == [first, second]
+
+
+class Moments:
+    """Moments that are asked for and waited for."""
+
+    def __init__(self):
+        self.asked = self.waited = 0
+
+    def ask(self):
+        self.asked += 1
+
+    def wait(self, check):
+        check()
+        self.waited += 1
+
+
+@pytest.mark.parametrize(
+    ("do", "engine", "waited"),
+    [("fit", "svi", 2), ("fit", "nuts", 2), ("fit", "gauss-newton", 0), ("survey", "svi", 0)],
+)
+def test_long_fit_waits_for_who_asks_for_something_quick(monkeypatch, do, engine, waited):
+    def work(request, progress, kept):
+        progress(stage="a block of steps")
+        give_way()
+        return Preparation()
+
+    monkeypatch.setitem(solver_process._WORK, do, work)
+    heard, said = _Heard(_Cancellations(), Moments()), []
+    request = {"do": do, "job": "1", "settings": {"engine": engine}}
+    _serve(request, said.append, heard, _Kept(fitters.Fitters(), PutOff()))
+    assert heard.moments.waited == waited
+    assert [event["event"] for event in said] == ["progress", "done"]
+
+
+def test_fit_is_cancelled_while_it_waits(monkeypatch):
+    monkeypatch.setitem(solver_process._WORK, "fit", lambda request, progress, kept: progress())
+    heard, said = _Heard(_Cancellations(), Moments()), []
+    monkeypatch.setattr(
+        heard.moments, "wait", lambda check: (heard.cancellations.add("1"), check())
+    )
+    request = {"do": "fit", "job": "1", "settings": {"engine": "svi"}}
+    _serve(request, said.append, heard, _Kept(fitters.Fitters(), PutOff()))
+    assert [event["event"] for event in said] == ["progress", "cancelled"]
+
+
+def test_what_is_said_to_a_process_at_work_is_heard_at_once(requests):
+    heard = _Heard(_Cancellations(), Moments())
+    _hear({"do": "pause"}, requests, heard)
+    _hear({"do": "cancel", "job": "1"}, requests, heard)
+    assert heard.moments.asked == 1
+    with pytest.raises(CancelledError):
+        heard.cancellations.check("1")
+    assert [requests.get_nowait() for _ in range(requests.qsize())] == [{"do": "pause"}]

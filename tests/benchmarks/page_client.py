@@ -61,6 +61,7 @@ class PageClient:
         self._connection: Any = None
         self._listening: asyncio.Task | None = None
         self._models: dict[str, dict[str, Any]] = {}
+        self._roots: list[Any] = []
         self._marks: list[Mark] = []
         # Changes of the orbit so far; and how many there had been when a table got its rows.
         self._n_turned, self._filled = 0, dict[str, int]()
@@ -206,10 +207,26 @@ class PageClient:
         return _changed(selected, "indices", list(range(first, min(first + count, rows))))
 
     def _tables_of_points(self) -> Iterator[tuple[str, dict[str, Any]]]:
-        for model in self._models.values():
+        for model in map(self._models.__getitem__, self._in_document()):
             glyph, table = (_id(model.get(name)) for name in ("glyph", "data_source"))
             if glyph and table and self._models[glyph]["name"] == "Scatter":
                 yield table, self._models[table]
+
+    def _in_document(self) -> set[str]:
+        """Return the models that the document has now; others have been replaced."""
+        found, parts = set[str](), list(self._roots)
+        while parts:
+            part = parts.pop()
+            if isinstance(part, list):
+                parts += part
+            elif isinstance(part, dict):
+                model = part.get("id")
+                if not isinstance(model, str) or model not in self._models:
+                    parts += part.values()
+                elif model not in found:
+                    found.add(model)
+                    parts += self._models[model].values()
+        return found
 
     def _find(self, label: str) -> str | None:
         """Return the model with the value of a control; a symbol may follow its label."""
@@ -259,7 +276,8 @@ class PageClient:
         elif kind == "ERROR":
             self.errors += 1
         elif kind == "PULL-DOC-REPLY":
-            self._gather(content["doc"]["roots"])
+            self._roots = content["doc"]["roots"]
+            self._gather(self._roots)
         elif kind == "PATCH-DOC":
             for event in content["events"]:
                 self._marks += [Mark(one, now) for one in self._followed(event)]
